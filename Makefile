@@ -1,0 +1,33 @@
+# make test       all tests: ruff, mypy, pytest (with the README's examples)
+# make reproduce  the main job: the paper's results as one page in reproduce/
+# Both make the environment in .venv first. FORM=quick shortens reproduce.
+FORM ?= full
+BIN := .venv/bin
+
+.PHONY: test test-slow reproduce bench lock env clean
+
+env: .venv/.ready
+
+.venv/.ready: pyproject.toml requirements.lock tools/make_env.sh
+	sh tools/make_env.sh
+	touch $@
+
+test: env
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest
+
+test-slow: env
+	$(BIN)/python -m pytest -m slow
+
+reproduce: env
+	$(BIN)/hotlever reproduce -o reproduce $(if $(filter quick,$(FORM)),--quick)
+
+lock: env
+	$(BIN)/pip install "pip-tools>=7.4"
+	$(BIN)/pip-compile --quiet --strip-extras --no-emit-index-url --no-emit-find-links \
+	    --no-header --extra test --output-file requirements.lock pyproject.toml
+
+clean:
+	rm -rf .venv reproduce benchmarks/results

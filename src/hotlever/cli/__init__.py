@@ -1,0 +1,5 @@
+"""The command line of hotlever; importing a command's module registers it."""
+
+from hotlever.cli.app import app, main
+
+__all__ = ["app", "main"]

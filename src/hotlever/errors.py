@@ -1,0 +1,72 @@
+"""The errors hotlever raises, and how a typo is answered."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+
+class HotleverError(Exception):
+    """Base of every error raised on purpose; its text is one line for a user."""
+
+    exit_status = 1
+
+
+class InputError(HotleverError):
+    """The input is at fault: the text says where, what was found and what is expected."""
+
+    exit_status = 2
+
+
+class ComputationError(HotleverError):
+    """A computation could not be finished.
+
+    Parameters
+    ----------
+    message : str
+        One line for the user.
+    partial : optional
+        What was reached before the failure, of the type the call would have returned.
+    """
+
+    def __init__(self, message: str, partial: Any = None) -> None:
+        super().__init__(message)
+        self.partial = partial
+
+
+class NewtonError(ComputationError):
+    """Newton's method did not converge; ``partial`` holds the last finite iterate."""
+
+
+class BranchEndError(ComputationError):
+    """The branch that a slow bias ramp follows ends before the last bias asked for.
+
+    Attributes
+    ----------
+    bias_reached : float
+        Bias (V) at which the branch ends.
+    partial : xarray.Dataset or list
+        The states up to there.
+    """
+
+    def __init__(self, message: str, bias_reached: float, partial: Any = None) -> None:
+        super().__init__(message, partial)
+        self.bias_reached = bias_reached
+
+
+def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") -> InputError:
+    """Return the error for a name that does not exist, with the nearest one that does.
+
+    Examples
+    --------
+    >>> str(unknown_name("parameter", "c_kapa", ["c_kappa", "delta"]))
+    "unknown parameter 'c_kapa': did you mean 'c_kappa'? (expected one of: c_kappa, delta)"
+    """
+    known = list(choices)
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    prefix = f"{where}: " if where else ""
+    return InputError(
+        f"{prefix}unknown {kind} '{name}': {hint}(expected one of: {', '.join(known)})"
+    )
