@@ -117,7 +117,12 @@ class LeverEquations:
             {name: sheet * values for name, values in sigma_by.items()},
         )
 
-    def _at(self, x: Array) -> tuple[Fields, Conductivities]:
+    def per_cm(self, sheet_conductivity: Array) -> Array:
+        """Return a conductivity in S/cm or W/(cm K) of a sheet conductivity in mA/V or mW/K."""
+        return sheet_conductivity / self._sheet
+
+    def at(self, x: Array) -> tuple[Fields, Conductivities]:
+        """Return the fields of a state, and κ and σ, at the quadrature points."""
         fields = self.space.fields(x, self.circuit.base_temperature_K)
         return fields, self.conductivities(fields.T)
 
@@ -129,7 +134,7 @@ class LeverEquations:
 
     def residual(self, x: Array) -> Array:
         """Return the residual without the pin, shape (size + 1,)."""
-        fields, laws = self._at(x)
+        fields, laws = self.at(x)
         weak = self.space.weak_form(
             -laws.sigma * _square(fields.grad_V),
             laws.kappa * fields.grad_T,
@@ -151,7 +156,7 @@ class LeverEquations:
 
     def jacobian(self, x: Array) -> SparseJacobian:
         """Return the Jacobian of the free values and of the current, ready to be completed."""
-        return self.space.jacobian(self.tangent(*self._at(x)))
+        return self.space.jacobian(self.tangent(*self.at(x)))
 
     @property
     def _series(self) -> float:
@@ -183,7 +188,7 @@ class LeverEquations:
             the part over I_h²; they add up to V_l / I_h; NaN without current), ``max_K``, and
             for the balances ``ground_current_mA`` and ``end_heat_mW``.
         """
-        fields, laws = self._at(x)
+        fields, laws = self.at(x)
         source, heat = laws.sigma * _square(fields.grad_V), laws.kappa * fields.grad_T
         charge = laws.sigma * fields.grad_V
         current = float(self.space.weak_form(-source, heat, charge)[-1])
@@ -226,7 +231,7 @@ class LeverEquations:
             In the order of `OBSERVABLES` and of `PARAMETERS`; mA, V and K per unit of the
             parameter. The row of V_r is NaN without a reader.
         """
-        fields, laws = self._at(x)
+        fields, laws = self.at(x)
         square = _square(fields.grad_V)
         columns = []
         for name in PARAMETERS:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from hotlever import __version__
-from hotlever.errors import BranchEndError, ComputationError, InputError
+from hotlever.errors import ComputationError, InputError
 from hotlever.files import read_text, whole_file, write_text
 from hotlever.lever.continuation import BranchFollower, ContinuationOptions
 from hotlever.lever.equations import LAWS, OBSERVABLES, LeverEquations
@@ -68,6 +68,22 @@ class LeverState:
     jacobian: LinearSolve
 
 
+@dataclass(frozen=True)
+class Ramp:
+    """What a slow ramp of the bias passes.
+
+    Attributes
+    ----------
+    states : list of LeverState
+        In the order of rising bias.
+    notes : list of str
+        A sentence on each jump to another branch.
+    """
+
+    states: list[LeverState]
+    notes: list[str]
+
+
 class Lever:
     """A probe with its mesh, ready to be solved for any material and circuit.
 
@@ -105,36 +121,47 @@ class Lever:
         """Return a follower of the lever's solutions, at zero bias."""
         return BranchFollower(self.equations, options)
 
-    def states(self, bias: ArrayLike, notes: list[str] | None = None) -> Iterator[LeverState]:
-        """Yield the states that a slow ramp of the bias passes.
+    def solve(self, bias: ArrayLike, progress: Progress | None = None) -> Ramp:
+        """Find the states that a slow ramp of the bias from zero passes.
 
         Parameters
         ----------
-        bias : array_like
-            Rising biases (V), not negative.
-        notes : list of str, optional
-            Gets a sentence on each jump that the ramp makes.
+        bias : array_like, shape (n,)
+            Biases (V) in any order, not negative; repeated ones are solved once.
+        progress : callable, optional
+            Called with the states done and their number.
+
+        Returns
+        -------
+        Ramp
+            States in the order of rising bias.
 
         Raises
         ------
         InputError
-            If a bias is negative or not finite, or they do not rise.
-        BranchEndError
-            If the branch ends below a bias asked for.
+            If a bias is negative or not finite.
+        BranchEndError, ComputationError
+            If not every bias is reached; ``partial`` holds the ramp up to there.
         """
-        values = checked_bias(bias)
+        values = np.unique(checked_bias(bias))
+        ramp = Ramp([], [])
         follower = self.follower()
-        folds = 0
-        for state in follower.ramp(values.tolist()):
-            if notes is not None:
-                for fold in follower.folds[folds:]:
-                    notes.append(
-                        f"at a bias of {fold.state.bias:.4f} V the lever jumps from a tip at "
-                        f"{fold.state.tip:.0f} K to a hotter branch; the next state given is at "
-                        f"{state.bias:.4f} V, {state.tip:.0f} K"
-                    )
-            folds = len(follower.folds)
-            yield LeverState(state.bias, state.x, state.jacobian)
+        try:
+            for state in follower.ramp(values.tolist()):
+                ramp.notes.extend(
+                    f"at a bias of {fold.state.bias:.4f} V the lever jumps from a tip at "
+                    f"{fold.state.tip:.0f} K to a hotter branch; the next state given is at "
+                    f"{state.bias:.4f} V, {state.tip:.0f} K"
+                    for fold in follower.folds
+                )
+                follower.folds.clear()
+                ramp.states.append(LeverState(state.bias, state.x, state.jacobian))
+                if progress is not None:
+                    progress(len(ramp.states), len(values))
+        except ComputationError as error:
+            error.partial = ramp
+            raise
+        return ramp
 
     def knee(self) -> xr.Dataset:
         """Find the knee of the I-V curve, dV_l/dI_h = 0, and return that one state.
@@ -155,7 +182,7 @@ class Lever:
         x = fold.x.copy()
         current = self.equations.observe(x)["current_mA"]
         x[-1] = x[-2] + self.probe.circuit.series_resistance_ohm / 1000.0 * current
-        return self.dataset([LeverState(float(x[-1]), x, fold.jacobian)])
+        return self.dataset(Ramp([LeverState(float(x[-1]), x, fold.jacobian)], []))
 
     def sweep(
         self,
@@ -187,36 +214,24 @@ class Lever:
         BranchEndError, ComputationError
             If not every bias is reached; ``partial`` holds the dataset up to there.
         """
-        asked = np.atleast_1d(np.asarray(bias, dtype=float))
-        values, back = np.unique(asked, return_inverse=True)
-        notes: list[str] = []
-        reached: list[LeverState] = []
         try:
-            for state in self.states(values, notes):
-                reached.append(state)
-                if progress is not None:
-                    progress(len(reached), len(values))
+            ramp = self.solve(bias, progress)
         except ComputationError as error:
-            error.partial = self.dataset(reached, sensitivities=sensitivities, notes=notes)
+            error.partial = self.dataset(error.partial, sensitivities=sensitivities)
             raise
-        return self.dataset(reached, sensitivities=sensitivities, notes=notes).isel(bias=back)
+        asked = np.atleast_1d(np.asarray(bias, dtype=float))
+        rows = np.searchsorted([state.bias for state in ramp.states], asked)
+        return self.dataset(ramp, sensitivities=sensitivities).isel(bias=rows)
 
-    def dataset(
-        self,
-        states: Iterable[LeverState],
-        *,
-        sensitivities: bool = False,
-        notes: Sequence[str] = (),
-    ) -> xr.Dataset:
+    def dataset(self, ramp: Ramp, *, sensitivities: bool = False) -> xr.Dataset:
         """Return what is measured in some states.
 
         Parameters
         ----------
-        states : iterable of LeverState
+        ramp : Ramp
         sensitivities : bool
             Add ``sensitivity``, dimensions (observable, bias, parameter): mA, V or K per unit
             of the parameter, at fixed bias.
-        notes : sequence of str
 
         Returns
         -------
@@ -225,9 +240,11 @@ class Lever:
             ``bias``; units and long names as attributes; the probe, material, circuit and
             version as attributes of the dataset.
         """
-        states = list(states)
+        states = ramp.states
         rows = [self.equations.observe(state.x) for state in states]
-        columns = {name: np.array([row[name] for row in rows]) for name in (rows[0] if rows else ())}
+        columns = {
+            name: np.array([row[name] for row in rows]) for name in (rows[0] if rows else ())
+        }
         columns["bias_V"] = np.array([state.bias for state in states])
         if rows:
             columns["legs_ohm"] = columns["leg1_ohm"] + columns["leg2_ohm"]
@@ -250,7 +267,7 @@ class Lever:
         data.attrs = {
             **{name: json.dumps(section) for name, section in values.items()},
             "medium": "vacuum",
-            "notes": "\n".join([*notes, *self._range_notes(data)]),
+            "notes": "\n".join([*ramp.notes, *self._range_notes(data)]),
             "software": f"hotlever {__version__}",
         }
         return data
@@ -268,22 +285,27 @@ class Lever:
 
 
 def checked_bias(bias: ArrayLike) -> Array:
-    """Return biases as a rising array.
+    """Return biases as an array.
 
     Raises
     ------
     InputError
-        If one is negative or not finite, or they do not rise.
+        If one is negative or not finite.
     """
     values = np.atleast_1d(np.asarray(bias, dtype=float))
-    if not np.all(np.isfinite(values)) or np.any(values < 0):
-        raise InputError(f"bias must be finite and not negative, found {values.min():g} V")
-    if np.any(np.diff(values) <= 0):
-        raise InputError("biases must rise from one to the next")
+    wrong = values[~(values >= 0) | ~np.isfinite(values)]
+    if wrong.size:
+        raise InputError(f"found a bias of {wrong[0]:g} V, expected finite biases of 0 or more")
     return values
 
 
-def sweep(probe: Probe, bias: ArrayLike, **options: bool | Progress | None) -> xr.Dataset:
+def sweep(
+    probe: Probe,
+    bias: ArrayLike,
+    *,
+    sensitivities: bool = False,
+    progress: Progress | None = None,
+) -> xr.Dataset:
     """Mesh and solve a probe over a range of bias; see `Lever.sweep`.
 
     Examples
@@ -292,7 +314,7 @@ def sweep(probe: Probe, bias: ArrayLike, **options: bool | Progress | None) -> x
     >>> data.tip_K.round(0).values.tolist()
     [295.0, 545.0]
     """
-    return Lever(probe).sweep(bias, **options)  # type: ignore[arg-type]
+    return Lever(probe).sweep(bias, sensitivities=sensitivities, progress=progress)
 
 
 def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -348,16 +370,3 @@ def probe_of(data: xr.Dataset) -> Probe:
     """Return the probe that a sweep was made of."""
     sections = {name: json.loads(data.attrs[name]) for name in ("probe", "circuit", "material")}
     return Probe.from_values(sections, "sweep")
-
-
-__all__ = [
-    "BranchEndError",
-    "Lever",
-    "LeverState",
-    "checked_bias",
-    "probe_of",
-    "read_sweep",
-    "sweep",
-    "sweep_csv",
-    "write_sweep",
-]

@@ -17,6 +17,12 @@ from hotlever.errors import InputError
 Array = NDArray[np.float64]
 
 
+def sums_by_index(index: NDArray[np.intp], values: Array, size: int) -> Array:
+    """Return the sums of `values` with equal `index`, shape (size,); the arrays match."""
+    # numpy's stubs overlook that weights make the counts floats
+    return np.bincount(index.ravel(), values.ravel(), minlength=size)  # type: ignore[return-value]
+
+
 class FiniteElements:
     """Values, gradients and weak forms of a scalar field on a mesh.
 
@@ -147,7 +153,7 @@ class FiniteElements:
 
     def gather(self, element_vectors: Array) -> Array:
         """Sum element vectors (elements, nodes) into a nodal vector (size,)."""
-        return np.bincount(self.dofs.ravel(), element_vectors.ravel(), minlength=self.size)
+        return sums_by_index(self.dofs, element_vectors, self.size)
 
     def facet_nodes(self, facets: NDArray[np.intp]) -> NDArray[np.intp]:
         """Return the numbers of the nodes on some facets of the mesh."""

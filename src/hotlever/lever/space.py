@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
-from hotlever.lever.operators import FiniteElements
+from hotlever.lever.operators import FiniteElements, sums_by_index
 from hotlever.probe.layout import Part
 from hotlever.probe.mesh import ProbeMesh
 
@@ -94,8 +94,7 @@ class LeverSpace:
         self.mesh = mesh
         self.operators = operators or FiniteElements(mesh.triangles)
         terminal_nodes = {
-            name: self.operators.facet_nodes(facets)
-            for name, facets in mesh.terminal_edges.items()
+            name: self.operators.facet_nodes(facets) for name, facets in mesh.terminal_edges.items()
         }
         self._ends = np.unique(np.concatenate(list(terminal_nodes.values())))
         self._ground, self._supply = terminal_nodes["ground"], terminal_nodes["supply"]
@@ -107,7 +106,9 @@ class LeverSpace:
         self.tapered = self._tapered_regions()
         self._part_elements = {
             part: np.flatnonzero(
-                np.isin(mesh.region, [i for i, r in enumerate(mesh.layout.regions) if r.part == part])
+                np.isin(
+                    mesh.region, [i for i, r in enumerate(mesh.layout.regions) if r.part == part]
+                )
             )
             for part in ("heater", "leg 1", "leg 2", "reader branch")
         }
@@ -137,7 +138,7 @@ class LeverSpace:
         The matrix has two rows and columns beyond the free values: V_l with the circuit
         equation, and the bias V_b with the condition that pins a state on the branch.
         """
-        nodes, weights = self.operators.point_weights(self.mesh.layout.tip)
+        nodes, _ = self.operators.point_weights(self.mesh.layout.tip)
         lever, bias = self.size, self.size + 1
         unknowns = self._element_unknowns()
         width = unknowns.shape[1]
@@ -160,9 +161,9 @@ class LeverSpace:
         keys = position[all_columns] * shape[0] + position[all_rows]
         unique, slots = np.unique(keys, return_inverse=True)
         self._matrix_rows = (unique % shape[0]).astype(np.int32)
-        self._matrix_starts = np.searchsorted(
-            unique // shape[0], np.arange(shape[0] + 1)
-        ).astype(np.int32)
+        self._matrix_starts = np.searchsorted(unique // shape[0], np.arange(shape[0] + 1)).astype(
+            np.int32
+        )
         self._entries = unique.size
         element_slots = np.full(rows.size, self._entries)  # one past the end: dropped
         element_slots[kept] = slots[: kept.sum()]
@@ -234,11 +235,8 @@ class LeverSpace:
         heat = self.operators.weak_form(heat_source, heat_flux)
         charge = self.operators.weak_form(0.0, charge_flux)
         # eliminated values (-1) are counted in the first place and dropped
-        sums = np.bincount(
-            self._unknowns.ravel() + 1,
-            np.concatenate([heat, charge], axis=1).ravel(),
-            minlength=self.size + 2,
-        )
+        weak = np.concatenate([heat, charge], axis=1)
+        sums = sums_by_index(self._unknowns + 1, weak, self.size + 2)
         return sums[1:]
 
     def end_fluxes(
@@ -281,7 +279,7 @@ class LeverSpace:
             ],
             axis=1,
         )
-        data = np.bincount(self._element_slots, element.ravel(), minlength=self._entries + 1)
+        data = sums_by_index(self._element_slots, element, self._entries + 1)
         return SparseJacobian(self, data[: self._entries])
 
 

@@ -62,7 +62,9 @@ def thermal_conductivity(T: ArrayLike, c_kappa: float = 1.0) -> tuple[Array, Par
     return c_kappa * silicon, {"T": -c_kappa * slope * silicon**2, "c_kappa": silicon}
 
 
-@law(meant_for=(200.0, 1300.0), source="Eq. 7; Berggren and Sernelius, Phys. Rev. B 24, 1971 (1981)")
+@law(
+    meant_for=(200.0, 1300.0), source="Eq. 7; Berggren and Sernelius, Phys. Rev. B 24, 1971 (1981)"
+)
 def band_gap(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
     """Band gap of doped silicon with band-gap narrowing (Eq. 7, second line).
 
@@ -157,9 +159,7 @@ def hole_density(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
     return _carriers(T, n)[1]
 
 
-def _carriers(
-    T: ArrayLike, n: ArrayLike
-) -> tuple[tuple[Array, Partials], tuple[Array, Partials]]:
+def _carriers(T: ArrayLike, n: ArrayLike) -> tuple[tuple[Array, Partials], tuple[Array, Partials]]:
     """Electrons and holes together, as they share n_i."""
     n = np.asarray(n, dtype=float)
     n_i, d_i = intrinsic_density.formula(T, n)
@@ -201,9 +201,7 @@ def impurity_mobility(n: ArrayLike, carrier: str = "electron") -> tuple[Array, P
 
 
 @law(meant_for=(290.0, 1300.0), source="Eq. 10; Dürig, J. Appl. Phys. 98, 044906 (2005)")
-def phonon_mobility(
-    T: ArrayLike, p: float, carrier: str = "electron"
-) -> tuple[Array, Partials]:
+def phonon_mobility(T: ArrayLike, p: float, carrier: str = "electron") -> tuple[Array, Partials]:
     """Mobility limited by phonon scattering (Eq. 10).
 
     Parameters

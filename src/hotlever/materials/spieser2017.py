@@ -106,6 +106,33 @@ PUBLISHED: dict[str, PublishedSet] = {
 }
 
 
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A published state of lever 1 with the option-III parameters (caption of Fig. 7).
+
+    Attributes
+    ----------
+    name : str
+    lever_V, current_mA : float
+        V_l and I_h.
+    tip_K : float or None
+        Predicted tip temperature, where it is given.
+    """
+
+    name: str
+    lever_V: float
+    current_mA: float
+    tip_K: float | None = None
+
+
+#: In the order of rising temperature.
+OPERATING_POINTS = (
+    OperatingPoint("plateau", 1.90, 0.95),
+    OperatingPoint("knee", 3.06, 0.93, 893.0),
+    OperatingPoint("hot", 2.74, 1.43),
+)
+
+
 def published(name: str) -> PublishedSet:
     """Return a published parameter set by name.
 

@@ -81,9 +81,7 @@ def mesh_layout(layout: Layout, options: MeshOptions | None = None) -> ProbeMesh
     options = options or MeshOptions()
     points, triangles, region = _netgen(layout, options)
     mesh = MeshTri(points.T.copy(), triangles.T.copy())
-    edges = {
-        terminal.name: _facets_on(mesh, terminal, layout) for terminal in layout.terminals
-    }
+    edges = {terminal.name: _facets_on(mesh, terminal, layout) for terminal in layout.terminals}
     return ProbeMesh(layout, mesh, region, edges)
 
 
