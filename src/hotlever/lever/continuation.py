@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hotlever.errors import BranchEndError, ComputationError, NewtonError
-from hotlever.lever.equations import LeverEquations
-from hotlever.lever.newton import LinearSolve, NewtonOptions, newton
+from hotlever.lever.equations import LeverEquations, Pin
+from hotlever.lever.newton import NewtonOptions, newton
 
 Array = NDArray[np.float64]
 
@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 MELTING_POINT = 1687.0
 #: Units of arc length: this many volts or kelvins are one.
 BIAS_UNIT, TIP_UNIT = 1.0, 100.0
+
+AT_BIAS, AT_TIP = Pin(1.0, 0.0), Pin(0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,6 @@ class State:
         Unknowns.
     tangent : ndarray
         Derivative of `x` by arc length, in the direction of following.
-    jacobian : LinearSolve
-        Factorised Jacobian with the pin that the state was found with.
     bias, tip : float
         V and K.
     iterations : int
@@ -74,23 +74,9 @@ class State:
 
     x: Array
     tangent: Array
-    jacobian: LinearSolve
     bias: float
     tip: float
     iterations: int
-
-
-@dataclass(frozen=True)
-class Fold:
-    """A bias at which the curve turns: the ramp leaves the branch there.
-
-    Attributes
-    ----------
-    state : State
-        The state at the fold.
-    """
-
-    state: State
 
 
 class BranchFollower:
@@ -103,8 +89,8 @@ class BranchFollower:
 
     Attributes
     ----------
-    folds : list of Fold
-        Folds passed so far.
+    folds : list of State
+        Biases passed at which the curve turns: the ramp leaves the branch there.
     solves : int
         Newton iterations spent so far.
     """
@@ -114,13 +100,13 @@ class BranchFollower:
     ) -> None:
         self.equations = equations
         self.options = options or ContinuationOptions()
-        self.folds: list[Fold] = []
+        self.folds: list[State] = []
         self.solves = 0
         unknowns, weights = equations.space.tip
         self._tip_row = np.zeros(equations.space.size + 2)
         self._tip_row[unknowns] = weights
         start = equations.start()
-        self.state = self._solve(start, 1.0, 0.0, 0.0, None)
+        self.state = self._solve(start, AT_BIAS, 0.0, None)
         self._previous: State | None = None
         self._arc = self.options.arc_step
 
@@ -148,9 +134,7 @@ class BranchFollower:
             if self.state.bias == bias and self._rising(self.state):
                 return self.state
             state = self._step_to_bias(bias) or self._step_along_arc(bias)
-            self._check_melting(state)
-            self._note_fold(state)
-            self._previous, self.state = self.state, state
+            self._move_to(state)
         raise ComputationError(
             f"stopped at a bias of {self.state.bias:.4g} V (tip at {self.state.tip:.0f} K): "
             f"{self.options.max_steps} steps did not reach {bias:.4g} V"
@@ -160,9 +144,7 @@ class BranchFollower:
         """Yield states along the curve, unstable ones included, while `keep_going` says so."""
         while keep_going(self.state):
             state = self._step_along_arc(None)
-            self._check_melting(state)
-            self._note_fold(state)
-            self._previous, self.state = self.state, state
+            self._move_to(state)
             yield state
 
     # --- steps -------------------------------------------------------------------------------
@@ -181,28 +163,24 @@ class BranchFollower:
         ):
             return None
         try:
-            state = self._solve(predicted, 1.0, 0.0, bias, here)
+            state = self._solve(predicted, AT_BIAS, bias, here)
         except NewtonError:
             return None
-        surprise = abs(state.tip - here.tip - expected)
-        if not self._rising(state) or surprise > 0.4 * abs(expected) + 5.0:
-            return None
-        return state
+        return state if self._rising(state) and self._neighbours(here, state) else None
 
     def _step_along_arc(self, bias: float | None) -> State:
         """Take one step in arc length, ending exactly at `bias` if the step would cross it."""
         here = self.state
         while self._arc >= self.options.smallest_arc_step:
             predicted = here.x + self._arc * here.tangent
-            pin_bias = here.tangent[-1] / BIAS_UNIT**2
-            pin_tip = self._tip(here.tangent) / TIP_UNIT**2
-            value = pin_bias * predicted[-1] + pin_tip * self._tip(predicted)
+            pin = Pin(here.tangent[-1] / BIAS_UNIT**2, self._tip(here.tangent) / TIP_UNIT**2)
+            value = pin.bias * predicted[-1] + pin.tip * self._tip(predicted)
             try:
-                state = self._solve(predicted, pin_bias, pin_tip, value, here)
+                state = self._solve(predicted, pin, value, here)
             except NewtonError:
                 self._arc /= 2
                 continue
-            if self._turned(here, state) < 0.7:
+            if not self._neighbours(here, state):
                 self._arc /= 2
                 continue
             if bias is not None and here.bias < bias <= state.bias:
@@ -224,18 +202,16 @@ class BranchFollower:
         share = (bias - below.bias) / (above.bias - below.bias)
         guess = below.x + share * (above.x - below.x)
         try:
-            state = self._solve(guess, 1.0, 0.0, bias, below)
+            state = self._solve(guess, AT_BIAS, bias, below)
         except NewtonError:
             return None
         low, high = sorted((below.tip, above.tip))
         inside = low - 5.0 <= state.tip <= high + 5.0
         return state if inside and self._rising(state) else None
 
-    def _solve(
-        self, guess: Array, bias: float, tip: float, value: float, origin: State | None
-    ) -> State:
-        """Find the state with ``bias V_b + tip T_tip = value`` and its tangent."""
-        result = newton(self.equations.pinned(bias, tip, value), guess, self.options.newton)
+    def _solve(self, guess: Array, pin: Pin, value: float, origin: State | None) -> State:
+        """Find the state near `guess` whose pin has this value, and its tangent."""
+        result = newton(self.equations.pinned(pin, value), guess, self.options.newton)
         self.solves += result.iterations
         unit = np.zeros_like(result.x)
         unit[-1] = 1.0
@@ -243,12 +219,11 @@ class BranchFollower:
         tangent /= np.hypot(tangent[-1] / BIAS_UNIT, self._tip(tangent) / TIP_UNIT)
         forward = tangent[-1] if origin is None else self._along(tangent, origin.tangent)
         x = result.x
-        if (bias, tip) == (1.0, 0.0):
+        if pin == AT_BIAS:
             x[-1] = value
         return State(
             x,
             np.copysign(1.0, forward) * tangent,
-            result.jacobian,
             float(x[-1]),
             self._tip(x),
             result.iterations,
@@ -266,9 +241,18 @@ class BranchFollower:
             + self._tip(tangent) * self._tip(other) / TIP_UNIT**2
         )
 
-    def _turned(self, here: State, there: State) -> float:
-        """Cosine of the angle by which the curve turned."""
-        return self._along(here.tangent, there.tangent)
+    def _neighbours(self, here: State, there: State) -> bool:
+        """Whether nothing but a gentle bend lies between two states.
+
+        Between near neighbours the tangent turns little, and the chord halves the angle
+        between the tangents. A pair of folds stepped over betrays itself by a chord that is
+        steeper than both.
+        """
+        turned = self._along(here.tangent, there.tangent)
+        chord, middle = there.x - here.x, here.tangent + there.tangent
+        lengths = self._along(chord, chord) * self._along(middle, middle)
+        halved = self._along(chord, middle) / max(np.sqrt(lengths), 1e-300)
+        return bool(turned > 0.7 and halved > 0.995)
 
     @staticmethod
     def _rising(state: State) -> bool:
@@ -281,10 +265,12 @@ class BranchFollower:
             return 0.0
         return (slope - before.tangent / before.tangent[-1]) / (self.state.bias - before.bias)
 
-    def _note_fold(self, state: State) -> None:
-        """Locate a fold between the present state and the next one."""
+    def _move_to(self, state: State) -> None:
+        """Make `state` the present one, after checking and noting what lies between."""
+        self._check_melting(state)
         if self._rising(self.state) and not self._rising(state):
-            self.folds.append(Fold(self._locate_fold(self.state, state)))
+            self.folds.append(self._locate_fold(self.state, state))
+        self._previous, self.state = self.state, state
 
     def _locate_fold(self, before: State, after: State) -> State:
         """Bisect the arc between two states, by tip temperature, to where the bias turns."""
@@ -295,7 +281,7 @@ class BranchFollower:
             tip = before.tip + share * (after.tip - before.tip)
             guess = before.x + share * (after.x - before.x)
             try:
-                best = self._solve(guess, 0.0, 1.0, tip, before)
+                best = self._solve(guess, AT_TIP, tip, before)
             except NewtonError:
                 break
             if abs(best.tangent[-1]) < 1e-5 or abs(after.tip - before.tip) < 1e-3:
@@ -309,8 +295,8 @@ class BranchFollower:
     def _check_melting(self, state: State) -> None:
         if self.equations.highest_temperature(state.x) < MELTING_POINT:
             return
-        if self.folds and state.bias <= self.folds[-1].state.bias:
-            turn = self.folds[-1].state
+        if self.folds and state.bias <= self.folds[-1].bias:
+            turn = self.folds[-1]
             at = self.equations.observe(turn.x)
             raise BranchEndError(
                 f"the branch of a slow bias ramp ends at a bias of {turn.bias:.4f} V (lever "

@@ -13,11 +13,13 @@ given bias, or a point along the arc. Units are µm, V, mA, mW and K.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_matrix
 
-from hotlever.lever.newton import LinearSolve, refined
+from hotlever.lever.newton import LinearSolve
 from hotlever.lever.space import Fields, LeverSpace, SparseJacobian, Tangent, factorised
 from hotlever.materials import PARAMETERS, Material
 from hotlever.materials.doping import tapered_doping
@@ -57,6 +59,13 @@ class Conductivities:
     sigma: Array
     kappa_by: dict[str, Array]
     sigma_by: dict[str, Array]
+
+
+class Pin(NamedTuple):
+    """The condition ``bias V_b + tip T_tip = value`` that selects a state on the branch."""
+
+    bias: float
+    tip: float
 
 
 class LeverEquations:
@@ -128,9 +137,9 @@ class LeverEquations:
 
     # --- Newton's method and continuation ----------------------------------------------------
 
-    def pinned(self, bias: float, tip: float, value: float) -> PinnedEquations:
-        """Return square equations: these and ``bias V_b + tip T_tip = value``."""
-        return PinnedEquations(self, bias, tip, value)
+    def pinned(self, pin: Pin, value: float) -> PinnedEquations:
+        """Return square equations: these and the condition that `pin` has this value."""
+        return PinnedEquations(self, pin, value)
 
     def residual(self, x: Array) -> Array:
         """Return the residual without the pin, shape (size + 1,)."""
@@ -157,6 +166,10 @@ class LeverEquations:
     def jacobian(self, x: Array) -> SparseJacobian:
         """Return the Jacobian of the free values and of the current, ready to be completed."""
         return self.space.jacobian(self.tangent(*self.at(x)))
+
+    def completed(self, jacobian: SparseJacobian, pin: Pin) -> csc_matrix:
+        """Add the circuit equation and the pin to a Jacobian."""
+        return jacobian.completed(self._series, pin.bias, pin.tip)
 
     @property
     def _series(self) -> float:
@@ -215,15 +228,13 @@ class LeverEquations:
             "end_heat_mW": end_heat,
         }
 
-    def sensitivities(self, x: Array, solver: LinearSolve) -> Array:
+    def sensitivities(self, x: Array) -> Array:
         """Return derivatives of I_h, V_r and T_tip by the six parameters, at a fixed bias.
 
         Parameters
         ----------
         x : ndarray
             A solved state.
-        solver : LinearSolve
-            The Jacobian near `x`, factorised with the bias pinned.
 
         Returns
         -------
@@ -245,7 +256,7 @@ class LeverEquations:
         right_hand_side[:-1] = -by_parameter
         right_hand_side[-2] *= self._series
         jacobian = self.jacobian(x)
-        change = refined(solver, jacobian.completed(self._series, 1.0, 0.0), right_hand_side)
+        change = factorised(self.completed(jacobian, Pin(1.0, 0.0))).solve(right_hand_side)
         unknowns, slopes = jacobian.current_gradient
         current = by_parameter[-1] + slopes @ change[unknowns]
         tip_unknowns, tip_weights = self.space.tip
@@ -259,19 +270,18 @@ class LeverEquations:
 class PinnedEquations:
     """The lever's equations and one condition on V_b and T_tip; see `newton.Equations`."""
 
-    def __init__(self, lever: LeverEquations, bias: float, tip: float, value: float) -> None:
-        self._lever, self._bias, self._tip, self._value = lever, bias, tip, value
+    def __init__(self, lever: LeverEquations, pin: Pin, value: float) -> None:
+        self._lever, self._pin, self._value = lever, pin, value
         self.scale, self.step_limit = lever.scale, lever.step_limit
 
     def residual(self, x: Array) -> Array:
         """Return the residual, shape (size + 2,)."""
-        pin = self._bias * x[-1] + self._tip * self._lever.tip_temperature(x) - self._value
-        return np.append(self._lever.residual(x), pin)
+        pinned = self._pin.bias * x[-1] + self._pin.tip * self._lever.tip_temperature(x)
+        return np.append(self._lever.residual(x), pinned - self._value)
 
     def factorised(self, x: Array) -> LinearSolve:
         """Return the factorised Jacobian."""
-        lever = self._lever
-        return factorised(lever.jacobian(x).completed(lever._series, self._bias, self._tip))
+        return factorised(self._lever.completed(self._lever.jacobian(x), self._pin))
 
 
 def _square(gradient: Array) -> Array:

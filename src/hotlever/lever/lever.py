@@ -17,7 +17,6 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.files import read_text, whole_file, write_text
 from hotlever.lever.continuation import BranchFollower, ContinuationOptions
 from hotlever.lever.equations import LAWS, OBSERVABLES, LeverEquations
-from hotlever.lever.newton import LinearSolve
 from hotlever.lever.space import LeverSpace
 from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import MeshOptions, Probe, mesh_layout
@@ -59,13 +58,10 @@ class LeverState:
         V.
     x : ndarray
         Unknowns, see `LeverSpace`.
-    jacobian : LinearSolve
-        Factorised near the state, with the bias pinned.
     """
 
     bias: float
     x: Array
-    jacobian: LinearSolve
 
 
 @dataclass(frozen=True)
@@ -99,7 +95,7 @@ class Lever:
     >>> lever = Lever(Probe.reference())
     >>> sweep = lever.sweep([7.22])
     >>> round(sweep.current_mA.item(), 3), round(sweep.tip_K.item())
-    (0.951, 545)
+    (0.949, 547)
     """
 
     def __init__(
@@ -149,13 +145,13 @@ class Lever:
         try:
             for state in follower.ramp(values.tolist()):
                 ramp.notes.extend(
-                    f"at a bias of {fold.state.bias:.4f} V the lever jumps from a tip at "
-                    f"{fold.state.tip:.0f} K to a hotter branch; the next state given is at "
+                    f"at a bias of {fold.bias:.4f} V the lever jumps from a tip at "
+                    f"{fold.tip:.0f} K to a hotter branch; the next state given is at "
                     f"{state.bias:.4f} V, {state.tip:.0f} K"
                     for fold in follower.folds
                 )
                 follower.folds.clear()
-                ramp.states.append(LeverState(state.bias, state.x, state.jacobian))
+                ramp.states.append(LeverState(state.bias, state.x))
                 if progress is not None:
                     progress(len(ramp.states), len(values))
         except ComputationError as error:
@@ -178,11 +174,11 @@ class Lever:
         follower = Lever(bare, space=self.space).follower()
         for _ in follower.follow_arc(lambda _: not follower.folds):
             pass
-        fold = follower.folds[0].state
+        fold = follower.folds[0]
         x = fold.x.copy()
         current = self.equations.observe(x)["current_mA"]
         x[-1] = x[-2] + self.probe.circuit.series_resistance_ohm / 1000.0 * current
-        return self.dataset(Ramp([LeverState(float(x[-1]), x, fold.jacobian)], []))
+        return self.dataset(Ramp([LeverState(float(x[-1]), x)], []))
 
     def sweep(
         self,
@@ -257,9 +253,9 @@ class Lever:
             }
         ).set_coords("bias_V")
         if sensitivities:
-            table = np.array(
-                [self.equations.sensitivities(state.x, state.jacobian) for state in states]
-            ).reshape(-1, len(OBSERVABLES), len(PARAMETERS))
+            table = np.array([self.equations.sensitivities(state.x) for state in states]).reshape(
+                -1, len(OBSERVABLES), len(PARAMETERS)
+            )
             data["sensitivity"] = (("observable", "bias", "parameter"), np.swapaxes(table, 0, 1))
             data["sensitivity"].attrs["long_name"] = "derivative by a fit parameter, at fixed bias"
             data = data.assign_coords(observable=list(OBSERVABLES), parameter=list(PARAMETERS))
@@ -312,7 +308,7 @@ def sweep(
     --------
     >>> data = sweep(Probe.reference(), [1.0, 7.22])
     >>> data.tip_K.round(0).values.tolist()
-    [295.0, 545.0]
+    [295.0, 547.0]
     """
     return Lever(probe).sweep(bias, sensitivities=sensitivities, progress=progress)
 

@@ -7,7 +7,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix
 
 from hotlever.errors import NewtonError
 
@@ -111,34 +110,6 @@ def newton(equations: Equations, x: Array, options: NewtonOptions) -> NewtonResu
             return NewtonResult(x, jacobian, iteration)
         fresh, last = False, length
     raise NewtonError(f"not converged after {options.max_iterations} iterations", partial=x)
-
-
-def refined(solver: LinearSolve, matrix: csc_matrix, right_hand_side: Array) -> Array:
-    """Solve ``matrix @ y = right_hand_side`` with the factors of a nearby matrix.
-
-    Iterative refinement: each pass shrinks the error by the relative difference of the
-    matrices.
-
-    Parameters
-    ----------
-    solver : LinearSolve
-        A factorised matrix near `matrix`.
-    matrix : csc_matrix, shape (n, n)
-    right_hand_side : ndarray, shape (n,) or (n, k)
-
-    Raises
-    ------
-    NewtonError
-        If the matrices are too far apart for refinement to converge.
-    """
-    solution = solver.solve(right_hand_side)
-    for _ in range(40):
-        correction = solver.solve(right_hand_side - matrix @ solution)
-        solution = solution + correction
-        size = np.abs(solution).max(axis=0)
-        if np.all(np.abs(correction).max(axis=0) <= 1e-10 * size):
-            return solution
-    raise NewtonError("iterative refinement did not converge", partial=solution)
 
 
 def _length(step: Array, unit: Array) -> float:

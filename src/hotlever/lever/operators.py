@@ -72,7 +72,7 @@ class FiniteElements:
         dimension = self.positions.shape[0]
         table = np.empty((elements, points, 1 + dimension, self.dofs.shape[1]))
         for node, (field,) in enumerate(self.basis.basis):
-            table[:, :, 0, node] = np.broadcast_to(field.value, (elements, points))
+            table[:, :, 0, node] = np.broadcast_to(field, (elements, points))
             table[:, :, 1:, node] = np.moveaxis(np.asarray(field.grad), 0, -1)
         self._table = table
         self._rows = table.reshape(elements, -1, self.dofs.shape[1])

@@ -117,7 +117,7 @@ def intrinsic_density(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
     --------
     >>> n_i, _ = intrinsic_density(300.0, 0.0)
     >>> f"{n_i:.2e}"
-    '9.69e+09'
+    '9.68e+09'
     """
     T = np.asarray(T, dtype=float)
     gap, d_gap = band_gap.formula(T, n)
