@@ -14,13 +14,13 @@ import time
 from statistics import median
 
 import numpy as np
-from problems import BIAS, peer_problem, solve_with_peer, table
 from skfem.element import ElementTriP2, ElementTriP3
 
 from hotlever.lever import Lever
 from hotlever.lever.operators import FiniteElements
 from hotlever.lever.space import LeverSpace
 from hotlever.probe import MeshOptions, Probe, mesh_layout
+from problems import BIAS, peer_problem, solve_with_peer, table
 
 RUNS = 5
 

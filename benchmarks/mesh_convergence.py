@@ -6,13 +6,13 @@ python benchmarks/mesh_convergence.py
 from __future__ import annotations
 
 import numpy as np
-from problems import BIAS, table
 
 from hotlever.lever import Lever
 from hotlever.lever.operators import FiniteElements
 from hotlever.lever.space import LeverSpace
 from hotlever.materials.spieser2017 import published
 from hotlever.probe import MeshOptions, Probe, mesh_layout
+from problems import BIAS, table
 
 
 def main():

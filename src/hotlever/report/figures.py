@@ -29,10 +29,15 @@ from hotlever.report.style import (
 )
 
 
+def _marker(sweep: xr.Dataset, marker: str = "o") -> str:
+    """Mark the points of a sweep, unless they are so many that they hide the line."""
+    return marker if sweep.sizes["bias"] <= 40 else ""
+
+
 def probe_drawing(layout: Layout, title: str = "") -> Figure:
     """Draw a probe from above, with heater, reader, terminals and tip marked."""
     low_doped = {"heater": (VERMILION, "heater (low-doped)"), "reader": (SKY, "reader (low-doped)")}
-    with figure(7.0, 4.2) as made:
+    with figure(7.0, 3.4) as made:
         axes = made.add_subplot()
         handles: dict[str, Patch | Line2D] = {}
         for region in layout.regions:
@@ -210,9 +215,10 @@ def temperature_power(
                 color=ORANGE,
                 label="power law, Eq. 12" if part.start == 0 else None,
             )
-        axes.plot(sweep.power_mW, sweep.tip_K, "o-", color=BLUE, lw=0.8, label="model")
+        style = {"color": BLUE, "marker": _marker(sweep)}
+        axes.plot(sweep.power_mW, sweep.tip_K, label="model", **style)
         difference = sweep.tip_K - law.tip_temperature(sweep.power_mW, base_temperature_K)
-        below.plot(sweep.power_mW, difference, "o-", color=BLUE, lw=0.8)
+        below.plot(sweep.power_mW, difference, **style)
         if measurement is not None and measurement.series_resistance_ohm is not None:
             current = measurement.current_mA
             lever = measurement.bias_V - measurement.series_resistance_ohm / 1000.0 * current
@@ -243,7 +249,8 @@ def resistances(sweep: xr.Dataset) -> Figure:
             ("heater_ohm", "heater R$_h$", VERMILION, "o"),
             ("legs_ohm", "legs R$_{l1}$ + R$_{l2}$", BLUE, "^"),
         ):
-            axes.plot(sweep.tip_K, sweep[name] / 1000, color=colour, marker=marker, label=label)
+            style = {"color": colour, "marker": _marker(sweep, marker), "label": label}
+            axes.plot(sweep.tip_K, sweep[name] / 1000, **style)
         axes.set(xlabel="tip temperature (K)", ylabel="resistance (kΩ)", ylim=(0, None))
         axes.legend()
     return made
