@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -215,7 +216,7 @@ def temperature_power(
                 color=ORANGE,
                 label="power law, Eq. 12" if part.start == 0 else None,
             )
-        style = {"color": BLUE, "marker": _marker(sweep)}
+        style: Any = {"color": BLUE, "marker": _marker(sweep)}
         axes.plot(sweep.power_mW, sweep.tip_K, label="model", **style)
         difference = sweep.tip_K - law.tip_temperature(sweep.power_mW, base_temperature_K)
         below.plot(sweep.power_mW, difference, **style)
@@ -249,7 +250,7 @@ def resistances(sweep: xr.Dataset) -> Figure:
             ("heater_ohm", "heater R$_h$", VERMILION, "o"),
             ("legs_ohm", "legs R$_{l1}$ + R$_{l2}$", BLUE, "^"),
         ):
-            style = {"color": colour, "marker": _marker(sweep, marker), "label": label}
+            style: Any = {"color": colour, "marker": _marker(sweep, marker), "label": label}
             axes.plot(sweep.tip_K, sweep[name] / 1000, **style)
         axes.set(xlabel="tip temperature (K)", ylabel="resistance (kΩ)", ylim=(0, None))
         axes.legend()
