@@ -81,7 +81,9 @@ def test_heater_profile_spans_the_heater(coarse):
     material = coarse.probe.material
     assert profile.position.values[[0, -1]] == pytest.approx([-2, 2])
     middle = profile.isel(position=20)
-    assert middle.temperature.item() == pytest.approx(coarse.equations.tip_temperature(state.x))
+    assert middle.temperature.item() == pytest.approx(
+        coarse.equations.space.tip_temperature(state.x)
+    )
     assert middle.doping.item() == pytest.approx(material.n_d, rel=0.02)
     assert middle.inversion_temperature.item() == pytest.approx(
         inversion_temperature(material.n_d, material.p), abs=1.5

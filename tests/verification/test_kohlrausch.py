@@ -51,7 +51,7 @@ def temperatures(mesh, voltage, *, element=None, taper=None, quadrature=6):
         quadrature=quadrature,
     )
     state = BranchFollower(equations).advance_to(voltage)
-    return equations.tip_temperature(state.x), equations.highest_temperature(state.x)
+    return equations.space.tip_temperature(state.x), equations.space.highest_temperature(state.x)
 
 
 def exact_high_doped(voltage):

@@ -156,8 +156,8 @@ class BranchFollower:
         if not self._rising(here) or rise > options.largest_bias_step:
             return None
         slope = here.tangent / here.tangent[-1]
-        predicted = here.x + rise * (slope + 0.5 * rise * self._curvature(slope))
-        expected = self._tip(predicted) - here.tip
+        change = rise * (slope + 0.5 * rise * self._curvature(slope))
+        predicted, expected = here.x + change, self._tip(change)
         if abs(rise * self._tip(slope)) > options.largest_tip_step or (
             abs(expected) > options.largest_tip_step
         ):
@@ -174,7 +174,8 @@ class BranchFollower:
         while self._arc >= self.options.smallest_arc_step:
             predicted = here.x + self._arc * here.tangent
             pin = Pin(here.tangent[-1] / BIAS_UNIT**2, self._tip(here.tangent) / TIP_UNIT**2)
-            value = pin.bias * predicted[-1] + pin.tip * self._tip(predicted)
+            expected = here.tip + self._arc * self._tip(here.tangent)
+            value = pin.bias * predicted[-1] + pin.tip * expected
             try:
                 state = self._solve(predicted, pin, value, here)
             except NewtonError:
@@ -225,7 +226,7 @@ class BranchFollower:
             x,
             np.copysign(1.0, forward) * tangent,
             float(x[-1]),
-            self._tip(x),
+            self.equations.space.tip_temperature(x),
             result.iterations,
         )
 
@@ -293,7 +294,7 @@ class BranchFollower:
         return best
 
     def _check_melting(self, state: State) -> None:
-        if self.equations.highest_temperature(state.x) < MELTING_POINT:
+        if self.equations.space.highest_temperature(state.x) < MELTING_POINT:
             return
         if self.folds and state.bias <= self.folds[-1].bias:
             turn = self.folds[-1]

@@ -13,14 +13,13 @@ given bias, or a point along the arc. Units are µm, V, mA, mW and K.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix
 
 from hotlever.lever.newton import LinearSolve
-from hotlever.lever.space import Fields, LeverSpace, SparseJacobian, Tangent, factorised
+from hotlever.lever.space import Fields, LeverSpace, Tangent, Tapered
 from hotlever.materials import PARAMETERS, Material
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.silicon import (
@@ -61,6 +60,72 @@ class Conductivities:
     sigma_by: dict[str, Array]
 
 
+class Jacobian(Protocol):
+    """The linearised equations before the circuit equation and the pin are added."""
+
+    current_gradient: tuple[NDArray[np.intp], Array]
+
+    def completed(self, series_resistance_kohm: float, pin_bias: float, pin_tip: float) -> Any:
+        """Return the square matrix; the last rows are circuit equation and pin."""
+        ...
+
+    def factorised(
+        self, series_resistance_kohm: float, pin_bias: float, pin_tip: float
+    ) -> LinearSolve:
+        """Complete and factorise."""
+        ...
+
+
+class Space(Protocol):
+    """Unknowns and operators of a lever: finite elements, or a reduced basis of them.
+
+    A state has ``size`` values, then V_l, then V_b. See `LeverSpace` for the methods.
+    """
+
+    size: int
+    tip: tuple[NDArray[np.intp], Array]
+    tapered: list[Tapered]
+
+    @property
+    def thickness_um(self) -> float:
+        """Thickness of the silicon (µm)."""
+        ...
+
+    def fields(self, x: Array, base_temperature_K: float) -> Fields:
+        """Return temperature and gradients at the quadrature points."""
+        ...
+
+    def weak_form(
+        self, heat_source: Array | float, heat_flux: Array | float, charge_flux: Array
+    ) -> Array:
+        """Return the weak equations of the values, and last the current I_h into V_l."""
+        ...
+
+    def jacobian(self, tangent: Tangent) -> Jacobian:
+        """Assemble the linearised equations."""
+        ...
+
+    def start(self, base_temperature_K: float) -> Array:
+        """Return the exact state without bias."""
+        ...
+
+    def is_temperature(self) -> NDArray[np.bool_]:
+        """Return which of the unknowns are temperatures."""
+        ...
+
+    def tip_temperature(self, x: Array) -> float:
+        """Return T_tip (K)."""
+        ...
+
+    def highest_temperature(self, x: Array) -> float:
+        """Return the highest temperature (K)."""
+        ...
+
+    def reader_weights(self) -> tuple[NDArray[np.intp], Array] | None:
+        """Return unknowns and weights that give V_r; None without a reader."""
+        ...
+
+
 class Pin(NamedTuple):
     """The condition ``bias V_b + tip T_tip = value`` that selects a state on the branch."""
 
@@ -73,14 +138,14 @@ class LeverEquations:
 
     Parameters
     ----------
-    space : LeverSpace
+    space : Space
     circuit : Circuit
     material : Material
     """
 
-    def __init__(self, space: LeverSpace, circuit: Circuit, material: Material) -> None:
+    def __init__(self, space: Space, circuit: Circuit, material: Material) -> None:
         self.space, self.circuit, self.material = space, circuit, material
-        self._sheet = PER_CM_TO_MILLI_PER_UM * space.mesh.layout.thickness_um
+        self._sheet = PER_CM_TO_MILLI_PER_UM * space.thickness_um
         self._doping = [
             tapered_doping(
                 region.along,
@@ -149,7 +214,7 @@ class LeverEquations:
             laws.kappa * fields.grad_T,
             laws.sigma * fields.grad_V,
         )
-        weak[-1] = x[-2] + self._series * weak[-1] - x[-1]
+        weak[-1] = x[-2] + self.series_kohm * weak[-1] - x[-1]
         return weak
 
     def tangent(self, fields: Fields, laws: Conductivities) -> Tangent:
@@ -163,35 +228,33 @@ class LeverEquations:
             sigma=laws.sigma,
         )
 
-    def jacobian(self, x: Array) -> SparseJacobian:
+    def jacobian(self, x: Array) -> Jacobian:
         """Return the Jacobian of the free values and of the current, ready to be completed."""
         return self.space.jacobian(self.tangent(*self.at(x)))
 
-    def completed(self, jacobian: SparseJacobian, pin: Pin) -> csc_matrix:
-        """Add the circuit equation and the pin to a Jacobian."""
-        return jacobian.completed(self._series, pin.bias, pin.tip)
-
     @property
-    def _series(self) -> float:
+    def series_kohm(self) -> float:
+        """Series resistance R_s (kΩ), which makes volts of milliamperes."""
         return self.circuit.series_resistance_ohm / 1000.0
-
-    def tip_temperature(self, x: Array) -> float:
-        """Return T_tip (K)."""
-        unknowns, weights = self.space.tip
-        return float(weights @ x[unknowns])
 
     def start(self) -> Array:
         """Return the exact state at zero bias."""
         return self.space.start(self.circuit.base_temperature_K)
 
-    def highest_temperature(self, x: Array) -> float:
-        """Return the highest nodal temperature (K)."""
-        return float(x[self.space.is_temperature()].max())
-
     # --- what is measured ------------------------------------------------------------------------
 
+    def measured(self, x: Array) -> Array:
+        """Return I_h (mA), V_r (V, NaN without a reader) and T_tip (K), shape (3,)."""
+        fields, laws = self.at(x)
+        current = self.space.weak_form(0.0, 0.0, laws.sigma * fields.grad_V)[-1]
+        return np.array([current, self._reader_voltage(x), self.space.tip_temperature(x)])
+
+    def _reader_voltage(self, x: Array) -> float:
+        reader = self.space.reader_weights()
+        return float("nan") if reader is None else float(reader[1] @ x[reader[0]])
+
     def observe(self, x: Array) -> dict[str, float]:
-        """Return the observables of a solved state.
+        """Return everything that is observed of a solved state, balances included.
 
         Returns
         -------
@@ -200,30 +263,37 @@ class LeverEquations:
             ``power_mW``, resistances ``heater_ohm``, ``leg1_ohm``, ``leg2_ohm`` (Joule heat of
             the part over I_h²; they add up to V_l / I_h; NaN without current), ``max_K``, and
             for the balances ``ground_current_mA`` and ``end_heat_mW``.
+
+        Raises
+        ------
+        TypeError
+            If the space is not the full finite-element one.
         """
+        space = self.space
+        if not isinstance(space, LeverSpace):
+            raise TypeError("balances and resistances need the full finite-element space")
         fields, laws = self.at(x)
         source, heat = laws.sigma * _square(fields.grad_V), laws.kappa * fields.grad_T
         charge = laws.sigma * fields.grad_V
-        current = float(self.space.weak_form(-source, heat, charge)[-1])
-        end_heat, ground_current = self.space.end_fluxes(-source, heat, charge)
-        reader = self.space.reader_weights()
+        current = float(space.weak_form(-source, heat, charge)[-1])
+        end_heat, ground_current = space.end_fluxes(-source, heat, charge)
         lever = float(x[-2])
 
         def resistance(part: Part) -> float:
             if current == 0.0:
                 return float("nan")
-            return 1000.0 * self.space.integral(source, part) / current**2
+            return 1000.0 * space.integral(source, part) / current**2
 
         return {
             "current_mA": current,
             "lever_V": lever,
-            "reader_V": float("nan") if reader is None else float(reader[1] @ x[reader[0]]),
-            "tip_K": self.tip_temperature(x),
+            "reader_V": self._reader_voltage(x),
+            "tip_K": space.tip_temperature(x),
             "power_mW": lever * current,
             "heater_ohm": resistance("heater"),
             "leg1_ohm": resistance("leg 1"),
             "leg2_ohm": resistance("leg 2"),
-            "max_K": self.highest_temperature(x),
+            "max_K": space.highest_temperature(x),
             "ground_current_mA": ground_current,
             "end_heat_mW": end_heat,
         }
@@ -254,9 +324,9 @@ class LeverEquations:
         by_parameter = np.column_stack(columns)
         right_hand_side = np.zeros((x.size, len(PARAMETERS)))
         right_hand_side[:-1] = -by_parameter
-        right_hand_side[-2] *= self._series
+        right_hand_side[-2] *= self.series_kohm
         jacobian = self.jacobian(x)
-        change = factorised(self.completed(jacobian, Pin(1.0, 0.0))).solve(right_hand_side)
+        change = jacobian.factorised(self.series_kohm, 1.0, 0.0).solve(right_hand_side)
         unknowns, slopes = jacobian.current_gradient
         current = by_parameter[-1] + slopes @ change[unknowns]
         tip_unknowns, tip_weights = self.space.tip
@@ -276,12 +346,12 @@ class PinnedEquations:
 
     def residual(self, x: Array) -> Array:
         """Return the residual, shape (size + 2,)."""
-        pinned = self._pin.bias * x[-1] + self._pin.tip * self._lever.tip_temperature(x)
+        pinned = self._pin.bias * x[-1] + self._pin.tip * self._lever.space.tip_temperature(x)
         return np.append(self._lever.residual(x), pinned - self._value)
 
     def factorised(self, x: Array) -> LinearSolve:
         """Return the factorised Jacobian."""
-        return factorised(self._lever.completed(self._lever.jacobian(x), self._pin))
+        return self._lever.jacobian(x).factorised(self._lever.series_kohm, *self._pin)
 
 
 def _square(gradient: Array) -> Array:

@@ -105,7 +105,7 @@ class Lever:
         space: LeverSpace | None = None,
     ) -> None:
         self.probe = probe
-        self.space = space or LeverSpace(mesh_layout(probe.layout(), mesh))
+        self.space: LeverSpace = space or LeverSpace(mesh_layout(probe.layout(), mesh))
         self.equations = LeverEquations(self.space, probe.circuit, probe.material)
 
     def with_material(self, material: Material) -> Lever:

@@ -188,6 +188,11 @@ class LeverSpace:
                 found.append(Tapered(elements, along, region.taper.length_um))
         return found
 
+    @property
+    def thickness_um(self) -> float:
+        """Thickness of the silicon (µm)."""
+        return self.mesh.layout.thickness_um
+
     # --- unknowns to fields -------------------------------------------------------------
 
     def nodal(self, x: Array, base_temperature_K: float) -> tuple[Array, Array]:
@@ -215,6 +220,15 @@ class LeverSpace:
         x = np.zeros(self.size + 2)
         x[self._T[self._T >= 0]] = base_temperature_K
         return x
+
+    def tip_temperature(self, x: Array) -> float:
+        """Return T_tip (K)."""
+        unknowns, weights = self.tip
+        return float(weights @ x[unknowns])
+
+    def highest_temperature(self, x: Array) -> float:
+        """Return the highest nodal temperature (K) of the free nodes."""
+        return float(x[self._T[self._T >= 0]].max())
 
     def is_temperature(self) -> NDArray[np.bool_]:
         """Return which of the unknowns (V_l and V_b included) are temperatures."""
@@ -296,6 +310,15 @@ class SparseJacobian:
         self._space, self._data = space, data
         self.current_gradient = (space._lever_columns, data[space._lever_row])
 
+    def factorised(self, series_resistance_kohm: float, pin_bias: float, pin_tip: float) -> SuperLU:
+        """Complete and factorise; the unknowns are already ordered for little fill."""
+        return splu(
+            self.completed(series_resistance_kohm, pin_bias, pin_tip),
+            permc_spec="NATURAL",
+            diag_pivot_thresh=0.01,
+            options={"SymmetricMode": True},
+        )
+
     def completed(
         self, series_resistance_kohm: float, pin_bias: float, pin_tip: float
     ) -> csc_matrix:
@@ -309,16 +332,6 @@ class SparseJacobian:
         data[space._pin_slots] = np.concatenate([[pin_bias], pin_tip * space.tip[1]])
         size = space.size + 2
         return csc_matrix((data, space._matrix_rows, space._matrix_starts), shape=(size, size))
-
-
-def factorised(matrix: csc_matrix) -> SuperLU:
-    """Factorise a completed Jacobian, whose unknowns are already ordered for little fill."""
-    return splu(
-        matrix,
-        permc_spec="NATURAL",
-        diag_pivot_thresh=0.01,
-        options={"SymmetricMode": True},
-    )
 
 
 def _fill_reducing_order(rows: Index, columns: Index, size: int) -> Index:
