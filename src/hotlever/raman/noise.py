@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from hotlever.raman.lineshape import Array
 
@@ -16,12 +17,14 @@ SPIKE_LINE_TOLERANCE = 0.04
 before a difference is taken for a cosmic ray."""
 SPIKE_MAX_SAMPLES = 5
 """A cosmic ray hits no more neighbouring samples than this."""
-PLATEAU_TOLERANCE = 0.004
+SPIKE_MAX_STEP = 1.2
+"""Coarsest axis (cm⁻¹) on which a spike looks narrower than silicon's line."""
+PLATEAU_TOLERANCE = 0.006
 """Samples of a clipped top agree within this part of the line's height."""
 PLATEAU_MIN_SAMPLES = 4
 
 _OFFSETS = np.array([0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 1e6])
-_POISSON_PREFERENCE = 6.0
+_POISSON_PREFERENCE = 12.0
 
 
 def variance(residual: Array, model: Array, parameters: int) -> Array:
@@ -98,7 +101,7 @@ def spikes(y: Array, model: Array, line_part: Array, trusted: Mask) -> Mask:
     sigma = robust_sigma(residual[trusted], model[trusted])
     sigma_all = np.sqrt(
         np.interp(np.arange(y.size), np.flatnonzero(trusted), sigma) ** 2
-        + (SPIKE_LINE_TOLERANCE * line_part) ** 2
+        + (SPIKE_LINE_TOLERANCE * maximum_filter1d(np.abs(line_part), 5)) ** 2
     )
     score = residual / sigma_all
     hit = score > SPIKE_SIGMAS
@@ -113,13 +116,19 @@ def spikes(y: Array, model: Array, line_part: Array, trusted: Mask) -> Mask:
     return hit
 
 
-def likely_spikes(y: Array, base: float) -> Mask:
-    """First guess at cosmic rays, before there is a fit: far above the local median."""
+def likely_spikes(y: Array, base: float, step: float) -> Mask:
+    """First guess at cosmic rays, before there is a fit: far above the local median.
+
+    On an axis so coarse (`step`, cm⁻¹) that silicon's line itself covers two or three samples
+    nothing can be told yet, and nothing is.
+    """
+    if step > SPIKE_MAX_STEP:
+        return np.zeros(y.size, dtype=bool)
     window = 9
     padded = np.pad(y, window // 2, mode="reflect")
     local = np.median(np.lib.stride_tricks.sliding_window_view(padded, window), axis=1)
-    step = 1.4826 * float(np.median(np.abs(np.diff(y)))) / np.sqrt(2.0)
-    return np.asarray(y - local > 8.0 * step + 1.2 * np.maximum(local - base, 0.0))
+    sigma = 1.4826 * float(np.median(np.abs(np.diff(y)))) / np.sqrt(2.0)
+    return np.asarray(y - local > 8.0 * sigma + 1.2 * np.maximum(local - base, 0.0))
 
 
 def plateau(y: Array, candidates: Mask, base: float) -> slice | None:

@@ -9,12 +9,14 @@ such a band pulls the centre of a hot, weak line by more than a wavenumber (some
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import leastsq
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.raman import lineshape, noise
@@ -31,12 +33,16 @@ MIN_SAMPLES = 12
 """Fewer samples than this in the window are no spectrum to fit."""
 
 DETECTION_SIGMAS = 5.0
+"""A line's area must exceed its standard error so many times."""
+MISFIT_LIMIT = 1.6
+"""From this ratio on the residuals are flagged as more than noise."""
 _BAND_GAIN = 20.0  # drop of chi-square that a band with three parameters must bring
 _BAND_FWHM, _BAND_SPREAD = 25.0, 0.6  # soft prior of the band: ln fwhm = ln 25 ± 0.6
+_WIDE = 9.0  # cm⁻¹; a line this wide may be two
 _SIGMA_SPREAD = 1.0  # soft prior of an unknown spectrometer response: a factor e
+_NATURAL_WIDTH = (math.log(4.0), 0.7)  # soft prior of ln fwhm, with an unknown response only
 _MIN_FWHM_SAMPLES = 0.5
 _MAX_FWHM = 45.0
-_PASSES = 8
 
 
 class NoSiliconLine(InputError):
@@ -213,33 +219,38 @@ class _Problem:
         spreads = np.array([spread for _, _, spread in self.priors])
         rows = np.zeros((len(indices), self.size()))
         rows[np.arange(len(indices)), indices] = 1.0 / spreads if indices else 1.0
-        last: dict[bytes, tuple[Array, Array]] = {}
+        last: tuple[bytes, Array, Array] = (b"", weight, weight)
 
-        def both(p: Array) -> tuple[Array, Array]:
+        def both(p: Array) -> tuple[bytes, Array, Array]:
+            # MINPACK asks for the residual and the Jacobian at the same point in two calls
+            nonlocal last
             key = p.tobytes()
-            if key not in last:
+            if key != last[0]:
                 value, jacobian, _ = self.evaluate(p)
                 residual = (value - self.y)[use] * weight
                 scaled = jacobian[use] * weight[:, None]
                 if indices:
                     residual = np.concatenate([residual, (p[indices] - means) / spreads])
                     scaled = np.concatenate([scaled, rows])
-                last.clear()
-                last[key] = (np.nan_to_num(residual, nan=1e30), np.nan_to_num(scaled))
-            return last[key]
+                if not np.isfinite(residual).all():
+                    residual, scaled = np.full_like(residual, 1e30), np.nan_to_num(scaled)
+                last = (key, residual, scaled)
+            return last
 
-        result = least_squares(
-            lambda p: both(p)[0],
-            start,
-            jac=lambda p: both(p)[1],
-            method="lm",
-            x_scale="jac",
-            xtol=1e-9,
-            ftol=1e-9,
-            gtol=1e-9,
-            max_nfev=200,
-        )
-        return result.x, result.jac
+        # leastsq is the thinnest door to MINPACK's Levenberg-Marquardt: the wrapping that
+        # least_squares adds takes longer than the fit of a few hundred samples
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            p = leastsq(
+                lambda p: both(p)[1],
+                start,
+                Dfun=lambda p: both(p)[2],
+                full_output=True,
+                ftol=1e-9,
+                xtol=1e-8,
+                maxfev=200,
+            )[0]
+        return np.asarray(p), both(np.asarray(p))[2]
 
 
 @dataclass(frozen=True)
@@ -311,9 +322,16 @@ def fit_peak(x: Array, y: Array, options: PeakOptions | None = None, where: str 
     if not np.ptp(y) > 0.0:
         raise missing
     problem, start, clipped = _start(x, y, options, missing)
-    solution = _refine(problem, start, _first_use(y, clipped), clipped)
-    if options.band:
-        solution = _try_band(solution, clipped)
+    step = float(np.median(np.diff(x)))
+    use = _without(~noise.likely_spikes(y, float(np.percentile(y, 20)), step), clipped)
+    variance = np.maximum(noise.robust_sigma(y - np.median(y), np.abs(y)) ** 2, 1e-300)
+    solution = _refine(problem, start, use, variance, clipped, passes=2)
+    # beside a clipped line's flanks a band cannot be told from the hidden shape
+    look = options.band and clipped is None
+    richer = _with_band(solution, clipped) if look else None
+    if richer is None:
+        richer = _refine(problem, solution.p, solution.use, solution.variance, clipped)
+    solution = richer
     return _peak(solution, options, clipped, missing)
 
 
@@ -324,7 +342,9 @@ def _start(
     background, slope = _coarse_background(x, y)
     origin = float(0.5 * (x[0] + x[-1]))
     flat = y - background - slope * (x - origin)
-    clean = ~noise.likely_spikes(y, background)
+    step = float(np.median(np.diff(x)))
+    clean = ~noise.likely_spikes(y, background, step)
+    flat = np.interp(x, x[clean], flat[clean])
     # three samples and their median: no single spike makes a line, a coarse axis keeps one
     smooth = np.median(
         np.stack([np.roll(flat, 1), flat, np.roll(flat, -1)]), axis=0
@@ -343,15 +363,14 @@ def _start(
         left -= 1
     while right < x.size - 1 and above[right + 1]:
         right += 1
-    step = float(np.median(np.diff(x)))
     fwhm = float(np.clip(x[right] - x[left] + step, 1.5 * step, _MAX_FWHM))
-    line_samples = allowed & clean & (np.abs(x - x[peak]) < 2.0 * fwhm + 2.0 * step)
-    clipped = noise.plateau(flat, line_samples, 0.0)
+    clipped = noise.plateau(y, allowed & clean, float(np.percentile(y, 5)))
     if clipped is not None:
         # flanks alone: the hidden top is higher than the clipped one
         peak = (clipped.start + clipped.stop - 1) // 2
-        height *= 2.0
-        fwhm = max(0.5 * fwhm, 2.0 * step)
+        width = float(x[clipped.stop - 1] - x[clipped.start])
+        height, fwhm = 2.0 * float(y[peak] - y.min()), max(width, 2.0 * step)
+        background, slope = float(y.min()), 0.0
     start = [float(x[peak]), math.log(fwhm), height, background, slope]
     sigma, priors = 0.0, []
     fit_sigma = options.shape == "voigt" and options.resolution is None
@@ -359,7 +378,8 @@ def _start(
         sigma = options.resolution * lineshape.SIGMA_PER_FWHM
     if fit_sigma:
         guess = math.log(max(step, 0.2 * fwhm) * 2.0 * lineshape.SIGMA_PER_FWHM)
-        priors.append((len(start), guess, _SIGMA_SPREAD))
+        # on a coarse axis the two widths are hard to tell apart: keep both near what they are
+        priors += [(1, *_NATURAL_WIDTH), (len(start), guess, _SIGMA_SPREAD)]
         start.append(guess)
     if options.shape == "fano":
         start.append(0.0)
@@ -384,11 +404,6 @@ def _coarse_background(x: Array, y: Array) -> tuple[float, float]:
     return low + slope * (0.5 * (x[0] + x[-1]) - x_low), slope
 
 
-def _first_use(y: Array, clipped: slice | None) -> noise.Mask:
-    use = ~noise.likely_spikes(y, float(np.percentile(y, 20)))
-    return _without(use, clipped)
-
-
 def _without(use: noise.Mask, clipped: slice | None) -> noise.Mask:
     if clipped is not None:
         use = use.copy()
@@ -397,13 +412,17 @@ def _without(use: noise.Mask, clipped: slice | None) -> noise.Mask:
 
 
 def _refine(
-    problem: _Problem, start: Array, use: noise.Mask, clipped: slice | None
+    problem: _Problem,
+    start: Array,
+    use: noise.Mask,
+    variance: Array,
+    clipped: slice | None,
+    passes: int = 8,
 ) -> _Solution:
     """Fit, judge noise and spikes by the fit, and again until neither changes."""
     y, p = problem.y, start
-    variance = np.maximum(noise.robust_sigma(y - np.median(y), np.abs(y)) ** 2, 1e-300)
     settled = False
-    for _ in range(_PASSES):
+    for _ in range(passes):
         p, jacobian = problem.solve(p, variance, use)
         value, _, part = problem.evaluate(p)
         if not np.all(np.isfinite(value)):
@@ -429,41 +448,60 @@ def _refine(
     return _Solution(problem, p, jacobian, value, part, variance, use)
 
 
-def _try_band(plain: _Solution, clipped: slice | None) -> _Solution:
-    """Add a broad band on the low side if the residuals ask for it."""
+def _with_band(plain: _Solution, clipped: slice | None) -> _Solution | None:
+    """The fit with a broad band on the low side, or None if the residuals ask for none."""
     problem = plain.problem
     centre, fwhm = float(plain.p[0]), math.exp(float(plain.p[1]))
     residual = np.where(plain.use, problem.y - plain.value, 0.0) / np.sqrt(plain.variance)
     width = max(0.5 * _BAND_FWHM, min(fwhm, _BAND_FWHM))
-    distance = problem.x[:, None] - problem.x[None, :]
-    kernel = np.exp(-0.5 * (distance / (width * lineshape.SIGMA_PER_FWHM)) ** 2)
-    matched = kernel @ residual / np.sqrt((kernel**2).sum(axis=1))
+    step = float(np.median(np.diff(problem.x)))
+    samples = width * lineshape.SIGMA_PER_FWHM / step
+    # a matched filter: white noise of unit variance comes out with unit variance
+    matched = gaussian_filter1d(residual, samples, mode="constant")
+    matched *= math.sqrt(2.0 * math.sqrt(math.pi) * max(samples, 0.3))
     low_side = (problem.x < centre - 0.5 * fwhm) & (problem.x > problem.x[0] + 0.25 * width)
     if not low_side.any():
-        return plain
+        return None
     at = int(np.argmax(np.where(low_side, matched, -np.inf)))
-    if matched[at] < 3.0:
-        return plain
     size = problem.size()
-    height = float(np.sqrt(plain.variance[at]) * max(residual[at], 1.0))
     prior = (size + 2, math.log(_BAND_FWHM), _BAND_SPREAD)
     richer = replace(problem, with_band=True, priors=(*problem.priors, prior))
-    start = np.concatenate([plain.p, [height, problem.x[at], math.log(_BAND_FWHM)]])
-    fitted = _refine(richer, start, plain.use, clipped)
-    use = fitted.use & plain.use
-    gain = np.sum(
-        ((problem.y - plain.value) ** 2 - (problem.y - fitted.value) ** 2)[use]
-        / fitted.variance[use]
+    starts = []
+    if matched[at] > 3.0:
+        height = float(np.sqrt(plain.variance[at]) * max(residual[at], 1.0))
+        starts.append(np.concatenate([plain.p, [height, problem.x[at], math.log(_BAND_FWHM)]]))
+    if fwhm > _WIDE:
+        # one wide line may have swallowed a line and a band, and left no residual to see
+        line = plain.p.copy()
+        line[0], line[1] = centre + 0.2 * fwhm, math.log(0.4 * fwhm)
+        extra = [0.4 * plain.p[2], centre - 0.6 * fwhm, math.log(_BAND_FWHM)]
+        starts.append(np.concatenate([line, extra]))
+    best, best_gain = None, _BAND_GAIN
+    for start in starts:
+        fitted = _refine(richer, start, plain.use, plain.variance, clipped)
+        gain = _gain(plain, fitted)
+        if gain > best_gain and _sound(fitted, size):
+            best, best_gain = fitted, gain
+    return best
+
+
+def _gain(plain: _Solution, fitted: _Solution) -> float:
+    """Drop of chi-square from one fit to the other, on the samples both use."""
+    y, use = plain.problem.y, fitted.use & plain.use
+    drop = (y - plain.value) ** 2 - (y - fitted.value) ** 2
+    return float(np.sum(drop[use] / fitted.variance[use]))
+
+
+def _sound(fitted: _Solution, band_at: int) -> bool:
+    """Whether the band is one: positive, on the low side, beside a line of sane width."""
+    p, x = fitted.p, fitted.problem.x
+    return bool(
+        np.all(np.isfinite(p))
+        and p[2] > 0
+        and p[band_at] > 0
+        and x[0] - 10.0 < p[band_at + 1] < p[0]
+        and math.exp(p[1]) < _MAX_FWHM
     )
-    band_height, band_centre = fitted.p[size], fitted.p[size + 1]
-    sound = (
-        np.all(np.isfinite(fitted.p))
-        and fitted.p[2] > 0
-        and band_height > 0
-        and problem.x[0] - 10.0 < band_centre < fitted.p[0]
-        and math.exp(fitted.p[1]) < _MAX_FWHM
-    )
-    return fitted if sound and gain > _BAND_GAIN else plain
 
 
 def _peak(
@@ -477,18 +515,13 @@ def _peak(
     covariance = solution.covariance
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     centre, fwhm, height = float(p[0]), math.exp(float(p[1])), float(p[2])
-    step = float(np.median(np.diff(x)))
-    if not (
-        LINE_RANGE[0] < centre < LINE_RANGE[1]
-        and _MIN_FWHM_SAMPLES * step < fwhm < _MAX_FWHM
-        and height > DETECTION_SIGMAS * errors[2]
-    ):
-        raise missing
     index = 5
     sigma, fano, fano_error = problem.fixed_sigma, 0.0, 0.0
     if problem.fit_sigma:
         sigma = math.exp(float(p[index]))
         index += 1
+    resolution = sigma / lineshape.SIGMA_PER_FWHM
+    step = float(np.median(np.diff(x)))
     gradient = np.zeros_like(p)
     if problem.fit_fano:
         fano, fano_error = float(p[index]), float(errors[index])
@@ -500,13 +533,26 @@ def _peak(
     gradient[2] = 1.0 - fano**2
     area = (1.0 - fano**2) * height * factor
     area_error = factor * math.sqrt(max(float(gradient @ covariance @ gradient), 0.0))
+    if not (
+        LINE_RANGE[0] < centre < LINE_RANGE[1]
+        and _MIN_FWHM_SAMPLES * step < observed_width(fwhm, resolution) < _MAX_FWHM
+        and area > DETECTION_SIGMAS * area_error
+    ):
+        raise missing
     found_band = None
     if problem.with_band:
         found_band = Band(float(p[index + 1]), math.exp(float(p[index + 2])), float(p[index]))
     clean = _without(np.ones_like(use), clipped)
     spiked = x[clean & ~use]
     misfit = _misfit(problem.y - solution.value, solution.variance, use)
-    flags = _flags(solution, found_band, bool(spiked.size), clipped is not None, misfit)
+    width = observed_width(fwhm, resolution)
+    flags = _flags(solution, width, found_band, bool(spiked.size), clipped is not None, misfit)
+    # residuals that are no noise are correlated: fewer samples count than there are
+    errors *= math.sqrt(misfit) if misfit > MISFIT_LIMIT else 1.0
+    if clipped is not None:
+        # the flanks disagree with the clipped top by as much as detector blooming skews them
+        middle = 0.5 * float(x[clipped.start] + x[clipped.stop - 1])
+        errors[0] = math.hypot(float(errors[0]), centre - middle)
     return Peak(
         centre=centre,
         centre_stderr=float(errors[0]),
@@ -520,7 +566,7 @@ def _peak(
         origin=problem.origin,
         fano=fano,
         fano_stderr=fano_error,
-        resolution=sigma / lineshape.SIGMA_PER_FWHM,
+        resolution=resolution,
         band=found_band,
         misfit=misfit,
         samples=int(use.sum()),
@@ -529,7 +575,15 @@ def _peak(
     )
 
 
-MISFIT_LIMIT = 1.6
+def observed_width(lorentzian: float, gaussian: float) -> float:
+    """FWHM of a Voigt line from those of its parts, to 0.02 % (Olivero and Longbothum 1977).
+
+    Examples
+    --------
+    >>> observed_width(3.0, 0.0), observed_width(0.0, 2.0)
+    (3.0, 2.0)
+    """
+    return 0.5346 * lorentzian + math.sqrt(0.2166 * lorentzian**2 + gaussian**2)
 
 
 def _misfit(residual: Array, variance: Array, use: noise.Mask) -> float:
@@ -541,10 +595,14 @@ def _misfit(residual: Array, variance: Array, use: noise.Mask) -> float:
 
 
 def _flags(
-    solution: _Solution, found: Band | None, spiked: bool, saturated: bool, misfit: float
+    solution: _Solution,
+    fwhm: float,
+    found: Band | None,
+    spiked: bool,
+    saturated: bool,
+    misfit: float,
 ) -> tuple[str, ...]:
     x, centre = solution.problem.x, float(solution.p[0])
-    fwhm = math.exp(float(solution.p[1]))
     tests: list[tuple[str, Callable[[], bool]]] = [
         ("cosmic-ray", lambda: spiked),
         ("saturated", lambda: saturated),
