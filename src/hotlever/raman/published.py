@@ -47,8 +47,7 @@ SPIESER2017 = LinearLaw(
     error_constant=5.0,
     error_fraction=0.02,
     calibrated_to=900.0,
-    source="Spieser et al., J. Appl. Phys. 121, 174503 (2017), section III, "
-    "doi:10.1063/1.4981883",
+    source="Spieser et al., J. Appl. Phys. 121, 174503 (2017), section III, doi:10.1063/1.4981883",
 )
 
 KNEE_PREDICTED = 893.0
@@ -80,6 +79,5 @@ BALKANSKI1983 = AnharmonicConstants(
     bare=528.0,
     three_phonon=-2.96,
     four_phonon=-0.174,
-    source="Balkanski, Wallis and Haro, Phys. Rev. B 28, 1928 (1983), "
-    "doi:10.1103/PhysRevB.28.1928",
+    source="Balkanski, Wallis and Haro, Phys. Rev. B 28, 1928 (1983), doi:10.1103/PhysRevB.28.1928",
 )
