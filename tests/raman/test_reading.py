@@ -157,11 +157,13 @@ def test_any_table_of_two_columns_is_read_back(
 def test_no_bytes_end_in_anything_but_a_spectrum_or_one_line(raw, tmp_path_factory):
     file = tmp_path_factory.getbasetemp() / "any.txt"
     file.write_bytes(raw)
+    message = ""
     try:
         read_file(file)
     except InputError as error:
-        assert str(file) in str(error)
-        assert "\n" not in str(error)
+        message = str(error)
+    assert "\n" not in message
+    assert not message or str(file) in message
 
 
 BAD = {

@@ -3,3 +3,5 @@
 from hotlever.cli.app import app, main
 
 __all__ = ["app", "main"]
+
+from hotlever.cli import raman  # noqa: E402, F401

@@ -1,0 +1,34 @@
+"""Raman thermometry: from silicon's spectra to the tip temperature with its error.
+
+Section III of Spieser et al. 2017. A spectrum (`spectrum`) is fitted for its line (`peak`); a
+hot-plate series gives a calibration (`calibration`); a thermometer (`thermometer`) turns line
+positions into temperatures.
+"""
+
+from hotlever.raman.calibration import Calibration, Point, calibrate, load, published
+from hotlever.raman.check import paper_check
+from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions, fit_peak
+from hotlever.raman.series import calibrate_from, measure, read_lines
+from hotlever.raman.spectrum import Spectrum, read_spectra, read_spectrum
+from hotlever.raman.thermometer import Thermometer, laser_heating
+
+__all__ = [
+    "Calibration",
+    "NoSiliconLine",
+    "Peak",
+    "PeakOptions",
+    "Point",
+    "Spectrum",
+    "Thermometer",
+    "calibrate",
+    "calibrate_from",
+    "fit_peak",
+    "laser_heating",
+    "load",
+    "measure",
+    "paper_check",
+    "published",
+    "read_lines",
+    "read_spectra",
+    "read_spectrum",
+]

@@ -41,6 +41,8 @@ class Spectrum:
         What the file's header says.
     temperature : float or None
         Sample temperature (K) by the header or the file's name.
+    folder : str
+        Where the file is.
     """
 
     x: Array
@@ -48,6 +50,7 @@ class Spectrum:
     name: str = ""
     metadata: dict[str, str] = field(default_factory=dict)
     temperature: float | None = None
+    folder: str = ""
 
 
 def read_spectrum(path: str | os.PathLike[str]) -> Spectrum:
@@ -97,14 +100,14 @@ def read_file(path: str | os.PathLike[str]) -> list[Spectrum]:
         parts = reader(file, raw)
         names = [file.name] if len(parts) == 1 else [f"{file.name}[{i}]" for i in range(len(parts))]
         return [
-            _checked(x, y, name, {}, temperature, f"{file.parent / name}")
+            _checked(x, y, file.with_name(name), {}, temperature)
             for name, (x, y) in zip(names, parts, strict=True)
         ]
     table = parse_table(decode(raw, str(file)), str(file))
     x, y = pick_columns(table, str(file))
     stated = temperature_in_metadata(table.metadata)
     temperature = stated if stated is not None else temperature
-    return [_checked(x, y, file.name, table.metadata, temperature, str(file))]
+    return [_checked(x, y, file, table.metadata, temperature)]
 
 
 def _vendor_reader(file: Path, raw: bytes) -> Callable[[Path, bytes], Parts] | None:
@@ -229,10 +232,9 @@ def iter_spectra(
 def _checked(
     x: Array,
     y: Array,
-    name: str,
+    where: Path,
     metadata: dict[str, str],
     temperature: float | None,
-    where: str,
 ) -> Spectrum:
     """Sort, merge repeated axis values, and make sure there is a silicon line to look for."""
     good = np.isfinite(x) & np.isfinite(y)
@@ -247,8 +249,5 @@ def _checked(
             f"that covers silicon's line at {SILICON_LINE:g} cm⁻¹"
         )
     unique, inverse, counts = np.unique(x, return_inverse=True, return_counts=True)
-    if unique.size != x.size:
-        y = np.bincount(inverse, weights=y) / counts
-    else:
-        y = y[np.argsort(x)]
-    return Spectrum(unique, y, name, metadata, temperature)
+    y = np.bincount(inverse, weights=y) / counts
+    return Spectrum(unique, y, where.name, metadata, temperature, str(where.parent))

@@ -34,9 +34,9 @@ def temperature_in_name(stem: str) -> float | None:
     for part in parts:
         match = _IN_NAME.fullmatch(part)
         if match:
-            return _kelvin(match[1], match[2])
+            return _to_kelvin(match[1], match[2])
     match = _SPACED.search(stem)
-    return _kelvin(match[1], match[2]) if match else None
+    return _to_kelvin(match[1], match[2]) if match else None
 
 
 def temperature_in_metadata(metadata: dict[str, str]) -> float | None:
@@ -56,12 +56,22 @@ def temperature_in_metadata(metadata: dict[str, str]) -> float | None:
         stated = re.fullmatch(rf"\s*{_NUMBER}\s*{_UNIT}?\s*", value, re.I)
         unit = (stated[2] if stated else None) or match[1]
         if stated and unit:
-            return _kelvin(stated[1], unit)
+            return _to_kelvin(stated[1], unit)
     return None
 
 
-def _kelvin(number: str, unit: str) -> float | None:
-    value = float(number.replace(",", "."))
+def kelvin(value: float, unit: str) -> float | None:
+    """Convert to kelvin; None for what no silicon sample can have.
+
+    Examples
+    --------
+    >>> kelvin(25.0, "C"), kelvin(-3.0, "K")
+    (298.15, None)
+    """
     if not unit.lower().startswith("k"):
         value += zero_Celsius
     return round(value, 6) if 0.0 < value < HOTTEST else None
+
+
+def _to_kelvin(number: str, unit: str) -> float | None:
+    return kelvin(float(number.replace(",", ".")), unit)
