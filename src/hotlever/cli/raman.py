@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -27,6 +28,7 @@ LAWS = ("linear", "anharmonic")
 SHAPES = ("lorentzian", "voigt", "fano")
 
 _MANY = "--calibrate-from"
+_BAR_FROM = 150  # spectra; they take about a second
 
 
 class SeveralFiles(typer.core.TyperCommand):
@@ -321,7 +323,7 @@ def _setup(
     if calibrate_from:
         table = series.read_temperatures(temperatures) if temperatures else None
         plate = _read(calibrate_from)
-        with progress("hot plate") as update:
+        with _progress("hot plate", len(plate)) as update:
             source = ", ".join(path.name or str(path) for path in calibrate_from)
             chosen, hot_plate = series.calibrate_from(plate, options, table, update, source)
         _describe(chosen)
@@ -391,7 +393,7 @@ def _read(paths: list[Path]) -> list[Spectrum]:
     skipped: list[str] = []
     total = len(spectrum_files(paths))
     found: list[Spectrum] = []
-    with progress("reading") as update:
+    with _progress("reading", total) as update:
         for done, part in enumerate(iter_spectra(paths, skipped), start=1):
             found += part
             update(done, total)
@@ -402,12 +404,17 @@ def _read(paths: list[Path]) -> list[Spectrum]:
 
 def _lines(paths: list[Path], options: PeakOptions, label: str) -> list[series.Line]:
     spectra = _read(paths)
-    with progress(label) as update:
+    with _progress(label, len(spectra)) as update:
         lines = series.measure(spectra, options, update)
     for line in lines:
         if line.peak is None and len(lines) > 1:
             note(f"{line.spectrum.name}: no silicon line")
     return lines
+
+
+def _progress(label: str, spectra: int) -> AbstractContextManager[series.Progress]:
+    """A bar where the work can take more than two seconds."""
+    return progress(label) if spectra > _BAR_FROM else nullcontext(lambda done, total: None)
 
 
 def _put(text: str, output: Path | None) -> None:

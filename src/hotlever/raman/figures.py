@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -114,12 +115,10 @@ def _stack(axes: Axes, lines: Sequence[Line], labels: Sequence[str]) -> None:
             fine = np.linspace(x[0], x[-1], 1200)
             curve = (peak.model(fine) - peak.baseline(fine)) / top  # type: ignore[union-attr]
             axes.plot(fine, level + 0.75 * np.clip(curve, None, 1.25), color=BLUE, lw=1.0)
-        axes.text(
-            WINDOW[1] - 1.0, level + 0.12, label, ha="right", va="bottom", fontsize=8, color="black"
-        )
+        axes.text(WINDOW[1] - 1.0, level + 0.12, _short(label), ha="right", va="bottom", fontsize=8)
     axes.set(
         xlim=WINDOW,
-        ylim=(-0.15, len(pairs) + 0.1),
+        ylim=(-0.15, len(pairs) + 0.25),
         xlabel="Raman shift (cm⁻¹)",
         ylabel="intensity less background, scaled",
         yticks=[],
@@ -127,6 +126,12 @@ def _stack(axes: Axes, lines: Sequence[Line], labels: Sequence[str]) -> None:
     axes.plot([], [], ".", color=GREY, label="counts")
     axes.plot([], [], color=BLUE, label="fit")
     axes.legend(loc="upper left", fontsize=8, frameon=False)
+
+
+def _short(label: str, limit: int = 22) -> str:
+    if len(label) <= limit:
+        return label
+    return f"{label[: limit // 2 - 1]}…{label[-limit // 2 :]}"
 
 
 def _calibration(axes: Axes, calibration: Calibration, rows: Sequence[Row]) -> None:
@@ -244,15 +249,14 @@ def paper_check(check: PaperCheck) -> Figure:
         upper.plot(temperature, values, dash, color=color, lw=1.8, label=name)
         upper.plot([check.hottest], [result.error_at_hottest], "o", color=color, ms=5)
     high = max(result.error_at_hottest for result in check.results)
-    upper.annotate(
-        f"{min(r.error_at_hottest for r in check.results):.0f} to {high:.0f} K too hot "
-        f"at {check.hottest:.0f} K",
-        (check.hottest, high),
-        (check.hottest - 170.0, 0.97 * high),
+    low = min(result.error_at_hottest for result in check.results)
+    upper.text(
+        check.hottest - 55.0,
+        0.99 * high,
+        f"{low:.0f} to {high:.0f} K too hot\nat {check.hottest:.0f} K",
         ha="right",
         va="top",
         fontsize=9,
-        arrowprops={"arrowstyle": "-", "color": GREY, "lw": 0.8},
     )
     upper.axvline(check.calibrated_to, color="black", lw=0.8, ls=":")
     upper.text(check.calibrated_to + 4.0, -0.27 * high, "end of hot plate", fontsize=8)
@@ -263,7 +267,7 @@ def paper_check(check: PaperCheck) -> Figure:
         xlim=(temperature[0], temperature[-1]),
         ylim=(-0.33 * high, 1.15 * high),
     )
-    upper.legend(fontsize=8, frameon=False, loc="upper center")
+    upper.legend(fontsize=8, frameon=False, loc="upper left")
     bars: list[tuple[str, float, str]] = [
         ("as published", check.knee_measured - check.knee_predicted, GREY)
     ]
@@ -271,7 +275,7 @@ def paper_check(check: PaperCheck) -> Figure:
         bars.append(
             (result.name.split(":")[0] + ",\ncurvature corrected", result.discrepancy, color)
         )
-    for level, (label, value, color) in enumerate(reversed(bars)):
+    for level, (_, value, color) in enumerate(reversed(bars)):
         lower.barh(level, value, color=color, height=0.6)
         lower.text(
             value + 0.8,
@@ -285,18 +289,12 @@ def paper_check(check: PaperCheck) -> Figure:
         xlabel="knee temperature, measured − predicted (K)",
         xlim=(0.0, 1.45 * (check.knee_measured - check.knee_predicted)),
     )
-    figure.suptitle(_wrapped(check.conclusion()), fontsize=9.5, ha="center")
+    figure.suptitle("\n".join(textwrap.wrap(check.conclusion(), 92)), fontsize=9.5)
     return figure
 
 
-def _wrapped(text: str, width: int = 92) -> str:
-    import textwrap
-
-    return "\n".join(textwrap.wrap(text, width))
-
-
 def one_spectrum(line: Line) -> Figure:
-    """One spectrum with its fit and the residual in standard deviations of photon noise."""
+    """One spectrum with its fit and what the fit leaves."""
     x, y = line.spectrum.x, line.spectrum.y
     inside = (x >= WINDOW[0]) & (x <= WINDOW[1])
     x, y = x[inside], y[inside]
@@ -311,13 +309,19 @@ def one_spectrum(line: Line) -> Figure:
         upper.plot(fine, peak.baseline(fine), ":", color="black", lw=1.0, label="background")
         hit = np.isin(x, peak.spikes)
         residual = y - peak.model(x)
-        if hit.any():
-            upper.plot(x[hit], y[hit], "x", color=ORANGE, ms=7, label="cosmic ray, left out")
-            residual = np.where(hit, np.nan, residual)
+        if peak.clipped is not None:
+            upper.axvspan(*peak.clipped, color=ORANGE, alpha=0.2, lw=0, label="clipped, left out")
+            residual = np.where((x >= peak.clipped[0]) & (x <= peak.clipped[1]), np.nan, residual)
         label = f"{peak.centre:.3f} ± {peak.centre_stderr:.3f} cm⁻¹"
         upper.axvline(peak.centre, color=GREEN, lw=0.9, ls="--", label=label)
         reach = float(peak.model(fine).max()) - float(y.min())
-        upper.set_ylim(float(y.min()) - 0.08 * reach, float(y.min()) + 1.35 * reach)
+        top = float(y.min()) + 1.35 * reach
+        upper.set_ylim(float(y.min()) - 0.08 * reach, top)
+        if hit.any():
+            # a spike above the frame is marked at its edge
+            shown = np.minimum(y[hit], top - 0.03 * reach)
+            upper.plot(x[hit], shown, "x", color=ORANGE, ms=7, label="cosmic ray, left out")
+            residual = np.where(hit, np.nan, residual)
     lower.plot(x, residual, ".", ms=3, color=GREY)
     lower.axhline(0.0, color="black", lw=0.8)
     upper.set(ylabel="counts", title=line.spectrum.name)

@@ -124,6 +124,8 @@ class Peak:
         Samples fitted.
     spikes : tuple of float
         Positions of the samples left out as cosmic rays, cm⁻¹.
+    clipped : (float, float) or None
+        Ends of the flat top that was left out, cm⁻¹.
     flags : tuple of str
         Of "cosmic-ray", "saturated", "low-shoulder", "low-band", "edge", "coarse", "misfit".
     """
@@ -145,6 +147,7 @@ class Peak:
     misfit: float = 1.0
     samples: int = 0
     spikes: tuple[float, ...] = ()
+    clipped: tuple[float, float] | None = None
     flags: tuple[str, ...] = field(default=())
 
     def model(self, x: Array) -> Array:
@@ -160,6 +163,11 @@ class Peak:
     def baseline(self, x: Array) -> Array:
         """The sloping background at `x` (cm⁻¹), counts."""
         return np.asarray(self.background + self.slope * (np.asarray(x) - self.origin))
+
+
+def _exp(logarithm: float) -> float:
+    """A width from its logarithm, where a diverging fit may have left any number."""
+    return math.exp(min(max(float(logarithm), -50.0), 50.0))
 
 
 @dataclass(frozen=True)
@@ -188,12 +196,12 @@ class _Problem:
             next_one = 5
             sigma, fano = self.fixed_sigma, 0.0
             if self.fit_sigma:
-                sigma = math.exp(min(p[next_one], 50.0))
+                sigma = _exp(p[next_one])
                 next_one += 1
             if self.fit_fano:
                 fano = float(p[next_one])
                 next_one += 1
-            fwhm = math.exp(min(max(p[1], -50.0), 50.0))
+            fwhm = _exp(p[1])
             unit, slopes = lineshape.line(self.x, float(p[0]), fwhm, fano, sigma)
             part = p[2] * unit
             u = self.x - self.origin
@@ -205,7 +213,7 @@ class _Problem:
             value = part + p[3] + p[4] * u
             if self.with_band:
                 height, centre, log_fwhm = p[next_one : next_one + 3]
-                band_fwhm = math.exp(min(max(log_fwhm, -50.0), 50.0))
+                band_fwhm = _exp(log_fwhm)
                 unit_band, band_slopes = lineshape.band(self.x, float(centre), band_fwhm)
                 value = value + height * unit_band
                 columns += [unit_band, height * band_slopes[0], height * band_slopes[1]]
@@ -451,7 +459,7 @@ def _refine(
 def _with_band(plain: _Solution, clipped: slice | None) -> _Solution | None:
     """The fit with a broad band on the low side, or None if the residuals ask for none."""
     problem = plain.problem
-    centre, fwhm = float(plain.p[0]), math.exp(float(plain.p[1]))
+    centre, fwhm = float(plain.p[0]), _exp(plain.p[1])
     residual = np.where(plain.use, problem.y - plain.value, 0.0) / np.sqrt(plain.variance)
     width = max(0.5 * _BAND_FWHM, min(fwhm, _BAND_FWHM))
     step = float(np.median(np.diff(problem.x)))
@@ -500,7 +508,7 @@ def _sound(fitted: _Solution, band_at: int) -> bool:
         and p[2] > 0
         and p[band_at] > 0
         and x[0] - 10.0 < p[band_at + 1] < p[0]
-        and math.exp(p[1]) < _MAX_FWHM
+        and _exp(p[1]) < _MAX_FWHM
     )
 
 
@@ -514,11 +522,11 @@ def _peak(
         raise missing
     covariance = solution.covariance
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    centre, fwhm, height = float(p[0]), math.exp(float(p[1])), float(p[2])
+    centre, fwhm, height = float(p[0]), _exp(p[1]), float(p[2])
     index = 5
     sigma, fano, fano_error = problem.fixed_sigma, 0.0, 0.0
     if problem.fit_sigma:
-        sigma = math.exp(float(p[index]))
+        sigma = _exp(p[index])
         index += 1
     resolution = sigma / lineshape.SIGMA_PER_FWHM
     step = float(np.median(np.diff(x)))
@@ -536,12 +544,14 @@ def _peak(
     if not (
         LINE_RANGE[0] < centre < LINE_RANGE[1]
         and _MIN_FWHM_SAMPLES * step < observed_width(fwhm, resolution) < _MAX_FWHM
-        and area > DETECTION_SIGMAS * area_error
+        # a clipped line has no known height, but it is there
+        and (clipped is not None or area > DETECTION_SIGMAS * area_error)
+        and area > 0.0
     ):
         raise missing
     found_band = None
     if problem.with_band:
-        found_band = Band(float(p[index + 1]), math.exp(float(p[index + 2])), float(p[index]))
+        found_band = Band(float(p[index + 1]), _exp(p[index + 2]), float(p[index]))
     clean = _without(np.ones_like(use), clipped)
     spiked = x[clean & ~use]
     misfit = _misfit(problem.y - solution.value, solution.variance, use)
@@ -549,10 +559,11 @@ def _peak(
     flags = _flags(solution, width, found_band, bool(spiked.size), clipped is not None, misfit)
     # residuals that are no noise are correlated: fewer samples count than there are
     errors *= math.sqrt(misfit) if misfit > MISFIT_LIMIT else 1.0
+    ends = None
     if clipped is not None:
+        ends = (float(x[clipped.start]), float(x[clipped.stop - 1]))
         # the flanks disagree with the clipped top by as much as detector blooming skews them
-        middle = 0.5 * float(x[clipped.start] + x[clipped.stop - 1])
-        errors[0] = math.hypot(float(errors[0]), centre - middle)
+        errors[0] = math.hypot(float(errors[0]), centre - 0.5 * sum(ends))
     return Peak(
         centre=centre,
         centre_stderr=float(errors[0]),
@@ -571,6 +582,7 @@ def _peak(
         misfit=misfit,
         samples=int(use.sum()),
         spikes=tuple(float(value) for value in spiked),
+        clipped=ends,
         flags=flags,
     )
 

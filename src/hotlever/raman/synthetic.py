@@ -60,8 +60,19 @@ def line_centre(temperature: float) -> float:
 
 
 def line_width(temperature: float) -> float:
-    """Typical full width at half maximum of silicon's line, cm⁻¹: 3.1 at 300 K, 9 at 1150 K."""
+    """Typical full width at half maximum of silicon's line, cm⁻¹: 3 at 300 K, 9 at 1150 K."""
     return float(0.6 + 1.4 * anharmonic.terms(temperature)[0])
+
+
+def true_line(
+    temperature: float, instrument: Instrument | None = None
+) -> tuple[float, float, float]:
+    """Centre (cm⁻¹), width (cm⁻¹) and area (counts cm⁻¹) of the line in `spectrum`."""
+    it = instrument or Instrument()
+    width = line_width(temperature)
+    height = it.gain * it.counts * line_width(300.0) / width
+    area = 0.5 * np.pi * height * width * (1.0 - it.fano**2)
+    return line_centre(temperature) + it.offset, width, area
 
 
 def spectrum(

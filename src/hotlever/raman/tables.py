@@ -16,7 +16,7 @@ from hotlever.errors import InputError
 from hotlever.raman.lineshape import Array
 
 SEPARATORS = ("\t", ";", ",", None)  # None is any run of blanks
-_SAMPLE_LINES = 60
+_SAMPLE_LINES = 40
 _MIN_ROWS = 3
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _KEY_VALUE = re.compile(r"^\s*[#;%!*\"]*\s*([^=:;\t]{1,80}?)\s*(?:[=:;]|\t)+\s*(.*?)\s*$")
@@ -130,6 +130,8 @@ def _dialect(lines: list[str]) -> tuple[str | None, bool]:
             score = (len(wide), len(rows))
             if score > best_score:
                 best, best_score = (separator, comma), score
+            if len(wide) == len(sample):
+                return best
     return best
 
 
