@@ -48,6 +48,7 @@ def pick_columns(table: Table, where: str) -> tuple[Array, Array]:
     if laser is not None:
         with np.errstate(divide="ignore"):
             x = 1e7 / laser - 1e7 / x
+    require_line(x, where)
     others = [j for j in range(values.shape[1]) if j != at]
     y = values[:, _y_column(values, names, others, where)]
     return x, y
@@ -131,3 +132,14 @@ def _y_column(values: Array, names: list[str], others: list[int], where: str) ->
 def _varies(column: Array) -> bool:
     good = column[np.isfinite(column)]
     return bool(good.size and good.max() > good.min())
+
+
+def require_line(x: Array, where: str) -> None:
+    """Raise InputError if these values of an axis (cm⁻¹) do not hold silicon's line."""
+    if not reaches_line(x):
+        good = x[np.isfinite(x)]
+        span = f"from {good.min():g} to {good.max():g}" if good.size else "over no numbers"
+        raise InputError(
+            f"{where}: the axis runs {span}, expected a Raman shift that covers silicon's line "
+            f"at {SILICON_LINE:g} cm⁻¹"
+        )
