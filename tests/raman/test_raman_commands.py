@@ -182,9 +182,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_input_ends_in_one_line_status_2_and_no_file(
-    case, run, examples, tmp_path, monkeypatch
-):
+def test_bad_input_is_one_line_status_2_and_no_file(case, run, examples, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("empty").mkdir()
     Path("tip").symlink_to(examples / "tip")

@@ -47,6 +47,7 @@ DIALECTS = {
         "latin-1"
     ),
     "labspec, utf-8": lambda x, y: (LABSPEC + rows(x, y, end="\r\n")).encode(),
+    "vertical bars": lambda x, y: rows(x, y, " | ").encode(),
     "old mac line ends": lambda x, y: rows(x, y, end="\r").encode(),
     "wire text": lambda x, y: (
         "#Wave\t\t#Intensity\n" + rows(x[::-1], y[::-1], "\t\t", end="\n")
@@ -101,6 +102,29 @@ def test_every_dialect_gives_the_same_spectrum(dialect, silicon, tmp_path):
     found = read_spectrum(file)
     np.testing.assert_allclose(found.x, x, atol=2e-3)
     np.testing.assert_allclose(found.y, y, atol=1e-9)
+
+
+def test_labspec_map_gives_all_its_spectra(silicon, tmp_path):
+    x, y = silicon
+    file = tmp_path / "map.txt"
+    lines = ["\t\t" + "\t".join(f"{a:.3f}" for a in x)]
+    lines += [f"{i}\t5.5\t" + "\t".join(f"{b * (i + 1):.1f}" for b in y) for i in range(2)]
+    file.write_text("\n".join(lines))
+    first, second = read_file(file)
+    assert (first.name, second.name) == ("map.txt[0]", "map.txt[1]")
+    np.testing.assert_allclose(first.x, x)
+    np.testing.assert_allclose(second.y, 2 * y)
+
+
+def test_a_column_that_happens_to_pass_520_is_no_axis(tmp_path):
+    """The virtual lab's bias sweep: V_r runs from 60 to 940 mV."""
+    file = tmp_path / "lever.csv"
+    file.write_text(
+        "V_b (V),I_h (mA),V_r (mV)\n"
+        + "".join(f"{i},{np.sin(i):.4f},{60 + 35 * i}\n" for i in range(1, 26))
+    )
+    with pytest.raises(InputError, match=r"lever\.csv: \d samples between 440 and 600"):
+        read_spectrum(file)
 
 
 def test_labspec_header_is_kept_and_its_sample_temperature_found(silicon, tmp_path):
@@ -182,7 +206,7 @@ BAD = {
         b"".join(b"%d %d\n" % (i, i) for i in range(600, 900)),
         "the axis runs from 600 to 899",
     ),
-    "few rows": (b"500 1\n510 2\n520 3\n530 4\n", "4 rows"),
+    "few rows": (b"500 1\n510 2\n520 3\n530 4\n", "4 samples between 440 and 600"),
     "wavelength without laser": (
         b"Wavelength (nm),Counts\n" + b"".join(b"%d,%d\n" % (i, i % 7) for i in range(500, 600)),
         "does not name the laser",

@@ -95,7 +95,7 @@ def shift(
     --------
     >>> value, slope = shift(900.0, reference=293.0)
     >>> round(float(value), 1), round(float(slope), 3)
-    (-14.9, -0.029)
+    (-14.9, -0.03)
     """
     a, b, da, db = terms(temperature)
     a_ref, b_ref, _, _ = terms(reference)

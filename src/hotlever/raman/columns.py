@@ -15,6 +15,7 @@ SILICON_LINE = 520.0
 MARGIN = 5.0
 """cm⁻¹; and go on this far on both sides."""
 
+_MAP_COLUMNS = 40
 _SHIFT = re.compile(r"raman|shift|rel\.?\s*1/cm|wave\b|#wave|cm-1|cm\^-1|1/cm|cm⁻¹|cm\?1", re.I)
 _ABSOLUTE = re.compile(r"wave\s*numbers?", re.I)
 _WAVELENGTH = re.compile(r"wave\s*length|lambda|\bnm\b|\(nm\)|\[nm\]", re.I)
@@ -30,8 +31,10 @@ _UNWANTED = re.compile(
 )
 
 
-def pick_columns(table: Table, where: str) -> tuple[Array, Array]:
-    """Raman shift (cm⁻¹) and intensity of a table, by the columns' names or their values.
+def pick_spectra(table: Table, where: str) -> list[tuple[Array, Array]]:
+    """Raman shift (cm⁻¹) and intensity, by the columns' names or their values.
+
+    One pair, unless the table is a map: an axis in its first row and a spectrum in each other.
 
     Raises
     ------
@@ -43,6 +46,11 @@ def pick_columns(table: Table, where: str) -> tuple[Array, Array]:
         raise InputError(
             f"{where}: one column of numbers, expected Raman shift (cm⁻¹) and intensity"
         )
+    first = values[0]
+    if values.shape[1] > _MAP_COLUMNS and _is_axis(first) and reaches_line(first):
+        # LabSpec's maps: positions stand before each spectrum, blanks above them
+        axis = np.isfinite(first)
+        return [(first[axis], row[axis]) for row in values[1:]]
     at, laser = _x_column(values, names, table.metadata, where)
     x = values[:, at]
     if laser is not None:
@@ -50,8 +58,7 @@ def pick_columns(table: Table, where: str) -> tuple[Array, Array]:
             x = 1e7 / laser - 1e7 / x
     require_line(x, where)
     others = [j for j in range(values.shape[1]) if j != at]
-    y = values[:, _y_column(values, names, others, where)]
-    return x, y
+    return [(x, values[:, _y_column(values, names, others, where)])]
 
 
 def _x_column(

@@ -592,7 +592,7 @@ def observed_width(lorentzian: float, gaussian: float) -> float:
 
     Examples
     --------
-    >>> observed_width(3.0, 0.0), observed_width(0.0, 2.0)
+    >>> round(observed_width(3.0, 0.0), 3), observed_width(0.0, 2.0)
     (3.0, 2.0)
     """
     return 0.5346 * lorentzian + math.sqrt(0.2166 * lorentzian**2 + gaussian**2)

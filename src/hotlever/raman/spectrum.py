@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from hotlever.errors import InputError
-from hotlever.raman.columns import pick_columns, require_line
+from hotlever.raman.columns import pick_spectra, require_line
 from hotlever.raman.lineshape import Array
+from hotlever.raman.peak import MIN_SAMPLES, WINDOW
 from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
 from hotlever.raman.tables import decode, parse_table
 from hotlever.raman.vendor import VENDOR_READERS, Parts
 
-MIN_SAMPLES = 20
 LARGEST_FILE = 64 * 2**20
 """Bytes; no spectrometer writes a spectrum this long."""
 
@@ -96,18 +96,19 @@ def read_file(path: str | os.PathLike[str]) -> list[Spectrum]:
         raise InputError(f"{file}: the file is empty, expected a Raman spectrum")
     temperature = temperature_in_name(file.stem)
     reader = _vendor_reader(file, raw)
+    metadata: dict[str, str] = {}
     if reader is not None:
         parts = reader(file, raw)
-        names = [file.name] if len(parts) == 1 else [f"{file.name}[{i}]" for i in range(len(parts))]
-        return [
-            _checked(x, y, file.with_name(name), {}, temperature)
-            for name, (x, y) in zip(names, parts, strict=True)
-        ]
-    table = parse_table(decode(raw, str(file)), str(file))
-    x, y = pick_columns(table, str(file))
-    stated = temperature_in_metadata(table.metadata)
-    temperature = stated if stated is not None else temperature
-    return [_checked(x, y, file, table.metadata, temperature)]
+    else:
+        table = parse_table(decode(raw, str(file)), str(file))
+        parts, metadata = pick_spectra(table, str(file)), table.metadata
+        stated = temperature_in_metadata(metadata)
+        temperature = stated if stated is not None else temperature
+    names = [file.name] if len(parts) == 1 else [f"{file.name}[{i}]" for i in range(len(parts))]
+    return [
+        _checked(x, y, file.with_name(name), metadata, temperature)
+        for name, (x, y) in zip(names, parts, strict=True)
+    ]
 
 
 def _vendor_reader(file: Path, raw: bytes) -> Callable[[Path, bytes], Parts] | None:
@@ -240,10 +241,12 @@ def _checked(
     good = np.isfinite(x) & np.isfinite(y)
     x, y = np.asarray(x, dtype=float)[good], np.asarray(y, dtype=float)[good]
     require_line(x, str(where))
-    if x.size < MIN_SAMPLES:
-        raise InputError(
-            f"{where}: {x.size} rows of Raman shift and intensity, expected at least {MIN_SAMPLES}"
-        )
     unique, inverse, counts = np.unique(x, return_inverse=True, return_counts=True)
     y = np.bincount(inverse, weights=y) / counts
+    inside = int(np.count_nonzero((unique >= WINDOW[0]) & (unique <= WINDOW[1])))
+    if inside < MIN_SAMPLES:
+        raise InputError(
+            f"{where}: {inside} samples between {WINDOW[0]:g} and {WINDOW[1]:g} cm⁻¹, expected at "
+            f"least {MIN_SAMPLES} around silicon's line"
+        )
     return Spectrum(unique, y, where.name, metadata, temperature, str(where.parent))

@@ -94,8 +94,8 @@ def spectrum(
 
     Examples
     --------
-    >>> x, y = spectrum(300.0, np.random.default_rng(0))
-    >>> abs(x[y.argmax()] - 522.3) < 1.0
+    >>> x, y = spectrum(300.0, np.random.default_rng(0), Instrument(spike_rate=0.0))
+    >>> bool(abs(x[y.argmax()] - 522.2) < 1.0)
     True
     """
     it = instrument or Instrument()

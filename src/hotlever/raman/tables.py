@@ -15,9 +15,9 @@ import numpy as np
 from hotlever.errors import InputError
 from hotlever.raman.lineshape import Array
 
-SEPARATORS = ("\t", ";", ",", None)  # None is any run of blanks
+SEPARATORS = ("\t", ";", ",", "|", None)  # None is any run of blanks
 _SAMPLE_LINES = 40
-_MIN_ROWS = 3
+_MIN_ROWS = 2
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _KEY_VALUE = re.compile(r"^\s*[#;%!*\"]*\s*([^=:;\t]{1,80}?)\s*(?:[=:;]|\t)+\s*(.*?)\s*$")
 
