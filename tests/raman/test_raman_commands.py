@@ -63,7 +63,7 @@ def test_calibrated_from_a_folder_and_again_from_the_saved_calibration(run, exam
         *("--save-calibration", cal, "--plot", figure, "-o", table_file),
     )
     assert (status, out) == (0, "")
-    assert "calibrated from 5 spectra, 295 to 895 K" in err
+    assert "calibrated from 7 spectra, 295 to 895 K" in err
     assert figure.read_bytes().startswith(b"\x89PNG")
     rows = table(table_file.read_text())
     temperatures = [float(row["temperature_K"]) for row in rows]

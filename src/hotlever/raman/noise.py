@@ -12,9 +12,9 @@ Mask = NDArray[np.bool_]
 
 SPIKE_SIGMAS = 6.0
 """A cosmic ray stands this many standard deviations above the fit."""
-SPIKE_LINE_TOLERANCE = 0.04
-"""How far the true line may differ from the line model, as a part of the line's height,
-before a difference is taken for a cosmic ray."""
+SPIKE_LINE_TOLERANCE = (0.01, 0.04)
+"""How far the true line may differ from the line model, as a part of the line's height, before
+a difference is taken for a cosmic ray: where the fit leaves noise alone, and where it does not."""
 SPIKE_MAX_SAMPLES = 5
 """A cosmic ray hits no more neighbouring samples than this."""
 SPIKE_MAX_STEP = 1.2
@@ -83,7 +83,7 @@ def robust_sigma(residual: Array, model: Array) -> Array:
     return np.asarray(max(scale, 1e-300) * shape)
 
 
-def spikes(y: Array, model: Array, line_part: Array, trusted: Mask) -> Mask:
+def spikes(y: Array, model: Array, line_part: Array, trusted: Mask, tolerance: float) -> Mask:
     """Samples hit by cosmic rays: narrow, and far above the fit.
 
     Parameters
@@ -92,6 +92,8 @@ def spikes(y: Array, model: Array, line_part: Array, trusted: Mask) -> Mask:
         Data, fit, and the silicon line's part of the fit.
     trusted : (n,) bool array
         Samples that the noise is judged by.
+    tolerance : float
+        How far the true line may differ from the model, as a part of the line's height.
 
     Returns
     -------
@@ -101,7 +103,7 @@ def spikes(y: Array, model: Array, line_part: Array, trusted: Mask) -> Mask:
     sigma = robust_sigma(residual[trusted], model[trusted])
     sigma_all = np.sqrt(
         np.interp(np.arange(y.size), np.flatnonzero(trusted), sigma) ** 2
-        + (SPIKE_LINE_TOLERANCE * maximum_filter1d(np.abs(line_part), 5)) ** 2
+        + (tolerance * maximum_filter1d(np.abs(line_part), 5)) ** 2
     )
     score = residual / sigma_all
     hit = score > SPIKE_SIGMAS

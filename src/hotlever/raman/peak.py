@@ -38,6 +38,7 @@ MISFIT_LIMIT = 1.6
 """From this ratio on the residuals are flagged as more than noise."""
 _BAND_GAIN = 20.0  # drop of chi-square that a band with three parameters must bring
 _BAND_FWHM, _BAND_SPREAD = 25.0, 0.6  # soft prior of the band: ln fwhm = ln 25 ± 0.6
+_SMALL_MISFIT = 1.25  # below it the line model is the right one
 _WIDE = 9.0  # cm⁻¹; a line this wide may be two
 _SIGMA_SPREAD = 1.0  # soft prior of an unknown spectrometer response: a factor e
 _NATURAL_WIDTH = (math.log(4.0), 0.7)  # soft prior of ln fwhm, with an unknown response only
@@ -435,7 +436,9 @@ def _refine(
         value, _, part = problem.evaluate(p)
         if not np.all(np.isfinite(value)):
             break
-        new_use = _without(~noise.spikes(y, value, part, use), clipped)
+        strict, lenient = noise.SPIKE_LINE_TOLERANCE
+        tolerance = lenient if _misfit(y - value, variance, use) > _SMALL_MISFIT else strict
+        new_use = _without(~noise.spikes(y, value, part, use, tolerance), clipped)
         # a line seen by one or two samples must not be thrown out as a cosmic ray
         if np.count_nonzero(new_use) < MIN_SAMPLES:
             new_use = use
