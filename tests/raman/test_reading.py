@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hotlever.errors import InputError
-from hotlever.raman.peak import fit_peak
+from hotlever.raman.fit import fit_peak
 from hotlever.raman.spectrum import read_file, read_spectra, read_spectrum, spectrum_files
 from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
 from hotlever.raman.tables import decode, parse_table

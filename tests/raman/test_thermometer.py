@@ -13,7 +13,8 @@ from hotlever.errors import InputError
 from hotlever.raman import anharmonic, synthetic
 from hotlever.raman.calibration import Point, calibrate, load, published
 from hotlever.raman.check import paper_check
-from hotlever.raman.peak import PeakOptions, fit_peak
+from hotlever.raman.fit import fit_peak
+from hotlever.raman.peak import PeakOptions
 from hotlever.raman.published import (
     BALKANSKI1983,
     HEATER_STRESS,

@@ -205,7 +205,7 @@ def _residuals(axes: Axes, calibration: Calibration) -> None:
         mfc="none",
         color=ORANGE,
         ms=5,
-        label=f"line ({np.count_nonzero(out)} of {out.size} outside the band)",
+        label=f"line (filled: {np.count_nonzero(out)} of {out.size} outside the band)",
     )
     axes.plot(found["temperature_K"][out], found["linear_K"][out], "^", color=ORANGE, ms=5)
     axes.plot(

@@ -17,8 +17,6 @@ SPIKE_LINE_TOLERANCE = (0.01, 0.04)
 a difference is taken for a cosmic ray: where the fit leaves noise alone, and where it does not."""
 SPIKE_MAX_SAMPLES = 5
 """A cosmic ray hits no more neighbouring samples than this."""
-SPIKE_MAX_STEP = 1.2
-"""Coarsest axis (cm⁻¹) on which a spike looks narrower than silicon's line."""
 PLATEAU_TOLERANCE = 0.006
 """Samples of a clipped top agree within this part of the line's height."""
 PLATEAU_MIN_SAMPLES = 4
@@ -118,14 +116,8 @@ def spikes(y: Array, model: Array, line_part: Array, trusted: Mask, tolerance: f
     return hit
 
 
-def likely_spikes(y: Array, base: float, step: float) -> Mask:
-    """First guess at cosmic rays, before there is a fit: far above the local median.
-
-    On an axis so coarse (`step`, cm⁻¹) that silicon's line itself covers two or three samples
-    nothing can be told yet, and nothing is.
-    """
-    if step > SPIKE_MAX_STEP:
-        return np.zeros(y.size, dtype=bool)
+def likely_spikes(y: Array, base: float) -> Mask:
+    """First guess at cosmic rays, before there is a fit: far above the local median."""
     window = 9
     padded = np.pad(y, window // 2, mode="reflect")
     local = np.median(np.lib.stride_tricks.sliding_window_view(padded, window), axis=1)

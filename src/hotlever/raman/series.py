@@ -12,7 +12,8 @@ from pathlib import Path
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.raman.calibration import Calibration, Point, calibrate
-from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions, fit_peak
+from hotlever.raman.fit import fit_peak
+from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.stated import kelvin
 from hotlever.raman.tables import decode
