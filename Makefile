@@ -4,7 +4,7 @@
 FORM ?= full
 BIN := .venv/bin
 
-.PHONY: test test-slow reproduce bench lock env clean
+.PHONY: test test-slow reproduce lock env clean
 
 env: .venv/.ready
 

@@ -1,1 +1,20 @@
+"""Probes: shapes, layouts, meshes and the probe file."""
 
+from hotlever.probe.layout import Layout, Region, Taper, Terminal
+from hotlever.probe.mesh import MeshOptions, ProbeMesh, mesh_layout
+from hotlever.probe.probe import Circuit, Probe
+from hotlever.probe.shapes import ThreeLeg, UShape
+
+__all__ = [
+    "Circuit",
+    "Layout",
+    "MeshOptions",
+    "Probe",
+    "ProbeMesh",
+    "Region",
+    "Taper",
+    "Terminal",
+    "ThreeLeg",
+    "UShape",
+    "mesh_layout",
+]

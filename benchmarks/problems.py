@@ -1,0 +1,90 @@
+"""What the benchmarks share: our problems as files for the FEniCS peer, and tables."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hotlever.probe import Probe, ProbeMesh
+
+BIAS = np.linspace(1.0, 11.0, 25)
+PEER = Path(__file__).parent / "fenics" / "peer.py"
+DEBIAN_PYTHON = "/usr/bin/python3"
+
+
+def peer_problem(
+    probe: Probe, mesh: ProbeMesh, *, degree: int, quadrature: int, bias: Sequence[float]
+) -> dict[str, Any]:
+    """Return a mesh, material and circuit as the peer reads them."""
+    layout, triangles = mesh.layout, mesh.triangles
+    regions: dict[str, dict[str, Any]] = {}
+    for index, region in enumerate(layout.regions):
+        regions[str(index)] = {"name": region.name, "doping": "high"}
+        if region.taper is not None:
+            regions[str(index)] |= {
+                "doping": "tapered",
+                "centre_um": region.taper.centre,
+                "axis": region.taper.axis,
+                "length_um": region.taper.length_um,
+            }
+    return {
+        "points_um": triangles.p.T.tolist(),
+        "triangles": triangles.t.T.tolist(),
+        "region": mesh.region.tolist(),
+        "regions": regions,
+        "terminals": {
+            name: triangles.facets[:, facets].T.tolist()
+            for name, facets in mesh.terminal_edges.items()
+        },
+        "tip_um": layout.tip,
+        "thickness_um": layout.thickness_um,
+        "circuit": probe.circuit.model_dump(),
+        "material": probe.material.model_dump(),
+        "bias_V": list(bias),
+        "quadrature_degree": quadrature,
+        "degree": degree,
+    }
+
+
+def solve_with_peer(problem: dict[str, Any], *, plain: bool = False) -> dict[str, Any]:
+    """Solve a problem with legacy FEniCS in a process of its own."""
+    check_peer()
+    with tempfile.TemporaryDirectory() as folder:
+        question, answer = Path(folder, "problem.json"), Path(folder, "result.json")
+        question.write_text(json.dumps(problem))
+        command = [DEBIAN_PYTHON, str(PEER), str(question), "-o", str(answer)]
+        environment = {"PATH": os.environ["PATH"], "HOME": folder, "OMP_NUM_THREADS": "1"}
+        environment["HOME"] = os.environ.get("HOME", folder)  # keeps the peer's compiled forms
+        subprocess.run(
+            command + ["--plain"] * plain, check=True, env=environment, stdout=subprocess.DEVNULL
+        )
+        return json.loads(answer.read_text())
+
+
+def check_peer() -> None:
+    """Stop, saying how to install it, if legacy FEniCS is not there."""
+    found = shutil.which(DEBIAN_PYTHON) and (
+        subprocess.run([DEBIAN_PYTHON, "-c", "import dolfin"], capture_output=True).returncode == 0
+    )
+    if not found:
+        sys.exit("legacy FEniCS is not installed: run benchmarks/fenics/install.sh (Debian)")
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+    """Print a Markdown table."""
+    cells = [list(columns), *[[str(cell) for cell in row] for row in rows]]
+    widths = [max(len(row[k]) for row in cells) for k in range(len(columns))]
+    for number, row in enumerate(cells):
+        line = " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        print(f"| {line} |")
+        if number == 0:
+            print("|" + "|".join("-" * (width + 2) for width in widths) + "|")

@@ -1,0 +1,416 @@
+"""Fitting the material parameters of a lever to measured data."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import lmfit
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from hotlever.errors import ComputationError, InputError
+from hotlever.files import write_text
+from hotlever.fitting.measurement import COLUMNS, OBSERVABLE_SYMBOLS, Measurement
+from hotlever.lever.equations import OBSERVABLES
+from hotlever.lever.lever import OBSERVABLE_COLUMNS, Lever
+from hotlever.materials import PARAMETERS, Material, parameter
+from hotlever.materials.silicon import inversion_temperature
+from hotlever.probe import Probe
+
+Array = NDArray[np.float64]
+
+#: Scaled residual given to trial parameters for which the lever cannot be solved: far beyond
+#: any real one, so that Levenberg-Marquardt turns back.
+_UNSOLVED = 10.0
+
+#: Solved sweeps that most fits need, for a progress bar to fill.
+_USUAL_EVALUATIONS = 10
+
+
+class ForwardModel(Protocol):
+    """What a fit compares the data with."""
+
+    def predict(self, material: Material, bias: Array) -> tuple[Array, Array]:
+        """Return observables (3, n) and sensitivities (3, n, 6) at biases (n,) in any order."""
+        ...
+
+
+class FullModel:
+    """The finite-element lever as a forward model."""
+
+    def __init__(self, lever: Lever) -> None:
+        self._lever = lever
+
+    def predict(self, material: Material, bias: Array) -> tuple[Array, Array]:
+        """Return observables (3, n) and sensitivities (3, n, 6) at biases (n,) in any order."""
+        data = self._lever.with_material(material).sweep(bias, sensitivities=True)
+        values = np.stack([data[OBSERVABLE_COLUMNS[name]].values for name in OBSERVABLES])
+        return values, data.sensitivity.values
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One material parameter after a fit.
+
+    Attributes
+    ----------
+    value : float
+    stderr : float or None
+        Standard error; None if the parameter was fixed or its error could not be estimated.
+    unit : str
+    vary : bool
+    """
+
+    value: float
+    stderr: float | None
+    unit: str
+    vary: bool
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Material parameters found from a measurement.
+
+    Attributes
+    ----------
+    parameters : dict of str to FittedParameter
+    names : list of str
+        The parameters that were varied.
+    correlation : ndarray, shape (len(names), len(names))
+        NaN if it could not be estimated.
+    observables : tuple of str
+        What was fitted.
+    inversion_temperature_K, inversion_temperature_stderr_K : float
+        Of the heater's doping concentration (paper's T_i); the error is NaN if unknown.
+    residual_rms : dict of str to float
+        Per column of a sweep (mA, V, K), for every observable with data, fitted or not.
+    evaluations, steps : int
+        Solved sweeps, and Levenberg-Marquardt steps among them.
+    seconds : float
+    probe : Probe
+        With the fitted material, and the circuit of the measurement.
+    measurement : Measurement
+    notes : list of str
+        What the user should know beside the numbers.
+    """
+
+    parameters: dict[str, FittedParameter]
+    names: list[str]
+    correlation: Array
+    observables: tuple[str, ...]
+    inversion_temperature_K: float
+    inversion_temperature_stderr_K: float
+    residual_rms: dict[str, float]
+    evaluations: int
+    steps: int
+    seconds: float
+    probe: Probe
+    measurement: Measurement
+    notes: list[str] = field(default_factory=list)
+
+    def to_json(self) -> str:
+        """Return the fit file."""
+        content = {
+            "parameters": {name: vars(p) for name, p in self.parameters.items()},
+            "correlation": {"names": self.names, "matrix": self.correlation.tolist()},
+            "observables": list(self.observables),
+            "inversion_temperature_K": self.inversion_temperature_K,
+            "inversion_temperature_stderr_K": self.inversion_temperature_stderr_K,
+            "residual_rms": self.residual_rms,
+            "evaluations": self.evaluations,
+            "steps": self.steps,
+            "seconds": round(self.seconds, 3),
+            "probe": self.probe.values(),
+            "data": {"path": self.measurement.path, "sha256": self.measurement.sha256},
+            "notes": self.notes,
+        }
+        return json.dumps(_without_nan(content), indent=2, ensure_ascii=False) + "\n"
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the fit file, whole or not at all."""
+        write_text(path, self.to_json())
+
+    def model(self, bias: Array | None = None) -> xr.Dataset:
+        """Solve the fitted lever, at the measured biases by default."""
+        return Lever(self.probe).sweep(self.measurement.bias_V if bias is None else bias)
+
+
+def fit(
+    measurement: Measurement,
+    probe: Probe | None = None,
+    *,
+    observables: Sequence[str] | None = None,
+    fixed: Mapping[str, float | None] | None = None,
+    model: Callable[[Probe], ForwardModel] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Fit:
+    """Find the material parameters that make the model match a measurement.
+
+    Levenberg-Marquardt (lmfit) with the exact Jacobian; every observable is divided by its
+    largest measured value, as in the paper. The start is the probe's material.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    probe : Probe, optional
+        The reference probe by default. The measurement's series resistance and base
+        temperature win over the probe's.
+    observables : sequence of {"current", "reader", "tip"}, optional
+        Option I of the paper is ``["current"]``, option II ``["current", "reader"]``, option
+        III all three. All that the measurement has, by default.
+    fixed : mapping of str to float or None, optional
+        Parameters to hold, at a value or (None) at the probe's.
+    model : callable, optional
+        Makes the forward model of a probe; the finite-element lever by default.
+    progress : callable, optional
+        Called after every solved sweep with their number and how many there usually are.
+
+    Raises
+    ------
+    InputError
+        If a name does not exist, an observable has no data, a fixed value is impossible, or
+        there are fewer data than parameters.
+    ComputationError
+        If the lever cannot be solved at the start, or the fit does not converge.
+    """
+    began = time.perf_counter()
+    probe, notes = with_measured_circuit(probe or Probe.reference(), measurement)
+    fixed = dict(fixed or {})
+    chosen = _chosen(observables, measurement)
+    start = _held(probe.material, fixed)
+    varied = [name for name in PARAMETERS if name not in fixed]
+    used = np.any(np.isfinite([measurement.observable(name) for name in chosen]), axis=0)
+    problem = _LeastSquares(
+        (model or _full_model)(probe.with_values(start.model_dump())),
+        start,
+        measurement,
+        used,
+        chosen,
+        varied,
+        progress,
+    )
+    if problem.size < len(varied):
+        raise InputError(
+            f"{measurement.path or 'measurement'}: {problem.size} data for {len(varied)} "
+            "parameters; fix some or measure more"
+        )
+    result = problem.solve()
+    material = problem.material(result.params)
+    fitted_probe = probe.model_copy(update={"material": material})
+    parameters = {
+        name: FittedParameter(
+            value=getattr(material, name),
+            stderr=problem.stderr(result, name),
+            unit=PARAMETERS[name].unit,
+            vary=name in varied,
+        )
+        for name in PARAMETERS
+    }
+    covariance = problem.covariance(result)
+    return Fit(
+        parameters=parameters,
+        names=varied,
+        correlation=_correlation(covariance),
+        observables=chosen,
+        inversion_temperature_K=float(inversion_temperature(material.n_d, material.p)),
+        inversion_temperature_stderr_K=_inversion_error(material, varied, covariance),
+        residual_rms=problem.residual_rms(result.params),
+        evaluations=problem.evaluations,
+        steps=int(problem.steps),
+        seconds=time.perf_counter() - began,
+        probe=fitted_probe,
+        measurement=measurement,
+        notes=notes,
+    )
+
+
+def with_measured_circuit(probe: Probe, measurement: Measurement) -> tuple[Probe, list[str]]:
+    """Return the probe in the circuit of the measurement, and a note on each difference."""
+    changes, notes = {}, []
+    for name in ("series_resistance_ohm", "base_temperature_K"):
+        measured, assumed = getattr(measurement, name), getattr(probe.circuit, name)
+        if measured is not None and not np.isclose(measured, assumed, rtol=1e-9):
+            changes[name] = measured
+            notes.append(
+                f"{name}: the data file's {measured:g} is used, not the probe's {assumed:g}"
+            )
+    return probe.with_values(changes), notes
+
+
+class _LeastSquares:
+    """Scaled residuals and their Jacobian, for lmfit."""
+
+    def __init__(
+        self,
+        model: ForwardModel,
+        start: Material,
+        measurement: Measurement,
+        used: NDArray[np.bool_],
+        observables: tuple[str, ...],
+        varied: list[str],
+        progress: Callable[[int, int], None] | None,
+    ) -> None:
+        self._model, self._start, self._varied = model, start, varied
+        self._measurement, self._progress = measurement, progress
+        self._bias = measurement.bias_V[used]
+        self._rows = [OBSERVABLES.index(name) for name in observables]
+        data = np.stack([measurement.observable(name)[used] for name in observables])
+        self._scale = np.nanmax(np.abs(data), axis=1, keepdims=True)
+        self._data, self._present = data, np.isfinite(data)
+        self.size = int(self._present.sum())
+        self.evaluations = 0
+        self.steps = 0
+        self._at: Material | None = None
+        self._prediction: tuple[Array, Array] | None = None
+
+    def solve(self) -> Any:
+        """Run Levenberg-Marquardt."""
+        parameters = lmfit.Parameters()
+        for name in self._varied:
+            known = PARAMETERS[name]
+            value = getattr(self._start, name)
+            if not known.lower < value < known.upper:
+                raise InputError(
+                    f"{name} = {value:g} to start from, expected a value between "
+                    f"{known.lower:g} and {known.upper:g} {known.unit}"
+                )
+            parameters.add(
+                name,
+                value=value / known.scale,
+                min=known.lower / known.scale,
+                max=known.upper / known.scale,
+            )
+        minimizer = lmfit.Minimizer(self._residual, parameters, max_nfev=200)
+        result = minimizer.leastsq(Dfun=self._jacobian, xtol=1e-5, ftol=1e-8)
+        if not result.success:
+            raise ComputationError(f"the fit did not converge: {result.message}")
+        return result
+
+    def material(self, parameters: Any) -> Material:
+        """Return the material of lmfit's scaled parameters."""
+        values = {name: parameters[name].value * PARAMETERS[name].scale for name in self._varied}
+        return self._start.model_copy(update=values)
+
+    def stderr(self, result: Any, name: str) -> float | None:
+        """Return the standard error of a parameter in its own unit."""
+        if name not in self._varied or result.params[name].stderr is None:
+            return None
+        return float(result.params[name].stderr * PARAMETERS[name].scale)
+
+    def covariance(self, result: Any) -> Array:
+        """Return the covariance of the varied parameters in their own units."""
+        scale = np.array([PARAMETERS[name].scale for name in self._varied])
+        covariance = getattr(result, "covar", None)
+        if covariance is None:
+            return np.full((scale.size, scale.size), np.nan)
+        scaled: Array = covariance * np.outer(scale, scale)
+        return scaled
+
+    def residual_rms(self, parameters: Any) -> dict[str, float]:
+        """Return the rms of data minus model per column, for every observable with data."""
+        values, _ = self._predict(self.material(parameters))
+        used = np.isin(self._measurement.bias_V, self._bias)
+        rms = {}
+        for row, name in enumerate(OBSERVABLES):
+            difference = self._measurement.observable(name)[used] - values[row]
+            if np.isfinite(difference).any():
+                rms[OBSERVABLE_COLUMNS[name]] = float(np.sqrt(np.nanmean(difference**2)))
+        return rms
+
+    def _residual(self, parameters: Any) -> Array:
+        try:
+            values, _ = self._predict(self.material(parameters))
+        except ComputationError:
+            if self.evaluations == 1:
+                raise
+            return np.full(self.size, _UNSOLVED)
+        return ((values[self._rows] - self._data) / self._scale)[self._present]
+
+    def _jacobian(self, parameters: Any) -> Array:
+        # Levenberg-Marquardt asks for this once per step, at parameters it has just accepted
+        self.steps += 1
+        _, sensitivities = self._predict(self.material(parameters))
+        columns = [list(PARAMETERS).index(name) for name in self._varied]
+        scale = np.array([PARAMETERS[name].scale for name in self._varied])
+        scaled = sensitivities[self._rows][:, :, columns] * scale / self._scale[:, :, None]
+        return scaled[self._present]
+
+    def _predict(self, material: Material) -> tuple[Array, Array]:
+        if self._prediction is None or material != self._at:
+            self._at, self._prediction = material, None
+            self.evaluations += 1
+            self._prediction = self._model.predict(material, self._bias)
+            if self._progress is not None:
+                self._progress(self.evaluations, max(_USUAL_EVALUATIONS, self.evaluations))
+        return self._prediction
+
+
+def _full_model(probe: Probe) -> ForwardModel:
+    return FullModel(Lever(probe))
+
+
+def _chosen(observables: Sequence[str] | None, measurement: Measurement) -> tuple[str, ...]:
+    """Check the observables asked for; all that have data, by default."""
+    if observables is None:
+        return measurement.observables
+    for name in observables:
+        if not np.isfinite(measurement.observable(name)).any():
+            raise InputError(
+                f"{measurement.path or 'measurement'}: no values of {name} "
+                f"(column {OBSERVABLE_SYMBOLS[name]}); it has "
+                f"{', '.join(measurement.observables)}"
+            )
+    if not observables:
+        raise InputError(f"no observables; expected some of {', '.join(OBSERVABLES)}")
+    return tuple(name for name in OBSERVABLES if name in observables)
+
+
+def _held(material: Material, fixed: Mapping[str, float | None]) -> Material:
+    """Return the starting material with the fixed values in place."""
+    values = {}
+    for name, value in fixed.items():
+        parameter(name)
+        if value is not None:
+            values[name] = value
+    if len(fixed) >= len(PARAMETERS):
+        raise InputError("all parameters are fixed; nothing is left to fit")
+    return material.with_(**values)
+
+
+def _correlation(covariance: Array) -> Array:
+    spread = np.sqrt(np.diag(covariance))
+    return covariance / np.outer(spread, spread)
+
+
+def _inversion_error(material: Material, varied: list[str], covariance: Array) -> float:
+    """Standard error of T_i from the covariance of n_d and p, by central differences."""
+    slope = np.zeros(len(varied))
+    for place, name in enumerate(varied):
+        if name in ("n_d", "p"):
+            step = 1e-4 * getattr(material, name)
+            high, low = (
+                material.model_copy(update={name: getattr(material, name) + sign * step})
+                for sign in (1, -1)
+            )
+            slope[place] = (
+                inversion_temperature(high.n_d, high.p) - inversion_temperature(low.n_d, low.p)
+            ) / (2 * step)
+    return float(np.sqrt(slope @ covariance @ slope))
+
+
+def _without_nan(value: Any) -> Any:
+    """Replace NaN by None: JSON has no NaN."""
+    if isinstance(value, dict):
+        return {key: _without_nan(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(entry) for entry in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+__all__ = ["COLUMNS", "Fit", "FittedParameter", "ForwardModel", "FullModel", "fit"]

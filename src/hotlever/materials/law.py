@@ -1,0 +1,94 @@
+"""What every material law has in common: derivatives, a range, and calm beyond it.
+
+A law is a plain function of arrays. It returns its value and a dict of exact partial
+derivatives, keyed by argument name. The decorator `law` notes the temperature range that the
+law is meant for and replaces the temperature by `limited_temperature`, so that an iterate of
+Newton's method that strays to 20 K or 10⁵ K meets a finite, smooth, monotone continuation and
+can come back. Results outside the range are never silent: `LeverSweep` states them.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, Protocol, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+Partials = dict[str, Array]
+
+#: Between these temperatures (K) every law follows its formula to the letter.
+FORMULA_FROM, FORMULA_TO = 200.0, 1700.0
+#: Width (K) over which a law levels off outside.
+LEVELLING = 100.0
+
+
+class Law(Protocol):
+    """A material law: ``value, partials = law(T, ...)``."""
+
+    temperature_range: tuple[float, float]
+    formula: Callable[..., tuple[Array, Partials]]
+    source: str
+
+    def __call__(self, *args: Any, **kwargs: Any) -> tuple[Array, Partials]:
+        """Evaluate the law and its partial derivatives."""
+        ...
+
+
+def limited_temperature(T: ArrayLike) -> tuple[Array, Array]:
+    """Return a temperature that levels off outside the laws' formulas, and its derivative.
+
+    The identity from 200 to 1700 K; beyond, a tanh approaches 100 K and 1800 K. Twice
+    continuously differentiable and monotone.
+
+    Parameters
+    ----------
+    T : array_like
+        Temperature (K), any real number.
+
+    Returns
+    -------
+    limited, derivative : ndarray
+        Temperature (K) between 100 and 1800 K and its derivative with respect to `T`.
+
+    Examples
+    --------
+    >>> limited, slope = limited_temperature([293.0, 1e6])
+    >>> limited.tolist(), slope.tolist()
+    ([293.0, 1800.0], [1.0, 0.0])
+    """
+    T = np.asarray(T, dtype=float)
+    inside = np.clip(T, FORMULA_FROM, FORMULA_TO)
+    beyond = np.tanh((T - inside) / LEVELLING)
+    return inside + LEVELLING * beyond, 1.0 - beyond**2
+
+
+def law(
+    *, meant_for: tuple[float, float], source: str
+) -> Callable[[Callable[..., tuple[Array, Partials]]], Law]:
+    """Make a law of a formula in T: see the module's text.
+
+    Parameters
+    ----------
+    meant_for : tuple of float
+        Temperature range (K) in which the formula describes measurements.
+    source : str
+        Equation number and reference.
+    """
+
+    def decorate(formula: Callable[..., tuple[Array, Partials]]) -> Law:
+        @functools.wraps(formula)
+        def limited(T: ArrayLike, *args: Any, **kwargs: Any) -> tuple[Array, Partials]:
+            temperature, slope = limited_temperature(T)
+            value, partials = formula(temperature, *args, **kwargs)
+            return value, {**partials, "T": partials["T"] * slope}
+
+        result = cast(Any, limited)
+        result.temperature_range = meant_for
+        result.formula = formula
+        result.source = source
+        return cast(Law, result)
+
+    return decorate

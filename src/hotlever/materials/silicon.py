@@ -1,0 +1,374 @@
+"""Silicon: thermal conductivity, carriers, mobilities and electrical conductivity.
+
+Equations 4 to 11 of Spieser et al., J. Appl. Phys. 121, 174503 (2017),
+doi:10.1063/1.4981883, called "the paper" below. Units are the paper's: cm, V, A, W, K.
+Every function returns its value and the partial derivatives with respect to its arguments;
+see `hotlever.materials.law` for the convention and for what happens outside a law's range.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import elementwise
+
+from hotlever.materials.law import FORMULA_TO, Array, Partials, law
+
+#: Boltzmann constant (eV/K), CODATA 2018.
+BOLTZMANN = 8.617333262e-5
+#: Elementary charge (C) as rounded in Eq. 5.
+ELEMENTARY_CHARGE = 1.6e-19
+#: Eq. 9 prints 0.746 for (m_e/m_h)^½; the masses it quotes, 0.33 and 0.55, give 0.775.
+#: The printed number is kept because the published parameters were fitted with it.
+HOLE_IMPURITY_RATIO = 0.746
+#: Eq. 10, (m_e/m_h)^(5/2).
+HOLE_PHONON_RATIO = 0.279
+
+
+@law(meant_for=(290.0, 1300.0), source="Eq. 4; Fulkerson et al., Phys. Rev. 167, 765 (1968)")
+def thermal_conductivity(T: ArrayLike, c_kappa: float = 1.0) -> tuple[Array, Partials]:
+    """Thermal conductivity of silicon, c_κ κ_Si(T) (Eq. 4).
+
+    Parameters
+    ----------
+    T : array_like
+        Temperature (K); meant for 290 to 1300 K.
+    c_kappa : float
+        Reduction by phonon scattering in a thin structure.
+
+    Returns
+    -------
+    kappa : ndarray
+        W cm⁻¹ K⁻¹.
+    partials : dict
+        ``T``, ``c_kappa``.
+
+    Notes
+    -----
+    The slope of 1/κ steps at 680 K through a tanh that is 1 K wide; its derivative is exact.
+
+    Examples
+    --------
+    >>> kappa, _ = thermal_conductivity([300.0, 680.0, 1000.0])
+    >>> (100 * kappa).round(1).tolist()  # W/(m K)
+    [141.4, 52.5, 30.8]
+    """
+    T = np.asarray(T, dtype=float)
+    above = T - 680.0
+    step = np.tanh(above)
+    resistivity = 0.707 + 3.15e-3 * (T - 300.0) + 5.25e-4 * (1.0 + step) * above
+    slope = 3.15e-3 + 5.25e-4 * (1.0 + step + above * (1.0 - step**2))
+    silicon = 1.0 / resistivity
+    return c_kappa * silicon, {"T": -c_kappa * slope * silicon**2, "c_kappa": silicon}
+
+
+@law(
+    meant_for=(200.0, 1300.0), source="Eq. 7; Berggren and Sernelius, Phys. Rev. B 24, 1971 (1981)"
+)
+def band_gap(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
+    """Band gap of doped silicon with band-gap narrowing (Eq. 7, second line).
+
+    Parameters
+    ----------
+    T : array_like
+        Temperature (K).
+    n : array_like
+        Doping concentration (cm⁻³).
+
+    Returns
+    -------
+    gap : ndarray
+        eV.
+    partials : dict
+        ``T``, ``n``.
+
+    Examples
+    --------
+    >>> band_gap(300.0, 0.0)[0].round(4).item()
+    1.1245
+    """
+    T, n = np.asarray(T, dtype=float), np.asarray(n, dtype=float)
+    narrowing = 0.025 * np.cbrt(n / 1e18)
+    gap = 1.17 - 4.73e-4 * T**2 / (T + 636.0) - narrowing
+    with np.errstate(divide="ignore", invalid="ignore"):
+        d_n = -narrowing / (3.0 * n)
+    return gap, {"T": -4.73e-4 * T * (T + 2 * 636.0) / (T + 636.0) ** 2, "n": d_n}
+
+
+@law(meant_for=(200.0, 1300.0), source="Eq. 7; Altermatt et al. (1999)")
+def intrinsic_density(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
+    """Intrinsic carrier density (Eq. 7, first line).
+
+    Parameters
+    ----------
+    T : array_like
+        Temperature (K).
+    n : array_like
+        Doping concentration (cm⁻³), which narrows the gap.
+
+    Returns
+    -------
+    n_i : ndarray
+        cm⁻³.
+    partials : dict
+        ``T``, ``n``.
+
+    Examples
+    --------
+    >>> n_i, _ = intrinsic_density(300.0, 0.0)
+    >>> f"{n_i:.2e}"
+    '9.68e+09'
+    """
+    T = np.asarray(T, dtype=float)
+    gap, d_gap = band_gap.formula(T, n)
+    two_kT = 2.0 * BOLTZMANN * T
+    n_i = 2.70e19 * (T / 300.0) ** 1.5 * np.exp(-gap / two_kT)
+    return n_i, {
+        "T": n_i * (1.5 / T + (gap / T - d_gap["T"]) / two_kT),
+        "n": -n_i * d_gap["n"] / two_kT,
+    }
+
+
+@law(meant_for=(200.0, 1300.0), source="Eq. 6")
+def electron_density(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
+    """Electron density in n-doped silicon (Eq. 6, first line).
+
+    Parameters
+    ----------
+    T : array_like
+        Temperature (K).
+    n : array_like
+        Doping concentration (cm⁻³).
+
+    Returns
+    -------
+    n_e : ndarray
+        cm⁻³.
+    partials : dict
+        ``T``, ``n``.
+    """
+    return _carriers(T, n)[0]
+
+
+@law(meant_for=(200.0, 1300.0), source="Eq. 6")
+def hole_density(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
+    """Hole density in n-doped silicon, n_i²/n_e (Eq. 6, second line).
+
+    Parameters and returns as in `electron_density`.
+    """
+    return _carriers(T, n)[1]
+
+
+def _carriers(T: ArrayLike, n: ArrayLike) -> tuple[tuple[Array, Partials], tuple[Array, Partials]]:
+    """Electrons and holes together, as they share n_i."""
+    n = np.asarray(n, dtype=float)
+    n_i, d_i = intrinsic_density.formula(T, n)
+    root = np.sqrt(n**2 + 4.0 * n_i**2)
+    electrons = 0.5 * (n + root)
+    holes = n_i**2 / electrons
+    # n_e - n_h = n and n_e n_h = n_i² give (n_e + n_h) dn_e = n_e dn + 2 n_i dn_i
+    d_T = 2.0 * n_i * d_i["T"] / root
+    d_n = (electrons + 2.0 * n_i * d_i["n"]) / root
+    return (electrons, {"T": d_T, "n": d_n}), (holes, {"T": d_T, "n": d_n - 1.0})
+
+
+def impurity_mobility(n: ArrayLike, carrier: str = "electron") -> tuple[Array, Partials]:
+    """Mobility limited by impurity scattering (Eq. 9).
+
+    Parameters
+    ----------
+    n : array_like
+        Doping concentration (cm⁻³).
+    carrier : {"electron", "hole"}
+        Holes take the printed ratio 0.746 (see `HOLE_IMPURITY_RATIO`).
+
+    Returns
+    -------
+    mobility : ndarray
+        cm² V⁻¹ s⁻¹.
+    partials : dict
+        ``n``.
+
+    Examples
+    --------
+    >>> impurity_mobility(1e18)[0].item()
+    410.0
+    """
+    n = np.asarray(n, dtype=float)
+    ratio = 1.0 if carrier == "electron" else HOLE_IMPURITY_RATIO
+    mobility = ratio * 4.1e11 / np.sqrt(n)
+    return mobility, {"n": -0.5 * mobility / n}
+
+
+@law(meant_for=(290.0, 1300.0), source="Eq. 10; Dürig, J. Appl. Phys. 98, 044906 (2005)")
+def phonon_mobility(T: ArrayLike, p: float, carrier: str = "electron") -> tuple[Array, Partials]:
+    """Mobility limited by phonon scattering (Eq. 10).
+
+    Parameters
+    ----------
+    T : array_like
+        Temperature (K).
+    p : float
+        Phonon scattering exponent.
+    carrier : {"electron", "hole"}
+        Holes take the printed ratio 0.279.
+
+    Returns
+    -------
+    mobility : ndarray
+        cm² V⁻¹ s⁻¹.
+    partials : dict
+        ``T``, ``p``.
+
+    Examples
+    --------
+    >>> phonon_mobility(600.0, p=2.0)[0].item()
+    400.0
+    """
+    T = np.asarray(T, dtype=float)
+    ratio = 1.0 if carrier == "electron" else HOLE_PHONON_RATIO
+    cold = 300.0 / T
+    mobility = ratio * 1.6e3 * cold**p
+    return mobility, {"T": -p * mobility / T, "p": mobility * np.log(cold)}
+
+
+def _mobility(T: Array, n: Array, p: float, carrier: str) -> tuple[Array, Partials]:
+    """Combine impurity and phonon scattering by Matthiessen's rule (Eq. 8)."""
+    impurity, d_impurity = impurity_mobility(n, carrier)
+    phonon, d_phonon = phonon_mobility.formula(T, p, carrier)
+    share = 1.0 / (impurity + phonon)
+    by_phonon, by_impurity = (impurity * share) ** 2, (phonon * share) ** 2
+    return impurity * phonon * share, {
+        "T": by_phonon * d_phonon["T"],
+        "p": by_phonon * d_phonon["p"],
+        "n": by_impurity * d_impurity["n"],
+    }
+
+
+@law(meant_for=(290.0, 1300.0), source="Eq. 8")
+def mobility(
+    T: ArrayLike, n: ArrayLike, p: float, carrier: str = "electron"
+) -> tuple[Array, Partials]:
+    """Carrier mobility by Matthiessen's rule (Eq. 8).
+
+    Parameters
+    ----------
+    T : array_like
+        Temperature (K).
+    n : array_like
+        Doping concentration (cm⁻³).
+    p : float
+        Phonon scattering exponent.
+    carrier : {"electron", "hole"}
+
+    Returns
+    -------
+    mobility : ndarray
+        cm² V⁻¹ s⁻¹.
+    partials : dict
+        ``T``, ``n``, ``p``.
+    """
+    return _mobility(np.asarray(T, dtype=float), np.asarray(n, dtype=float), p, carrier)
+
+
+@law(meant_for=(290.0, 1300.0), source="Eq. 5")
+def conductivity_low_doped(T: ArrayLike, n: ArrayLike, p: float) -> tuple[Array, Partials]:
+    """Electrical conductivity of the low-doped silicon of heater and reader (Eq. 5).
+
+    Parameters
+    ----------
+    T : array_like
+        Temperature (K); meant for 290 to 1300 K.
+    n : array_like
+        Local doping concentration (cm⁻³), see `hotlever.materials.doping`.
+    p : float
+        Phonon scattering exponent.
+
+    Returns
+    -------
+    sigma : ndarray
+        S cm⁻¹.
+    partials : dict
+        ``T``, ``n``, ``p``.
+    """
+    T, n = np.asarray(T, dtype=float), np.asarray(n, dtype=float)
+    sigma: Array = np.zeros(np.broadcast(T, n).shape)
+    total: Partials = {"T": sigma, "n": sigma, "p": sigma}
+    for carrier, (density, d_density) in zip(("electron", "hole"), _carriers(T, n), strict=True):
+        speed, d_speed = _mobility(T, n, p, carrier)
+        sigma = sigma + ELEMENTARY_CHARGE * density * speed
+        total = {
+            name: total[name]
+            + ELEMENTARY_CHARGE
+            * (density * d_speed[name] + (d_density[name] * speed if name in d_density else 0.0))
+            for name in total
+        }
+    return sigma, total
+
+
+@law(meant_for=(290.0, 1300.0), source="Eq. 11; Chapman et al., J. Appl. Phys. 34, 3291 (1963)")
+def conductivity_high_doped(T: ArrayLike, a0: float, a1: float) -> tuple[Array, Partials]:
+    """Electrical conductivity of the quasi-metallic high-doped silicon (Eq. 11).
+
+    Parameters
+    ----------
+    T : array_like
+        Temperature (K); meant for temperatures above 300 K.
+    a0 : float
+        Resistivity at 300 K (Ω cm).
+    a1 : float
+        Temperature coefficient of the resistivity (Ω cm K⁻¹).
+
+    Returns
+    -------
+    sigma : ndarray
+        S cm⁻¹.
+    partials : dict
+        ``T``, ``a0``, ``a1``.
+
+    Examples
+    --------
+    >>> sigma, _ = conductivity_high_doped(300.0, a0=1e-3, a1=1e-6)
+    >>> sigma.item()
+    1000.0
+    """
+    above = np.asarray(T, dtype=float) - 300.0
+    sigma = 1.0 / (a0 + a1 * above)
+    d_resistivity = -(sigma**2)
+    return sigma, {
+        "T": d_resistivity * a1,
+        "a0": d_resistivity,
+        "a1": d_resistivity * above,
+    }
+
+
+def inversion_temperature(n: ArrayLike, p: float) -> Array:
+    """Temperature at which the resistivity of low-doped silicon is highest, dρ/dT = 0.
+
+    Parameters
+    ----------
+    n : array_like
+        Doping concentration (cm⁻³).
+    p : float
+        Phonon scattering exponent.
+
+    Returns
+    -------
+    ndarray
+        Inversion temperature T_i (K), of the shape of `n`; NaN where the resistivity has no
+        maximum between 300 and 1700 K, as at very high doping.
+
+    Examples
+    --------
+    >>> inversion_temperature([4.10e17], p=2.64).round(0).tolist()
+    [805.0]
+    """
+    n = np.asarray(n, dtype=float)
+    cold, hot = np.full(n.shape, 300.0), np.full(n.shape, FORMULA_TO)
+
+    def slope(T: Array, n: Array) -> Array:
+        sigma, partials = conductivity_low_doped(T, n, p)
+        return partials["T"] / sigma
+
+    root = elementwise.find_root(slope, (cold, hot), args=(n,))
+    return np.where(root.success, root.x, np.nan)

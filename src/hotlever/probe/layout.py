@@ -1,0 +1,131 @@
+"""A probe's layout: named regions, terminals and the tip, all in the plane of the lever.
+
+A parametric shape (`hotlever.probe.shapes`) or any other source makes a `Layout`; meshing,
+drawing and solving know only this. Lengths are in µm.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+Point = tuple[float, float]
+
+#: What a region is to the measuring circuit: R_h, R_l1, R_l2 of the paper's Fig. 1(c), or
+#: the reader branch, which carries no current.
+Part = Literal["heater", "leg 1", "leg 2", "reader branch"]
+
+
+@dataclass(frozen=True)
+class Taper:
+    """Axis along which the doping of a low-doped region is tapered.
+
+    Attributes
+    ----------
+    centre : tuple of float
+        Centre of the heater (µm).
+    axis : tuple of float
+        Unit vector along the current.
+    length_um : float
+        Geometrical length l_h (µm).
+    """
+
+    centre: Point
+    axis: Point
+    length_um: float
+
+
+@dataclass(frozen=True)
+class Region:
+    """A polygon of one kind of silicon: high-doped, or low-doped with a taper."""
+
+    name: str
+    part: Part
+    outline: tuple[Point, ...]
+    taper: Taper | None = None
+
+
+@dataclass(frozen=True)
+class Terminal:
+    """A straight edge held at the base temperature, where current may enter or leave.
+
+    The names ``supply``, ``ground`` and ``reader`` have a meaning for the circuit.
+    """
+
+    name: str
+    start: Point
+    end: Point
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A lever seen from above.
+
+    Attributes
+    ----------
+    regions : tuple of Region
+        Polygons that tile the lever and share whole edges or parts of them.
+    terminals : tuple of Terminal
+        Among them ``supply`` and ``ground``; ``reader`` if the lever has one.
+    tip : tuple of float
+        Position of the tip (µm).
+    thickness_um : float
+        Thickness of the silicon (µm).
+    """
+
+    regions: tuple[Region, ...]
+    terminals: tuple[Terminal, ...]
+    tip: Point
+    thickness_um: float
+
+    @property
+    def heater(self) -> Region:
+        """The region that heats the tip."""
+        return next(region for region in self.regions if region.part == "heater")
+
+    @property
+    def heater_taper(self) -> Taper:
+        """Axis and length of the heater."""
+        taper = self.heater.taper
+        if taper is None:
+            raise ValueError("the heater of a layout must be low-doped, with a taper")
+        return taper
+
+    def terminal(self, name: str) -> Terminal | None:
+        """Return the terminal of this name, or None if the layout has none."""
+        return next((terminal for terminal in self.terminals if terminal.name == name), None)
+
+    def reentrant_corners(self) -> list[Point]:
+        """Corners where the silicon spans more than 180°, at which fields are singular."""
+        corners = {_rounded(point) for region in self.regions for point in region.outline}
+        return sorted(
+            corner
+            for corner in corners
+            if math.pi + 1e-6
+            < sum(_angle_at(corner, region.outline) for region in self.regions)
+            < 2 * math.pi - 1e-6
+        )
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> tuple[Point, ...]:
+    """Outline of an axis-parallel rectangle, counter-clockwise."""
+    return ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
+
+
+def _rounded(point: Point) -> Point:
+    return round(point[0], 6), round(point[1], 6)
+
+
+def _angle_at(point: Point, outline: tuple[Point, ...]) -> float:
+    """Angle (rad) that a counter-clockwise polygon spans at `point` on its outline, else 0."""
+    for i, corner in enumerate(outline):
+        before, after = outline[i - 1], outline[(i + 1) % len(outline)]
+        if math.dist(point, corner) < 1e-6:
+            inward = math.atan2(before[1] - corner[1], before[0] - corner[0])
+            outward = math.atan2(after[1] - corner[1], after[0] - corner[0])
+            return (inward - outward) % (2 * math.pi)
+        along = math.dist(corner, point) + math.dist(point, after) - math.dist(corner, after)
+        if abs(along) < 1e-9 and math.dist(point, after) > 1e-6:
+            return math.pi
+    return 0.0

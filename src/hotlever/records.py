@@ -1,0 +1,51 @@
+"""Immutable, checked records: the base of everything a probe file holds."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from hotlever.errors import InputError, unknown_name
+
+
+class Record(BaseModel):
+    """A frozen pydantic model whose errors are one line that names the key.
+
+    Raises
+    ------
+    InputError
+        From `of` and `with_`, on a missing, misspelt or impossible value.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def of(cls, values: dict[str, Any], where: str) -> Self:
+        """Check `values` and make a record; `where` names their origin in an error."""
+        try:
+            return cls.model_validate(values)
+        except ValidationError as error:
+            raise explained(error, cls, where) from None
+
+    def with_(self, **changes: Any) -> Self:
+        """Return a copy with some values changed, checked again."""
+        return type(self).of({**self.model_dump(), **changes}, type(self).__name__.lower())
+
+
+def explained(error: ValidationError, record: type[BaseModel], where: str) -> InputError:
+    """Turn pydantic's report into one line: the place, what was found, what is expected.
+
+    A misspelt key also leaves the right one missing, so it is reported first.
+    """
+    reports = error.errors(include_url=False)
+    first = min(reports, key=lambda report: report["type"] != "extra_forbidden")
+    key = str(first["loc"][-1]) if first["loc"] else ""
+    if first["type"] == "extra_forbidden":
+        return unknown_name("key", key, record.model_fields, where)
+    if first["type"] == "missing":
+        return InputError(f"{where}: {key} is missing")
+    message = first["msg"].removeprefix("Value error, ")
+    if not key:
+        return InputError(f"{where}: {message}")
+    return InputError(f"{where}: {key} = {first['input']!r}: {message[0].lower()}{message[1:]}")

@@ -1,0 +1,52 @@
+"""Fixtures shared by the tests."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from hotlever.cli import main
+from hotlever.lever import Lever
+from hotlever.probe import MeshOptions, Probe
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def lever() -> Lever:
+    """The reference lever on the default mesh."""
+    return Lever(Probe.reference())
+
+
+@pytest.fixture(scope="session")
+def coarse() -> Lever:
+    """The reference lever on a coarse mesh: for what does not depend on accuracy."""
+    return Lever(Probe.reference(), MeshOptions(refinement=0.4))
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of shared data; tests that need it are skipped where it is not there."""
+    folder = Path(os.environ.get("HOTLEVER_SHARED", ROOT.parent / "shared"))
+    if not folder.is_dir():
+        pytest.skip(f"the shared data are not there ({folder})")
+    return folder
+
+
+@pytest.fixture
+def run(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., tuple[int, str, str]]:
+    """Run the command line in an empty folder; returns exit status, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as ended:
+            main([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        return int(ended.value.code or 0), captured.out, captured.err
+
+    return call

@@ -1,0 +1,178 @@
+"""Fits of twins whose truth is known, and of the example."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import as_file, files
+
+import numpy as np
+import pytest
+
+from hotlever.errors import ComputationError, InputError
+from hotlever.fitting import Measurement, fit, read_measurement
+from hotlever.fitting.fit import FullModel, with_measured_circuit
+from hotlever.lever import Lever
+from hotlever.materials import PARAMETERS
+from hotlever.probe import Probe
+
+TRUTH = {"c_kappa": 0.66, "delta": 0.69, "n_d": 4.6e17, "p": 2.72, "a0": 9.9e-4, "a1": 1.18e-6}
+BIAS = np.linspace(1, 11, 13)
+
+
+def twin(lever: Lever, noise: float = 0.0, **settings) -> Measurement:
+    """A measurement made by the model itself."""
+    sweep = lever.with_material(lever.probe.material.with_(**TRUTH)).sweep(BIAS)
+    rng = np.random.default_rng(5)
+
+    def noisy(values):
+        return values.values * (1 + noise * rng.normal(size=values.size))
+
+    empty = np.full(BIAS.size, np.nan)
+    return Measurement(
+        BIAS, noisy(sweep.current_mA), noisy(sweep.reader_V), noisy(sweep.tip_K), empty, **settings
+    )
+
+
+@pytest.fixture(scope="module")
+def coarse_model(coarse):
+    """The coarse lever as forward model: the same equations on both sides."""
+    return lambda probe: FullModel(Lever(probe, space=coarse.space))
+
+
+@pytest.fixture(scope="module")
+def exact_fit(coarse, coarse_model):
+    return fit(twin(coarse), model=coarse_model)
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_exact_data_give_the_true_parameters(exact_fit, name):
+    assert exact_fit.parameters[name].value == pytest.approx(TRUTH[name], rel=1e-4)
+
+
+def test_a_good_optimum_needs_few_steps(exact_fit):
+    assert exact_fit.steps <= 10
+    assert max(exact_fit.residual_rms.values()) < 0.01
+
+
+def test_noise_gives_errors_of_its_size(coarse, coarse_model):
+    result = fit(twin(coarse, noise=2e-3), model=coarse_model)
+    for name, fitted in result.parameters.items():
+        assert fitted.stderr is not None
+        assert abs(fitted.value - TRUTH[name]) < 4 * fitted.stderr
+    assert np.allclose(np.diag(result.correlation), 1.0)
+    assert np.allclose(result.correlation, result.correlation.T)
+    assert 0 < result.inversion_temperature_stderr_K < 60
+
+
+def test_fixed_parameters_are_held_and_marked(coarse, coarse_model):
+    result = fit(twin(coarse), fixed={"n_d": TRUTH["n_d"], "a1": None}, model=coarse_model)
+    assert result.parameters["n_d"].value == TRUTH["n_d"]
+    assert result.parameters["a1"].value == coarse.probe.material.a1
+    assert result.parameters["n_d"].stderr is None
+    assert not result.parameters["n_d"].vary
+    assert result.names == ["c_kappa", "delta", "p", "a0"]
+    assert result.correlation.shape == (4, 4)
+
+
+def test_only_the_chosen_observables_enter(coarse, coarse_model):
+    data = twin(coarse)
+    wrong_tip = Measurement(
+        data.bias_V, data.current_mA, data.reader_V, data.tip_K + 100, data.tip_error_K
+    )
+    result = fit(wrong_tip, observables=["reader", "current"], model=coarse_model)
+    assert result.observables == ("current", "reader")
+    assert result.residual_rms["tip_K"] == pytest.approx(100, abs=5)
+    assert result.parameters["c_kappa"].value == pytest.approx(TRUTH["c_kappa"], rel=0.02)
+
+
+def test_order_and_repetition_of_the_rows_do_not_matter(coarse, coarse_model, exact_fit):
+    data = twin(coarse)
+    rows = np.r_[np.random.default_rng(0).permutation(BIAS.size), 3, 3]
+    mixed = Measurement(
+        data.bias_V[rows],
+        data.current_mA[rows],
+        data.reader_V[rows],
+        data.tip_K[rows],
+        data.tip_error_K[rows],
+    )
+    result = fit(mixed, model=coarse_model)
+    for name in PARAMETERS:
+        assert result.parameters[name].value == pytest.approx(
+            exact_fit.parameters[name].value, rel=1e-3
+        )
+
+
+def test_the_measured_circuit_wins_and_a_note_says_so(coarse):
+    probe, notes = with_measured_circuit(
+        Probe.reference(), twin(coarse, series_resistance_ohm=5000.0, base_temperature_K=293.0)
+    )
+    assert probe.circuit.series_resistance_ohm == 5000.0
+    assert notes == ["series_resistance_ohm: the data file's 5000 is used, not the probe's 5600"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"observables": ["tipp"]}, "did you mean 'tip'"),
+        ({"observables": []}, "no observables"),
+        ({"fixed": {"ckappa": 1.0}}, "did you mean 'c_kappa'"),
+        ({"fixed": {"p": -1.0}}, "p = -1.0: input should be greater than 0"),
+        ({"fixed": dict.fromkeys(PARAMETERS)}, "nothing is left to fit"),
+    ],
+)
+def test_impossible_requests_are_refused(coarse, options, message):
+    with pytest.raises(InputError, match=message):
+        fit(twin(coarse), **options)
+
+
+def test_an_observable_without_data_is_refused(coarse):
+    data = twin(coarse)
+    empty = np.full(BIAS.size, np.nan)
+    no_tip = Measurement(data.bias_V, data.current_mA, data.reader_V, empty, empty)
+    with pytest.raises(InputError, match=r"no values of tip \(column T_tip\)"):
+        fit(no_tip, observables=["tip"])
+
+
+def test_too_few_data_are_refused(coarse):
+    one = Measurement(*(np.array([value]) for value in (5.0, 0.7, 0.3, 380.0, 5.0)))
+    with pytest.raises(InputError, match="3 data for 6 parameters"):
+        fit(one)
+
+
+def test_an_unsolvable_start_is_reported(coarse, coarse_model):
+    data = twin(coarse, series_resistance_ohm=0.0)
+    with pytest.raises(ComputationError, match="branch of a slow bias ramp ends"):
+        fit(data, model=coarse_model)
+
+
+def test_fit_file_has_the_keys_of_the_contract(exact_fit, tmp_path):
+    exact_fit.write(tmp_path / "fit.json")
+    content = json.loads((tmp_path / "fit.json").read_text())
+    assert set(content["parameters"]) == set(PARAMETERS)
+    for entry in content["parameters"].values():
+        assert set(entry) == {"value", "stderr", "unit", "vary"}
+    assert set(content["correlation"]) == {"names", "matrix"}
+    assert set(content["residual_rms"]) == {"current_mA", "reader_V", "tip_K"}
+    assert {
+        "observables",
+        "inversion_temperature_K",
+        "evaluations",
+        "seconds",
+        "probe",
+    } <= set(content)
+    assert set(content["data"]) == {"path", "sha256"}
+    assert Probe.from_values(content["probe"], "fit") == exact_fit.probe
+
+
+def test_example_fit_on_the_full_mesh():
+    """The virtual-lab lever: an independent solver's data, noise of a few kelvin and 0.3 %."""
+    with as_file(files("hotlever") / "examples" / "lever-a.csv") as path:
+        result = fit(read_measurement(path))
+    assert result.steps <= 10
+    assert result.residual_rms["current_mA"] < 0.004
+    assert result.residual_rms["reader_V"] < 0.001
+    # the file's own temperature errors are 5 to 24 K
+    assert result.residual_rms["tip_K"] < 10.0
+    for fitted in result.parameters.values():
+        assert fitted.stderr is not None
+        assert fitted.stderr < 0.1 * fitted.value

@@ -1,0 +1,90 @@
+"""Sweeps as files: CSV, NetCDF, VTU."""
+
+from __future__ import annotations
+
+import json
+
+import meshio
+import numpy as np
+import pytest
+import xarray as xr
+
+from hotlever.errors import InputError
+from hotlever.lever import probe_of, read_sweep, write_sweep
+from hotlever.lever.fields import FieldMapper, heater_profile, write_vtu
+from hotlever.materials.silicon import inversion_temperature
+
+HEADER = "bias_V,current_mA,lever_V,reader_V,tip_K,power_mW,heater_ohm,legs_ohm"
+
+
+@pytest.fixture(scope="module")
+def sweep(coarse):
+    return coarse.sweep([1.0, 8.0])
+
+
+def test_csv_has_the_columns_of_the_contract(sweep, tmp_path):
+    write_sweep(sweep, tmp_path / "a.csv")
+    lines = (tmp_path / "a.csv").read_text().splitlines()
+    assert lines[0] == HEADER
+    assert len(lines) == 3
+    row = dict(zip(HEADER.split(","), map(float, lines[2].split(",")), strict=True))
+    assert row["power_mW"] == pytest.approx(row["lever_V"] * row["current_mA"])
+    assert row["tip_K"] == pytest.approx(sweep.tip_K.values[1], rel=1e-9)
+
+
+def test_netcdf_round_trip_keeps_units_and_the_probe(sweep, coarse, tmp_path):
+    write_sweep(sweep, tmp_path / "a.nc")
+    back = read_sweep(tmp_path / "a.nc")
+    xr.testing.assert_identical(back, sweep)
+    assert probe_of(back) == coarse.probe
+    for name in HEADER.split(","):
+        assert back[name].dims == ("bias",)
+        assert {"units", "long_name"} <= set(back[name].attrs)
+    assert json.loads(back.attrs["material"])["c_kappa"] == 0.686
+    assert back.attrs["software"].startswith("hotlever ")
+
+
+def test_other_file_types_are_refused(sweep, tmp_path):
+    with pytest.raises(InputError, match=r"unknown file type '.xls', expected .csv or .nc"):
+        write_sweep(sweep, tmp_path / "a.xls")
+
+
+def test_what_is_no_sweep_is_refused(tmp_path):
+    (tmp_path / "text.nc").write_text("hello")
+    with pytest.raises(InputError, match="not a NetCDF file"):
+        read_sweep(tmp_path / "text.nc")
+    with pytest.raises(InputError, match="no such file"):
+        read_sweep(tmp_path / "none.nc")
+    xr.Dataset({"x": ("a", [1.0])}).to_netcdf(tmp_path / "other.nc")
+    with pytest.raises(InputError, match="variable 'bias_V' is missing"):
+        read_sweep(tmp_path / "other.nc")
+
+
+def test_vtu_holds_the_fields(coarse, tmp_path):
+    state = coarse.solve([8.3]).states[0]
+    fields = FieldMapper(coarse).map(state.x)
+    write_vtu(fields, tmp_path / "a.vtu")
+    mesh = meshio.read(tmp_path / "a.vtu")
+    seen = coarse.equations.observe(state.x)
+    assert mesh.point_data["temperature_K"].max() == pytest.approx(seen["max_K"], abs=1.0)
+    assert mesh.point_data["potential_V"].max() == pytest.approx(seen["lever_V"])
+    # the current through the middle of the centre leg: density times cross-section
+    centre = mesh.points[mesh.cells_dict["triangle"]].mean(axis=1)
+    leg = (np.abs(centre[:, 0] - 20) < 4) & (np.abs(centre[:, 1]) < 3.2)
+    density = mesh.cell_data["current_density_mA_um2"][0][leg, 0]
+    np.testing.assert_allclose(density * 6.44 * 0.4, seen["current_mA"], rtol=0.01)
+
+
+def test_heater_profile_spans_the_heater(coarse):
+    state = coarse.solve([8.3]).states[0]
+    profile = heater_profile(coarse, state.x, count=41)
+    material = coarse.probe.material
+    assert profile.position.values[[0, -1]] == pytest.approx([-2, 2])
+    middle = profile.isel(position=20)
+    assert middle.temperature.item() == pytest.approx(coarse.equations.tip_temperature(state.x))
+    assert middle.doping.item() == pytest.approx(material.n_d, rel=0.02)
+    assert middle.inversion_temperature.item() == pytest.approx(
+        inversion_temperature(material.n_d, material.p), abs=1.5
+    )
+    # at the knee the middle is inverted, the ends are not (paper's Fig. 7b)
+    assert profile.resistivity_slope.values[20] < 0 < profile.resistivity_slope.values[0]

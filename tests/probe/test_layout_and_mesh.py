@@ -1,0 +1,123 @@
+"""Layouts and their meshes."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hotlever.errors import InputError
+from hotlever.probe import MeshOptions, Probe, mesh_layout
+
+PROBES = {"three-leg": Probe.reference(), "u-shape": Probe.u_shape()}
+
+
+def polygon_area(outline):
+    x, y = np.array(outline).T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+@pytest.mark.parametrize("name", PROBES)
+def test_mesh_tiles_every_region(name):
+    layout = PROBES[name].layout()
+    mesh = mesh_layout(layout)
+    corners = mesh.triangles.p[:, mesh.triangles.t]
+    (ax, ay), (bx, by) = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    areas = np.abs(ax * by - ay * bx) / 2
+    for index, region in enumerate(layout.regions):
+        assert areas[mesh.region == index].sum() == pytest.approx(polygon_area(region.outline))
+
+
+@pytest.mark.parametrize("name", PROBES)
+def test_terminals_have_edges_of_their_full_length(name):
+    layout = PROBES[name].layout()
+    mesh = mesh_layout(layout)
+    for terminal in layout.terminals:
+        a, b = mesh.triangles.p[
+            :, mesh.triangles.facets[:, mesh.terminal_edges[terminal.name]]
+        ].T.swapaxes(0, 1)
+        length = np.linalg.norm(a - b, axis=1).sum()
+        assert length == pytest.approx(math.dist(terminal.start, terminal.end))
+
+
+def test_reference_probe_has_the_published_parts():
+    layout = Probe.reference().layout()
+    assert {terminal.name for terminal in layout.terminals} == {"supply", "ground", "reader"}
+    assert layout.tip == (pytest.approx(48.58), 0.0)
+    assert layout.heater_taper.length_um == 4.0
+    assert [region.name for region in layout.regions if region.taper] == ["heater", "reader"]
+
+
+def test_reentrant_corners_of_the_reference_probe():
+    corners = Probe.reference().layout().reentrant_corners()
+    expected = [(46.58, 0.8225), (50.58, 0.8225), (50.58, 6.42)]
+    assert sorted(corners) == sorted([*expected, *((x, -y) for x, y in expected)])
+
+
+def test_mesh_is_graded_to_heater_and_corners():
+    layout = Probe.reference().layout()
+    mesh = mesh_layout(layout)
+    p, facets = mesh.triangles.p, mesh.triangles.facets
+    length = np.linalg.norm(p[:, facets[0]] - p[:, facets[1]], axis=0)
+    middle = p[:, facets].mean(axis=1)
+    for corner in layout.reentrant_corners():
+        near = np.linalg.norm(middle - np.array(corner)[:, None], axis=0) < 0.1
+        assert length[near].min() < 0.06
+        assert length[near].max() < 0.25
+    assert length.max() > 2.0
+
+
+def test_refinement_divides_the_sizes():
+    layout = Probe.reference().layout()
+    coarse, fine = (
+        mesh_layout(layout, MeshOptions(refinement=r)).triangles.nelements for r in (1.0, 2.0)
+    )
+    assert fine > 1.8 * coarse
+
+
+def test_mesh_is_made_in_well_under_a_second():
+    # generous: this guards against a blow-up, the benchmark measures
+    layout = Probe.reference().layout()
+    mesh_layout(layout)
+    began = time.perf_counter()
+    mesh_layout(layout)
+    assert time.perf_counter() - began < 1.0
+
+
+def test_the_tip_lies_in_the_heater_and_outside_points_are_refused(coarse):
+    nodes, weights = coarse.space.operators.point_weights(coarse.space.mesh.layout.tip)
+    x = coarse.space.operators.nodes
+    np.testing.assert_allclose(x[:, nodes] @ weights, (48.58, 0.0), atol=1e-9)
+    with pytest.raises(InputError, match="outside the lever"):
+        coarse.space.operators.point_weights((0.0, 100.0))
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.floats(30, 120),
+    st.floats(2, 10),
+    st.floats(1.5, 6),
+    st.floats(1.5, 8),
+    st.floats(1.5, 8),
+    st.floats(1.5, 8),
+    st.floats(0.4, 3),
+)
+def test_any_sensible_three_leg_lever_meshes(length, centre, outer, gap, bridge, heater, width):
+    probe = Probe.reference().with_values(
+        {
+            "length_um": length,
+            "centre_leg_width_um": centre,
+            "outer_leg_width_um": outer,
+            "gap_um": gap,
+            "bridge_width_um": bridge,
+            "heater_length_um": heater,
+            "heater_width_um": width,
+            "reader_length_um": 3.0,
+        }
+    )
+    mesh = mesh_layout(probe.layout())
+    assert 100 < mesh.triangles.nelements < 6000

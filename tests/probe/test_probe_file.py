@@ -1,0 +1,115 @@
+"""Probe files: round trip, defaults, and errors that name the key."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+
+from hotlever.errors import InputError
+from hotlever.probe import Probe, ThreeLeg
+
+CONTRACT = """
+[probe]
+shape = "three-leg"            # "u-shape" too; more later
+length_um = 54.4                # base to front edge
+centre_leg_width_um = 6.44
+outer_leg_width_um = 3.46
+gap_um = 3.2
+bridge_width_um = 3.82
+heater_length_um = 4.0
+heater_width_um = 1.645
+thickness_um = 0.4
+reader_length_um = 4.0
+
+[circuit]
+series_resistance_ohm = 5600
+base_temperature_K = 293
+
+[material]
+c_kappa = 0.686
+delta = 0.647
+n_d = 5.75e17
+p = 2.65
+a0 = 9.34e-4
+a1 = 1.11e-6
+n_hd = 2.2e20
+"""
+
+
+def read(tmp_path, text):
+    path = tmp_path / "probe.toml"
+    path.write_text(text, encoding="utf-8")
+    return Probe.from_file(path)
+
+
+def test_the_file_of_the_contract_is_the_reference_probe(tmp_path):
+    assert read(tmp_path, CONTRACT) == Probe.reference()
+
+
+@pytest.mark.parametrize("probe", [Probe.reference(), Probe.u_shape()], ids=["three", "u"])
+def test_written_file_reads_back_the_same_and_comments_every_key(tmp_path, probe):
+    text = probe.to_toml()
+    assert read(tmp_path, text) == probe
+    entries = [line for line in text.splitlines() if "=" in line and not line.startswith("#")]
+    assert all("#" in line for line in entries if "shape" not in line)
+    assert set(tomllib.loads(text)) == {"probe", "circuit", "material"}
+
+
+def test_left_out_sections_take_the_reference_values(tmp_path):
+    text = CONTRACT.split("[circuit]")[0] + "[material]\nn_d = 4e17\n"
+    probe = read(tmp_path, text)
+    assert probe.circuit == Probe.reference().circuit
+    assert probe.material == Probe.reference().material.with_(n_d=4e17)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "gap_um",
+            "gapp_um",
+            r"probe.toml: \[probe\]: unknown key 'gapp_um': did you mean 'gap_um'",
+        ),
+        ("gap_um = 3.2", "", r"\[probe\]: gap_um is missing"),
+        ("gap_um = 3.2", "gap_um = -1", r"\[probe\]: gap_um = -1: input should be greater than 0"),
+        ("gap_um = 3.2", 'gap_um = "a"', r"gap_um = 'a': input should be a valid number"),
+        ('"three-leg"', '"three-legs"', r"unknown shape 'three-legs': did you mean 'three-leg'"),
+        ("[circuit]", "[circus]", r"unknown section 'circus': did you mean 'circuit'"),
+        (
+            "heater_length_um = 4.0",
+            "heater_length_um = 60",
+            r"heater_length_um = 63.82 must be less",
+        ),
+        ("reader_length_um = 4.0", "reader_length_um = 40", r"the reader .* must lie between"),
+        ("heater_width_um = 1.645", "heater_width_um = 20", r"must be less than the 12.84 µm"),
+        ("= 293", "= 20", r"base_temperature_K = 20: input should be greater than or equal to 250"),
+        (
+            "= 5600",
+            "= -5",
+            r"series_resistance_ohm = -5: input should be greater than or equal to 0",
+        ),
+        ("= 3.2", "= = 3.2", r"probe.toml: not valid TOML: .*line 7"),
+        ("n_d = 5.75e17", "n_d = nan", r"n_d = nan: input should be a finite number"),
+    ],
+)
+def test_errors_name_the_place_and_what_is_expected(tmp_path, old, new, message):
+    with pytest.raises(InputError, match=message) as caught:
+        read(tmp_path, CONTRACT.replace(old, new, 1))
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_file_is_one_line(tmp_path):
+    with pytest.raises(InputError, match=r"nothing.toml: no such file"):
+        Probe.from_file(tmp_path / "nothing.toml")
+
+
+def test_with_values_reaches_every_section_and_answers_a_typo():
+    probe = Probe.reference().with_values(
+        {"a0": 1e-3, "series_resistance_ohm": 0, "gap_um": 4.0, "reader_centre_um": 30.0}
+    )
+    assert isinstance(probe.shape, ThreeLeg)
+    assert (probe.material.a0, probe.circuit.series_resistance_ohm) == (1e-3, 0)
+    assert (probe.shape.gap_um, probe.shape.reader_centre_um) == (4.0, 30.0)
+    with pytest.raises(InputError, match="did you mean 'c_kappa'"):
+        probe.with_values({"ckappa": 1})

@@ -1,0 +1,157 @@
+"""The command line: the contract's commands, exit statuses and one-line errors."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from hotlever import __version__
+from hotlever.probe import Probe
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "lever-a.csv"
+
+
+def test_help_and_version(run):
+    status, out, _ = run("--help")
+    assert status == 0
+    for command in ("probe", "sweep", "fit", "reproduce"):
+        assert command in out
+    assert run("--version")[:2] == (0, f"{__version__}\n")
+    assert run()[0] == 0
+
+
+def test_probe_new_writes_the_reference_probe(run, tmp_path):
+    assert run("probe", "new", "-o", "probe.toml")[0] == 0
+    assert Probe.from_file(tmp_path / "probe.toml") == Probe.reference()
+    status, out, _ = run("probe", "new", "--shape", "u-shape")
+    assert status == 0
+    assert 'shape = "u-shape"' in out
+
+
+def test_probe_show_describes_and_draws(run, tmp_path):
+    run("probe", "new", "-o", "probe.toml")
+    status, out, _ = run("probe", "show", "probe.toml", "--plot", "probe.svg")
+    assert status == 0
+    assert "three-leg, 0.4 µm thick" in out
+    assert "831.3 K" in out
+    assert (tmp_path / "probe.svg").stat().st_size > 1000
+
+
+def test_sweep_prints_csv(run):
+    status, out, _ = run("sweep", "--bias", "1:11:3")
+    assert status == 0
+    rows = list(csv.DictReader(io.StringIO(out)))
+    assert [float(row["bias_V"]) for row in rows] == [1, 6, 11]
+    assert 1150 < float(rows[-1]["tip_K"]) < 1250
+
+
+def test_sweep_writes_files_plot_and_fields(run, tmp_path):
+    status, out, _ = run(
+        "sweep", "--bias", "5:5:1", "--set", "c_kappa=0.7", "--set", "gap_um=3.5",
+        "-o", "a.nc", "--plot", "a.png", "--fields", "fields",
+    )  # fmt: skip
+    assert (status, out) == (0, "")
+    with xr.open_dataset(tmp_path / "a.nc") as data:
+        assert json.loads(data.attrs["material"])["c_kappa"] == 0.7
+        assert json.loads(data.attrs["probe"])["gap_um"] == 3.5
+    assert (tmp_path / "a.png").exists()
+    assert [path.name for path in (tmp_path / "fields").iterdir()] == ["bias_005.0000V.vtu"]
+
+
+def test_sweep_that_ends_early_writes_what_it_reached(run, tmp_path):
+    status, _, err = run(
+        "sweep", "--bias", "1:5:5", "--set", "series_resistance_ohm=0", "-o", "a.csv"
+    )
+    assert status == 1
+    assert "branch of a slow bias ramp ends at a bias of 3.07" in err
+    assert len((tmp_path / "a.csv").read_text().splitlines()) == 4
+
+
+def test_fit_prints_writes_and_reports(run, tmp_path):
+    status, out, err = run(
+        "fit", EXAMPLE, "--fix", "n_d=4.6e17", "--fix", "p", "-o", "fit.json", "--report", "report"
+    )
+    assert status == 0, err
+    assert "inversion temperature" in out
+    assert "fixed" in out
+    content = json.loads((tmp_path / "fit.json").read_text())
+    assert content["parameters"]["n_d"] == {
+        "value": 4.6e17,
+        "stderr": None,
+        "unit": "cm⁻³",
+        "vary": False,
+    }
+    page = (tmp_path / "report" / "index.html").read_text()
+    assert page.count("<img") == 3
+
+
+def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
+    text = EXAMPLE.read_text().replace("5.6", "5.5", 1)
+    (tmp_path / "data.csv").write_text(text)
+    status, _, err = run(
+        "fit", "data.csv", "--observables", "current",
+        "--fix", "delta", "--fix", "p", "--fix", "a0", "--fix", "a1",
+    )  # fmt: skip
+    assert status == 0
+    assert "the data file's 5500 is used, not the probe's 5600" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("sweeep",), "unknown command 'sweeep': did you mean 'sweep'"),
+        (("probe", "shwo"), "unknown command 'shwo': did you mean 'show'"),
+        (("probe", "new", "--shape", "v"), "unknown shape 'v'"),
+        (("probe", "show", "none.toml"), "none.toml: no such file"),
+        (("probe", "show", "--plot", "a.txt"), "a.txt: unknown file type '.txt'"),
+        (("probe", "new", "-o", "no/such/folder/a.toml"), "cannot be written"),
+        (("sweep", "--bias", "1:11"), "expected START:STOP:COUNT"),
+        (("sweep", "--bias", "1:x:3"), "found 'x', expected a number"),
+        (("sweep", "--bias", "1:11:0"), "COUNT is '0'"),
+        (("sweep", "--bias", "1:11:1"), "COUNT 1 goes with START = STOP"),
+        (("sweep", "--bias", "5:1:3"), "expected 0 <= START <= STOP"),
+        (("sweep", "--set", "ckappa=1"), "did you mean 'c_kappa'"),
+        (("sweep", "--set", "c_kappa"), "expected NAME=VALUE"),
+        (("sweep", "--set", "c_kappa=high"), "--set c_kappa: found 'high', expected a number"),
+        (("sweep", "--set", "c_kappa=-1"), "input should be greater than 0"),
+        (("sweep", "--medium", "water"), "--medium water: expected vacuum"),
+        (("sweep", "-o", "a.xls"), "expected .csv or .nc"),
+        (("sweep", "-o", "none/a.csv"), "the folder none does not exist"),
+        (("sweep", "--plot", "a.bmp"), "unknown file type '.bmp'"),
+        (("sweep", "--frobnicate"), "No such option: --frobnicate"),
+        (("fit", "none.csv"), "none.csv: no such file"),
+        (("fit",), "Missing argument"),
+        (("fit", EXAMPLE, "--observables", "tpi"), "did you mean 'tip'"),
+        (("fit", EXAMPLE, "--fix", "nd"), "did you mean 'n_d'"),
+        (("fit", EXAMPLE, "--fix", "n_d=a"), "--fix n_d: found 'a', expected a number"),
+    ],
+)
+def test_bad_input_gets_one_line_and_status_two(run, tmp_path, arguments, message):
+    status, out, err = run(*arguments)
+    assert status == 2
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
+    assert out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_bad_request_leaves_an_existing_file_as_it_was(run, tmp_path):
+    (tmp_path / "a.csv").write_text("mine")
+    assert run("sweep", "--bias", "1:5:5", "--set", "heater_width_um=99", "-o", "a.csv")[0] == 2
+    assert (tmp_path / "a.csv").read_text() == "mine"
+
+
+@pytest.mark.slow
+def test_reproduce_writes_the_page(run, tmp_path):
+    status, out, err = run("reproduce", "--quick", "-o", "page")
+    assert status == 0, err
+    assert out.strip() == "page/index.html"
+    page = (tmp_path / "page" / "index.html").read_text()
+    for figure in ("probe", "iv", "temperature_power", "field_maps", "fit_data_and_model"):
+        assert (tmp_path / "page" / f"{figure}.pdf").exists()
+    assert "Published operating points" in page

@@ -1,0 +1,46 @@
+"""Layouts without a heater, on which exact solutions are known."""
+
+from __future__ import annotations
+
+import numpy as np
+from skfem import MeshTri
+from skfem.element import Element
+
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.operators import FiniteElements
+from hotlever.lever.space import LeverSpace
+from hotlever.materials import Material
+from hotlever.probe import Circuit, Layout, ProbeMesh, Region, Taper, Terminal
+
+
+def bare_equations(
+    mesh: MeshTri,
+    supply: Terminal,
+    ground: Terminal,
+    tip: tuple[float, float],
+    material: Material,
+    *,
+    taper: Taper | None = None,
+    element: Element | None = None,
+    quadrature: int = 6,
+) -> LeverEquations:
+    """Equations of one piece of silicon between two terminals, without a series resistor."""
+    region = Region("all", "heater", ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), taper)
+    layout = Layout((region,), (supply, ground), tip, 0.4)
+    boundary = mesh.boundary_facets()
+
+    def edges(terminal: Terminal):
+        a, b = np.array(terminal.start), np.array(terminal.end)
+        ends = mesh.p[:, mesh.facets[:, boundary]]
+        normal = np.array([-(b - a)[1], (b - a)[0]])
+        on = np.abs(np.tensordot(normal, ends - a[:, None, None], axes=1)).max(axis=0) < 1e-9
+        return boundary[on]
+
+    probe_mesh = ProbeMesh(
+        layout,
+        mesh,
+        np.zeros(mesh.nelements, dtype=np.intp),
+        {"supply": edges(supply), "ground": edges(ground)},
+    )
+    space = LeverSpace(probe_mesh, FiniteElements(mesh, element, quadrature))
+    return LeverEquations(space, Circuit(series_resistance_ohm=0.0), material)

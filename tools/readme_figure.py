@@ -1,0 +1,17 @@
+"""Draw the README's figure: python tools/readme_figure.py docs/lever.png"""
+
+import sys
+
+from PIL import Image
+
+from hotlever import Lever, Probe, save_figure
+from hotlever.lever.fields import FieldMapper
+from hotlever.report.figures import field_maps
+
+lever = Lever(Probe.reference())
+state = lever.solve(lever.knee().bias_V.values).states[0]
+save_figure(field_maps(FieldMapper(lever).map(state.x), lever.space.mesh.layout), sys.argv[1])
+# small enough for a repository
+Image.open(sys.argv[1]).convert("RGB").resize((660, 641), Image.Resampling.LANCZOS).save(
+    sys.argv[1], optimize=True
+)
