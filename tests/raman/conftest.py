@@ -1,8 +1,7 @@
-"""Where the shared data is, and silicon spectra made for the tests."""
+"""Silicon spectra: the shared ones, and those made for the tests."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -11,32 +10,21 @@ import pytest
 from hotlever.raman import synthetic
 
 REPO = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("HOTLEVER_SHARED", REPO.parent / "shared"))
-
-
-def shared(path: str) -> Path:
-    """A path below the shared folder; the test that asks for it skips where it is missing."""
-    found = SHARED / path
-    if not found.exists():
-        pytest.skip(
-            f"needs the shared data: {found} is not there (HOTLEVER_SHARED names its place)"
-        )
-    return found
 
 
 @pytest.fixture
-def real_spectra() -> Path:
-    return shared("data/raman")
+def real_spectra(shared: Path) -> Path:
+    return shared / "data" / "raman"
 
 
 @pytest.fixture
-def hot_plate_files() -> Path:
-    return shared("data/virtual-lab/raman-hot-plate")
+def hot_plate_files(shared: Path) -> Path:
+    return shared / "data" / "virtual-lab" / "raman-hot-plate"
 
 
 @pytest.fixture
-def tip_files() -> Path:
-    return shared("data/virtual-lab/raman-tip")
+def tip_files(shared: Path) -> Path:
+    return shared / "data" / "virtual-lab" / "raman-tip"
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hotlever.cli import main
 from hotlever.cli.raman import spread_option
 from hotlever.errors import InputError
+from hotlever.fitting.measurement import read_measurement
 from hotlever.raman import figures, synthetic
 from hotlever.raman.calibration import published
 from hotlever.raman.check import paper_check
@@ -25,19 +25,6 @@ HEADER = (
     "file,center_cm-1,center_stderr_cm-1,fwhm_cm-1,shift_cm-1,temperature_K,"
     "temperature_error_K,flags"
 )
-
-
-@pytest.fixture
-def run(capsys):
-    """Run the command line; returns exit status, standard output and standard error."""
-
-    def call(*arguments):
-        with pytest.raises(SystemExit) as stopped:
-            main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        return stopped.value.code, captured.out, captured.err
-
-    return call
 
 
 def table(text):
@@ -163,7 +150,7 @@ BAD = {
         ["raman", "tip", "--calibrate-from", "tip"],
         "no temperature in its header or name",
     ),
-    "figure format": (["raman", "tip", "--plot", "f.doc"], "unknown figure format '.doc'"),
+    "figure format": (["raman", "tip", "--plot", "f.doc"], "unknown figure type '.doc'"),
     "output folder": (["raman", "tip", "-o", "none/t.csv"], "cannot be written"),
     "output is a folder": (["raman", "tip", "-o", "empty"], "is a folder"),
     "no spectra": (["raman"], "FILE_OR_DIR"),
@@ -234,6 +221,10 @@ def test_join_gives_the_measurement_file_by_file_column(run, examples, tmp_path)
     assert lines[4] == "V_b (V),I_h (mA),V_r (mV),file,T_tip (K),dT_tip (K)"
     assert lines[5].startswith("1.0000,0.14338,60.12,tip_00.txt,29")
     assert all(float(line.split(",")[-1]) > 0 for line in lines[5:])
+    data = read_measurement(out)
+    assert data.series_resistance_ohm == 5600.0
+    assert np.all(np.diff(data.tip_K) > 0)
+    assert data.tip_error_K.size == 4
 
 
 def test_join_by_bias_in_the_name_leaves_other_rows_empty(tmp_path):

@@ -186,12 +186,13 @@ def raman(
     lines, rows = setup.measure(spectra)
     if plot is not None:
         from hotlever.raman import figures
+        from hotlever.report.style import save_figure
 
         if len(lines) == 1 and setup.calibration is None:
             figure = figures.one_spectrum(lines[0])
         else:
             figure = figures.thermometry(lines, rows, setup.calibration, setup.series)
-        figures.save(figure, plot)
+        save_figure(figure, plot)
     if save_calibration is not None and setup.calibration is not None:
         setup.calibration.save(save_calibration)
     _put(series.to_csv(rows), output)
@@ -251,8 +252,9 @@ def raman_check(
     check = paper_check(law)
     if plot is not None:
         from hotlever.raman import figures
+        from hotlever.report.style import save_figure
 
-        figures.save(figures.paper_check(check), plot)
+        save_figure(figures.paper_check(check), plot)
     if output is not None:
         numbers = {
             "truth": check.calibration.source,

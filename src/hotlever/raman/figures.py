@@ -2,45 +2,22 @@
 
 from __future__ import annotations
 
-import os
 import textwrap
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from hotlever.errors import InputError
-from hotlever.files import whole_file
 from hotlever.raman.calibration import Calibration
 from hotlever.raman.check import PaperCheck
 from hotlever.raman.lineshape import Array
 from hotlever.raman.peak import WINDOW
 from hotlever.raman.series import Line, Row
+from hotlever.report.style import BLACK, BLUE, GREEN, VERMILION, figure, panel_letter
 
-# Okabe and Ito's palette: told apart by colour-blind readers, and in grey by marker and dash
-BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
+GREY = "0.4"
 STACKED = 9
-SUFFIXES = (".png", ".svg", ".pdf")
-
-
-def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure whole or not at all; the suffix of `path` is its format."""
-    suffix = Path(path).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InputError(
-            f"{path}: unknown figure format '{suffix}', expected one of {', '.join(SUFFIXES)}"
-        )
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=160)
-
-
-def _figure(width: float, height: float) -> Figure:
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def thermometry(
@@ -61,12 +38,23 @@ def thermometry(
         The hot-plate spectra, to be stacked in place of `lines`.
     """
     if calibration is None:
-        figure = _figure(4.2, 5.4)
-        _stack(figure.subplots(), lines, [row.file for row in rows])
-        return figure
-    figure = _figure(10.0, 5.4)
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.35), height_ratios=(1.5, 1.0))
-    stack = figure.add_subplot(grid[:, 0])
+        with figure(4.2, 5.4) as made:
+            _stack(made.subplots(), lines, [row.file for row in rows])
+        return made
+    with figure(10.0, 5.4) as made:
+        _three_panels(made, lines, rows, calibration, series)
+    return made
+
+
+def _three_panels(
+    made: Figure,
+    lines: Sequence[Line],
+    rows: Sequence[Row],
+    calibration: Calibration,
+    series: Sequence[Line],
+) -> None:
+    grid = made.add_gridspec(2, 2, width_ratios=(1.0, 1.35), height_ratios=(1.5, 1.0))
+    stack = made.add_subplot(grid[:, 0])
     if series:
         ordered = _by_temperature(series, calibration)
         _stack(stack, [line for _, line in ordered], [f"{t:.0f} K" for t, _ in ordered])
@@ -75,13 +63,12 @@ def thermometry(
             f"{row.temperature:.0f} K" if np.isfinite(row.temperature) else row.file for row in rows
         ]
         _stack(stack, lines, labels)
-    upper = figure.add_subplot(grid[0, 1])
-    lower = figure.add_subplot(grid[1, 1])
+    upper = made.add_subplot(grid[0, 1])
+    lower = made.add_subplot(grid[1, 1])
     _calibration(upper, calibration, rows)
     _residuals(lower, calibration)
     for letter, axes in zip("abc", (stack, upper, lower), strict=True):
-        axes.set_title(f"({letter})", loc="left", fontsize=10)
-    return figure
+        panel_letter(axes, letter)
 
 
 def _by_temperature(series: Sequence[Line], calibration: Calibration) -> list[tuple[float, Line]]:
@@ -125,7 +112,7 @@ def _stack(axes: Axes, lines: Sequence[Line], labels: Sequence[str]) -> None:
     )
     axes.plot([], [], ".", color=GREY, label="counts")
     axes.plot([], [], color=BLUE, label="fit")
-    axes.legend(loc="upper left", fontsize=8, frameon=False)
+    axes.legend(loc="upper left", fontsize=8)
 
 
 def _short(label: str, limit: int = 22) -> str:
@@ -149,7 +136,7 @@ def _calibration(axes: Axes, calibration: Calibration, rows: Sequence[Row]) -> N
         shift,
         line.temperature(shift, room),
         "--",
-        color=ORANGE,
+        color=VERMILION,
         lw=1.4,
         label=f"line: {line.constant_K:.1f} K − {-line.slope_K_cm:.1f} K cm × shift",
     )
@@ -159,7 +146,7 @@ def _calibration(axes: Axes, calibration: Calibration, rows: Sequence[Row]) -> N
             found["temperature_K"],
             "o",
             mfc="none",
-            color="black",
+            color=BLACK,
             ms=4.5,
             label="hot plate",
         )
@@ -179,7 +166,7 @@ def _calibration(axes: Axes, calibration: Calibration, rows: Sequence[Row]) -> N
     axes.set(xlabel="shift against room temperature (cm⁻¹)", ylabel="temperature (K)")
     axes.set_xlim(float(shift.min()) - 0.5, 1.0)
     axes.invert_xaxis()
-    axes.legend(fontsize=8, frameon=False, loc="upper left")
+    axes.legend(fontsize=8, loc="upper left")
 
 
 def _residuals(axes: Axes, calibration: Calibration) -> None:
@@ -195,7 +182,7 @@ def _residuals(axes: Axes, calibration: Calibration) -> None:
     grid = np.linspace(low, high, 100)
     band = calibration.linear.band(grid - room)
     axes.fill_between(
-        grid, -band, band, color=ORANGE, alpha=0.18, lw=0, label="paper: ±(5 K + 0.02 ΔT)"
+        grid, -band, band, color=VERMILION, alpha=0.18, lw=0, label="paper: ±(5 K + 0.02 ΔT)"
     )
     out = np.abs(found["linear_K"]) > found["band_K"]
     axes.plot(
@@ -203,11 +190,11 @@ def _residuals(axes: Axes, calibration: Calibration) -> None:
         found["linear_K"],
         "^",
         mfc="none",
-        color=ORANGE,
+        color=VERMILION,
         ms=5,
         label=f"line (filled: {np.count_nonzero(out)} of {out.size} outside the band)",
     )
-    axes.plot(found["temperature_K"][out], found["linear_K"][out], "^", color=ORANGE, ms=5)
+    axes.plot(found["temperature_K"][out], found["linear_K"][out], "^", color=VERMILION, ms=5)
     axes.plot(
         found["temperature_K"],
         found["anharmonic_K"],
@@ -216,22 +203,27 @@ def _residuals(axes: Axes, calibration: Calibration) -> None:
         ms=3.5,
         label=f"anharmonic (rms {calibration.anharmonic.residual_rms_K:.1f} K)",
     )
-    axes.axhline(0.0, color="black", lw=0.8)
+    axes.axhline(0.0, color=BLACK, lw=0.8)
     reach = max(float(np.abs(found["linear_K"]).max()), float(band.max()))
     axes.set(
         xlabel="hot-plate temperature (K)",
         ylabel="law − hot plate (K)",
         ylim=(-1.3 * reach, 2.3 * reach),
     )
-    axes.legend(fontsize=8, frameon=False, ncol=2, loc="upper left")
+    axes.legend(fontsize=8, ncol=2, loc="upper left")
 
 
 def paper_check(check: PaperCheck) -> Figure:
     """How far a line calibrated to 900 K is off above, and what that does to the knee."""
-    figure = _figure(7.2, 6.4)
-    upper, lower = figure.subplots(2, 1, height_ratios=(1.7, 1.0))
+    with figure(7.2, 6.4) as made:
+        _paper_check(made, check)
+    return made
+
+
+def _paper_check(made: Figure, check: PaperCheck) -> None:
+    upper, lower = made.subplots(2, 1, height_ratios=(1.7, 1.0))
     temperature = np.linspace(check.calibration.room_temperature_K, check.hottest + 25.0, 300)
-    styles = ((ORANGE, "--"), (BLUE, "-."))
+    styles = ((VERMILION, "--"), (BLUE, "-."))
     errors = check.errors(temperature)
     band = check.laws[0][1].band(temperature - check.calibration.room_temperature_K)
     upper.fill_between(
@@ -258,16 +250,16 @@ def paper_check(check: PaperCheck) -> Figure:
         va="top",
         fontsize=9,
     )
-    upper.axvline(check.calibrated_to, color="black", lw=0.8, ls=":")
+    upper.axvline(check.calibrated_to, color=BLACK, lw=0.8, ls=":")
     upper.text(check.calibrated_to + 4.0, -0.27 * high, "end of hot plate", fontsize=8)
-    upper.axhline(0.0, color="black", lw=0.8)
+    upper.axhline(0.0, color=BLACK, lw=0.8)
     upper.set(
         xlabel="true temperature (K), by the anharmonic law",
         ylabel="line reads − true (K)",
         xlim=(temperature[0], temperature[-1]),
         ylim=(-0.33 * high, 1.15 * high),
     )
-    upper.legend(fontsize=8, frameon=False, loc="upper left")
+    upper.legend(fontsize=8, loc="upper left")
     bars: list[tuple[str, float, str]] = [
         ("as published", check.knee_measured - check.knee_predicted, GREY)
     ]
@@ -289,28 +281,34 @@ def paper_check(check: PaperCheck) -> Figure:
         xlabel="knee temperature, measured − predicted (K)",
         xlim=(0.0, 1.45 * (check.knee_measured - check.knee_predicted)),
     )
-    figure.suptitle("\n".join(textwrap.wrap(check.conclusion(), 92)), fontsize=9.5)
-    return figure
+    made.suptitle("\n".join(textwrap.wrap(check.conclusion(), 92)), fontsize=9.5)
 
 
 def one_spectrum(line: Line) -> Figure:
     """One spectrum with its fit and what the fit leaves."""
+    with figure(6.0, 4.6) as made:
+        _one_spectrum(made, line)
+    return made
+
+
+def _one_spectrum(made: Figure, line: Line) -> None:
     x, y = line.spectrum.x, line.spectrum.y
     inside = (x >= WINDOW[0]) & (x <= WINDOW[1])
     x, y = x[inside], y[inside]
-    figure = _figure(6.0, 4.6)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
+    upper, lower = made.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
     upper.plot(x, y, ".", ms=3, color=GREY, label="counts")
     residual: Array = y - float(np.median(y))
     if line.peak is not None:
         peak = line.peak
         fine = np.linspace(x[0], x[-1], 1500)
         upper.plot(fine, peak.model(fine), color=BLUE, lw=1.4, label="fit")
-        upper.plot(fine, peak.baseline(fine), ":", color="black", lw=1.0, label="background")
+        upper.plot(fine, peak.baseline(fine), ":", color=BLACK, lw=1.0, label="background")
         hit = np.isin(x, peak.spikes)
         residual = y - peak.model(x)
         if peak.clipped is not None:
-            upper.axvspan(*peak.clipped, color=ORANGE, alpha=0.2, lw=0, label="clipped, left out")
+            upper.axvspan(
+                *peak.clipped, color=VERMILION, alpha=0.2, lw=0, label="clipped, left out"
+            )
             residual = np.where((x >= peak.clipped[0]) & (x <= peak.clipped[1]), np.nan, residual)
         label = f"{peak.centre:.3f} ± {peak.centre_stderr:.3f} cm⁻¹"
         upper.axvline(peak.centre, color=GREEN, lw=0.9, ls="--", label=label)
@@ -320,11 +318,10 @@ def one_spectrum(line: Line) -> Figure:
         if hit.any():
             # a spike above the frame is marked at its edge
             shown = np.minimum(y[hit], top - 0.03 * reach)
-            upper.plot(x[hit], shown, "x", color=ORANGE, ms=7, label="cosmic ray, left out")
+            upper.plot(x[hit], shown, "x", color=VERMILION, ms=7, label="cosmic ray, left out")
             residual = np.where(hit, np.nan, residual)
     lower.plot(x, residual, ".", ms=3, color=GREY)
-    lower.axhline(0.0, color="black", lw=0.8)
+    lower.axhline(0.0, color=BLACK, lw=0.8)
     upper.set(ylabel="counts", title=line.spectrum.name)
     lower.set(xlabel="Raman shift (cm⁻¹)", ylabel="counts − fit", xlim=WINDOW)
-    upper.legend(fontsize=8, frameon=False)
-    return figure
+    upper.legend(fontsize=8)

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from hotlever.materials.spieser2017 import OPERATING_POINTS
+
 ROOM_TEMPERATURE = 293.0
 """K; the base temperature of Spieser et al. 2017, taken for T_RT where a file says nothing."""
 
@@ -50,7 +52,9 @@ SPIESER2017 = LinearLaw(
     source="Spieser et al., J. Appl. Phys. 121, 174503 (2017), section III, doi:10.1063/1.4981883",
 )
 
-KNEE_PREDICTED = 893.0
+[KNEE_PREDICTED] = [
+    point.tip_K for point in OPERATING_POINTS if point.name == "knee" and point.tip_K is not None
+]
 """K; tip temperature at the knee by simulation, Spieser et al. 2017."""
 KNEE_MEASURED = 943.0
 """K; the same by Raman with the linear law."""
