@@ -1,0 +1,105 @@
+"""Are the standard errors of the line honest? Pulls of synthetic spectra.
+
+Spectra of silicon from 295 to 1150 K with the paper's photon counts, cosmic rays, a sloping
+background and the band of disordered silicon are fitted; a pull is (fitted − true)/standard
+error, and its width is 1 where errors are honest. Target: within 10 %, and no failed fit. The
+peer is what the paper did: an unweighted Lorentzian on a flat background (lmfit).
+Run: python benchmarks/raman_pulls.py [COUNT]
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+
+import lmfit
+import numpy as np
+
+from hotlever.errors import InputError
+from hotlever.raman import PeakOptions, fit_peak, synthetic
+from hotlever.raman.synthetic import Instrument
+
+
+@dataclass(frozen=True)
+class Case:
+    name: str
+    instrument: Instrument
+    options: PeakOptions
+
+
+CASES = (
+    Case("paper's counts, 1 spike each", Instrument(), PeakOptions()),
+    Case("3 spikes each", Instrument(spike_rate=3.0), PeakOptions()),
+    Case("no band", Instrument(band=0.0), PeakOptions()),
+    Case("ten times the counts", Instrument(counts=8500.0), PeakOptions()),
+    Case("gain 3, read noise 10", Instrument(gain=3.0, read_noise=10.0), PeakOptions()),
+    Case(
+        "response 1.5 cm-1, Voigt",
+        Instrument(counts=2000.0, resolution=1.5),
+        PeakOptions(shape="voigt", resolution=1.5),
+    ),
+    Case("1/q = -0.05, Fano", Instrument(fano=-0.05), PeakOptions(shape="fano")),
+)
+
+
+def pulls(case: Case, count: int, seed: int = 2017) -> tuple[np.ndarray, int]:
+    """Pulls of centre, width and area, (spectra, 3), and the number of failed fits."""
+    rng = np.random.default_rng(seed)
+    found, failed = [], 0
+    for _ in range(count):
+        temperature = float(rng.uniform(295.0, 1150.0))
+        x, y = synthetic.spectrum(temperature, rng, case.instrument)
+        centre, fwhm, area = synthetic.true_line(temperature, case.instrument)
+        try:
+            peak = fit_peak(x, y, case.options)
+        except InputError:
+            failed += 1
+            continue
+        found.append(
+            [
+                (peak.centre - centre) / peak.centre_stderr,
+                (peak.fwhm - fwhm) / peak.fwhm_stderr,
+                (peak.area - area) / peak.area_stderr,
+            ]
+        )
+    return np.array(found), failed
+
+
+def peer(case: Case, count: int, seed: int = 2017) -> np.ndarray:
+    """Pulls of the centre by an unweighted Lorentzian on a constant."""
+    rng = np.random.default_rng(seed)
+    model = lmfit.models.LorentzianModel() + lmfit.models.ConstantModel()
+    found = []
+    for _ in range(count):
+        temperature = float(rng.uniform(295.0, 1150.0))
+        x, y = synthetic.spectrum(temperature, rng, case.instrument)
+        centre, _, _ = synthetic.true_line(temperature, case.instrument)
+        start = model.make_params(
+            center=x[y.argmax()], sigma=2.0, amplitude=6.0 * np.ptp(y), c=np.median(y)
+        )
+        result = model.fit(y, start, x=x)
+        if result.params["center"].stderr:
+            found.append((result.params["center"].value - centre) / result.params["center"].stderr)
+    return np.array(found)
+
+
+def main(count: int = 1000) -> None:
+    print(f"{count} spectra each; width of the pulls (target 0.90 to 1.10), worst |pull|, failures")
+    print(f"{'case':<32}{'centre':>8}{'fwhm':>8}{'area':>8}{'bias':>8}{'worst':>8}{'failed':>8}")
+    for case in CASES:
+        found, failed = pulls(case, count)
+        width = found.std(axis=0)
+        print(
+            f"{case.name:<32}{width[0]:8.3f}{width[1]:8.3f}{width[2]:8.3f}"
+            f"{found[:, 0].mean():8.3f}{np.abs(found[:, 0]).max():8.1f}{failed:8d}"
+        )
+    print("\nthe peer's centre; its median |pull| would be 0.67")
+    few = max(count // 10, 10)
+    for case in (CASES[0], Case("no spikes", Instrument(spike_rate=0.0), PeakOptions())):
+        found = np.abs(peer(case, few))
+        name = f"lmfit, {case.name} ({few})"
+        print(f"{name:<42} median |pull| {np.median(found):6.2f}   worst {found.max():8.1f}")
+
+
+if __name__ == "__main__":
+    main(*(int(word) for word in sys.argv[1:]))

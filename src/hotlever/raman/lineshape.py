@@ -1,0 +1,107 @@
+"""The silicon line and what lies under it, with exact derivatives.
+
+The one-phonon line of silicon is a Lorentzian. Heavy doping makes it interfere with
+electronic transitions (Fano), and the spectrometer convolves it with its own, nearly
+Gaussian, response (Voigt). One expression holds all of them. With the Fano asymmetry
+f = 1/q, the profile (1 + f·e)²/(1 + e²), e = 2(x − centre)/fwhm, is the constant f² (part of
+the background) plus
+
+    (1 − f²)·D(e) + 2f·X(e),   D = 1/(1 + e²),   X = e/(1 + e²).
+
+D and X are real and imaginary part of one analytic function, so a Gaussian response turns
+both into real and imaginary part of the Faddeeva function w(z) [1]_.
+
+References
+----------
+.. [1] Abramowitz and Stegun, Handbook of Mathematical Functions, 7.1 and 7.4.13;
+   w'(z) = −2z·w(z) + 2i/√π.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import wofz
+
+Array = NDArray[np.float64]
+
+SIGMA_PER_FWHM = 1.0 / (2.0 * math.sqrt(2.0 * math.log(2.0)))
+
+
+def line(
+    x: Array, centre: float, fwhm: float, fano: float = 0.0, sigma: float = 0.0
+) -> tuple[Array, Array]:
+    """Silicon line of unit height (before interference and convolution) and its derivatives.
+
+    Parameters
+    ----------
+    x : (n,) array
+        Raman shift, cm⁻¹.
+    centre, fwhm : float
+        Centre and full width at half maximum of the Lorentzian, cm⁻¹.
+    fano : float
+        Asymmetry 1/q; 0 is a symmetric line.
+    sigma : float
+        Standard deviation of the spectrometer's Gaussian response, cm⁻¹; 0 is none.
+
+    Returns
+    -------
+    value : (n,) array
+    derivatives : (4, n) array
+        With respect to centre, ln fwhm, fano and ln sigma (zeros where sigma is 0).
+
+    Examples
+    --------
+    >>> value, _ = line(np.array([520.0, 521.5]), centre=520.0, fwhm=3.0)
+    >>> value.tolist()
+    [1.0, 0.5]
+    """
+    half = 0.5 * fwhm
+    u = x - centre
+    derivatives = np.zeros((4, x.size))
+    if sigma == 0.0:
+        e = u / half
+        absorptive = 1.0 / (1.0 + e * e)
+        dispersive = e * absorptive
+        # dD/de and dX/de
+        d_absorptive = -2.0 * dispersive * absorptive
+        d_dispersive = absorptive * (1.0 - 2.0 * e * dispersive)
+        slope = (1.0 - fano * fano) * d_absorptive + 2.0 * fano * d_dispersive
+        derivatives[0] = -slope / half
+        derivatives[1] = -slope * e
+    else:
+        width = sigma * math.sqrt(2.0)
+        z = (u + 1j * half) / width
+        w = wofz(z)
+        dw = -2.0 * z * w + 2j / math.sqrt(math.pi)
+        factor = math.sqrt(math.pi) * half / width
+        absorptive, dispersive = factor * w.real, factor * w.imag
+
+        def blend(complex_values: NDArray[np.complex128]) -> Array:
+            return np.asarray(
+                (1.0 - fano * fano) * complex_values.real + 2.0 * fano * complex_values.imag
+            )
+
+        derivatives[0] = -factor / width * blend(dw)
+        derivatives[1] = factor * blend(w + dw * (1j * half / width))
+        derivatives[3] = -factor * blend(w + dw * z)
+    value = (1.0 - fano * fano) * absorptive + 2.0 * fano * dispersive
+    derivatives[2] = -2.0 * fano * absorptive + 2.0 * dispersive
+    return value, derivatives
+
+
+def band(x: Array, centre: float, fwhm: float) -> tuple[Array, Array]:
+    """Gaussian band of unit height and its derivatives with respect to centre and ln fwhm.
+
+    Examples
+    --------
+    >>> value, _ = band(np.array([480.0, 492.0]), centre=480.0, fwhm=24.0)
+    >>> value.round(12).tolist()
+    [1.0, 0.5]
+    """
+    k = 4.0 * math.log(2.0) / (fwhm * fwhm)
+    u = x - centre
+    value = np.exp(-k * u * u)
+    return value, np.stack([2.0 * k * u * value, 2.0 * k * u * u * value])

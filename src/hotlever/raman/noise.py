@@ -1,0 +1,168 @@
+"""What a spectrum's own residuals say about its noise, its spikes and a clipped top."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+
+from hotlever.raman.lineshape import Array
+
+Mask = NDArray[np.bool_]
+
+SPIKE_SIGMAS = 6.0
+"""A cosmic ray stands this many standard deviations above the fit."""
+SPIKE_LINE_TOLERANCE = (0.01, 0.04)
+"""How far the true line may differ from the line model, as a part of the line's height, before
+a difference is taken for a cosmic ray: where the fit leaves noise alone, and where it does not."""
+SPIKE_MAX_SAMPLES = 5
+"""A cosmic ray hits no more neighbouring samples than this."""
+PLATEAU_TOLERANCE = 0.006
+"""Samples of a clipped top agree within this part of the line's height."""
+PLATEAU_MIN_SAMPLES = 4
+
+_OFFSETS = np.array([0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 1e6])
+_POISSON_PREFERENCE = 12.0
+
+
+def variance(residual: Array, model: Array, parameters: int) -> Array:
+    """Variance of each sample, from the residuals of a fit.
+
+    Photon noise has a variance proportional to the signal, but neither the detector's gain
+    nor the level that was subtracted is in the file. So the variance is s²·(model + o) with
+    the scale s² and the offset o of greatest likelihood for these residuals; pure photon
+    noise (o = 0) is kept unless the residuals contradict it.
+
+    Parameters
+    ----------
+    residual, model : (n,) array
+        Data minus fit, and the fit, counts.
+    parameters : int
+        Number of fitted parameters.
+
+    Returns
+    -------
+    (n,) array
+        Variance, counts².
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> model = np.linspace(100.0, 900.0, 2000)
+    >>> noise = rng.normal(size=2000) * np.sqrt(2.0 * model)
+    >>> bool(np.allclose(variance(noise, model, 0) / model, 2.0, rtol=0.1))
+    True
+    """
+    top = float(np.max(np.abs(model)))
+    if top == 0.0:
+        top = 1.0
+    level = np.maximum(model, 0.0) / top
+    offsets = _OFFSETS if level.min() > 1e-3 else _OFFSETS[1:]
+    shape = (level + offsets[:, None]) / (1.0 + offsets[:, None])
+    scale = np.mean(residual**2 / shape, axis=1)
+    scale = np.maximum(scale, np.finfo(float).tiny)
+    loss = residual.size * np.log(scale) + np.sum(np.log(shape), axis=1)
+    best = int(np.argmin(loss))
+    if loss[0] - loss[best] < _POISSON_PREFERENCE:
+        best = 0
+    freedom = max(residual.size - parameters, 1)
+    return np.asarray(scale[best] * shape[best] * residual.size / freedom)
+
+
+def robust_sigma(residual: Array, model: Array) -> Array:
+    """Standard deviation of each sample that a few wild samples cannot spoil.
+
+    The shape is photon noise, with the upper half of the signal's range as a floor against
+    levels near zero; the scale is the median absolute deviation.
+    """
+    level = np.maximum(model, 0.0)
+    shape = np.sqrt(np.maximum(level, 0.02 * float(level.max(initial=0.0)) + 1e-300))
+    scale = 1.4826 * float(np.median(np.abs(residual / shape)))
+    return np.asarray(max(scale, 1e-300) * shape)
+
+
+def spikes(y: Array, model: Array, line_part: Array, trusted: Mask, tolerance: float) -> Mask:
+    """Samples hit by cosmic rays: narrow, and far above the fit.
+
+    Parameters
+    ----------
+    y, model, line_part : (n,) array
+        Data, fit, and the silicon line's part of the fit.
+    trusted : (n,) bool array
+        Samples that the noise is judged by.
+    tolerance : float
+        How far the true line may differ from the model, as a part of the line's height.
+
+    Returns
+    -------
+    (n,) bool array
+    """
+    residual = y - model
+    sigma = robust_sigma(residual[trusted], model[trusted])
+    sigma_all = np.sqrt(
+        np.interp(np.arange(y.size), np.flatnonzero(trusted), sigma) ** 2
+        + (tolerance * maximum_filter1d(np.abs(line_part), 5)) ** 2
+    )
+    score = residual / sigma_all
+    hit = score > SPIKE_SIGMAS
+    # the flanks of a spike that spilled into its neighbours
+    near = np.zeros_like(hit)
+    near[1:] |= hit[:-1]
+    near[:-1] |= hit[1:]
+    hit |= near & (score > 0.5 * SPIKE_SIGMAS)
+    for start, stop in runs(hit):
+        if stop - start > SPIKE_MAX_SAMPLES:
+            hit[start:stop] = False
+    return hit
+
+
+def likely_spikes(y: Array, base: float) -> Mask:
+    """First guess at cosmic rays, before there is a fit: far above the local median."""
+    window = 9
+    padded = np.pad(y, window // 2, mode="reflect")
+    local = np.median(np.lib.stride_tricks.sliding_window_view(padded, window), axis=1)
+    sigma = 1.4826 * float(np.median(np.abs(np.diff(y)))) / np.sqrt(2.0)
+    return np.asarray(y - local > 8.0 * sigma + 1.2 * np.maximum(local - base, 0.0))
+
+
+def plateau(y: Array, candidates: Mask, base: float) -> slice | None:
+    """The flat top of a saturated line, or None.
+
+    A line that is not clipped has only few samples within a small part of its height; more
+    than its width allows, in one run at the top, is a clipped line.
+
+    Parameters
+    ----------
+    y : (n,) array
+        Counts.
+    candidates : (n,) bool array
+        Samples that are no cosmic rays and may belong to the line.
+    base : float
+        Background level.
+    """
+    if not candidates.any():
+        return None
+    top = float(y[candidates].max())
+    height = top - base
+    if height <= 0.0:
+        return None
+    at_top = candidates & (y >= top - PLATEAU_TOLERANCE * height)
+    longest = max(runs(at_top), key=lambda run: run[1] - run[0])
+    count = longest[1] - longest[0]
+    above_half = int(np.count_nonzero(candidates & (y > base + 0.5 * height)))
+    expected = 1.0 + np.sqrt(PLATEAU_TOLERANCE) * above_half
+    if count < PLATEAU_MIN_SAMPLES or count < 2.5 * expected:
+        return None
+    return slice(longest[0], longest[1])
+
+
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """Start and stop of each run of True.
+
+    Examples
+    --------
+    >>> runs(np.array([True, False, True, True]))
+    [(0, 1), (2, 4)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,0 +1,56 @@
+"""Silicon spectra: the shared ones, and those made for the tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hotlever.raman import synthetic
+
+REPO = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def real_spectra(shared: Path) -> Path:
+    return shared / "data" / "raman"
+
+
+@pytest.fixture
+def hot_plate_files(shared: Path) -> Path:
+    return shared / "data" / "virtual-lab" / "raman-hot-plate"
+
+
+@pytest.fixture
+def tip_files(shared: Path) -> Path:
+    return shared / "data" / "virtual-lab" / "raman-tip"
+
+
+@pytest.fixture
+def examples() -> Path:
+    return REPO / "examples" / "raman"
+
+
+@pytest.fixture(scope="session")
+def silicon() -> tuple[np.ndarray, np.ndarray]:
+    """One spectrum at 300 K, rounded as files hold it."""
+    x, y = synthetic.spectrum(300.0, np.random.default_rng(5), synthetic.Instrument(spike_rate=0))
+    return np.round(x, 3), np.round(y, 1)
+
+
+def write_spectrum(path: Path, x: np.ndarray, y: np.ndarray, header: str = "") -> Path:
+    rows = "".join(f"{a:.3f}\t{b:.1f}\n" for a, b in zip(x, y, strict=True))
+    path.write_text(header + rows, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="session")
+def hot_plate(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A made-up hot-plate series, 295 to 895 K, temperatures in the file names."""
+    folder = tmp_path_factory.mktemp("hot-plate")
+    rng = np.random.default_rng(11)
+    for temperature in range(295, 900, 25):
+        x, y = synthetic.spectrum(temperature, rng)
+        write_spectrum(folder / f"si_{temperature}K.txt", x, y)
+    return folder

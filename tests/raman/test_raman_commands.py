@@ -1,0 +1,317 @@
+"""``hotlever raman``, ``hotlever join`` and ``hotlever raman-check`` as a user meets them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hotlever.cli.raman import spread_option
+from hotlever.errors import InputError
+from hotlever.fitting.measurement import read_measurement
+from hotlever.raman import figures, synthetic
+from hotlever.raman.calibration import published
+from hotlever.raman.check import paper_check
+from hotlever.raman.join import join, read_bias_log
+from hotlever.raman.series import COLUMNS, Row, measure, read_lines
+from hotlever.raman.spectrum import read_spectra
+from hotlever.raman.thermometer import Thermometer
+
+HEADER = (
+    "file,center_cm-1,center_stderr_cm-1,fwhm_cm-1,shift_cm-1,temperature_K,"
+    "temperature_error_K,flags"
+)
+
+
+def table(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_peaks_without_calibration_leave_temperatures_empty(run, examples):
+    status, out, err = run("raman", examples / "tip")
+    assert status == 0
+    assert err == ""
+    assert out.splitlines()[0] == HEADER == ",".join(COLUMNS)
+    rows = table(out)
+    assert [row["file"] for row in rows] == [f"tip_{i:02d}.txt" for i in (0, 4, 8, 11)]
+    for row in rows:
+        assert 495.0 < float(row["center_cm-1"]) < 523.0
+        assert row["shift_cm-1"] == row["temperature_K"] == row["temperature_error_K"] == ""
+
+
+def test_calibrated_from_a_folder_and_again_from_the_saved_calibration(run, examples, tmp_path):
+    cal, figure, table_file = tmp_path / "cal.json", tmp_path / "f.png", tmp_path / "t.csv"
+    status, out, err = run(
+        *("raman", examples / "tip", "--calibrate-from", examples / "hot-plate"),
+        *("--save-calibration", cal, "--plot", figure, "-o", table_file),
+    )
+    assert (status, out) == (0, "")
+    assert "calibrated from 7 spectra, 295 to 895 K" in err
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    rows = table(table_file.read_text())
+    temperatures = [float(row["temperature_K"]) for row in rows]
+    assert temperatures == sorted(temperatures)
+    assert abs(temperatures[0] - 295.0) < 10.0
+    assert "extrapolated" in rows[-1]["flags"]
+    status, out, _ = run("raman", examples / "tip", "--calibration", cal)
+    assert status == 0
+    assert out == table_file.read_text()
+
+
+def test_both_laws_and_the_order_of_words(run, examples):
+    plate = sorted((examples / "hot-plate").iterdir())
+    _, one, _ = run("raman", "--calibrate-from", examples / "hot-plate", examples / "tip")
+    _, two, _ = run("raman", examples / "tip", "--calibrate-from", *plate)
+    _, three, err = run(
+        "raman", examples / "tip", "--law", "linear", "--calibrate-from", examples / "hot-plate"
+    )
+    assert one == two
+    assert float(table(three)[-1]["temperature_K"]) > float(table(one)[-1]["temperature_K"]) + 40
+    assert "the shift is not linear" in err
+
+
+def test_published_laws_with_a_reference(run, examples):
+    reference = examples / "hot-plate" / "si100_00.txt"
+    status, out, _ = run(
+        *("raman", examples / "tip", "--calibration", "published", "--reference", reference),
+        *("--law", "linear", "--stress", "20", "--laser-power", "0.1"),
+        *("--thermal-resistance", "215"),
+    )
+    assert status == 0
+    rows = table(out)
+    for row in rows:
+        expected = 293.0 + 5.0 - 41.1 * float(row["shift_cm-1"])
+        assert float(row["temperature_K"]) == pytest.approx(expected, abs=0.05)
+
+
+def test_single_spectrum_and_lineless_spectrum(run, tmp_path):
+    x = np.arange(440.0, 600.0, 0.5)
+    noise = np.random.default_rng(0).poisson(100.0, x.size)
+    rows = "".join(f"{a} {b}\n" for a, b in zip(x, noise, strict=True))
+    (tmp_path / "a_none.txt").write_text(rows)
+    status, out, err = run("raman", tmp_path)
+    assert (status, out) == (2, "")
+    assert "no silicon line in this spectrum" in err
+    xs, ys = synthetic.spectrum(300.0, np.random.default_rng(1))
+    line = "".join(f"{a:.3f} {b:.1f}\n" for a, b in zip(xs, ys, strict=True))
+    (tmp_path / "b_si.txt").write_text(line)
+    status, out, err = run("raman", tmp_path)
+    assert status == 0
+    assert table(out)[0]["flags"] == "no-line"
+    assert table(out)[0]["center_cm-1"] == ""
+    assert "a_none.txt: no silicon line" in err
+    status, _, _ = run("raman", tmp_path / "b_si.txt", "--plot", tmp_path / "one.svg")
+    assert status == 0
+    assert "cm⁻¹" in (tmp_path / "one.svg").read_text()
+
+
+def test_equal_names_in_two_folders_are_told_apart(run, examples, tmp_path):
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        source = examples / "tip" / "tip_00.txt"
+        (tmp_path / folder / "si.txt").write_bytes(source.read_bytes())
+    _, out, _ = run("raman", tmp_path / "a", tmp_path / "b")
+    assert [row["file"] for row in table(out)] == [
+        str(tmp_path / folder / "si.txt") for folder in ("a", "b")
+    ]
+
+
+BAD = {
+    "no such file": (["raman", "none.txt"], "none.txt: no such file or folder"),
+    "empty folder": (["raman", "empty"], "empty: the folder holds no spectrum file"),
+    "not a spectrum": (["raman", "log.csv"], "log.csv: the axis runs from 1 to 30"),
+    "two calibrations": (
+        ["raman", "tip", "--calibration", "c.json", "--calibrate-from", "plate"],
+        "--calibration or --calibrate-from, not both",
+    ),
+    "broken calibration": (["raman", "tip", "--calibration", "log.csv"], "not a Raman calibr"),
+    "law": (["raman", "tip", "--law", "quadratic"], "unknown law 'quadratic'"),
+    "shape": (["raman", "tip", "--shape", "gauss"], "unknown line shape 'gauss'"),
+    "resolution": (
+        ["raman", "tip", "--shape", "voigt", "--resolution", "-3"],
+        "found -3, expected a width",
+    ),
+    "published without reference": (
+        ["raman", "tip", "--calibration", "published"],
+        "give --reference",
+    ),
+    "reference without calibration": (
+        ["raman", "tip", "--reference", "tip"],
+        "--reference needs --calibration",
+    ),
+    "laser without resistance": (["raman", "tip", "--laser-power", "1"], "belong together"),
+    "table without series": (["raman", "tip", "--temperatures", "t.csv"], "--calibrate-from"),
+    "nothing to save": (["raman", "tip", "--save-calibration", "c.json"], "no calibration"),
+    "no temperatures": (
+        ["raman", "tip", "--calibrate-from", "tip"],
+        "no temperature in its header or name",
+    ),
+    "figure format": (["raman", "tip", "--plot", "f.doc"], "unknown figure type '.doc'"),
+    "output folder": (["raman", "tip", "-o", "none/t.csv"], "cannot be written"),
+    "output is a folder": (["raman", "tip", "-o", "empty"], "is a folder"),
+    "no spectra": (["raman"], "FILE_OR_DIR"),
+    "unknown option": (["raman", "tip", "--lawn", "linear"], "--law"),
+    "join without temperatures": (["join", "log.csv", "tip"], "give --calibration"),
+    "join without log": (["join", "none.csv", "tip"], "none.csv: no such file"),
+    "join of unequal numbers": (
+        ["join", "log.csv", "tip", "--calibrate-from", "plate"],
+        "30 rows and 4 spectra",
+    ),
+    "check with a broken calibration": (
+        ["raman-check", "--calibration", "log.csv"],
+        "not a Raman calibration",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_line_status_2_and_no_file(case, run, examples, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("empty").mkdir()
+    Path("tip").symlink_to(examples / "tip")
+    Path("plate").symlink_to(examples / "hot-plate")
+    Path("log.csv").write_text("V_b (V),I_h (mA)\n" + "".join(f"{i},0.1\n" for i in range(1, 31)))
+    before = sorted(path.name for path in tmp_path.iterdir())
+    arguments, words = BAD[case]
+    status, out, err = run(*arguments)
+    assert status == 2, err
+    assert out == ""
+    last = err.splitlines()[-1]
+    assert words in last
+    assert last.startswith("hotlever: ")
+    assert "Traceback" not in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == before
+
+
+def test_command_line_of_several_files():
+    takes = {"--from", "-o", "--law"}
+    for words, expected in (
+        ("tip --from a b --law linear", "tip --from a --from b --law linear"),
+        ("--from a b tip", "--from a b tip"),
+        ("--from a b -o out tip", "--from a --from b -o out tip"),
+        ("--law linear --from a tip", "--law linear --from a tip"),
+        ("tip --from=a b", "tip --from a --from b"),
+        ("tip --from a --from b c", "tip --from a --from b --from c"),
+        ("tip --from", "tip --from"),
+    ):
+        assert spread_option(words.split(), "--from", takes) == expected.split()
+
+
+# --- join ----------------------------------------------------------------------------------
+
+
+def row(name, temperature=500.0, error=3.0):
+    return Row(name, 515.0, 0.05, 5.0, -5.0, temperature, error, ())
+
+
+def test_join_gives_the_measurement_file_by_file_column(run, examples, tmp_path):
+    out = tmp_path / "data.csv"
+    status, _, _ = run(
+        *("join", examples / "bias-log.csv", examples / "tip"),
+        *("--calibrate-from", examples / "hot-plate", "-o", out),
+    )
+    assert status == 0
+    lines = out.read_text().splitlines()
+    log = (examples / "bias-log.csv").read_text().splitlines()
+    assert lines[:4] == log[:4]  # comments as they were
+    assert lines[4] == "V_b (V),I_h (mA),V_r (mV),file,T_tip (K),dT_tip (K)"
+    assert lines[5].startswith("1.0000,0.14338,60.12,tip_00.txt,29")
+    assert all(float(line.split(",")[-1]) > 0 for line in lines[5:])
+    data = read_measurement(out)
+    assert data.series_resistance_ohm == 5600.0
+    assert np.all(np.diff(data.tip_K) > 0)
+    assert data.tip_error_K.size == 4
+
+
+def test_join_by_bias_in_the_name_leaves_other_rows_empty(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("# medium: vacuum\nV_b (V),I_h (mA)\n1.0000,0.14\n5.2500,0.80\n11.0000,1.46\n")
+    found = [row("tip_11V.txt", 1200.4, 9.04), row("tip_5.25V.txt")]
+    assert join(read_bias_log(log), found).splitlines() == [
+        "# medium: vacuum",
+        "V_b (V),I_h (mA),T_tip (K),dT_tip (K)",
+        "1.0000,0.14,,",
+        "5.2500,0.80,500.0,3.0",
+        "11.0000,1.46,1200.4,9.0",
+    ]
+
+
+def test_join_by_order_keeps_the_files_dialect_and_replaces_old_temperatures(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("V_b (mV);T_tip (K);dT_tip (K);I_h (mA)\n1000,5;999;9;0,14\n2000,5;;;0,28\n")
+    found = [row("a.txt"), row("b.txt", float("nan"), float("nan"))]
+    assert join(read_bias_log(log), found).splitlines() == [
+        "V_b (mV);I_h (mA);T_tip (K);dT_tip (K)",
+        "1000,5;0,14;500,0;3,0",
+        "2000,5;0,28;;",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "names", "words"),
+    [
+        ("", ["a.txt"], "no rows"),
+        ("1,2\n3,4\n", ["a.txt"], "no bias column in '1,2'"),
+        ("V_b (V),I\n1,2,3\n", ["a.txt"], "line 2: 3 cells in '1,2,3', expected 2"),
+        ("V_b (V),I\nx,2\n", ["a.txt"], "line 2: bias 'x', expected a number"),
+        ("V_b (V),I\n1,2\n2,3\n", ["a.txt"], "2 rows and 1 spectra"),
+        ("V_b (V),I\n1,2\n2,3\n", ["a_1V.txt", "b_7V.txt"], "no row at the bias of b_7V.txt"),
+        ("V_b (V),I\n1,2\n2,3\n", ["a_1V.txt", "b_1V.txt"], "two spectra at 1 V"),
+        ("V_b (V),file\n1,z.txt\n", ["a.txt"], "'z.txt' is not among those given"),
+    ],
+)
+def test_logs_that_cannot_be_joined(text, names, words, tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text(text)
+    with pytest.raises(InputError, match=words) as caught:
+        join(read_bias_log(log), [row(name) for name in names], str(log))
+    assert str(log) in str(caught.value)
+
+
+# --- figures and the check -----------------------------------------------------------------
+
+
+def test_check_prints_its_conclusion_and_writes_figure_and_numbers(run, tmp_path):
+    status, out, _ = run(
+        "raman-check", "--plot", tmp_path / "check.pdf", "-o", tmp_path / "check.json"
+    )
+    assert status == 0
+    assert out.strip() == paper_check().conclusion()
+    numbers = json.loads((tmp_path / "check.json").read_text())
+    assert numbers["conclusion"] == out.strip()
+    assert [line["error_at_hottest"] for line in numbers["lines"]] == [
+        result.error_at_hottest for result in paper_check().results
+    ]
+    assert (tmp_path / "check.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_figure_holds_spectra_calibration_and_residuals(hot_plate):
+    from hotlever.raman.series import calibrate_from
+
+    found, lines = calibrate_from(read_spectra([hot_plate]))
+    rows = read_lines(lines, Thermometer(found))
+    figure = figures.thermometry(lines, rows, found, lines)
+    stack, upper, lower = figure.axes
+    labels = [text.get_text() for text in stack.texts]
+    assert labels[0] == "295 K"
+    assert labels[-1] == "895 K"
+    assert len(labels) == figures.STACKED
+    assert upper.get_ylabel() == "temperature (K)"
+    assert lower.get_ylabel() == "law − hot plate (K)"
+    drawn = {line.get_label().split(" (")[0]: line for line in lower.lines}
+    np.testing.assert_allclose(drawn["line"].get_ydata(), found.residuals()["linear_K"])
+    np.testing.assert_allclose(drawn["anharmonic"].get_ydata(), found.residuals()["anharmonic_K"])
+
+
+def test_figure_without_calibration_or_without_series(examples):
+    lines = measure(read_spectra([examples / "tip"]))
+    bare = figures.thermometry(lines, read_lines(lines, None))
+    assert [text.get_text() for text in bare.axes[0].texts] == [
+        line.spectrum.name for line in lines
+    ]
+    rows = read_lines(lines, Thermometer(published(), reference=522.39))
+    assert len(figures.thermometry(lines, rows, published()).axes) == 3

@@ -1,0 +1,433 @@
+"""Files that spectrometers write, and files that are no spectra."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from hotlever.errors import InputError
+from hotlever.raman.fit import fit_peak
+from hotlever.raman.spectrum import read_file, read_spectra, read_spectrum, spectrum_files
+from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
+from hotlever.raman.tables import decode, parse_table
+
+
+def rows(x, y, separator="\t", comma=False, end="\n"):
+    lines = [f"{a:.3f}{separator}{b:.1f}" for a, b in zip(x, y, strict=True)]
+    text = end.join(lines) + end
+    return text.replace(".", ",") if comma else text
+
+
+LABSPEC = (
+    "#Acq. time (s)=\t30\r\n#Detector temperature (°C)=\t-70.02\r\n#Laser (nm)=\t632.8\r\n"
+    "#Spectro (cm⁻¹)=\t520.003\r\n#Temperature (K)=\t345.0\r\n"
+)
+
+DIALECTS = {
+    "tab": lambda x, y: rows(x, y).encode(),
+    "semicolon": lambda x, y: rows(x, y, ";").encode(),
+    "comma": lambda x, y: rows(x, y, ",").encode(),
+    "comma and blank": lambda x, y: rows(x, y, ", ").encode(),
+    "blanks": lambda x, y: ("  " + rows(x, y, "    ", end="\n  ")).encode(),
+    "decimal comma, tab": lambda x, y: rows(x, y, "\t", comma=True).encode(),
+    "decimal comma, semicolon": lambda x, y: rows(x, y, ";", comma=True).encode(),
+    "decimal comma, blanks": lambda x, y: rows(x, y, "  ", comma=True).encode(),
+    "utf-8 with mark": lambda x, y: ("Raman Shift (cm⁻¹),I\n" + rows(x, y, ",")).encode(
+        "utf-8-sig"
+    ),
+    "utf-16": lambda x, y: ("Raman Shift (cm⁻¹)\tI\r\n" + rows(x, y, end="\r\n")).encode("utf-16"),
+    "utf-16 without mark": lambda x, y: rows(x, y).encode("utf-16-le"),
+    "labspec, latin-1": lambda x, y: (LABSPEC.replace("⁻¹", "-¹") + rows(x, y, end="\r\n")).encode(
+        "latin-1"
+    ),
+    "labspec, utf-8": lambda x, y: (LABSPEC + rows(x, y, end="\r\n")).encode(),
+    "vertical bars": lambda x, y: rows(x, y, " | ").encode(),
+    "old mac line ends": lambda x, y: rows(x, y, end="\r").encode(),
+    "wire text": lambda x, y: (
+        "#Wave\t\t#Intensity\n" + rows(x[::-1], y[::-1], "\t\t", end="\n")
+    ).encode(),
+    "witec table": lambda x, y: ("X-Axis\tY-Axis\nrel. 1/cm\tCCD cts\n" + rows(x, y)).encode(),
+    "ocean optics": lambda x, y: (
+        "Data from Si.txt Node\n\nDate: Tue Oct 05 10:38:02 CEST 2021\nUser: ab\n"
+        "Integration Time (sec): 1.000000E1\nNumber of Pixels in Spectrum: 304\n"
+        ">>>>>Begin Spectral Data<<<<<\n" + rows(x, y) + ">>>>>End Spectral Data<<<<<\n"
+    ).encode(),
+    "header with units": lambda x, y: (
+        "Raman shift [1/cm];Intensity [counts]\n" + rows(x, y, ";")
+    ).encode(),
+    "quoted": lambda x, y: (
+        '"Raman shift","Intensity"\n'
+        + "".join(f'"{a:.3f}","{b:.1f}"\n' for a, b in zip(x, y, strict=True))
+    ).encode(),
+    "running number first": lambda x, y: (
+        "".join(f"{i};{a:.3f};{b:.1f}\n" for i, (a, b) in enumerate(zip(x, y, strict=True)))
+    ).encode(),
+    "exponents": lambda x, y: (
+        "".join(f"{a:.6e} {b:.6E}\n" for a, b in zip(x, y, strict=True))
+    ).encode(),
+    "trailing separators and blank lines": lambda x, y: (
+        rows(x, y, ";").replace("\n", ";\n\n")
+    ).encode(),
+    "laser and wavelength": lambda x, y: (
+        "Laser wavelength: 532.0 nm\nWavelength (nm)\tCounts\n"
+        + "".join(f"{1e7 / (1e7 / 532.0 - a):.7f}\t{b:.1f}\n" for a, b in zip(x, y, strict=True))
+    ).encode(),
+    "bwtek": lambda x, y: (
+        "File Version;BWRam4.11_11\nlaser_wavelength;532,02\n"
+        "Pixel;Wavelength;Wavenumber;Raman Shift;Dark;Reference;Raw data #1;"
+        "Dark Subtracted #1;%TR #1;\n"
+        "0;   ;   ;   ;1535,0000;65535,0000;1584,5000;49,5000;0,0000;\n"
+        "1;   ;   ;   ;1495,0000;65535,0000;1539,0000;44,0000;0,0000;\n"
+        + "".join(
+            f"{i + 2};{500 + 0.1 * i:.2f};{18000 - i:.2f};{a:.3f};1500,0000;65535,0000;"
+            f"{b + 1500:.4f};{b:.4f};0,0000;\n".replace(".", ",")
+            for i, (a, b) in enumerate(zip(x, y, strict=True))
+        )
+        + "2047;   ;   ;   ;1068,0000;65535,0000;1061,5000;-6,5000;0,0000;\n"
+    ).encode(),
+}
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_every_dialect_gives_the_same_spectrum(dialect, silicon, tmp_path):
+    x, y = silicon
+    file = tmp_path / "spectrum.txt"
+    file.write_bytes(DIALECTS[dialect](x, y))
+    found = read_spectrum(file)
+    np.testing.assert_allclose(found.x, x, atol=2e-3)
+    np.testing.assert_allclose(found.y, y, atol=1e-9)
+
+
+def test_labspec_map_gives_all_its_spectra(silicon, tmp_path):
+    x, y = silicon
+    file = tmp_path / "map.txt"
+    lines = ["\t\t" + "\t".join(f"{a:.3f}" for a in x)]
+    lines += [f"{i}\t5.5\t" + "\t".join(f"{b * (i + 1):.1f}" for b in y) for i in range(2)]
+    file.write_text("\n".join(lines))
+    first, second = read_file(file)
+    assert (first.name, second.name) == ("map.txt[0]", "map.txt[1]")
+    np.testing.assert_allclose(first.x, x)
+    np.testing.assert_allclose(second.y, 2 * y)
+
+
+def test_a_column_that_happens_to_pass_520_is_no_axis(tmp_path):
+    """The virtual lab's bias sweep: V_r runs from 60 to 940 mV."""
+    file = tmp_path / "lever.csv"
+    file.write_text(
+        "V_b (V),I_h (mA),V_r (mV)\n"
+        + "".join(f"{i},{np.sin(i):.4f},{60 + 35 * i}\n" for i in range(1, 26))
+    )
+    with pytest.raises(InputError, match=r"lever\.csv: \d samples between 440 and 600"):
+        read_spectrum(file)
+
+
+def test_labspec_header_is_kept_and_its_sample_temperature_found(silicon, tmp_path):
+    file = tmp_path / "a_500K.txt"
+    file.write_bytes(DIALECTS["labspec, latin-1"](*silicon))
+    found = read_spectrum(file)
+    assert found.metadata["Laser (nm)"] == "632.8"
+    assert found.metadata["Detector temperature (°C)"] == "-70.02"
+    assert found.temperature == 345.0  # the header, not the name
+
+
+def test_repeated_axis_values_are_averaged(tmp_path):
+    file = tmp_path / "twice.txt"
+    file.write_text("".join(f"{500 + i // 2} {i}\n" for i in range(100)))
+    found = read_spectrum(file)
+    assert np.all(np.diff(found.x) > 0)
+    np.testing.assert_array_equal(found.y[:3], [0.5, 2.5, 4.5])
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    separator=st.sampled_from(["\t", ";", " ", "   ", "\t\t"]),
+    comma=st.booleans(),
+    end=st.sampled_from(["\n", "\r\n"]),
+    encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "latin-1"]),
+    header=st.lists(
+        st.text(st.characters(codec="latin-1", categories=("L", "N", "Zs")), max_size=12),
+        max_size=4,
+    ),
+    descending=st.booleans(),
+    start=st.floats(-100.0, 500.0),
+    step=st.floats(0.01, 5.0),
+    seed=st.integers(0, 2**31),
+)
+def test_any_table_of_two_columns_is_read_back(
+    separator, comma, end, encoding, header, descending, start, step, seed
+):
+    count = int((540.0 - start) / step) + 10
+    count = min(max(count, 30), 500)
+    x = np.round(540.0 - step * np.arange(count)[::-1], 3)
+    y = np.round(np.random.default_rng(seed).uniform(-50.0, 1e5, count), 2)
+    order = slice(None, None, -1) if descending else slice(None)
+    lines = [f"#{key}=\tx{key}" for key in header if key.strip()]
+    lines += [f"{a:.3f}{separator}{b:.2f}" for a, b in zip(x[order], y[order], strict=True)]
+    text = end.join(lines)
+    if comma:
+        text = text.replace(".", ",")
+    table = parse_table(decode(text.encode(encoding), "f"), "f")
+    np.testing.assert_allclose(table.values[order], np.stack([x, y], axis=1), atol=1e-9)
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(raw=st.binary(max_size=400))
+def test_no_bytes_end_in_anything_but_a_spectrum_or_one_line(raw, tmp_path_factory):
+    file = tmp_path_factory.getbasetemp() / "any.txt"
+    file.write_bytes(raw)
+    message = ""
+    try:
+        read_file(file)
+    except InputError as error:
+        message = str(error)
+    assert "\n" not in message
+    assert not message or str(file) in message
+
+
+BAD = {
+    "empty": (b"", "the file is empty"),
+    "blank": (b" \n\r\n", "the file is empty"),
+    "binary": (bytes(range(256)) * 20, "a binary file"),
+    "picture": (b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR" + bytes(99), "a binary file"),
+    "prose": (b"Dear all,\nhere is no spectrum.\nYours\n", "no table of numbers"),
+    "page": (b"<html><body><p>404</p></body></html>", "no table of numbers"),
+    "one column": ("\n".join(map(str, range(400, 600))).encode(), "one column"),
+    "bias log": (
+        b"V_b (V),I_h (mA)\n" + b"".join(b"%d.5,0.%d\n" % (i, i) for i in range(1, 40)),
+        "the axis runs from 1.5 to 39.5",
+    ),
+    "short of the line": (
+        b"".join(b"%d %d\n" % (i, i) for i in range(600, 900)),
+        "the axis runs from 600 to 899",
+    ),
+    "few rows": (b"500 1\n510 2\n520 3\n530 4\n", "4 samples between 440 and 600"),
+    "wavelength without laser": (
+        b"Wavelength (nm),Counts\n" + b"".join(b"%d,%d\n" % (i, i % 7) for i in range(500, 600)),
+        "does not name the laser",
+    ),
+    "flat": (b"".join(b"%d 7\n" % i for i in range(450, 600)), "no column of intensities"),
+    "truncated wdf": (b"WDF1" + bytes(40), "not a readable WiRE file"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_what_is_no_spectrum_gets_one_clear_line(kind, tmp_path):
+    content, words = BAD[kind]
+    file = tmp_path / "file.txt"
+    file.write_bytes(content)
+    with pytest.raises(InputError, match=words) as caught:
+        read_spectrum(file)
+    assert str(file) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_file_and_folder_without_spectra(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        read_spectrum(tmp_path / "none.txt")
+    with pytest.raises(InputError, match="no such file or folder"):
+        read_spectra([tmp_path / "none"])
+    with pytest.raises(InputError, match="holds no spectrum file"):
+        read_spectra([tmp_path])
+    (tmp_path / "notes.txt").write_text("nothing here")
+    with pytest.raises(InputError, match=r"none of 1 files is a spectrum.*notes\.txt"):
+        read_spectra([tmp_path])
+
+
+def test_folder_is_read_in_natural_order_and_passes_over_other_files(silicon, tmp_path):
+    for number in (10, 9, 1):
+        (tmp_path / f"tip_{number}.txt").write_bytes(DIALECTS["tab"](*silicon))
+    (tmp_path / "log.txt").write_text("V\n1\n")
+    (tmp_path / ".hidden").write_text("x")
+    skipped: list[str] = []
+    names = [spectrum.name for spectrum in read_spectra([tmp_path], skipped)]
+    assert names == ["tip_1.txt", "tip_9.txt", "tip_10.txt"]
+    assert len(skipped) == 1
+    assert "log.txt" in skipped[0]
+    assert next(file.name for file, _ in spectrum_files([tmp_path])) == "log.txt"
+
+
+@pytest.mark.parametrize(
+    ("stem", "kelvin"),
+    [
+        ("si_450K", 450.0),
+        ("25C", 298.15),
+        ("Si 300 K", 300.0),
+        ("T=627,5K_a", 627.5),
+        ("si100_T450K_2", 450.0),
+        ("run3_-20C", 253.15),
+        ("x50_532nm_10mW", None),
+        ("Probe_100_60000msx2", None),
+        ("100C0", None),
+        ("99999K", None),
+    ],
+)
+def test_temperature_in_a_file_name(stem, kelvin):
+    assert temperature_in_name(stem) == kelvin
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "kelvin"),
+    [
+        ("Temperature (K)", "295.0", 295.0),
+        ("Temperature (°C)", "25", 298.15),
+        ("Sample temperature [C]", "100,5", 373.65),
+        ("Temperature", "450 K", 450.0),
+        ("Temperature", "0", None),
+        ("Detector temperature (°C)", "-75", None),
+        ("T (K)", "abc", None),
+    ],
+)
+def test_temperature_in_a_header(key, value, kelvin):
+    assert temperature_in_metadata({key: value}) == kelvin
+
+
+# --- makers' own formats -------------------------------------------------------------------
+
+
+def wdf_bytes(
+    x: np.ndarray, spectra: list[np.ndarray], units: int = 1, laser: float = 0.0
+) -> bytes:
+    """A WiRE file as Renishaw's reader expects it: header, data, axis."""
+    header = struct.pack(
+        "<IIQQ16s12xIIIQQIIII24s4HIIQQIf48x32s160s48x32x32x",
+        *(0x31464457, 1, 512, 0, b"", 1, 0, x.size, len(spectra), len(spectra), 1, 1, x.size, 0),
+        *(b"test", 1, 0, 0, 0, 1, 1, 0, 0, 0, laser, b"", b""),
+    )
+    data = np.concatenate(spectra).astype("<f4").tobytes()
+    axis = struct.pack("<II", 1, units) + x.astype("<f4").tobytes()
+    return (
+        header
+        + struct.pack("<4sIQ", b"DATA", 0, 16 + len(data))
+        + data
+        + struct.pack("<4sIQ", b"XLST", 0, 16 + len(axis))
+        + axis
+    )
+
+
+def test_wire_file_with_two_spectra(silicon, tmp_path):
+    pytest.importorskip("wdf", reason="needs the raman extra")
+    x, y = silicon
+    file = tmp_path / "map.wdf"
+    file.write_bytes(wdf_bytes(x[::-1], [y[::-1], 2 * y[::-1]]))
+    first, second = read_file(file)
+    assert first.name == "map.wdf[0]"
+    np.testing.assert_allclose(first.x, x, rtol=1e-6)
+    np.testing.assert_allclose(second.y, 2 * y, rtol=1e-6)
+    with pytest.raises(InputError, match="holds 2 spectra"):
+        read_spectrum(file)
+
+
+def test_wire_file_on_a_wavelength_axis(silicon, tmp_path):
+    pytest.importorskip("wdf", reason="needs the raman extra")
+    x, y = silicon
+    laser = 1e7 / 532.0
+    file = tmp_path / "nm.wdf"
+    file.write_bytes(wdf_bytes(1e7 / (laser - x), [y], units=3, laser=laser))
+    # the axis is stored in single precision
+    np.testing.assert_allclose(read_spectrum(file).x, x, atol=5e-3)
+
+
+def spc_bytes(x: np.ndarray, y: np.ndarray, units: int = 13, log: bytes = b"") -> bytes:
+    """A GRAMS file (new format, least significant byte first): shared axis, one spectrum."""
+    end_of_data = 512 + 4 * x.size + 32 + 4 * y.size
+    header = struct.pack(
+        "<BBBbIddIBBBBI9s9sH8f130s30sIIBBHf48sfIfB187s",
+        *(0x80, 0x4B, 9, -128, x.size, x[0], x[-1], 1, units, 4, 0, 0, 0, b"", b"", 0),
+        *([0.0] * 8),
+        *(b"", b"", end_of_data if log else 0, 0, 0, 0, 0, 0.0, b"", 0.0, 0, 0.0, 0, b""),
+    )
+    subheader = struct.pack("<BbHfffIIf4s", 0, -128, 0, 0.0, 0.0, 0.0, y.size, 0, 0.0, b"")
+    data = header + x.astype("<f4").tobytes() + subheader + y.astype("<f4").tobytes()
+    if log:
+        data += struct.pack("<5I44s", 64 + len(log), 4096, 64, 0, 0, b"") + log
+    return data
+
+
+@pytest.mark.parametrize("log", [b"", b"Laser=532\r\nTemperature=295\r\n\x00"])
+def test_spc_file(silicon, tmp_path, log):
+    pytest.importorskip("spc_io", reason="needs the raman extra")
+    x, y = silicon
+    file = tmp_path / "si.spc"
+    file.write_bytes(spc_bytes(x, y, log=log))
+    found = read_spectrum(file)
+    np.testing.assert_allclose(found.x, x, rtol=1e-6)
+    np.testing.assert_allclose(found.y, y, rtol=1e-6)
+    file.write_bytes(spc_bytes(x, y, units=3))
+    with pytest.raises(InputError, match=r"si\.spc.*the axis is a wavelength"):
+        read_spectrum(file)
+
+
+def test_text_under_a_makers_suffix_is_read_as_text(silicon, tmp_path):
+    file = tmp_path / "si.spc"
+    file.write_bytes(DIALECTS["tab"](*silicon))
+    np.testing.assert_allclose(read_spectrum(file).y, silicon[1])
+
+
+def test_jcamp_file(silicon, tmp_path):
+    pytest.importorskip("jcamp", reason="needs the raman extra")
+    x, y = silicon
+    file = tmp_path / "si.jdx"
+    points = "\n".join(f"{a:.3f}, {b:.1f}" for a, b in zip(x, y, strict=True))
+    file.write_text(
+        "##TITLE=Si\n##JCAMP-DX=4.24\n##DATA TYPE=RAMAN SPECTRUM\n##XUNITS=1/CM\n"
+        f"##YUNITS=COUNTS\n##XFACTOR=1\n##YFACTOR=1\n##NPOINTS={x.size}\n"
+        f"##XYPOINTS=(XY..XY)\n{points}\n##END=\n"
+    )
+    found = read_spectrum(file)
+    np.testing.assert_allclose(found.x, x)
+    np.testing.assert_allclose(found.y, y)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "package"),
+    [
+        ("a.wdf", b"WDF1" + bytes(600), "renishaw-wdf"),
+        ("a.spc", b"\x00\x4b" + bytes(600), "spc-io"),
+        ("a.jdx", b"##TITLE=Si\n##END=\n", "jcamp"),
+    ],
+)
+def test_missing_library_is_named_with_the_way_to_get_it(
+    name, content, package, tmp_path, monkeypatch
+):
+    for module in ("wdf", "spc_io", "jcamp"):
+        monkeypatch.setitem(sys.modules, module, None)
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=rf"{package}.*hotlever\[raman\]"):
+        read_spectrum(tmp_path / name)
+
+
+# --- real files ----------------------------------------------------------------------------
+
+
+def test_real_files_are_read_and_hold_a_line(real_spectra: Path):
+    expected = {"FMNT-M_BW532": 1800, "FMNT-M_Ho785": 1000, "labram": 1010}
+    spectra = read_spectra([real_spectra])
+    assert len(spectra) == len(expected)
+    for spectrum, (start, samples) in zip(spectra, sorted(expected.items()), strict=True):
+        assert spectrum.name.startswith(start)
+        assert spectrum.x.size >= samples
+        peak = fit_peak(spectrum.x, spectrum.y)
+        # calibration of these instruments is good to a few wavenumbers
+        assert abs(peak.centre - 520.5) < max(3.0, 3.0 * peak.centre_stderr)
+
+
+def test_bwtek_dark_subtracted_column_and_raman_shift_are_chosen(real_spectra: Path):
+    [file] = real_spectra.glob("FMNT-M_BW532*")
+    found = read_spectrum(file)
+    at = np.searchsorted(found.x, 451.10)
+    assert found.x[at] == pytest.approx(451.10)
+    assert found.y[at] == pytest.approx(2446.5)
+
+
+def test_saturated_real_spectrum_is_flagged(real_spectra: Path):
+    spectrum = read_spectrum(real_spectra / "labram_spectrum_wn.txt")
+    peak = fit_peak(spectrum.x, spectrum.y)
+    assert "saturated" in peak.flags
+    assert spectrum.metadata["Instrument"] == "LabRAM HR Evol"
+    assert spectrum.temperature is None  # "Temperature= 0" has no unit

@@ -1,0 +1,376 @@
+"""Calibration, temperatures and their errors, and the paper's check."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hotlever.errors import InputError
+from hotlever.raman import anharmonic, synthetic
+from hotlever.raman.calibration import Point, calibrate, load, published
+from hotlever.raman.check import paper_check
+from hotlever.raman.fit import fit_peak
+from hotlever.raman.peak import PeakOptions
+from hotlever.raman.published import (
+    BALKANSKI1983,
+    HEATER_STRESS,
+    HIGHEST_TIP_TEMPERATURE,
+    SPIESER2017,
+)
+from hotlever.raman.series import calibrate_from, measure, read_lines, read_temperatures
+from hotlever.raman.spectrum import Spectrum, read_spectra
+from hotlever.raman.thermometer import Thermometer, laser_heating
+
+
+def points(temperatures, reference=521.0, noise=0.0, seed=0, stderr=0.04):
+    shift, _ = anharmonic.shift(temperatures, float(np.min(temperatures)))
+    rng = np.random.default_rng(seed)
+    return [
+        Point(
+            file=f"{t:g}K",
+            temperature_K=float(t),
+            centre_cm=float(reference + d + noise * rng.normal()),
+            centre_stderr_cm=stderr,
+        )
+        for t, d in zip(temperatures, shift, strict=True)
+    ]
+
+
+PLATE = np.arange(295.0, 896.0, 25.0)
+
+
+# --- the law -------------------------------------------------------------------------------
+
+
+@given(st.floats(30.0, 1600.0))
+def test_derivative_of_the_anharmonic_law(temperature):
+    h = 1e-3
+    _, slope = anharmonic.shift(temperature, 293.0)
+    plus, _ = anharmonic.shift(temperature + h, 293.0)
+    minus, _ = anharmonic.shift(temperature - h, 293.0)
+    assert slope == pytest.approx((plus - minus) / (2 * h), rel=1e-5, abs=1e-9)
+
+
+def test_law_gives_balkanskis_line_and_the_slope_the_paper_quotes():
+    # Balkanski et al. 1983, table and fig. 3: 524.9 cm⁻¹ at 5 K, near 520 at room temperature
+    assert synthetic.line_centre(5.0) == pytest.approx(524.866, abs=1e-3)
+    assert synthetic.line_centre(300.0) == pytest.approx(521.8, abs=0.2)
+    # "approximately −0.022 cm⁻¹/K"
+    _, slope = anharmonic.shift(400.0, 293.0)
+    assert slope == pytest.approx(-0.022, abs=0.002)
+
+
+@given(st.floats(120.0, 1650.0), st.floats(280.0, 320.0))
+def test_inverse_of_the_law_returns_the_temperature(temperature, room):
+    law = published().anharmonic
+    shift, _ = law.shift(np.array([temperature]), room)
+    assert law.temperature(shift, room)[0] == pytest.approx(temperature, abs=0.02)
+
+
+# --- calibration ---------------------------------------------------------------------------
+
+
+def test_calibration_recovers_the_law_without_noise():
+    found = calibrate(points(PLATE))
+    assert found.reference_cm == pytest.approx(521.0)
+    assert found.anharmonic.three_phonon_cm == pytest.approx(BALKANSKI1983.three_phonon)
+    assert found.anharmonic.four_phonon_cm == pytest.approx(BALKANSKI1983.four_phonon)
+    assert found.linear.slope_K_cm == pytest.approx(-40.6, abs=0.5)
+
+
+def test_errors_of_extrapolated_temperatures_are_honest():
+    """Above the plate the covariance, not the photon noise, rules; pulls must still be one."""
+    targets = np.array([500.0, 800.0, 1000.0, 1150.0])
+    pulls = []
+    for seed in range(300):
+        found = calibrate(points(PLATE, noise=0.06, seed=seed, stderr=0.06))
+        rng = np.random.default_rng(10_000 + seed)
+        shift, _ = anharmonic.shift(targets, 295.0)
+        centre = 521.0 + shift + 0.1 * rng.normal(size=4)
+        reading = Thermometer(found).read(centre, np.full(4, 0.1))
+        # the model's error is no noise: leave it out of the pull
+        _, slope = found.anharmonic.shift(reading.temperature, 295.0)
+        model = Thermometer(found)._model_error(reading.temperature, slope)
+        pulls.append((reading.temperature - targets) / np.sqrt(reading.error**2 - model**2))
+    width = np.std(pulls, axis=0)
+    assert np.all((width > 0.85) & (width < 1.15)), width
+
+
+def test_error_grows_outside_the_calibrated_range_and_is_flagged():
+    found = calibrate(points(PLATE, noise=0.05, stderr=0.05))
+    temperatures = np.array([300.0, 600.0, 890.0, 1000.0, 1150.0, 1400.0])
+    centre = found.reference_cm + found.anharmonic.shift(temperatures, 295.0)[0]
+    for law in ("anharmonic", "linear"):
+        reading = Thermometer(found, law=law).read(centre, np.full(6, 0.05))
+        assert np.all(np.diff(reading.error[2:]) > 0.0)
+        np.testing.assert_array_equal(reading.outside[[1, 3, 4, 5]], [False, True, True, True])
+    # the linear law owns up to what it is wrong by
+    assert np.all(reading.error[3:] >= np.abs(reading.temperature - temperatures)[3:] - 3.0)
+
+
+def test_offset_of_the_axis_cancels():
+    one = calibrate(points(PLATE, reference=520.2))
+    other = calibrate(points(PLATE, reference=523.9))
+    a = Thermometer(one).read([520.2 - 12.0], [0.05])
+    b = Thermometer(other).read([523.9 - 12.0], [0.05])
+    assert a.temperature[0] == pytest.approx(b.temperature[0], abs=1e-6)
+
+
+def test_reference_of_the_day_replaces_the_calibrations(hot_plate):
+    spectra = read_spectra([hot_plate])
+    found, lines = calibrate_from(spectra)
+    room = lines[0].peak
+    moved = [Spectrum(s.x + 1.5, s.y, s.name) for s in spectra]
+    shifted = measure(moved)
+    thermometer = Thermometer(found).with_reference([(shifted[0].peak, 295.0)])
+    reading = thermometer.read([shifted[20].peak.centre], [shifted[20].peak.centre_stderr])
+    assert reading.temperature[0] == pytest.approx(795.0, abs=4 * reading.error[0])
+    assert thermometer.reference_stderr == pytest.approx(room.centre_stderr, rel=0.02)
+    wrong = Thermometer(found).read([shifted[20].peak.centre], [0.1])
+    assert abs(wrong.temperature[0] - 795.0) > 40.0
+
+
+def test_reference_at_another_temperature_is_brought_to_room_temperature():
+    found = calibrate(points(PLATE))
+    x, y = synthetic.spectrum(330.0, np.random.default_rng(3))
+    warm = fit_peak(x, y)
+    reference = Thermometer(found).with_reference([(warm, 330.0)]).reference
+    expected = synthetic.true_line(295.0)[0]
+    assert reference == pytest.approx(expected, abs=4 * warm.centre_stderr)
+
+
+def test_few_temperatures_fix_the_ratio_of_the_terms():
+    found = calibrate(points(np.array([295.0, 400.0, 500.0])))
+    assert found.anharmonic.ratio_fixed
+    assert found.anharmonic.four_phonon_cm / found.anharmonic.three_phonon_cm == pytest.approx(
+        BALKANSKI1983.four_phonon / BALKANSKI1983.three_phonon
+    )
+    reading = Thermometer(found).read([521.0 + anharmonic.shift(480.0, 295.0)[0]], [0.03])
+    assert reading.temperature[0] == pytest.approx(480.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("series", "words"),
+    [
+        (points(np.array([295.0, 400.0])), "2 different temperatures"),
+        (points(np.arange(400.0, 900.0, 50.0)), "coldest spectrum is at 400 K"),
+        (
+            [p.model_copy(update={"centre_cm": 1042.0 - p.centre_cm}) for p in points(PLATE)],
+            r"moves by \+0\.\d+ cm⁻¹/K",
+        ),
+        ([p.model_copy(update={"centre_stderr_cm": 0.0}) for p in points(PLATE)], "above 0"),
+    ],
+)
+def test_series_that_cannot_calibrate(series, words):
+    with pytest.raises(InputError, match=words):
+        calibrate(series)
+
+
+def test_calibration_survives_its_file(tmp_path):
+    found = calibrate(points(PLATE, noise=0.05), line_shape="voigt", resolution_cm=1.2)
+    found.save(tmp_path / "cal.json")
+    assert load(tmp_path / "cal.json") == found
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda d: d.pop("linear"), "linear: Field required"),
+        (lambda d: d.update(format="other"), "format: "),
+        (lambda d: d["linear"].update(slope_K_cm=5), "linear.slope_K_cm: "),
+        (lambda d: d["linear"].update(slop=5), "linear.slop: "),
+        (lambda d: d["anharmonic"].update(covariance=[[1.0]]), "3 × 3"),
+        (lambda d: d["anharmonic"].update(four_phonon_cm=1.0), "must fall with temperature"),
+    ],
+)
+def test_broken_calibration_file_names_the_key(tmp_path, change, words):
+    file = tmp_path / "cal.json"
+    calibrate(points(PLATE)).save(file)
+    data = json.loads(file.read_text())
+    change(data)
+    file.write_text(json.dumps(data))
+    with pytest.raises(InputError, match=words) as caught:
+        load(file)
+    assert str(file) in str(caught.value)
+
+
+def test_file_that_is_no_calibration(tmp_path):
+    (tmp_path / "cal.json").write_text("520.0\t100\n")
+    with pytest.raises(InputError, match="not a Raman calibration"):
+        load(tmp_path / "cal.json")
+    with pytest.raises(InputError, match="no such file"):
+        load(tmp_path / "none.json")
+
+
+# --- the published laws and the paper's error model ----------------------------------------
+
+
+def test_published_line_and_its_error():
+    thermometer = Thermometer(published(), law="linear", reference=520.7)
+    reading = thermometer.read([520.7 - 14.0], [0.0])
+    above = SPIESER2017.constant - SPIESER2017.slope * 14.0
+    assert reading.temperature[0] - 293.0 == pytest.approx(above)
+    assert reading.error[0] == pytest.approx(5.0 + 0.02 * above, rel=1e-9)
+
+
+def test_published_laws_need_a_reference():
+    with pytest.raises(InputError, match="holds no room-temperature line"):
+        Thermometer(published())
+
+
+def test_no_temperature_where_silicon_has_no_such_line():
+    thermometer = Thermometer(published(), reference=520.7)
+    reading = thermometer.read([540.0, 470.0], [0.05, 0.05])
+    assert np.all(np.isnan(reading.temperature))
+    assert np.all(np.isnan(reading.error))
+
+
+def test_stress_and_laser_heating_enter_the_error():
+    found = calibrate(points(PLATE))
+    centre, stderr = [521.0 - 12.0], [0.05]
+    plain = Thermometer(found).read(centre, stderr).error[0]
+    stressed = Thermometer(found, stress=HEATER_STRESS).read(centre, stderr).error[0]
+    # the paper: stress below 20 MPa is worth less than 1 K
+    assert 0.3 < np.sqrt(stressed**2 - plain**2) < 1.0
+    heated = Thermometer(found, laser_heating=7.0).read(centre, stderr).error[0]
+    assert np.sqrt(heated**2 - plain**2) == pytest.approx(7.0)
+    # the paper: 100 µW, a tenth absorbed, some 860 K at 4 mW
+    assert laser_heating(0.1, 860.0 / 4.0) == pytest.approx(2.15)
+    for arguments in ((-1.0, 200.0), (1.0, float("nan")), (1.0, 1.0, 2.0)):
+        with pytest.raises(InputError, match="expected"):
+            laser_heating(*arguments)
+    with pytest.raises(InputError, match="stress"):
+        Thermometer(found, stress=-1.0)
+    with pytest.raises(InputError, match="did you mean 'linear'"):
+        Thermometer(found, law="liner")
+
+
+def test_papers_check_of_its_linear_law():
+    check = paper_check()
+    # our reference page, found independently: 50 to 100 K too hot at 1050 to 1150 K
+    for name, error in check.errors(np.array([1050.0, HIGHEST_TIP_TEMPERATURE])).items():
+        assert 40.0 < error[0] < 75.0, name
+        assert 75.0 < error[1] < 105.0, name
+    for result in check.results:
+        law = dict(check.laws)[result.name]
+        shift, _ = anharmonic.shift(result.true_at_knee, 293.0)
+        assert law.temperature(shift, 293.0) == pytest.approx(943.0, abs=0.05)
+        assert result.discrepancy == pytest.approx(result.true_at_knee - 893.0)
+        assert result.explained == pytest.approx((943.0 - result.true_at_knee) / 50.0)
+        assert 0.3 < result.explained < 0.6
+    assert "of the 50 K discrepancy remain" in check.conclusion()
+
+
+def test_papers_check_takes_a_calibration_of_ones_own():
+    own = calibrate(points(PLATE, noise=0.05))
+    check = paper_check(own)
+    assert check.calibration is own
+    assert check.results[0].error_at_hottest == pytest.approx(
+        paper_check().results[0].error_at_hottest, abs=25.0
+    )
+
+
+# --- whole series --------------------------------------------------------------------------
+
+
+def test_made_up_series_to_1150_kelvin(hot_plate):
+    found, _ = calibrate_from(read_spectra([hot_plate]))
+    assert found.anharmonic.residual_rms_K < 3.5
+    rng = np.random.default_rng(77)
+    true = np.linspace(300.0, 1150.0, 18)
+    spectra = [Spectrum(*synthetic.spectrum(t, rng), name=f"{t:.0f}") for t in true]
+    rows = read_lines(measure(spectra), Thermometer(found))
+    error = np.array([row.temperature for row in rows]) - true
+    stated = np.array([row.error for row in rows])
+    assert np.all(np.abs(error) < 12.0)
+    assert np.mean((error / stated) ** 2) < 2.0
+    assert [("extrapolated" in row.flags) for row in rows] == list(true > 895.0)
+
+
+def test_virtual_lab_hot_plate_meets_the_targets(hot_plate_files):
+    found, lines = calibrate_from(read_spectra([hot_plate_files]))
+    assert len(lines) == 25
+    assert abs(found.linear.slope_K_cm + 41.0) < 0.03 * 41.0
+    assert found.anharmonic.residual_rms_K < 3.0
+    residuals = found.residuals()
+    temperature = residuals["temperature_K"]
+    # no trend left: slope, curvature and cubic term all within two standard errors
+    scaled = (temperature - temperature.mean()) / np.ptp(temperature)
+    design = np.vander(scaled, 4)
+    coefficients, *_ = np.linalg.lstsq(design, residuals["anharmonic_K"], rcond=None)
+    noise = found.anharmonic.residual_rms_K
+    errors = noise * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+    assert np.all(np.abs(coefficients) < 2.0 * errors)
+    # the line does leave the paper's band, cold, in the middle and at the top
+    outside = temperature[np.abs(residuals["linear_K"]) > residuals["band_K"]]
+    assert outside.min() == 295.0
+    assert np.any((outside > 500.0) & (outside < 700.0))
+    # photon noise alone explains what the anharmonic law leaves
+    assert 0.4 < found.anharmonic.reduced_chi_square < 1.8
+
+
+def test_virtual_lab_tips_agree_with_the_published_constants(hot_plate_files, tip_files):
+    """Their temperatures are not given; the published constants are an independent witness."""
+    found, _ = calibrate_from(read_spectra([hot_plate_files]))
+    rows = read_lines(measure(read_spectra([tip_files])), Thermometer(found))
+    assert len(rows) == 12
+    law = published().anharmonic
+    room = found.room_temperature_K
+    for row in rows:
+        assert row.error < 12.0
+        other = law.temperature(np.array([row.shift]), room)[0]
+        assert row.temperature == pytest.approx(other, abs=6.0)
+    assert "extrapolated" in rows[-1].flags
+    temperatures = [row.temperature for row in rows]
+    assert temperatures == sorted(temperatures)
+
+
+def test_series_without_temperatures_or_line_is_refused(hot_plate, silicon):
+    x, y = silicon
+    with pytest.raises(InputError, match=r"a\.txt: no temperature in its header or name"):
+        calibrate_from([Spectrum(x, y, "a.txt")])
+    flat = np.random.default_rng(0).poisson(100.0, x.size).astype(float)
+    with pytest.raises(InputError, match=r"a\.txt: no silicon line"):
+        calibrate_from([Spectrum(x, flat, "a.txt", temperature=300.0)])
+    clipped = np.minimum(y, 400.0)
+    with pytest.raises(InputError, match="a saturated line"):
+        calibrate_from([Spectrum(x, clipped, "a.txt", temperature=300.0)])
+
+
+def test_table_of_temperatures(tmp_path, hot_plate):
+    spectra = read_spectra([hot_plate])
+    table = tmp_path / "plate.csv"
+    rows = "".join(f"{s.name};{s.temperature - 273.15:.2f}\n" for s in spectra)
+    table.write_text("file;temperature (°C)\n" + rows.replace(".", ",").replace(",txt", ".txt"))
+    bare = [Spectrum(s.x, s.y, s.name) for s in spectra]
+    found, _ = calibrate_from(bare, temperatures=read_temperatures(table))
+    expected, _ = calibrate_from(spectra)
+    assert found.linear.slope_K_cm == pytest.approx(expected.linear.slope_K_cm)
+    with pytest.raises(InputError, match=r"unknown spectrum .* 'other.txt'"):
+        calibrate_from(
+            [Spectrum(bare[0].x, bare[0].y, "other.txt")], temperatures=read_temperatures(table)
+        )
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "no rows"),
+        ("a.txt\n", "expected a file name and a temperature"),
+        ("a.txt,295\nb.txt,hot\n", "row 2: temperature 'hot'"),
+        ("a.txt,-5\n", "no sample temperature"),
+    ],
+)
+def test_broken_table_of_temperatures(tmp_path, text, words):
+    (tmp_path / "t.csv").write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_temperatures(tmp_path / "t.csv")
+
+
+def test_calibration_and_measurement_are_fitted_with_the_same_shape(hot_plate):
+    found, _ = calibrate_from(read_spectra([hot_plate]), PeakOptions("voigt", resolution=0.8))
+    assert (found.line_shape, found.resolution_cm) == ("voigt", 0.8)
