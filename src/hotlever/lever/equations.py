@@ -298,6 +298,25 @@ class LeverEquations:
             "end_heat_mW": end_heat,
         }
 
+    def by_parameter(self, x: Array) -> Array:
+        """Return derivatives of the weak equations and of I_h by the six parameters.
+
+        Returns
+        -------
+        ndarray, shape (size + 1, 6)
+            At fixed fields, in the order of `PARAMETERS`.
+        """
+        fields, laws = self.at(x)
+        square = _square(fields.grad_V)
+        columns = []
+        for name in PARAMETERS:
+            sigma = laws.sigma_by.get(name, np.zeros_like(laws.sigma))
+            kappa = laws.kappa_by.get(name, np.zeros_like(laws.kappa))
+            columns.append(
+                self.space.weak_form(-sigma * square, kappa * fields.grad_T, sigma * fields.grad_V)
+            )
+        return np.column_stack(columns)
+
     def sensitivities(self, x: Array) -> Array:
         """Return derivatives of I_h, V_r and T_tip by the six parameters, at a fixed bias.
 
@@ -312,16 +331,7 @@ class LeverEquations:
             In the order of `OBSERVABLES` and of `PARAMETERS`; mA, V and K per unit of the
             parameter. The row of V_r is NaN without a reader.
         """
-        fields, laws = self.at(x)
-        square = _square(fields.grad_V)
-        columns = []
-        for name in PARAMETERS:
-            sigma = laws.sigma_by.get(name, np.zeros_like(laws.sigma))
-            kappa = laws.kappa_by.get(name, np.zeros_like(laws.kappa))
-            columns.append(
-                self.space.weak_form(-sigma * square, kappa * fields.grad_T, sigma * fields.grad_V)
-            )
-        by_parameter = np.column_stack(columns)
+        by_parameter = self.by_parameter(x)
         right_hand_side = np.zeros((x.size, len(PARAMETERS)))
         right_hand_side[:-1] = -by_parameter
         right_hand_side[-2] *= self.series_kohm
