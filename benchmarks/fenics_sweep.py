@@ -76,7 +76,7 @@ def compare(name, options, element, degree, quadrature):
 
 def main():
     rows = [
-        compare("cubic, default mesh", MeshOptions(), ElementTriP3(), 3, 6),
+        compare("cubic, default mesh", MeshOptions(), ElementTriP3(), 3, 5),
         compare("quadratic, default mesh", MeshOptions(), ElementTriP2(), 2, 5),
         compare("quadratic, sizes / 2", MeshOptions(refinement=2.0), ElementTriP2(), 2, 5),
     ]

@@ -59,7 +59,7 @@ class FiniteElements:
         self,
         mesh: Mesh,
         element: Element | None = None,
-        quadrature: int | tuple[Array, Array] = 6,
+        quadrature: int | tuple[Array, Array] = 5,
     ) -> None:
         rule = {"intorder" if isinstance(quadrature, int) else "quadrature": quadrature}
         self.basis = CellBasis(mesh, element or ElementTriP3(), **rule)

@@ -17,6 +17,16 @@ from hotlever.lever.lever import OBSERVABLE_COLUMNS
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.materials.spieser2017 import DOI, OPERATING_POINTS, PUBLISHED, published
 from hotlever.probe import MeshOptions, Probe
+from hotlever.raman import (
+    Thermometer,
+    calibrate_from,
+    measure,
+    paper_check,
+    read_lines,
+    read_spectra,
+)
+from hotlever.raman.figures import paper_check as draw_paper_check
+from hotlever.raman.figures import thermometry
 from hotlever.report.figures import (
     doping_profile,
     field_maps,
@@ -57,6 +67,7 @@ def reproduce_page(quick: bool, progress: Callable[[int, int], None]) -> Page:
         _characteristics_section,
         _heater_section,
         _fit_section,
+        _thermometer_section,
         _balance_section,
     ]
     if not quick:
@@ -243,6 +254,22 @@ def _fit_section(page: Page, lever: Lever) -> None:
     with as_file(files("hotlever") / "examples" / "lever-a.csv") as path:
         measurement = read_measurement(path)
     add_fit(page, fit(measurement, lever.probe))
+
+
+def _thermometer_section(page: Page, lever: Lever) -> None:
+    page.heading("The Raman thermometer (Fig. 2)")
+    with as_file(files("hotlever") / "examples" / "raman") as folder:
+        calibration, series = calibrate_from(read_spectra([folder / "hot-plate"]))
+        lines = measure(read_spectra([folder / "tip"]))
+    rows = read_lines(lines, Thermometer(calibration, "anharmonic"))
+    page.figure(
+        "raman_calibration",
+        thermometry(lines, rows, calibration, series),
+        "Silicon spectra of a hot plate (some of the virtual lab's), the two calibration laws with "
+        "tip spectra read by the anharmonic one, and what the laws leave of the hot plate.",
+    )
+    check = paper_check()
+    page.figure("raman_check", draw_paper_check(check), check.conclusion())
 
 
 def _balance_section(page: Page, lever: Lever) -> None:
