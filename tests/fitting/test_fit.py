@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from importlib.resources import as_file, files
 
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting import Measurement, fit, read_measurement
-from hotlever.fitting.fit import FullModel, with_measured_circuit
+from hotlever.fitting.fit import with_measured_circuit
+from hotlever.fitting.models import FastModel, FullModel
 from hotlever.lever import Lever
+from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 
@@ -164,11 +167,52 @@ def test_fit_file_has_the_keys_of_the_contract(exact_fit, tmp_path):
     assert Probe.from_values(content["probe"], "fit") == exact_fit.probe
 
 
-def test_example_fit_on_the_full_mesh():
+def test_reduced_and_full_lever_give_the_same_fit(coarse, coarse_model):
+    """On noisy data, with parameters well away from the start."""
+    data = twin(coarse, noise=2e-3)
+    space = cached_reduction(coarse)
+
+    def fast(probe):
+        return FastModel(Lever(probe, space=coarse.space), space)
+
+    full, reduced = fit(data, model=coarse_model), fit(data, model=fast)
+    for name, parameter in full.parameters.items():
+        assert parameter.stderr is not None
+        assert abs(reduced.parameters[name].value - parameter.value) < 0.1 * parameter.stderr
+    for name, rms in full.residual_rms.items():
+        assert reduced.residual_rms[name] == pytest.approx(rms, rel=2e-3)
+
+
+def test_confirming_makes_the_prediction_exact(coarse):
+    material = coarse.probe.material.with_(**TRUTH)
+    model = FastModel(coarse, cached_reduction(coarse))
+    exact = coarse.with_material(material).sweep(BIAS)
+    before, _ = model.predict(material, BIAS)
+    change = model.confirm(material, BIAS)
+    after, _ = model.predict(material, BIAS)
+    np.testing.assert_allclose(after - before, change, atol=1e-12)
+    np.testing.assert_allclose(after[2], exact.tip_K, atol=1e-5)
+    np.testing.assert_allclose(after[0], exact.current_mA, rtol=1e-8)
+
+
+def test_where_the_reduced_lever_fails_the_full_one_takes_over(coarse, coarse_model, monkeypatch):
+    class Broken:
+        def predict(self, material, bias):
+            raise ComputationError("stopped")
+
+    module = sys.modules["hotlever.fitting.fit"]  # its name is also that of its function
+    monkeypatch.setattr(module, "fast_model", lambda *_: Broken())
+    monkeypatch.setattr(module, "full_model", coarse_model)
+    result = fit(twin(coarse))
+    assert result.parameters["c_kappa"].value == pytest.approx(TRUTH["c_kappa"], rel=1e-4)
+
+
+def test_example_fit_on_the_default_mesh():
     """The virtual-lab lever: an independent solver's data, noise of a few kelvin and 0.3 %."""
     with as_file(files("hotlever") / "examples" / "lever-a.csv") as path:
         result = fit(read_measurement(path))
-    assert result.steps <= 10
+    # those before the confirmation by full solves, and the few after it
+    assert result.steps <= 15
     assert result.residual_rms["current_mA"] < 0.004
     assert result.residual_rms["reader_V"] < 0.001
     # the file's own temperature errors are 5 to 24 K

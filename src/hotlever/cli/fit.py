@@ -42,10 +42,11 @@ def fit(
     measurement = read_measurement(data)
     for column in measurement.ignored:
         note(f"{data}: column '{column}' is not used")
+    probe = load_probe(probe_file)
     with progress("fit") as update:
         result = run_fit(
             measurement,
-            load_probe(probe_file),
+            probe,
             observables=None if observables is None else observables.split(","),
             fixed=fixed,
             progress=update,

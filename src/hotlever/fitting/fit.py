@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import lmfit
 import numpy as np
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.files import write_text
-from hotlever.fitting.measurement import COLUMNS, OBSERVABLE_SYMBOLS, Measurement
+from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement
+from hotlever.fitting.models import ForwardModel, fast_model, full_model
 from hotlever.lever.equations import OBSERVABLES
 from hotlever.lever.lever import OBSERVABLE_COLUMNS, Lever
 from hotlever.materials import PARAMETERS, Material, parameter
@@ -31,27 +32,10 @@ _UNSOLVED = 10.0
 
 #: Solved sweeps that most fits need, for a progress bar to fill.
 _USUAL_EVALUATIONS = 10
-
-
-class ForwardModel(Protocol):
-    """What a fit compares the data with."""
-
-    def predict(self, material: Material, bias: Array) -> tuple[Array, Array]:
-        """Return observables (3, n) and sensitivities (3, n, 6) at biases (n,) in any order."""
-        ...
-
-
-class FullModel:
-    """The finite-element lever as a forward model."""
-
-    def __init__(self, lever: Lever) -> None:
-        self._lever = lever
-
-    def predict(self, material: Material, bias: Array) -> tuple[Array, Array]:
-        """Return observables (3, n) and sensitivities (3, n, 6) at biases (n,) in any order."""
-        data = self._lever.with_material(material).sweep(bias, sensitivities=True)
-        values = np.stack([data[OBSERVABLE_COLUMNS[name]].values for name in OBSERVABLES])
-        return values, data.sensitivity.values
+#: A confirmation that moves every parameter by less than this share of its standard error ends
+#: the fit; further ones would move it by that share again.
+_SETTLED = 0.05
+_MOST_CONFIRMATIONS = 5
 
 
 @dataclass(frozen=True)
@@ -167,9 +151,12 @@ def fit(
     fixed : mapping of str to float or None, optional
         Parameters to hold, at a value or (None) at the probe's.
     model : callable, optional
-        Makes the forward model of a probe; the finite-element lever by default.
+        Makes the forward model of a probe. By default a reduced lever (made once for each
+        geometry, which takes some seconds) whose result is confirmed and corrected by the full
+        one; `hotlever.fitting.models.full_model` is the full lever throughout.
     progress : callable, optional
-        Called after every solved sweep with their number and how many there usually are.
+        Called with steps done and their number: parameter sets while a geometry is reduced,
+        then solved sweeps and how many there usually are.
 
     Raises
     ------
@@ -185,9 +172,15 @@ def fit(
     chosen = _chosen(observables, measurement)
     start = _held(probe.material, fixed)
     varied = [name for name in PARAMETERS if name not in fixed]
-    used = np.any(np.isfinite([measurement.observable(name) for name in chosen]), axis=0)
+    present = np.isfinite([measurement.observable(name) for name in chosen])
+    if present.sum() < len(varied):
+        raise InputError(
+            f"{measurement.path or 'measurement'}: {present.sum()} data for {len(varied)} "
+            "parameters; fix some or measure more"
+        )
+    used: NDArray[np.bool_] = np.any(present, axis=0)
     problem = _LeastSquares(
-        (model or _full_model)(probe.with_values(start.model_dump())),
+        model(probe) if model else fast_model(probe, progress),
         start,
         measurement,
         used,
@@ -195,12 +188,15 @@ def fit(
         varied,
         progress,
     )
-    if problem.size < len(varied):
-        raise InputError(
-            f"{measurement.path or 'measurement'}: {problem.size} data for {len(varied)} "
-            "parameters; fix some or measure more"
-        )
-    result = problem.solve()
+    try:
+        result = problem.solve_and_confirm()
+    except ComputationError:
+        if model is not None:
+            raise
+        # far from the parameters it was made for, a reduced lever may fail where the full one
+        # does not
+        problem.use(full_model(probe))
+        result = problem.solve_and_confirm()
     material = problem.material(result.params)
     fitted_probe = probe.model_copy(update={"material": material})
     parameters = {
@@ -269,12 +265,42 @@ class _LeastSquares:
         self._at: Material | None = None
         self._prediction: tuple[Array, Array] | None = None
 
-    def solve(self) -> Any:
+    def use(self, model: ForwardModel) -> None:
+        """Compare the data with another model from now on."""
+        self._model, self._at, self._prediction = model, None, None
+        self.evaluations = 0
+
+    def solve_and_confirm(self) -> Any:
+        """Run Levenberg-Marquardt, make the model exact at its end, and repeat if that matters."""
+        result = self._solve(self._start)
+        for _ in range(_MOST_CONFIRMATIONS):
+            change = self._model.confirm(self.material(result.params), self._bias)
+            self._at = None
+            moved = (change[self._rows] / self._scale)[self._present]
+            if not moved.any():
+                return result
+            previous, result = result, self._solve(self.material(result.params))
+            if self._settled(previous, result):
+                return result
+        raise ComputationError(
+            f"the fit did not settle: after {_MOST_CONFIRMATIONS} confirmations by full solves the "
+            f"parameters still move by more than {_SETTLED:g} of their standard errors"
+        )
+
+    def _settled(self, previous: Any, result: Any) -> bool:
+        """Whether confirming moved no parameter by more than a share of its standard error."""
+        return all(
+            abs(result.params[name].value - previous.params[name].value)
+            <= _SETTLED * (result.params[name].stderr or np.inf)
+            for name in self._varied
+        )
+
+    def _solve(self, start: Material) -> Any:
         """Run Levenberg-Marquardt."""
         parameters = lmfit.Parameters()
         for name in self._varied:
             known = PARAMETERS[name]
-            value = getattr(self._start, name)
+            value = getattr(start, name)
             if not known.lower < value < known.upper:
                 raise InputError(
                     f"{name} = {value:g} to start from, expected a value between "
@@ -351,10 +377,6 @@ class _LeastSquares:
         return self._prediction
 
 
-def _full_model(probe: Probe) -> ForwardModel:
-    return FullModel(Lever(probe))
-
-
 def _chosen(observables: Sequence[str] | None, measurement: Measurement) -> tuple[str, ...]:
     """Check the observables asked for; all that have data, by default."""
     if observables is None:
@@ -411,6 +433,3 @@ def _without_nan(value: Any) -> Any:
     if isinstance(value, list):
         return [_without_nan(entry) for entry in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-__all__ = ["COLUMNS", "Fit", "FittedParameter", "ForwardModel", "FullModel", "fit"]

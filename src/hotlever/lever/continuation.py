@@ -219,14 +219,12 @@ class BranchFollower:
         tangent = result.jacobian.solve(unit)
         tangent /= np.hypot(tangent[-1] / BIAS_UNIT, self._tip(tangent) / TIP_UNIT)
         forward = tangent[-1] if origin is None else self._along(tangent, origin.tangent)
-        x = result.x
-        if pin == AT_BIAS:
-            x[-1] = value
         return State(
-            x,
+            result.x,
             np.copysign(1.0, forward) * tangent,
-            float(x[-1]),
-            self.equations.space.tip_temperature(x),
+            # to rounding, V_b is the bias it was pinned to
+            value if pin == AT_BIAS else float(result.x[-1]),
+            self.equations.space.tip_temperature(result.x),
             result.iterations,
         )
 

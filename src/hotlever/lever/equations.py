@@ -146,6 +146,7 @@ class LeverEquations:
     def __init__(self, space: Space, circuit: Circuit, material: Material) -> None:
         self.space, self.circuit, self.material = space, circuit, material
         self._sheet = PER_CM_TO_MILLI_PER_UM * space.thickness_um
+        self._latest: tuple[Array, tuple[Fields, Conductivities]] | None = None
         self._doping = [
             tapered_doping(
                 region.along,
@@ -197,8 +198,11 @@ class LeverEquations:
 
     def at(self, x: Array) -> tuple[Fields, Conductivities]:
         """Return the fields of a state, and κ and σ, at the quadrature points."""
-        fields = self.space.fields(x, self.circuit.base_temperature_K)
-        return fields, self.conductivities(fields.T)
+        # residual, Jacobian and sensitivities are asked for at the same state one by one
+        if self._latest is None or self._latest[0] is not x:
+            fields = self.space.fields(x, self.circuit.base_temperature_K)
+            self._latest = (x, (fields, self.conductivities(fields.T)))
+        return self._latest[1]
 
     # --- Newton's method and continuation ----------------------------------------------------
 

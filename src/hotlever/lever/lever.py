@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from hotlever import __version__
 from hotlever.errors import ComputationError, InputError
 from hotlever.files import read_text, whole_file, write_text
-from hotlever.lever.continuation import BranchFollower, ContinuationOptions
+from hotlever.lever.continuation import AT_BIAS, BranchFollower, ContinuationOptions
 from hotlever.lever.equations import LAWS, OBSERVABLES, LeverEquations
+from hotlever.lever.newton import NewtonOptions, newton
 from hotlever.lever.space import LeverSpace
 from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import MeshOptions, Probe, mesh_layout
@@ -158,6 +159,26 @@ class Lever:
             error.partial = ramp
             raise
         return ramp
+
+    def polish(self, guesses: Iterable[Array]) -> Ramp:
+        """Solve at the biases of some nearby states, each from its own guess.
+
+        Parameters
+        ----------
+        guesses : iterable of ndarray
+            Full states, such as a reduced lever's expanded ones.
+
+        Raises
+        ------
+        NewtonError
+            If one is too far from a solution.
+        """
+        states = []
+        for guess in guesses:
+            bias = float(guess[-1])
+            root = newton(self.equations.pinned(AT_BIAS, bias), guess, NewtonOptions()).x
+            states.append(LeverState(bias, root))
+        return Ramp(states, [])
 
     def knee(self) -> xr.Dataset:
         """Find the knee of the I-V curve, dV_l/dI_h = 0, and return that one state.

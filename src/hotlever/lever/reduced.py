@@ -61,9 +61,9 @@ class ReductionOptions:
     """
 
     parameter_sets: int = 8
-    modes: int = 28
-    rule_tolerance: float = 1e-5
-    sketch: int = 500
+    modes: int = 32
+    rule_tolerance: float = 1e-6
+    sketch: int = 700
     seed: int = 0
 
 
@@ -136,6 +136,29 @@ class ReducedSpace:
         hot = np.argsort(-np.abs(modes_T[0]))[:60]
         self._hot = modes_T[:, hot]
         self.use_points(np.arange(operators.weights.size), operators.weights.ravel())
+
+    def arrays(self) -> tuple[Array, Index, Array, Index, Array]:
+        """Return what `from_arrays` makes the space of again."""
+        return self.basis, np.array([self._count]), self._lift, self.points, self.weights
+
+    @classmethod
+    def from_arrays(
+        cls, lever: Lever, basis: Array, count: Index, lift: Array, points: Index, weights: Array
+    ) -> ReducedSpace:
+        """Make a space of stored arrays.
+
+        Raises
+        ------
+        ValueError
+            If they do not belong to the lever.
+        """
+        size, split = lever.space.size, int(count[0])
+        if basis.shape[1:] != (size,) or lift.shape != (size,) or points.shape != weights.shape:
+            raise ValueError("the stored arrays are not of this lever")
+        base = lever.probe.circuit.base_temperature_K
+        space = cls(lever.space, basis[:split], basis[split:], lift, base)
+        space.use_points(points, weights)
+        return space
 
     @property
     def thickness_um(self) -> float:
