@@ -12,6 +12,6 @@ lever = Lever(Probe.reference())
 state = lever.solve(lever.knee().bias_V.values).states[0]
 save_figure(field_maps(FieldMapper(lever).map(state.x), lever.space.mesh.layout), sys.argv[1])
 # small enough for a repository
-Image.open(sys.argv[1]).convert("RGB").resize((570, 554), Image.Resampling.LANCZOS).save(
+Image.open(sys.argv[1]).convert("RGB").resize((550, 534), Image.Resampling.LANCZOS).save(
     sys.argv[1], optimize=True
 )
