@@ -87,7 +87,7 @@ def test_fit_prints_writes_and_reports(run, tmp_path):
         "vary": False,
     }
     page = (tmp_path / "report" / "index.html").read_text()
-    assert page.count("<img") == 3
+    assert page.count("<img") == 5
 
 
 def test_fit_notes_where_data_and_probe_differ(run, tmp_path):

@@ -22,13 +22,16 @@ TRUTH = {"c_kappa": 0.66, "delta": 0.69, "n_d": 4.6e17, "p": 2.72, "a0": 9.9e-4,
 BIAS = np.linspace(1, 11, 13)
 
 
-def twin(lever: Lever, noise: float = 0.0, **settings) -> Measurement:
-    """A measurement made by the model itself."""
+def twin(lever: Lever, noise: float = 0.0, seed: int = 5, **settings) -> Measurement:
+    """A measurement made by the model itself; noise in units of each largest value.
+
+    That is what the weights of a fit assume.
+    """
     sweep = lever.with_material(lever.probe.material.with_(**TRUTH)).sweep(BIAS)
-    rng = np.random.default_rng(5)
+    rng = np.random.default_rng(seed)
 
     def noisy(values):
-        return values.values * (1 + noise * rng.normal(size=values.size))
+        return values.values + noise * values.values.max() * rng.normal(size=values.size)
 
     empty = np.full(BIAS.size, np.nan)
     return Measurement(
@@ -40,6 +43,13 @@ def twin(lever: Lever, noise: float = 0.0, **settings) -> Measurement:
 def coarse_model(coarse):
     """The coarse lever as forward model: the same equations on both sides."""
     return lambda probe: FullModel(Lever(probe, space=coarse.space))
+
+
+@pytest.fixture(scope="module")
+def coarse_fast(coarse):
+    """The reduced lever of the same coarse mesh."""
+    space = cached_reduction(coarse)
+    return lambda probe: FastModel(Lever(probe, space=coarse.space), space)
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +96,59 @@ def test_only_the_chosen_observables_enter(coarse, coarse_model):
     assert result.observables == ("current", "reader")
     assert result.residual_rms["tip_K"] == pytest.approx(100, abs=5)
     assert result.parameters["c_kappa"].value == pytest.approx(TRUTH["c_kappa"], rel=0.02)
+
+
+def test_the_band_is_the_spread_of_repeated_experiments(coarse, coarse_fast):
+    """Fits of data with new noise each scatter in tip temperature as the band says."""
+    tips, errors = [], []
+    for seed in range(12):
+        band = fit(twin(coarse, noise=2e-3, seed=seed), model=coarse_fast).band
+        tips.append(band.tip_K.values)
+        errors.append(band.tip_stderr_K.values)
+    hot = BIAS > 6
+    ratio = np.std(tips, axis=0)[hot].mean() / np.mean(errors, axis=0)[hot].mean()
+    # twelve fits know a spread to 20 %
+    assert 0.6 < ratio < 1.6
+
+
+def test_wrong_points_are_named_and_a_robust_fit_sets_them_aside(coarse, coarse_fast):
+    data = twin(coarse, noise=2e-3)
+    current = data.current_mA.copy()
+    current[3] *= 10  # a wrong decade
+    spoilt = Measurement(data.bias_V, current, data.reader_V, data.tip_K, data.tip_error_K)
+    plain = fit(spoilt, model=coarse_fast)
+    robust = fit(spoilt, robust=True, model=coarse_fast)
+    for result in (plain, robust):
+        assert any(f"current at {BIAS[3]:g} V is" in note for note in result.notes)
+    for name, fitted in robust.parameters.items():
+        assert abs(fitted.value - TRUTH[name]) < 5 * fitted.stderr
+    assert plain.parameters["c_kappa"].stderr > 10 * robust.parameters["c_kappa"].stderr
+
+
+def test_good_data_raise_no_suspicion(coarse, coarse_model):
+    notes = fit(twin(coarse, noise=2e-3), model=coarse_model).notes
+    assert not any("standard deviations" in note for note in notes)
+
+
+def test_what_the_data_do_not_determine_is_said_in_words(coarse, coarse_model):
+    data = twin(coarse, noise=2e-3)
+    cold = np.where(BIAS < 5, 1.0, np.nan)
+    low_bias = Measurement(
+        data.bias_V, data.current_mA * cold, data.reader_V * cold, data.tip_K * cold, cold
+    )
+    result = fit(low_bias, fixed={"p": None}, model=coarse_model)
+    assert any("poorly determined" in note for note in result.notes)
+    assert any("hardly told apart" in note for note in result.notes)
+    assert "standard error of at most" in result.notes[-1]
+
+
+def test_data_that_are_all_zero_are_refused(coarse, coarse_model):
+    data = twin(coarse)
+    dead = Measurement(
+        data.bias_V, data.current_mA, 0 * data.reader_V, data.tip_K, data.tip_error_K
+    )
+    with pytest.raises(InputError, match="all values of reader are 0"):
+        fit(dead, model=coarse_model)
 
 
 def test_order_and_repetition_of_the_rows_do_not_matter(coarse, coarse_model, exact_fit):
@@ -167,15 +230,10 @@ def test_fit_file_has_the_keys_of_the_contract(exact_fit, tmp_path):
     assert Probe.from_values(content["probe"], "fit") == exact_fit.probe
 
 
-def test_reduced_and_full_lever_give_the_same_fit(coarse, coarse_model):
+def test_reduced_and_full_lever_give_the_same_fit(coarse, coarse_model, coarse_fast):
     """On noisy data, with parameters well away from the start."""
     data = twin(coarse, noise=2e-3)
-    space = cached_reduction(coarse)
-
-    def fast(probe):
-        return FastModel(Lever(probe, space=coarse.space), space)
-
-    full, reduced = fit(data, model=coarse_model), fit(data, model=fast)
+    full, reduced = fit(data, model=coarse_model), fit(data, model=coarse_fast)
     for name, parameter in full.parameters.items():
         assert parameter.stderr is not None
         assert abs(reduced.parameters[name].value - parameter.value) < 0.1 * parameter.stderr

@@ -35,9 +35,10 @@ def test_sensitivities_have_taylor_order_two(coarse, name):
             ]
         )
         orders = np.log2(rest[:-1] / rest[1:])
-        # a straight line leaves no remainder to measure an order of
+        # a straight line leaves no remainder to measure an order of; where the curvature happens
+        # to vanish the order is higher, and a wrong slope would make it one
         linear = rest[0] < 1e-7 * np.abs(start[column].values)
-        assert np.abs(orders[-1] - 2.0)[~linear].max(initial=0.0) < 0.25, (observable, orders)
+        assert orders[-1][~linear].min(initial=2.0) > 1.75, (observable, orders)
 
 
 def test_a_lever_without_reader_has_no_reader_sensitivity():

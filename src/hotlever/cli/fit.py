@@ -25,6 +25,9 @@ def fit(
         list[str] | None,
         typer.Option("--fix", metavar="NAME[=VALUE]", help="Hold a parameter."),
     ] = None,
+    robust: Annotated[
+        bool, typer.Option("--robust", help="Lessen the weight of points far off the others.")
+    ] = False,
     medium: Annotated[str, typer.Option(help="vacuum.")] = "vacuum",
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Fit file (JSON).")] = None,
     report: Annotated[
@@ -49,6 +52,7 @@ def fit(
             probe,
             observables=None if observables is None else observables.split(","),
             fixed=fixed,
+            robust=robust,
             progress=update,
         )
     for text in result.notes:

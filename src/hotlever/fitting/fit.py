@@ -36,6 +36,16 @@ _USUAL_EVALUATIONS = 10
 #: the fit; further ones would move it by that share again.
 _SETTLED = 0.05
 _MOST_CONFIRMATIONS = 5
+#: Tukey's biweight gives no weight beyond this many standard deviations.
+_TUKEY = 4.685
+_HUBER, _HUBER_TURNS = 1.345, 6
+_MOST_REWEIGHTINGS = 20
+#: A point is named as suspicious beyond this many standard deviations.
+_SUSPICIOUS = 8.0
+#: A parameter is called poorly determined from this relative standard error.
+_POOR = 0.15
+#: Two parameters are called hard to tell apart from this correlation.
+_ENTANGLED = 0.95
 
 
 @dataclass(frozen=True)
@@ -74,6 +84,10 @@ class Fit:
         Of the heater's doping concentration (paper's T_i); the error is NaN if unknown.
     residual_rms : dict of str to float
         Per column of a sweep (mA, V, K), for every observable with data, fitted or not.
+    band : xarray.Dataset
+        What the fit predicts at the measured biases, and the standard error of the predicted
+        tip temperature that follows from the covariance of the parameters: ``bias_V``,
+        ``power_mW``, ``tip_K``, ``tip_stderr_K``, rising in bias.
     evaluations, steps : int
         Solved sweeps, and Levenberg-Marquardt steps among them.
     seconds : float
@@ -91,6 +105,7 @@ class Fit:
     inversion_temperature_K: float
     inversion_temperature_stderr_K: float
     residual_rms: dict[str, float]
+    band: xr.Dataset
     evaluations: int
     steps: int
     seconds: float
@@ -131,6 +146,7 @@ def fit(
     *,
     observables: Sequence[str] | None = None,
     fixed: Mapping[str, float | None] | None = None,
+    robust: bool = False,
     model: Callable[[Probe], ForwardModel] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Fit:
@@ -150,6 +166,9 @@ def fit(
         III all three. All that the measurement has, by default.
     fixed : mapping of str to float or None, optional
         Parameters to hold, at a value or (None) at the probe's.
+    robust : bool
+        Lessen the weight of points far from the others' fit (Tukey's biweight on the residuals
+        in units of their median absolute deviation), down to nothing beyond 4.7 of them.
     model : callable, optional
         Makes the forward model of a probe. By default a reduced lever (made once for each
         geometry, which takes some seconds) whose result is confirmed and corrected by the full
@@ -189,14 +208,14 @@ def fit(
         progress,
     )
     try:
-        result = problem.solve_and_confirm()
+        result = problem.solve_and_confirm(robust)
     except ComputationError:
         if model is not None:
             raise
         # far from the parameters it was made for, a reduced lever may fail where the full one
         # does not
         problem.use(full_model(probe))
-        result = problem.solve_and_confirm()
+        result = problem.solve_and_confirm(robust)
     material = problem.material(result.params)
     fitted_probe = probe.model_copy(update={"material": material})
     parameters = {
@@ -209,14 +228,19 @@ def fit(
         for name in PARAMETERS
     }
     covariance = problem.covariance(result)
+    correlation = _correlation(covariance)
+    band = problem.band(result.params, covariance, probe.circuit.series_resistance_ohm)
+    notes += problem.suspicious(result.params, robust)
+    notes += statements(parameters, varied, correlation, band)
     return Fit(
         parameters=parameters,
         names=varied,
-        correlation=_correlation(covariance),
+        correlation=correlation,
         observables=chosen,
         inversion_temperature_K=float(inversion_temperature(material.n_d, material.p)),
         inversion_temperature_stderr_K=_inversion_error(material, varied, covariance),
         residual_rms=problem.residual_rms(result.params),
+        band=band,
         evaluations=problem.evaluations,
         steps=int(problem.steps),
         seconds=time.perf_counter() - began,
@@ -254,11 +278,15 @@ class _LeastSquares:
     ) -> None:
         self._model, self._start, self._varied = model, start, varied
         self._measurement, self._progress = measurement, progress
-        self._bias = measurement.bias_V[used]
+        self._used, self._bias = used, measurement.bias_V[used]
         self._rows = [OBSERVABLES.index(name) for name in observables]
         data = np.stack([measurement.observable(name)[used] for name in observables])
         self._scale = np.nanmax(np.abs(data), axis=1, keepdims=True)
         self._data, self._present = data, np.isfinite(data)
+        for name, scale in zip(observables, self._scale, strict=True):
+            if scale == 0:
+                raise InputError(f"{measurement.path or 'measurement'}: all values of {name} are 0")
+        self._weights = np.ones(data.shape)
         self.size = int(self._present.sum())
         self.evaluations = 0
         self.steps = 0
@@ -270,9 +298,23 @@ class _LeastSquares:
         self._model, self._at, self._prediction = model, None, None
         self.evaluations = 0
 
-    def solve_and_confirm(self) -> Any:
+    def solve_and_confirm(self, robust: bool) -> Any:
         """Run Levenberg-Marquardt, make the model exact at its end, and repeat if that matters."""
         result = self._solve(self._start)
+        for turn in range(_MOST_REWEIGHTINGS if robust else 0):
+            size = np.abs(self._deviations(result.params))
+            # first Huber's weights, which have one optimum, then Tukey's, which forget outliers
+            at_first = turn < _HUBER_TURNS
+            self._weights = (
+                np.sqrt(_HUBER / np.maximum(size, _HUBER))
+                if at_first
+                else np.clip(1.0 - (size / _TUKEY) ** 2, 0.0, None)
+            )
+            # outliers can drive the first fit onto a bound, where it would stay
+            origin = self._start if at_first else self.material(result.params)
+            previous, result = result, self._solve(origin)
+            if not at_first and self._settled(previous, result):
+                break
         for _ in range(_MOST_CONFIRMATIONS):
             change = self._model.confirm(self.material(result.params), self._bias)
             self._at = None
@@ -341,13 +383,55 @@ class _LeastSquares:
     def residual_rms(self, parameters: Any) -> dict[str, float]:
         """Return the rms of data minus model per column, for every observable with data."""
         values, _ = self._predict(self.material(parameters))
-        used = np.isin(self._measurement.bias_V, self._bias)
         rms = {}
         for row, name in enumerate(OBSERVABLES):
-            difference = self._measurement.observable(name)[used] - values[row]
+            difference = self._measurement.observable(name)[self._used] - values[row]
             if np.isfinite(difference).any():
                 rms[OBSERVABLE_COLUMNS[name]] = float(np.sqrt(np.nanmean(difference**2)))
         return rms
+
+    def band(self, parameters: Any, covariance: Array, series_resistance_ohm: float) -> xr.Dataset:
+        """Return the predicted tip temperature and its standard error: see `Fit.band`."""
+        (current, _, tip), sensitivities = self._predict(self.material(parameters))
+        columns = [list(PARAMETERS).index(name) for name in self._varied]
+        slopes = sensitivities[OBSERVABLES.index("tip")][:, columns]
+        stderr = np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes))
+        power = current * (self._bias - series_resistance_ohm / 1000.0 * current)
+        _, order = np.unique(self._bias, return_index=True)
+        described = {
+            "bias_V": (self._bias, "V", "bias"),
+            "power_mW": (power, "mW", "power dissipated in the lever"),
+            "tip_K": (tip, "K", "predicted tip temperature"),
+            "tip_stderr_K": (stderr, "K", "its standard error from the fitted parameters"),
+        }
+        return xr.Dataset(
+            {
+                name: ("bias", values[order], {"units": unit, "long_name": text})
+                for name, (values, unit, text) in described.items()
+            }
+        )
+
+    def suspicious(self, parameters: Any, robust: bool) -> list[str]:
+        """Name the points that lie far outside the scatter of the others."""
+        advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
+        deviations = self._deviations(parameters)
+        return [
+            f"{OBSERVABLES[row]} at {bias:g} V is {abs(deviation):.0f} standard deviations from "
+            f"the fit; {advice}"
+            for row, deviations_of_row in zip(self._rows, deviations, strict=True)
+            for bias, deviation in zip(self._bias, deviations_of_row, strict=True)
+            if abs(deviation) > _SUSPICIOUS
+        ]
+
+    def _deviations(self, parameters: Any) -> Array:
+        """Return residuals in units of the scatter of their observable; 0 where nothing is."""
+        values, _ = self._predict(self.material(parameters))
+        residuals = np.where(self._present, values[self._rows] - self._data, np.nan)
+        scatter = 1.4826 * np.nanmedian(np.abs(residuals), axis=1, keepdims=True)
+        # data without noise have no scatter to measure against
+        floor = 1e-4 * self._scale
+        deviations: Array = np.nan_to_num(residuals / np.maximum(scatter, floor))
+        return deviations
 
     def _residual(self, parameters: Any) -> Array:
         try:
@@ -356,7 +440,8 @@ class _LeastSquares:
             if self.evaluations == 1:
                 raise
             return np.full(self.size, _UNSOLVED)
-        return ((values[self._rows] - self._data) / self._scale)[self._present]
+        scaled = (values[self._rows] - self._data) / self._scale
+        return (self._weights * scaled)[self._present]
 
     def _jacobian(self, parameters: Any) -> Array:
         # Levenberg-Marquardt asks for this once per step, at parameters it has just accepted
@@ -365,7 +450,7 @@ class _LeastSquares:
         columns = [list(PARAMETERS).index(name) for name in self._varied]
         scale = np.array([PARAMETERS[name].scale for name in self._varied])
         scaled = sensitivities[self._rows][:, :, columns] * scale / self._scale[:, :, None]
-        return scaled[self._present]
+        return (self._weights[:, :, None] * scaled)[self._present]
 
     def _predict(self, material: Material) -> tuple[Array, Array]:
         if self._prediction is None or material != self._at:
@@ -375,6 +460,41 @@ class _LeastSquares:
             if self._progress is not None:
                 self._progress(self.evaluations, max(_USUAL_EVALUATIONS, self.evaluations))
         return self._prediction
+
+
+def statements(
+    parameters: Mapping[str, FittedParameter],
+    varied: Sequence[str],
+    correlation: Array,
+    band: xr.Dataset,
+) -> list[str]:
+    """Say in words what the data do not determine, and what that means for the tip temperature."""
+    found = []
+    for name in varied:
+        fitted = parameters[name]
+        if fitted.stderr is None:
+            found.append(f"{name}: no standard error could be estimated")
+        elif fitted.stderr > _POOR * abs(fitted.value):
+            share = fitted.stderr / abs(fitted.value)
+            found.append(
+                f"{name} is poorly determined by these data: its standard error is {share:.0%} of "
+                "its value"
+            )
+    for first in range(len(varied)):
+        for second in range(first):
+            together = correlation[first, second]
+            if abs(together) > _ENTANGLED:
+                found.append(
+                    f"{varied[second]} and {varied[first]} are hardly told apart by these data "
+                    f"(correlation {together:+.2f})"
+                )
+    largest = float(band.tip_stderr_K.max())
+    if found and np.isfinite(largest):
+        found.append(
+            "the tip temperature that follows has nevertheless a standard error of at most "
+            f"{largest:.1f} K from the fitted parameters"
+        )
+    return found
 
 
 def _chosen(observables: Sequence[str] | None, measurement: Measurement) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from matplotlib.tri import Triangulation
 from hotlever.calibration.power_law import EQ12, PowerLaw
 from hotlever.fitting.measurement import Measurement
 from hotlever.lever.fields import FieldMap
+from hotlever.materials import PARAMETERS
 from hotlever.probe import Layout
 from hotlever.report.style import (
     BLACK,
@@ -354,7 +355,70 @@ def data_and_model(measurement: Measurement, model: xr.Dataset, fitted: Sequence
     return made
 
 
+def correlation_matrix(names: Sequence[str], correlation: np.ndarray) -> Figure:
+    """Draw the correlation of fitted parameters (paper's Fig. 4 d-f)."""
+    count = len(names)
+    with figure(1.2 + 0.52 * count, 0.6 + 0.52 * count) as made:
+        axes = made.add_subplot()
+        image = axes.imshow(correlation, cmap="PuOr", vmin=-1, vmax=1)
+        symbols = [PARAMETERS[name].symbol for name in names]
+        axes.set_xticks(range(count), symbols)
+        axes.set_yticks(range(count), symbols)
+        axes.grid(False)
+        for row in range(count):
+            for column in range(count):
+                value = correlation[row, column]
+                axes.text(
+                    column,
+                    row,
+                    f"{value:.2f}",
+                    ha="center",
+                    va="center",
+                    fontsize=7.5,
+                    color="white" if abs(value) > 0.7 else "black",
+                )
+        made.colorbar(image, label="correlation (1)", shrink=0.9)
+    return made
+
+
+def tip_band(band: xr.Dataset, measurement: Measurement | None = None) -> Figure:
+    """Draw the predicted tip temperature with its 95 % band against bias and power.
+
+    Parameters
+    ----------
+    band : xarray.Dataset
+        `Fit.band`.
+    measurement : Measurement, optional
+        Drawn against the bias.
+    """
+    with figure(7.4, 4.2) as made:
+        grid = made.subplots(2, 2, sharex="col", height_ratios=(2.0, 1.0))
+        half = 1.96 * band.tip_stderr_K
+        for column, (name, label) in enumerate(
+            (("bias_V", "bias V$_b$ (V)"), ("power_mW", "power P$_l$ (mW)"))
+        ):
+            upper, lower = grid[:, column]
+            along = band[name]
+            upper.fill_between(along, band.tip_K - half, band.tip_K + half, color=SKY, alpha=0.6)
+            upper.plot(along, band.tip_K, color=BLUE, label="prediction and 95 % band")
+            if measurement is not None and name == "bias_V":
+                upper.plot(
+                    measurement.bias_V,
+                    measurement.tip_K,
+                    "o",
+                    mfc="none",
+                    color=BLACK,
+                    label="measured",
+                )
+            upper.set(ylabel="tip temperature (K)")
+            lower.plot(along, half, "o-", color=BLUE, ms=3.5)
+            lower.set(xlabel=label, ylabel="half band (K)", ylim=(0, None))
+        grid[0, 0].legend(loc="upper left")
+    return made
+
+
 __all__ = [
+    "correlation_matrix",
     "data_and_model",
     "doping_profile",
     "field_maps",
@@ -364,4 +428,5 @@ __all__ = [
     "resistances",
     "sweep_overview",
     "temperature_power",
+    "tip_band",
 ]

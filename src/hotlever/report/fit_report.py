@@ -6,7 +6,13 @@ from uncertainties import ufloat
 
 from hotlever.fitting.fit import Fit
 from hotlever.materials import PARAMETERS
-from hotlever.report.figures import data_and_model, iv_curve, temperature_power
+from hotlever.report.figures import (
+    correlation_matrix,
+    data_and_model,
+    iv_curve,
+    temperature_power,
+    tip_band,
+)
 from hotlever.report.page import Page
 
 _COLUMNS = ("parameter", "value", "unit", "")
@@ -64,28 +70,41 @@ def fit_text(fit: Fit) -> str:
     return "\n".join(lines)
 
 
-def add_fit(page: Page, fit: Fit) -> None:
-    """Add tables and figures of a fit to a page."""
+def add_fit(page: Page, fit: Fit, prefix: str = "fit_") -> None:
+    """Add tables and figures of a fit to a page; `prefix` begins their file names."""
     model = fit.model()
     page.table(
         _COLUMNS,
         parameter_rows(fit),
         "Material parameters; standard errors in units of the last digits.",
     )
+    for text in fit.notes:
+        page.text(f"{text[0].upper()}{text[1:]}.")
     page.text(fit_text(fit).split("\n", len(fit.parameters))[-1].replace("\n", "; ") + ".")
     page.figure(
-        "fit_data_and_model",
+        f"{prefix}data_and_model",
         data_and_model(fit.measurement, model, fit.observables),
         "Measured and modelled observables against bias, and their difference. "
         "Grey: the stated error of the measured temperature.",
     )
     page.figure(
-        "fit_iv",
+        f"{prefix}correlation",
+        correlation_matrix(fit.names, fit.correlation),
+        "Correlation of the fitted parameters.",
+    )
+    page.figure(
+        f"{prefix}tip_band",
+        tip_band(fit.band, fit.measurement),
+        "The tip temperature that the fit predicts, with the 95 % band that follows from the "
+        "covariance of the parameters (model errors not included).",
+    )
+    page.figure(
+        f"{prefix}iv",
         iv_curve(model, measurement=fit.measurement),
         "Heater current against lever voltage.",
     )
     page.figure(
-        "fit_temperature_power",
+        f"{prefix}temperature_power",
         temperature_power(
             model,
             measurement=fit.measurement,
@@ -103,6 +122,4 @@ def fit_page(fit: Fit) -> Page:
         f"{', '.join(fit.observables)}.",
     )
     add_fit(page, fit)
-    for text in fit.notes:
-        page.text(f"Note: {text}.")
     return page

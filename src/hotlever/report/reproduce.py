@@ -4,18 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from hotlever.calibration.power_law import EQ12
-from hotlever.fitting import fit, read_measurement
+from hotlever.fitting import Fit, Measurement, fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.lever.equations import OBSERVABLES
 from hotlever.lever.fields import FieldMapper, heater_profile
 from hotlever.lever.lever import OBSERVABLE_COLUMNS
+from hotlever.materials import PARAMETERS
 from hotlever.materials.silicon import inversion_temperature
-from hotlever.materials.spieser2017 import DOI, OPERATING_POINTS, PUBLISHED, published
+from hotlever.materials.spieser2017 import (
+    DOI,
+    NOMINAL_DOPING,
+    OPERATING_POINTS,
+    PUBLISHED,
+    published,
+)
 from hotlever.probe import MeshOptions, Probe
 from hotlever.raman import (
     Thermometer,
@@ -28,6 +37,7 @@ from hotlever.raman import (
 from hotlever.raman.figures import paper_check as draw_paper_check
 from hotlever.raman.figures import thermometry
 from hotlever.report.figures import (
+    correlation_matrix,
     doping_profile,
     field_maps,
     heater_profiles,
@@ -41,6 +51,15 @@ from hotlever.report.page import Page
 
 #: The paper's ramp: 1 to 11 V in 25 steps.
 BIAS = np.linspace(1.0, 11.0, 25)
+#: Headings of the six parameters, in units of their scale.
+_PARAMETER_COLUMNS = (
+    "c_κ",
+    "Δ (µm)",
+    "n_d (1e17 cm⁻³)",
+    "p",
+    "a₀ (1e-4 Ω cm)",
+    "a₁ (1e-6 Ω cm/K)",
+)
 
 
 def reproduce_page(quick: bool, progress: Callable[[int, int], None]) -> Page:
@@ -67,6 +86,7 @@ def reproduce_page(quick: bool, progress: Callable[[int, int], None]) -> Page:
         _characteristics_section,
         _heater_section,
         _fit_section,
+        _options_section,
         _thermometer_section,
         _balance_section,
     ]
@@ -99,15 +119,8 @@ def _parameter_section(page: Page, lever: Lever) -> None:
             (
                 entry.name,
                 *(
-                    value_with_error(getattr(material, name), error.get(name), scale)
-                    for name, scale in (
-                        ("c_kappa", 1),
-                        ("delta", 1),
-                        ("n_d", 1e17),
-                        ("p", 1),
-                        ("a0", 1e-4),
-                        ("a1", 1e-6),
-                    )
+                    value_with_error(getattr(material, name), error.get(name), known.scale)
+                    for name, known in PARAMETERS.items()
                 ),
                 "" if printed is None else f"{printed:.0f}",
                 f"{ours:.1f}",
@@ -116,12 +129,7 @@ def _parameter_section(page: Page, lever: Lever) -> None:
     page.table(
         (
             "set",
-            "c_κ",
-            "Δ (µm)",
-            "n_d (1e17 cm⁻³)",
-            "p",
-            "a₀ (1e-4 Ω cm)",
-            "a₁ (1e-6 Ω cm/K)",
+            *_PARAMETER_COLUMNS,
             "T_i published (K)",
             "T_i (K)",
         ),
@@ -251,9 +259,90 @@ def _fit_section(page: Page, lever: Lever) -> None:
         "The data set lever-a.csv was made with an independent solver and instrument noise; its "
         "parameters are not known to the fit, which starts from the published option III."
     )
-    with as_file(files("hotlever") / "examples" / "lever-a.csv") as path:
-        measurement = read_measurement(path)
-    add_fit(page, fit(measurement, lever.probe))
+    add_fit(page, fit(_example("lever-a.csv"), lever.probe))
+
+
+def _options_section(page: Page, lever: Lever) -> None:
+    page.heading("What each observable adds (options I to III, Figs. 3 and 4, Table I)")
+    page.text(
+        "lever-a.csv follows the model that is fitted. lever-b.csv comes from a richer one, with a "
+        "tip on the heater, so that the fit cannot be perfect."
+    )
+    for name in ("lever-a.csv", "lever-b.csv"):
+        _compare_options(page, _example(name), lever.probe)
+
+
+def _compare_options(page: Page, measurement: Measurement, probe: Probe) -> None:
+    name = Path(measurement.path).stem
+    choices: dict[str, dict[str, Any]] = {
+        "I": {"observables": ["current"]},
+        "II": {"observables": ["current", "reader"]},
+        "III": {},
+        "III, n_d fixed": {"fixed": {"n_d": NOMINAL_DOPING}},
+    }
+    fits = {option: fit(measurement, probe, **choice) for option, choice in choices.items()}
+    page.table(
+        (name, *_PARAMETER_COLUMNS, "T_i (K)", "rms T_tip (K)"),
+        [
+            (
+                f"option {option}",
+                *(
+                    value_with_error(found.value, found.stderr, PARAMETERS[key].scale)
+                    for key, found in result.parameters.items()
+                ),
+                f"{result.inversion_temperature_K:.0f}",
+                f"{result.residual_rms['tip_K']:.1f}",
+            )
+            for option, result in fits.items()
+        ],
+        f"{name}: parameters by what was fitted.",
+    )
+    for option in ("I", "II", "III"):
+        result = fits[option]
+        page.figure(
+            f"{name}_correlation_{option}",
+            correlation_matrix(result.names, result.correlation),
+            f"{name}, option {option}: correlation of the fitted parameters.",
+        )
+    page.table(
+        ("option", "strongest correlation between groups", "largest T_tip error above 850 K (K)"),
+        [
+            (option, f"{_between_groups(result):.2f}", f"{_hot_error(result):.0f}")
+            for option, result in fits.items()
+        ],
+        f"{name}: coupling of the groups {{c_κ}}, {{a₀, a₁}} and {{Δ, n_d, p}}, and how far the "
+        "predicted temperature is from the measured one.",
+    )
+    free, held = fits["III"].parameters, fits["III, n_d fixed"].parameters
+    changes = ", ".join(
+        f"{PARAMETERS[key].symbol} {held[key].value / free[key].value - 1:+.1%}"
+        for key in PARAMETERS
+        if key != "n_d"
+    )
+    page.text(
+        f"{name}: holding n_d at the nominal {NOMINAL_DOPING:.2g} cm⁻³ changes the other "
+        f"parameters by {changes}."
+    )
+
+
+def _between_groups(result: Fit) -> float:
+    """Largest correlation between parameters of different groups, in absolute value."""
+    group = {"c_kappa": 0, "a0": 1, "a1": 1, "delta": 2, "n_d": 2, "p": 2}
+    groups = np.array([group[name] for name in result.names])
+    apart = groups[:, None] != groups[None, :]
+    return float(np.abs(result.correlation[apart]).max())
+
+
+def _hot_error(result: Fit) -> float:
+    """Largest difference of predicted and measured tip temperature above 850 K."""
+    order = np.argsort(result.measurement.bias_V)
+    measured = result.measurement.tip_K[order]
+    return float(np.nanmax(np.abs(measured - result.band.tip_K.values)[measured > 850]))
+
+
+def _example(name: str) -> Measurement:
+    with as_file(files("hotlever") / "examples" / name) as path:
+        return read_measurement(path)
 
 
 def _thermometer_section(page: Page, lever: Lever) -> None:
