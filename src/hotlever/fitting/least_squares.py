@@ -1,0 +1,263 @@
+"""The least-squares problem of a fit: weights, Levenberg-Marquardt, confirmation, scatter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import lmfit
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from hotlever.errors import ComputationError, InputError
+from hotlever.fitting.measurement import Measurement
+from hotlever.fitting.models import ForwardModel
+from hotlever.lever.equations import OBSERVABLES
+from hotlever.lever.lever import OBSERVABLE_COLUMNS
+from hotlever.materials import PARAMETERS, Material
+
+Array = NDArray[np.float64]
+
+#: Scaled residual given to trial parameters for which the lever cannot be solved: far beyond
+#: any real one, so that Levenberg-Marquardt turns back.
+_UNSOLVED = 10.0
+
+#: Solved sweeps that most fits need, for a progress bar to fill.
+_USUAL_EVALUATIONS = 10
+#: A confirmation that moves every parameter by less than this share of its standard error ends
+#: the fit; further ones would move it by that share again.
+_SETTLED = 0.05
+_MOST_CONFIRMATIONS = 5
+#: Tukey's biweight gives no weight beyond this many standard deviations.
+_TUKEY = 4.685
+_HUBER, _HUBER_TURNS = 1.345, 6
+_MOST_REWEIGHTINGS = 20
+#: A point is named as suspicious beyond this many standard deviations.
+_SUSPICIOUS = 8.0
+
+
+class LeastSquares:
+    """The residuals of a measurement and their Jacobian, in the units of the fit, for lmfit.
+
+    Every observable is divided by its largest measured value, every parameter by its scale.
+
+    Parameters
+    ----------
+    model : ForwardModel
+    start : Material
+        Where to begin; fixed parameters stay there.
+    measurement : Measurement
+    used : ndarray of bool
+        The rows of the measurement that take part.
+    observables : tuple of str
+    varied : list of str
+        Parameters to find.
+    progress : callable or None
+        Called with the sweeps solved and how many there usually are.
+
+    Attributes
+    ----------
+    evaluations, steps : int
+        Sweeps solved, and Levenberg-Marquardt steps taken.
+
+    Raises
+    ------
+    InputError
+        If all values of an observable are zero.
+    """
+
+    def __init__(
+        self,
+        model: ForwardModel,
+        start: Material,
+        measurement: Measurement,
+        used: NDArray[np.bool_],
+        observables: tuple[str, ...],
+        varied: list[str],
+        progress: Callable[[int, int], None] | None,
+    ) -> None:
+        self._model, self._start, self._varied = model, start, varied
+        self._measurement, self._progress = measurement, progress
+        self._used, self._bias = used, measurement.bias_V[used]
+        self._rows = [OBSERVABLES.index(name) for name in observables]
+        data = np.stack([measurement.observable(name)[used] for name in observables])
+        self._scale = np.nanmax(np.abs(data), axis=1, keepdims=True)
+        self._data, self._present = data, np.isfinite(data)
+        for name, scale in zip(observables, self._scale, strict=True):
+            if scale == 0:
+                raise InputError(f"{measurement.path or 'measurement'}: all values of {name} are 0")
+        self._weights = np.ones(data.shape)
+        self.size = int(self._present.sum())
+        self.evaluations = 0
+        self.steps = 0
+        self._at: Material | None = None
+        self._prediction: tuple[Array, Array] | None = None
+
+    def use(self, model: ForwardModel) -> None:
+        """Compare the data with another model from now on."""
+        self._model, self._at, self._prediction = model, None, None
+        self.evaluations = 0
+
+    def solve_and_confirm(self, robust: bool) -> Any:
+        """Run Levenberg-Marquardt, make the model exact at its end, and repeat if that matters."""
+        result = self._solve(self._start)
+        for turn in range(_MOST_REWEIGHTINGS if robust else 0):
+            size = np.abs(self._deviations(result.params))
+            # first Huber's weights, which have one optimum, then Tukey's, which forget outliers
+            at_first = turn < _HUBER_TURNS
+            self._weights = (
+                np.sqrt(_HUBER / np.maximum(size, _HUBER))
+                if at_first
+                else np.clip(1.0 - (size / _TUKEY) ** 2, 0.0, None)
+            )
+            # outliers can drive the first fit onto a bound, where it would stay
+            origin = self._start if at_first else self.material(result.params)
+            previous, result = result, self._solve(origin)
+            if not at_first and self._settled(previous, result):
+                break
+        for _ in range(_MOST_CONFIRMATIONS):
+            change = self._model.confirm(self.material(result.params), self._bias)
+            self._at = None
+            moved = (change[self._rows] / self._scale)[self._present]
+            if not moved.any():
+                return result
+            previous, result = result, self._solve(self.material(result.params))
+            if self._settled(previous, result):
+                return result
+        raise ComputationError(
+            f"the fit did not settle: after {_MOST_CONFIRMATIONS} confirmations by full solves the "
+            f"parameters still move by more than {_SETTLED:g} of their standard errors"
+        )
+
+    def _settled(self, previous: Any, result: Any) -> bool:
+        """Whether confirming moved no parameter by more than a share of its standard error."""
+        return all(
+            abs(result.params[name].value - previous.params[name].value)
+            <= _SETTLED * (result.params[name].stderr or np.inf)
+            for name in self._varied
+        )
+
+    def _solve(self, start: Material) -> Any:
+        """Run Levenberg-Marquardt."""
+        parameters = lmfit.Parameters()
+        for name in self._varied:
+            known = PARAMETERS[name]
+            value = getattr(start, name)
+            if not known.lower < value < known.upper:
+                raise InputError(
+                    f"{name} = {value:g} to start from, expected a value between "
+                    f"{known.lower:g} and {known.upper:g} {known.unit}"
+                )
+            parameters.add(
+                name,
+                value=value / known.scale,
+                min=known.lower / known.scale,
+                max=known.upper / known.scale,
+            )
+        minimizer = lmfit.Minimizer(self._residual, parameters, max_nfev=200)
+        result = minimizer.leastsq(Dfun=self._jacobian, xtol=1e-5, ftol=1e-8)
+        if not result.success:
+            raise ComputationError(f"the fit did not converge: {result.message}")
+        return result
+
+    def material(self, parameters: Any) -> Material:
+        """Return the material of lmfit's scaled parameters."""
+        values = {name: parameters[name].value * PARAMETERS[name].scale for name in self._varied}
+        return self._start.model_copy(update=values)
+
+    def stderr(self, result: Any, name: str) -> float | None:
+        """Return the standard error of a parameter in its own unit."""
+        if name not in self._varied or result.params[name].stderr is None:
+            return None
+        return float(result.params[name].stderr * PARAMETERS[name].scale)
+
+    def covariance(self, result: Any) -> Array:
+        """Return the covariance of the varied parameters in their own units."""
+        scale = np.array([PARAMETERS[name].scale for name in self._varied])
+        covariance = getattr(result, "covar", None)
+        if covariance is None:
+            return np.full((scale.size, scale.size), np.nan)
+        scaled: Array = covariance * np.outer(scale, scale)
+        return scaled
+
+    def residual_rms(self, parameters: Any) -> dict[str, float]:
+        """Return the rms of data minus model per column, for every observable with data."""
+        values, _ = self._predict(self.material(parameters))
+        rms = {}
+        for row, name in enumerate(OBSERVABLES):
+            difference = self._measurement.observable(name)[self._used] - values[row]
+            if np.isfinite(difference).any():
+                rms[OBSERVABLE_COLUMNS[name]] = float(np.sqrt(np.nanmean(difference**2)))
+        return rms
+
+    def band(self, parameters: Any, covariance: Array, series_resistance_ohm: float) -> xr.Dataset:
+        """Return the predicted tip temperature and its standard error: see `Fit.band`."""
+        (current, _, tip), sensitivities = self._predict(self.material(parameters))
+        columns = [list(PARAMETERS).index(name) for name in self._varied]
+        slopes = sensitivities[OBSERVABLES.index("tip")][:, columns]
+        stderr = np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes))
+        power = current * (self._bias - series_resistance_ohm / 1000.0 * current)
+        _, order = np.unique(self._bias, return_index=True)
+        described = {
+            "bias_V": (self._bias, "V", "bias"),
+            "power_mW": (power, "mW", "power dissipated in the lever"),
+            "tip_K": (tip, "K", "predicted tip temperature"),
+            "tip_stderr_K": (stderr, "K", "its standard error from the fitted parameters"),
+        }
+        return xr.Dataset(
+            {
+                name: ("bias", values[order], {"units": unit, "long_name": text})
+                for name, (values, unit, text) in described.items()
+            }
+        )
+
+    def suspicious(self, parameters: Any, robust: bool) -> list[str]:
+        """Name the points that lie far outside the scatter of the others."""
+        advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
+        deviations = self._deviations(parameters)
+        return [
+            f"{OBSERVABLES[row]} at {bias:g} V is {abs(deviation):.0f} standard deviations from "
+            f"the fit; {advice}"
+            for row, deviations_of_row in zip(self._rows, deviations, strict=True)
+            for bias, deviation in zip(self._bias, deviations_of_row, strict=True)
+            if abs(deviation) > _SUSPICIOUS
+        ]
+
+    def _deviations(self, parameters: Any) -> Array:
+        """Return residuals in units of the scatter of their observable; 0 where nothing is."""
+        values, _ = self._predict(self.material(parameters))
+        residuals = np.where(self._present, values[self._rows] - self._data, np.nan)
+        scatter = 1.4826 * np.nanmedian(np.abs(residuals), axis=1, keepdims=True)
+        # data without noise have no scatter to measure against
+        floor = 1e-4 * self._scale
+        deviations: Array = np.nan_to_num(residuals / np.maximum(scatter, floor))
+        return deviations
+
+    def _residual(self, parameters: Any) -> Array:
+        try:
+            values, _ = self._predict(self.material(parameters))
+        except ComputationError:
+            if self.evaluations == 1:
+                raise
+            return np.full(self.size, _UNSOLVED)
+        scaled = (values[self._rows] - self._data) / self._scale
+        return (self._weights * scaled)[self._present]
+
+    def _jacobian(self, parameters: Any) -> Array:
+        # Levenberg-Marquardt asks for this once per step, at parameters it has just accepted
+        self.steps += 1
+        _, sensitivities = self._predict(self.material(parameters))
+        columns = [list(PARAMETERS).index(name) for name in self._varied]
+        scale = np.array([PARAMETERS[name].scale for name in self._varied])
+        scaled = sensitivities[self._rows][:, :, columns] * scale / self._scale[:, :, None]
+        return (self._weights[:, :, None] * scaled)[self._present]
+
+    def _predict(self, material: Material) -> tuple[Array, Array]:
+        if self._prediction is None or material != self._at:
+            self._at, self._prediction = material, None
+            self.evaluations += 1
+            self._prediction = self._model.predict(material, self._bias)
+            if self._progress is not None:
+                self._progress(self.evaluations, max(_USUAL_EVALUATIONS, self.evaluations))
+        return self._prediction
