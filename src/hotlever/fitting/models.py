@@ -15,6 +15,7 @@ from hotlever.lever.reduced import ReducedSpace
 from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.materials import Material
 from hotlever.probe import Probe
+from hotlever.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
@@ -63,12 +64,14 @@ class FastModel:
         self._lever, self._space = lever, space
         self._offset: Array | float = 0.0
 
+    @one_blas_thread
     def predict(self, material: Material, bias: Array) -> tuple[Array, Array]:
         """Return observables (3, n) and sensitivities (3, n, 6) at biases (n,) in any order."""
         equations, states, rows = self._solve(material, bias)
         values, sensitivities = _predicted(equations, states, rows)
         return values + self._offset, sensitivities
 
+    @one_blas_thread
     def confirm(self, material: Material, bias: Array) -> Array:
         """Solve the full lever here, from the reduced states, and correct by the difference."""
         equations, states, rows = self._solve(material, bias)

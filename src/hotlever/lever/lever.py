@@ -21,6 +21,7 @@ from hotlever.lever.newton import NewtonOptions, newton
 from hotlever.lever.space import LeverSpace
 from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import MeshOptions, Probe, mesh_layout
+from hotlever.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -118,6 +119,7 @@ class Lever:
         """Return a follower of the lever's solutions, at zero bias."""
         return BranchFollower(self.equations, options)
 
+    @one_blas_thread
     def solve(self, bias: ArrayLike, progress: Progress | None = None) -> Ramp:
         """Find the states that a slow ramp of the bias from zero passes.
 
@@ -160,6 +162,7 @@ class Lever:
             raise
         return ramp
 
+    @one_blas_thread
     def polish(self, guesses: Iterable[Array]) -> Ramp:
         """Solve at the biases of some nearby states, each from its own guess.
 
@@ -180,6 +183,7 @@ class Lever:
             states.append(LeverState(bias, root))
         return Ramp(states, [])
 
+    @one_blas_thread
     def knee(self) -> xr.Dataset:
         """Find the knee of the I-V curve, dV_l/dI_h = 0, and return that one state.
 
@@ -240,6 +244,7 @@ class Lever:
         rows = np.searchsorted([state.bias for state in ramp.states], asked)
         return self.dataset(ramp, sensitivities=sensitivities).isel(bias=rows)
 
+    @one_blas_thread
     def dataset(self, ramp: Ramp, *, sensitivities: bool = False) -> xr.Dataset:
         """Return what is measured in some states.
 

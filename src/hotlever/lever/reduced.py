@@ -25,6 +25,7 @@ from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import Lever
 from hotlever.lever.space import Fields, LeverSpace, Tangent, Tapered
 from hotlever.materials import PARAMETERS, Material
+from hotlever.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -313,6 +314,7 @@ class DenseSolver:
 # --- making a reduced space ---------------------------------------------------------------------
 
 
+@one_blas_thread
 def reduce(
     lever: Lever,
     options: ReductionOptions | None = None,
@@ -377,6 +379,7 @@ def neighbourhood(equations: LeverEquations, x: Array) -> Array:
     return changes
 
 
+@one_blas_thread
 def reduced_space(
     lever: Lever, snapshots: list[Snapshot], options: ReductionOptions
 ) -> ReducedSpace:
