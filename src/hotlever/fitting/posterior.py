@@ -595,6 +595,9 @@ def _single_threaded_children() -> Iterator[None]:
 def _keep_target(target: Target) -> None:
     global _worker_target
     _worker_target = target
+    # freeing a large block once teaches glibc not to hand the memory of every intermediate array
+    # back to the system, which would cost a new process as much time as the arithmetic
+    np.empty(2_000_000)
 
 
 def _on_target(function: Callable[..., Any], task: tuple[Any, ...]) -> Any:
