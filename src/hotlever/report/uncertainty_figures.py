@@ -113,7 +113,11 @@ def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
             away = np.abs(value - optimum).argmax()
             curvature = profile.parabola.values[away] / (value[away] - optimum) ** 2
             axes.plot(fine, curvature * (fine - optimum) ** 2, "--", color=ORANGE, label="parabola")
-            axes.plot(value, profile.delta_chi_square, "o-", color=BLUE, label="profile")
+            # the root of a near-parabola is nearly straight on either side of the optimum
+            side = np.where(value < optimum, -1.0, 1.0)
+            root = side * np.sqrt(np.maximum(profile.delta_chi_square.values, 0.0))
+            axes.plot(fine, np.interp(fine, value, root) ** 2, color=BLUE, label="profile")
+            axes.plot(value, root**2, "o", color=BLUE)
             axes.axvline(optimum, color=VERMILION, lw=0.8)
             for level in profile.level.values:
                 limit = chi2.ppf(level, 1)
@@ -195,7 +199,9 @@ def _shown(name: str) -> tuple[str, float]:
     unit = "" if known.unit == "1" else known.unit
     if known.scale != 1.0:
         unit = f"10$^{{{math.log10(known.scale):.0f}}}$ {unit}"
-    return f"{known.symbol} ({unit})" if unit else known.symbol, known.scale
+    symbol, _, index = known.symbol.partition("_")
+    symbol += f"$_{{{index}}}$" if index else ""
+    return f"{symbol} ({unit})" if unit else symbol, known.scale
 
 
 def _range(values: Array) -> tuple[float, float]:
