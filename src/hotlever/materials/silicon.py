@@ -8,6 +8,8 @@ see `hotlever.materials.law` for the convention and for what happens outside a l
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import elementwise
@@ -342,20 +344,20 @@ def conductivity_high_doped(T: ArrayLike, a0: float, a1: float) -> tuple[Array, 
     }
 
 
-def inversion_temperature(n: ArrayLike, p: float) -> Array:
+def inversion_temperature(n: ArrayLike, p: ArrayLike) -> Array:
     """Temperature at which the resistivity of low-doped silicon is highest, dρ/dT = 0.
 
     Parameters
     ----------
     n : array_like
         Doping concentration (cm⁻³).
-    p : float
-        Phonon scattering exponent.
+    p : array_like
+        Phonon scattering exponent; broadcast with `n`.
 
     Returns
     -------
     ndarray
-        Inversion temperature T_i (K), of the shape of `n`; NaN where the resistivity has no
+        Inversion temperature T_i (K), of the common shape; NaN where the resistivity has no
         maximum between 300 and 1700 K, as at very high doping.
 
     Examples
@@ -363,12 +365,12 @@ def inversion_temperature(n: ArrayLike, p: float) -> Array:
     >>> inversion_temperature([4.10e17], p=2.64).round(0).tolist()
     [805.0]
     """
-    n = np.asarray(n, dtype=float)
+    n, p = np.broadcast_arrays(np.asarray(n, dtype=float), np.asarray(p, dtype=float))
     cold, hot = np.full(n.shape, 300.0), np.full(n.shape, FORMULA_TO)
 
-    def slope(T: Array, n: Array) -> Array:
+    def slope(T: Array, n: Array, p: Any) -> Array:
         sigma, partials = conductivity_low_doped(T, n, p)
         return partials["T"] / sigma
 
-    root = elementwise.find_root(slope, (cold, hot), args=(n,))
+    root = elementwise.find_root(slope, (cold, hot), args=(n, p))
     return np.where(root.success, root.x, np.nan)

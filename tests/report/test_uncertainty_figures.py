@@ -1,0 +1,59 @@
+"""The figures of a fit's uncertainty, from made-up datasets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from hotlever.report.style import save_figure
+from hotlever.report.uncertainty_figures import (
+    posterior_corner,
+    predictive_bands,
+    profile_curves,
+)
+
+
+def test_corner_has_units_on_its_axes(tmp_path):
+    rng = np.random.default_rng(0)
+    data = {
+        name: (("chain", "draw"), scale * rng.normal(5, 1, size=(8, 100)))
+        for name, scale in (("c_kappa", 1.0), ("n_d", 1e17), ("inversion_temperature", 100.0))
+    }
+    made = posterior_corner(xr.Dataset(data, coords={"quantity": list(data)}))
+    labels = {axes.get_xlabel() for axes in made.axes} - {""}
+    assert labels == {"c$_{κ}$", "n$_{d}$ (10$^{17}$ cm⁻³)", "T$_i$ (K)"}
+    assert len(made.axes) == 6
+    save_figure(made, tmp_path / "corner.png")
+
+
+def test_profile_is_drawn_beside_its_parabola(tmp_path):
+    value = np.linspace(0.6, 0.7, 5)
+    parabola = ((value - 0.65) / 0.02) ** 2
+    profile = xr.Dataset(
+        {"delta_chi_square": ("point", parabola), "parabola": ("point", parabola)},
+        coords={"value": ("point", value), "level": [0.68, 0.95]},
+        attrs={"parameter": "c_kappa", "optimum": 0.65},
+    )
+    made = profile_curves([profile])
+    dashed, curve = made.axes[0].lines[:2]
+    np.testing.assert_allclose(curve.get_ydata(), dashed.get_ydata(), atol=1e-9)
+    save_figure(made, tmp_path / "profile.png")
+
+
+def test_band_shows_bias_and_power(tmp_path):
+    x = np.linspace(0, 10, 20)
+    tip = 300 + 50 * x + np.array([-2, -1, 0, 1, 2])[:, None] * x
+    made = predictive_bands(
+        xr.Dataset(
+            {"tip_K": (("quantile", "bias"), tip), "tip_at_power_K": (("quantile", "power"), tip)},
+            coords={"bias_V": ("bias", x), "power_mW": ("power", x)},
+        )
+    )
+    assert made.axes[2].get_xlabel() == "bias V$_b$ (V)"
+    assert made.axes[3].get_xlabel() == "power P$_l$ (mW)"
+    widest = max(
+        collection.get_datalim(made.axes[2].transData).y1 for collection in made.axes[2].collections
+    )
+    assert widest == pytest.approx(20.0)
+    save_figure(made, tmp_path / "band.png")
