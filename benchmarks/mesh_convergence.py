@@ -5,6 +5,8 @@ python benchmarks/mesh_convergence.py
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 
 from hotlever.lever import Lever
@@ -25,7 +27,11 @@ def main():
         probe = Probe.reference().model_copy(update={"material": published(option).material})
         reference = Lever(probe, space=finest).sweep(BIAS)
         for refinement in (0.5, 1.0, 2.0):
-            lever = Lever(probe, MeshOptions(refinement=refinement))
+            options = MeshOptions(refinement=refinement)
+            lever = Lever(probe, options)
+            began = time.perf_counter()
+            mesh_layout(layout, options)
+            seconds = time.perf_counter() - began
             sweep = lever.sweep(BIAS)
             rows.append(
                 (
@@ -35,10 +41,20 @@ def main():
                     f"{np.abs(sweep.current_mA / reference.current_mA - 1).max().item():.1e}",
                     f"{np.abs(sweep.reader_V / reference.reader_V - 1).max().item():.1e}",
                     f"{np.abs(sweep.tip_K - reference.tip_K).max().item():.3f}",
+                    f"{seconds:.2f}",
                 )
             )
     table(
-        ("parameters", "mesh", "triangles", "I_h (relative)", "V_r (relative)", "T_tip (K)"), rows
+        (
+            "parameters",
+            "mesh",
+            "triangles",
+            "I_h (relative)",
+            "V_r (relative)",
+            "T_tip (K)",
+            "meshing (s)",
+        ),
+        rows,
     )
 
 
