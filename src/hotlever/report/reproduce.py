@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
@@ -138,6 +139,17 @@ def _parameter_section(page: Page, lever: Lever) -> None:
     )
 
 
+@cache
+def _ramp(lever: Lever) -> xr.Dataset:
+    """The paper's ramp; several sections look at the same one."""
+    return lever.sweep(BIAS)
+
+
+@cache
+def _knee(lever: Lever) -> xr.Dataset:
+    return lever.knee()
+
+
 def _published_biases(lever: Lever) -> list[float]:
     """Bias V_l + R_s I_h of each published operating point, in the lever's circuit."""
     series = lever.probe.circuit.series_resistance_ohm / 1000.0
@@ -163,7 +175,7 @@ def _operating_points_section(page: Page, lever: Lever) -> None:
                 f"{here.tip_K.item():.1f}",
             )
         )
-    knee = lever.knee()
+    knee = _knee(lever)
     rows.append(
         (
             "dV_l/dI_h = 0",
@@ -195,11 +207,11 @@ def _operating_points_section(page: Page, lever: Lever) -> None:
 
 def _characteristics_section(page: Page, lever: Lever) -> None:
     page.heading("Characteristics in vacuum (Figs. 5 and 6)")
-    sweep = lever.sweep(BIAS)
+    sweep = _ramp(lever)
     curve = lever.sweep(np.linspace(0.1, BIAS[-1], 110))
     page.figure(
         "iv",
-        iv_curve(sweep, lever.knee(), curve=curve),
+        iv_curve(sweep, _knee(lever), curve=curve),
         "Heater current against lever voltage, option III, 1 to 11 V in 25 steps, with the knee "
         "dV_l/dI_h = 0.",
     )
@@ -363,7 +375,7 @@ def _thermometer_section(page: Page, lever: Lever) -> None:
 
 def _balance_section(page: Page, lever: Lever) -> None:
     page.heading("Balances")
-    sweep = lever.sweep(BIAS)
+    sweep = _ramp(lever)
     charge = np.abs(sweep.ground_current_mA / sweep.current_mA - 1).max().item()
     energy = np.abs(sweep.end_heat_mW / sweep.power_mW - 1).max().item()
     page.text(
@@ -389,7 +401,7 @@ def _mesh_section(page: Page, lever: Lever) -> None:
 
 def mesh_row(name: str, lever: Lever, fine: Lever) -> tuple[str, str, str, str, str]:
     """Return the largest differences of a sweep from that on a finer mesh, as text."""
-    ours, best = lever.sweep(BIAS), fine.sweep(BIAS)
+    ours, best = _ramp(lever), _ramp(fine)
     differences: dict[str, xr.DataArray] = {
         observable: abs(ours[OBSERVABLE_COLUMNS[observable]] - best[OBSERVABLE_COLUMNS[observable]])
         for observable in OBSERVABLES
