@@ -27,7 +27,7 @@ reproduce: env
 lock: env
 	$(BIN)/pip install "pip-tools>=7.4"
 	$(BIN)/pip-compile --quiet --strip-extras --no-emit-index-url --no-emit-find-links \
-	    --no-header --extra test --output-file requirements.lock pyproject.toml
+	    --no-header --all-extras --output-file requirements.lock pyproject.toml
 
 clean:
 	rm -rf .venv reproduce benchmarks/results
