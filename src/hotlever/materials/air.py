@@ -1,0 +1,125 @@
+"""Air at rest: thermal conductivity and its integral, the Kirchhoff variable.
+
+Equation 13 of Spieser et al., J. Appl. Phys. 121, 174503 (2017), doi:10.1063/1.4981883, after
+Kadoya, Matsunaga and Nagashima, J. Phys. Chem. Ref. Data 14, 947 (1985). Still air obeys
+∇·(κ_air(T) ∇T) = 0; with θ = ∫κ_air dT this is Laplace's equation for θ.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hotlever.materials.law import FORMULA_FROM, FORMULA_TO, Array, Partials, law
+
+#: Coefficient and exponent of T (K) of each term of Eq. 13, in W cm⁻¹ K⁻¹.
+_TERMS = (
+    (2.60e-4, 0.0),
+    (4.70e-7, 1.0),
+    (1.48e-7, 0.5),
+    (-6.63e-2, -1.0),
+    (9.14, -2.0),
+    (-6.50e2, -3.0),
+)
+
+
+def _sum(T: Array, order: int) -> Array:
+    """Return Eq. 13 (order 0), its derivative (1) or an antiderivative (−1)."""
+    total = np.zeros_like(T)
+    for coefficient, power in _TERMS:
+        if order == 1:
+            total += coefficient * power * T ** (power - 1.0)
+        elif order == -1 and power == -1.0:
+            total += coefficient * np.log(T)
+        elif order == -1:
+            total += coefficient / (power + 1.0) * T ** (power + 1.0)
+        else:
+            total += coefficient * T**power
+    return total
+
+
+@law(meant_for=(290.0, 1300.0), source="Eq. 13; Kadoya et al., JPCRD 14, 947 (1985)")
+def thermal_conductivity_of_air(T: ArrayLike) -> tuple[Array, Partials]:
+    """Thermal conductivity of air at atmospheric pressure (Eq. 13).
+
+    Parameters
+    ----------
+    T : array_like
+        Temperature (K); meant for 290 to 1300 K.
+
+    Returns
+    -------
+    kappa : ndarray
+        W cm⁻¹ K⁻¹.
+    partials : dict
+        ``T``.
+
+    Examples
+    --------
+    >>> kappa, _ = thermal_conductivity_of_air([293.0, 300.0, 800.0, 1100.0])
+    >>> (100 * kappa).round(5).tolist()  # W/(m K)
+    [0.02546, 0.026, 0.05703, 0.07287]
+    """
+    T = np.asarray(T, dtype=float)
+    return _sum(T, 0), {"T": _sum(T, 1)}
+
+
+def kirchhoff_variable(T: ArrayLike, base_temperature_K: float) -> tuple[Array, Partials]:
+    """Kirchhoff variable of air, θ = ∫κ_air dT from the base temperature.
+
+    Parameters
+    ----------
+    T : array_like
+        Temperature (K). From 200 to 1700 K the integral of Eq. 13; beyond, κ_air stays at its
+        value at the limit, so that θ rises for any T.
+    base_temperature_K : float
+        Where θ is zero.
+
+    Returns
+    -------
+    theta : ndarray
+        W cm⁻¹.
+    partials : dict
+        ``T``: κ_air.
+
+    Examples
+    --------
+    >>> theta, _ = kirchhoff_variable([293.0, 893.0], 293.0)
+    >>> (100 * theta).round(2).tolist()  # W/m
+    [0.0, 26.91]
+    """
+    T = np.asarray(T, dtype=float)
+    inside = np.clip(T, FORMULA_FROM, FORMULA_TO)
+    kappa = _sum(inside, 0)
+    start = _sum(np.asarray(base_temperature_K, dtype=float), -1)
+    return _sum(inside, -1) - start + kappa * (T - inside), {"T": kappa}
+
+
+def temperature_from_kirchhoff(theta: ArrayLike, base_temperature_K: float) -> Array:
+    """Invert `kirchhoff_variable`: the temperature of the air where θ is known.
+
+    Parameters
+    ----------
+    theta : array_like
+        W cm⁻¹.
+    base_temperature_K : float
+        Where θ is zero.
+
+    Returns
+    -------
+    T : ndarray
+        K.
+
+    Examples
+    --------
+    >>> theta, _ = kirchhoff_variable([293.0, 893.0], 293.0)
+    >>> temperature_from_kirchhoff(theta, 293.0).round(6).tolist()
+    [293.0, 893.0]
+    """
+    theta = np.asarray(theta, dtype=float)
+    grid = np.linspace(FORMULA_FROM, FORMULA_TO, 301)
+    T = np.interp(theta, kirchhoff_variable(grid, base_temperature_K)[0], grid)
+    for _ in range(4):  # κ_air is smooth: from the table, Newton's method needs two
+        value, partials = kirchhoff_variable(T, base_temperature_K)
+        T = T + (theta - value) / partials["T"]
+    return T
