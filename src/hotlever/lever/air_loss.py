@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 #: Krylov's method stops at this residual, relative to the right-hand side.
-_TOLERANCE = 1e-12
+_TOLERANCE = 1e-8
 _MOST_DIRECTIONS = 200
 
 
@@ -129,7 +129,9 @@ class AirSolver:
         self._factors, self._air, self._kappa = factors, air, kappa
         count, size = air.sampling.shape
         # per direction: its image between the sites (orthonormal), and the change of x
-        self._images, self._changes = np.empty((0, count)), np.empty((0, size))
+        self._images = np.empty((_MOST_DIRECTIONS, count))
+        self._changes = np.empty((_MOST_DIRECTIONS, size))
+        self._known = 0
 
     def solve(self, right_hand_side: Array) -> Array:
         """Solve for one right-hand side (n,) or several (n, k)."""
@@ -140,10 +142,11 @@ class AirSolver:
         goal = _TOLERANCE * np.linalg.norm(residual)
         used = 0
         while True:
-            shares = self._images[used:] @ residual
-            x += shares @ self._changes[used:]
-            residual = residual - shares @ self._images[used:]
-            used = len(self._images)
+            images = self._images[used : self._known]
+            shares = images @ residual
+            x += shares @ self._changes[used : self._known]
+            residual = residual - shares @ images
+            used = self._known
             if not np.linalg.norm(residual) > goal:
                 return x
             if used == _MOST_DIRECTIONS:
@@ -153,14 +156,12 @@ class AirSolver:
             self._add_direction(residual)
 
     def _add_direction(self, direction: Array) -> None:
-        air = self._air
-        loss = air.spreading @ (air.rest @ (self._kappa * direction))
-        change = -self._factors.solve(loss)
+        air, known = self._air, self._known
+        change = -self._factors.solve(air.spreading @ (air.rest @ (self._kappa * direction)))
         image = direction - air.sampling @ change
-        for _ in range(2):  # once is not enough to be orthogonal to rounding
-            shares = self._images @ image
-            image = image - shares @ self._images
-            change = change - shares @ self._changes
+        shares = self._images[:known] @ image
+        image = image - shares @ self._images[:known]
+        change = change - shares @ self._changes[:known]
         length = np.linalg.norm(image)
-        self._images = np.vstack([self._images, image / length])
-        self._changes = np.vstack([self._changes, change / length])
+        self._images[known], self._changes[known] = image / length, change / length
+        self._known += 1
