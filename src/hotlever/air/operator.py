@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from hotlever import __version__
-from hotlever.air.panels import mirror_group
+from hotlever.air.chip import chip_panels
+from hotlever.air.panels import Panels, mirror_group
 from hotlever.air.single_layer import single_layer
-from hotlever.air.surface import LeverSurface, PanelOptions, lever_surface
+from hotlever.air.surface import PanelOptions, lever_surface
+from hotlever.air.surroundings import Surroundings
 from hotlever.cache import cache_file, store_arrays, stored_arrays
-from hotlever.errors import ComputationError
+from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout
 
 Array = NDArray[np.float64]
@@ -43,49 +45,74 @@ class AirOperator:
     matrix: Array
 
 
-def air_operator(layout: Layout, options: PanelOptions | None = None) -> AirOperator:
+def air_operator(
+    layout: Layout,
+    surroundings: Surroundings | None = None,
+    base_temperature_K: float = 293.0,
+    options: PanelOptions | None = None,
+) -> AirOperator:
     """Return the operator of a lever in its surroundings, from the cache or made and cached.
 
     Parameters
     ----------
     layout : Layout
+    surroundings : Surroundings, optional
+        Free space by default.
+    base_temperature_K : float
+        Of the surroundings; matters only where the temperature jumps at surfaces.
     options : PanelOptions, optional
 
     Raises
     ------
     InputError
-        If a region of the layout is not an axis-parallel rectangle.
+        If a region of the layout is not an axis-parallel rectangle, or the surface below crosses
+        the lever.
     """
-    options = options or PanelOptions()
+    surroundings, options = surroundings or Surroundings(), options or PanelOptions()
     facts = {
         "version": __version__,
         "layout": asdict(layout),
+        "surroundings": surroundings.model_dump(),
+        "base_temperature_K": base_temperature_K,
         "options": asdict(options),
     }
     path = cache_file("air", facts)
     stored = stored_arrays(path)
     if stored is not None and {"sites", "matrix"} <= stored.keys():
         return AirOperator(stored["sites"], stored["matrix"])
-    surface = lever_surface(layout, options)
-    operator = AirOperator(surface.sites, heat_matrix(surface))
+    operator = make_operator(layout, surroundings, base_temperature_K, options)
     store_arrays(path, {"sites": operator.sites, "matrix": operator.matrix})
     return operator
 
 
-def heat_matrix(surface: LeverSurface) -> Array:
-    """Return the matrix from θ at the sites of a surface to the heat lost there (µm)."""
-    layer = single_layer(surface.panels, mirror_group(surface.mid_plane))
-    areas = surface.panels.areas
-    at_site = np.zeros((len(areas), len(surface.sites)))
-    at_site[np.arange(len(areas)), surface.site] = areas
+def make_operator(
+    layout: Layout,
+    surroundings: Surroundings,
+    base_temperature_K: float,
+    options: PanelOptions,
+) -> AirOperator:
+    """Make the operator: see `air_operator`."""
+    surface = lever_surface(layout, options, mirrored=surroundings.symmetric)
+    below = surroundings.surface(layout.tip, layout.thickness_um, base_temperature_K)
+    chip = [chip_panels(layout, options)] if surroundings.chip else []
+    panels = Panels.joined([surface.panels, *chip])
+    for mirror in below:
+        heights = mirror.height(panels.corners)
+        if heights.min() <= 0:
+            raise InputError(
+                "surroundings: the surface below crosses the lever or its chip; expected a larger "
+                "surface_gap_um or another surface_tilt_deg"
+            )
+    layer = single_layer(panels, mirror_group([*surface.mid_plane, *below]))
+    jump = np.full(len(panels), surroundings.jump_length_um(base_temperature_K))
+    jump[: len(surface.panels)] = surroundings.jump_length_um(surroundings.jump_temperature_K)
+    layer[np.diag_indices_from(layer)] += jump * panels.areas
+    moments = np.zeros((len(panels), len(surface.sites)))
+    moments[np.arange(len(surface.panels)), surface.site] = surface.panels.areas
     try:
-        density = cho_solve(cho_factor(layer, overwrite_a=True), at_site)
+        density = cho_solve(cho_factor(layer, overwrite_a=True), moments)
     except LinAlgError as error:
-        raise ComputationError(
-            "the air operator of this geometry is not positive definite: panels overlap or an "
-            "isothermal surface crosses the lever"
-        ) from error
+        raise ComputationError("the air operator of this geometry is not positive") from error
     halves = 2.0 if surface.mirrored else 1.0
-    heat = halves * (at_site.T @ density)
-    symmetric: Array = 0.5 * (heat + heat.T)
-    return symmetric
+    heat = halves * (moments.T @ density)
+    return AirOperator(surface.sites, 0.5 * (heat + heat.T))

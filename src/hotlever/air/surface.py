@@ -102,14 +102,14 @@ def lever_surface(
         x = sizes.breaks(box[0, 0], box[1, 0], 0, (ends[0], ends[1]))
         y = sizes.breaks(box[0, 1], box[1, 1], 1, (ends[2], ends[3]))
         for z in levels:
-            face = _grid(x, y)
+            face = grid(x, y)
             corners.append(np.concatenate([face, np.full((*face.shape[:2], 1), z)], axis=2))
             places.append(face.mean(axis=1))
         for side, intervals in zip(_SIDES, exposed, strict=True):
             for low, high in intervals:
                 along = sizes.breaks(low, high, 1 - side.axis, (True, True))
                 upright = sizes.across(half, mirrored)
-                wall = _grid(along, upright)
+                wall = grid(along, upright)
                 panel = np.empty((*wall.shape[:2], 3))
                 panel[..., side.axis] = box[side.end, side.axis]
                 panel[..., 1 - side.axis] = wall[..., 0]
@@ -135,14 +135,13 @@ class _Sizes:
     """How large panels may be where."""
 
     def __init__(self, layout: Layout, options: PanelOptions) -> None:
-        boxes = [_box(region) for region in layout.regions]
+        low, high = lever_box(layout)
         self._heater = _box(layout.heater)
         self._growth = options.growth
         fine = 1.0 / options.refinement
         self._edge = fine * options.edge * layout.thickness_um
         self._narrow = fine * options.heater * float(np.ptp(self._heater, axis=0).min())
-        whole = np.max([box[1] for box in boxes], axis=0) - np.min([b[0] for b in boxes], axis=0)
-        self._largest = fine * options.largest * float(whole.max())
+        self._largest = fine * options.largest * float((high - low).max())
 
     def breaks(self, low: float, high: float, axis: int, edges: tuple[bool, bool]) -> Array:
         """Divide an interval along an axis; `edges` says which ends are edges of the lever."""
@@ -153,15 +152,15 @@ class _Sizes:
         for end, is_edge in zip((low, high), edges, strict=True):
             if is_edge:
                 size = np.minimum(size, self._edge + self._growth * np.abs(at - end))
-        return _divided(at, size)
+        return divided(at, size)
 
     def across(self, half: float, mirrored: bool) -> Array:
         """Divide a side face from bottom (or the mid-plane) to top."""
         at = np.linspace(0.0 if mirrored else -half, half, 401)
-        return _divided(at, self._edge + self._growth * (half - np.abs(at)))
+        return divided(at, self._edge + self._growth * (half - np.abs(at)))
 
 
-def _divided(at: Array, size: Array) -> Array:
+def divided(at: Array, size: Array) -> Array:
     """Return break points between the ends of `at` whose distances follow `size`."""
     density = 1.0 / size
     counted = np.concatenate(
@@ -173,7 +172,7 @@ def _divided(at: Array, size: Array) -> Array:
     return breaks
 
 
-def _grid(u: Array, v: Array) -> Array:
+def grid(u: Array, v: Array) -> Array:
     """Return the corners (cells, 4, 2) of all cells between two sets of lines."""
     low_u, low_v = (grid.ravel() for grid in np.meshgrid(u[:-1], v[:-1], indexing="ij"))
     high_u, high_v = (grid.ravel() for grid in np.meshgrid(u[1:], v[1:], indexing="ij"))
@@ -186,6 +185,12 @@ def _grid(u: Array, v: Array) -> Array:
         ],
         axis=1,
     )
+
+
+def lever_box(layout: Layout) -> Array:
+    """Return the least and largest corner of a lever, shape (2, 2)."""
+    outline = np.concatenate([region.outline for region in layout.regions])
+    return np.stack([outline.min(axis=0), outline.max(axis=0)])
 
 
 def _box(region: Region) -> Array:
