@@ -18,7 +18,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from hotlever import __version__
 from hotlever.air.chip import chip_panels
 from hotlever.air.panels import Panels, mirror_group
-from hotlever.air.single_layer import single_layer
+from hotlever.air.single_layer import Progress, single_layer
 from hotlever.air.surface import PanelOptions, lever_surface
 from hotlever.air.surroundings import Surroundings
 from hotlever.cache import cache_file, store_arrays, stored_arrays
@@ -39,10 +39,14 @@ class AirOperator:
     matrix : ndarray, shape (n, n)
         Symmetric and positive semi-definite (µm): from θ (mW/µm) at the sites to the heat (mW)
         lost by the panels there.
+    filling : float
+        Share of κ_air by which the air that the single layer puts inside the plate conducts: one,
+        and less where the temperature jumps at the surface.
     """
 
     sites: Array
     matrix: Array
+    filling: float = 1.0
 
 
 def air_operator(
@@ -50,6 +54,7 @@ def air_operator(
     surroundings: Surroundings | None = None,
     base_temperature_K: float = 293.0,
     options: PanelOptions | None = None,
+    progress: Progress | None = None,
 ) -> AirOperator:
     """Return the operator of a lever in its surroundings, from the cache or made and cached.
 
@@ -61,6 +66,8 @@ def air_operator(
     base_temperature_K : float
         Of the surroundings; matters only where the temperature jumps at surfaces.
     options : PanelOptions, optional
+    progress : callable, optional
+        Called while an operator is made, with steps done and their number.
 
     Raises
     ------
@@ -73,15 +80,16 @@ def air_operator(
         "version": __version__,
         "layout": asdict(layout),
         "surroundings": surroundings.model_dump(),
-        "base_temperature_K": base_temperature_K,
+        "jump_um": surroundings.jump_length_um(base_temperature_K),
         "options": asdict(options),
     }
     path = cache_file("air", facts)
     stored = stored_arrays(path)
-    if stored is not None and {"sites", "matrix"} <= stored.keys():
-        return AirOperator(stored["sites"], stored["matrix"])
-    operator = make_operator(layout, surroundings, base_temperature_K, options)
-    store_arrays(path, {"sites": operator.sites, "matrix": operator.matrix})
+    if stored is not None and stored.keys() >= {"sites", "matrix", "filling"}:
+        return AirOperator(stored["sites"], stored["matrix"], float(stored["filling"]))
+    operator = make_operator(layout, surroundings, base_temperature_K, options, progress)
+    arrays = {name: np.asarray(value) for name, value in vars(operator).items()}
+    store_arrays(path, arrays)
     return operator
 
 
@@ -90,6 +98,7 @@ def make_operator(
     surroundings: Surroundings,
     base_temperature_K: float,
     options: PanelOptions,
+    progress: Progress | None = None,
 ) -> AirOperator:
     """Make the operator: see `air_operator`."""
     surface = lever_surface(layout, options, mirrored=surroundings.symmetric)
@@ -103,7 +112,7 @@ def make_operator(
                 "surroundings: the surface below crosses the lever or its chip; expected a larger "
                 "surface_gap_um or another surface_tilt_deg"
             )
-    layer = single_layer(panels, mirror_group([*surface.mid_plane, *below]))
+    layer = single_layer(panels, mirror_group([*surface.mid_plane, *below]), progress)
     jump = np.full(len(panels), surroundings.jump_length_um(base_temperature_K))
     jump[: len(surface.panels)] = surroundings.jump_length_um(surroundings.jump_temperature_K)
     layer[np.diag_indices_from(layer)] += jump * panels.areas
@@ -115,4 +124,7 @@ def make_operator(
         raise ComputationError("the air operator of this geometry is not positive") from error
     halves = 2.0 if surface.mirrored else 1.0
     heat = halves * (moments.T @ density)
-    return AirOperator(surface.sites, 0.5 * (heat + heat.T))
+    # of a lever of one temperature: θ of the air at the surface as a share of the lever's; the
+    # energy of the air inside goes with its square
+    jumped = (jump * panels.areas) @ density.sum(axis=1) / surface.panels.areas.sum()
+    return AirOperator(surface.sites, 0.5 * (heat + heat.T), float((1.0 - jumped) ** 2))

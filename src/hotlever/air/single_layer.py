@@ -8,7 +8,7 @@ infinity, the heat that leaves panel i is A_i q_i with V q = b, b_i = ∫_i θ.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from hotlever.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+Progress = Callable[[int, int], None]
 
 #: Pairs whose centroids are this many times the sum of their radii apart are far.
 FAR = 3.0
@@ -30,7 +31,9 @@ _ROWS, _PAIRS = 32, 8192
 
 
 @one_blas_thread
-def single_layer(panels: Panels, mirrors: Sequence[Mirror] = (IDENTITY,)) -> Array:
+def single_layer(
+    panels: Panels, mirrors: Sequence[Mirror] = (IDENTITY,), progress: Progress | None = None
+) -> Array:
     """Return the Galerkin matrix of 1/(4πR).
 
     Parameters
@@ -38,6 +41,8 @@ def single_layer(panels: Panels, mirrors: Sequence[Mirror] = (IDENTITY,)) -> Arr
     panels : Panels
     mirrors : sequence of Mirror, optional
         The identity among them; each its own inverse.
+    progress : callable, optional
+        Called with steps done and their number.
 
     Returns
     -------
@@ -46,7 +51,7 @@ def single_layer(panels: Panels, mirrors: Sequence[Mirror] = (IDENTITY,)) -> Arr
     """
     count = len(panels)
     matrix = np.zeros((count, count))
-    for mirror in mirrors:
+    for done, mirror in enumerate(mirrors):
         images = panels.reflected(mirror)
         one = np.empty_like(matrix)
         near: list[tuple[Index, Index]] = []
@@ -68,6 +73,9 @@ def single_layer(panels: Panels, mirrors: Sequence[Mirror] = (IDENTITY,)) -> Arr
                 values = integrals(panels.chosen(i), images.chosen(j))
                 one[i, j] = values
                 one[j, i] = values
+                if progress is not None:
+                    share = int(100 * min(start + _PAIRS, some_i.size) / some_i.size)
+                    progress(100 * done + share, 100 * len(mirrors))
         matrix += mirror.sign * one
     return matrix / (4.0 * np.pi)
 

@@ -81,7 +81,15 @@ class Jacobian(Protocol):
 
 
 class AirTerm(Protocol):
-    """Loss to air between the unknowns of a space: linear in θ at some sites."""
+    """Loss to air between the unknowns of a space: linear in θ at some sites.
+
+    Attributes
+    ----------
+    filling : float
+        See `hotlever.air.operator.AirOperator`.
+    """
+
+    filling: float
 
     def temperature(self, x: Array, base_temperature_K: float) -> Array:
         """Return the temperature (K) at the sites."""
@@ -199,8 +207,10 @@ class LeverEquations:
         material, sheet = self.material, self._sheet
         kappa, kappa_by = thermal_conductivity(T, material.c_kappa)
         if self.space.air is not None:
+            filling = self.space.air.filling
             of_air, of_air_by = thermal_conductivity_of_air(T)
-            kappa, kappa_by = kappa - of_air, {**kappa_by, "T": kappa_by["T"] - of_air_by["T"]}
+            kappa = kappa - filling * of_air
+            kappa_by = {**kappa_by, "T": kappa_by["T"] - filling * of_air_by["T"]}
         sigma, sigma_by = conductivity_high_doped(T, material.a0, material.a1)
         sigma_by |= {name: np.zeros_like(sigma) for name in ("n_d", "delta", "p")}
         for region, (n, n_by) in zip(self.space.tapered, self._doping, strict=True):

@@ -7,6 +7,7 @@ lever voltage V_l. This module knows where things are, not which laws hold there
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -123,6 +124,12 @@ class LeverSpace:
             for part in ("heater", "leg 1", "leg 2", "reader branch")
         }
         self.air = None if air is None else self._air_loss(air)
+
+    def in_medium(self, air: AirOperator | None) -> LeverSpace:
+        """Return the same space with this air around it, or in vacuum; everything is shared."""
+        space = copy(self)
+        space.air = None if air is None else space._air_loss(air)
+        return space
 
     def _air_loss(self, operator: AirOperator) -> AirLoss:
         elements, shares = self.operators.at_points(operator.sites)
