@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from hotlever.cli.app import app, note, progress, stdout
-from hotlever.cli.options import check_medium, check_output, load_probe, parse_fixed
+from hotlever.cli.options import check_output, load_probe, parse_fixed
 
 
 @app.command()
@@ -39,7 +39,6 @@ def fit(
     from hotlever.fitting import read_measurement
     from hotlever.report.fit_report import fit_page, fit_text
 
-    check_medium(medium)
     check_output(output)
     fixed = parse_fixed(fix or [])
     measurement = read_measurement(data)

@@ -89,12 +89,6 @@ def parse_fixed(settings: list[str]) -> dict[str, float | None]:
     return values
 
 
-def check_medium(medium: str) -> None:
-    """Refuse a medium that this version cannot solve."""
-    if medium != "vacuum":
-        raise InputError(f"--medium {medium}: expected vacuum, the only medium of this version")
-
-
 def check_output(path: Path | None, *suffixes: str) -> None:
     """Refuse an output file early: of an unknown type, or in a folder that does not exist."""
     if path is None:

@@ -10,7 +10,6 @@ import typer
 from hotlever.cli.app import app, note, progress, stdout
 from hotlever.cli.options import (
     ProbeFile,
-    check_medium,
     check_output,
     load_probe,
     parse_bias,
@@ -26,7 +25,7 @@ def sweep(
     bias: Annotated[str, typer.Option(help="START:STOP:COUNT in volts, ends included.")] = (
         "1:11:25"
     ),
-    medium: Annotated[str, typer.Option(help="vacuum.")] = "vacuum",
+    medium: Annotated[str, typer.Option(help="vacuum or air.")] = "vacuum",
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Change a value of the probe file."),
@@ -43,16 +42,18 @@ def sweep(
     ] = None,
 ) -> None:
     """Solve a lever over a range of bias."""
-    from hotlever.lever import Lever, sweep_csv, write_sweep
+    from hotlever.lever import Lever, checked_medium, sweep_csv, write_sweep
     from hotlever.lever.fields import FieldMapper, write_vtu
     from hotlever.report.figures import sweep_overview
     from hotlever.report.style import FIGURE_TYPES, save_figure
 
     values = parse_bias(bias)
-    check_medium(medium)
+    checked_medium(medium)
     check_output(output, ".csv", ".nc")
     check_output(plot, *FIGURE_TYPES)
-    lever = Lever(load_probe(probe_file).with_values(parse_settings(settings or [])))
+    probe = load_probe(probe_file).with_values(parse_settings(settings or []))
+    with progress("air") as update:
+        lever = Lever(probe, medium=medium, progress=update)
 
     failure: ComputationError | None = None
     with progress("sweep") as update:

@@ -1,9 +1,10 @@
-"""The coupled electro-thermal problem of a lever in vacuum, and sweeps over the bias."""
+"""The coupled electro-thermal problem of a lever in vacuum or air, and sweeps over the bias."""
 
 from hotlever.lever.lever import (
     Lever,
     LeverState,
     Ramp,
+    checked_medium,
     probe_of,
     read_sweep,
     sweep,
@@ -15,6 +16,7 @@ __all__ = [
     "Lever",
     "LeverState",
     "Ramp",
+    "checked_medium",
     "probe_of",
     "read_sweep",
     "sweep",

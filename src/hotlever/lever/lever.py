@@ -13,7 +13,8 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from hotlever import __version__
-from hotlever.errors import ComputationError, InputError
+from hotlever.air.operator import AirOperator, air_operator
+from hotlever.errors import ComputationError, InputError, unknown_name
 from hotlever.files import read_text, whole_file, write_text
 from hotlever.lever.continuation import AT_BIAS, BranchFollower, ContinuationOptions
 from hotlever.lever.equations import LAWS, OBSERVABLES, LeverEquations
@@ -21,10 +22,14 @@ from hotlever.lever.newton import NewtonOptions, newton
 from hotlever.lever.space import LeverSpace
 from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import MeshOptions, Probe, mesh_layout
+from hotlever.probe.probe import SECTIONS
 from hotlever.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
+
+#: What may be around a lever.
+MEDIA = ("vacuum", "air")
 
 #: Columns of a sweep file: name, unit, what it is.
 SWEEP_COLUMNS: dict[str, tuple[str, str]] = {
@@ -45,6 +50,7 @@ _MORE: dict[str, tuple[str, str]] = {
     "max_K": ("K", "highest temperature in the lever"),
     "ground_current_mA": ("mA", "current leaving to ground"),
     "end_heat_mW": ("mW", "heat leaving by the leg ends"),
+    "air_heat_mW": ("mW", "heat leaving into the air"),
 }
 #: Unit of each observable in a sweep, by its name.
 OBSERVABLE_COLUMNS = {"current": "current_mA", "reader": "reader_V", "tip": "tip_K"}
@@ -90,7 +96,11 @@ class Lever:
     probe : Probe
     mesh : MeshOptions, optional
     space : LeverSpace, optional
-        Share the mesh and operators of another lever of the same shape.
+        Share the mesh, operators and medium of another lever of the same shape.
+    medium : {"vacuum", "air"}
+        What is around the lever, if no `space` is given; in air the probe's surroundings count.
+    progress : callable, optional
+        Called while the air operator of a new geometry is made, with steps done and their number.
 
     Examples
     --------
@@ -105,10 +115,26 @@ class Lever:
         probe: Probe,
         mesh: MeshOptions | None = None,
         space: LeverSpace | None = None,
+        *,
+        medium: str = "vacuum",
+        progress: Progress | None = None,
     ) -> None:
         self.probe = probe
-        self.space: LeverSpace = space or LeverSpace(mesh_layout(probe.layout(), mesh))
+        if space is None:
+            space = LeverSpace(mesh_layout(probe.layout(), mesh))
+            space = space.in_medium(_air(probe, medium, progress))
+        self.space: LeverSpace = space
         self.equations = LeverEquations(self.space, probe.circuit, probe.material)
+
+    @property
+    def medium(self) -> str:
+        """What is around the lever: vacuum or air."""
+        return "vacuum" if self.space.air is None else "air"
+
+    def in_medium(self, medium: str, progress: Progress | None = None) -> Lever:
+        """Return the same lever in vacuum or in air; mesh and operators are shared."""
+        space = self.space.in_medium(_air(self.probe, medium, progress))
+        return Lever(self.probe, space=space)
 
     def with_material(self, material: Material) -> Lever:
         """Return the same lever of another material; the mesh is shared."""
@@ -288,7 +314,7 @@ class Lever:
         values = self.probe.values()
         data.attrs = {
             **{name: json.dumps(section) for name, section in values.items()},
-            "medium": "vacuum",
+            "medium": self.medium,
             "notes": "\n".join([*ramp.notes, *self._range_notes(data)]),
             "software": f"hotlever {__version__}",
         }
@@ -304,6 +330,26 @@ class Lever:
             f"from a bias of {beyond.min():.4g} V part of the lever is above {limit:.0f} K, "
             "where the material laws are extrapolated"
         ]
+
+
+def checked_medium(medium: str) -> str:
+    """Return a medium.
+
+    Raises
+    ------
+    InputError
+        If it is neither vacuum nor air.
+    """
+    if medium not in MEDIA:
+        raise unknown_name("medium", medium, MEDIA)
+    return medium
+
+
+def _air(probe: Probe, medium: str, progress: Progress | None) -> AirOperator | None:
+    if checked_medium(medium) == "vacuum":
+        return None
+    base = probe.circuit.base_temperature_K
+    return air_operator(probe.layout(), probe.surroundings, base, progress=progress)
 
 
 def checked_bias(bias: ArrayLike) -> Array:
@@ -325,6 +371,7 @@ def sweep(
     probe: Probe,
     bias: ArrayLike,
     *,
+    medium: str = "vacuum",
     sensitivities: bool = False,
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -336,7 +383,7 @@ def sweep(
     >>> data.tip_K.round(0).values.tolist()
     [295.0, 547.0]
     """
-    return Lever(probe).sweep(bias, sensitivities=sensitivities, progress=progress)
+    return Lever(probe, medium=medium).sweep(bias, sensitivities=sensitivities, progress=progress)
 
 
 def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -390,5 +437,5 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
 
 def probe_of(data: xr.Dataset) -> Probe:
     """Return the probe that a sweep was made of."""
-    sections = {name: json.loads(data.attrs[name]) for name in ("probe", "circuit", "material")}
+    sections = {name: json.loads(data.attrs[name]) for name in SECTIONS if name in data.attrs}
     return Probe.from_values(sections, "sweep")

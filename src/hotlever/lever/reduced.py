@@ -105,6 +105,8 @@ class ReducedSpace:
         The quadrature points of the full space that are used.
     """
 
+    air = None
+
     def __init__(
         self,
         full: LeverSpace,
