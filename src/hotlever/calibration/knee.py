@@ -193,24 +193,14 @@ def _around(curve: IVCurve, centre: float, like: Characteristic | None) -> tuple
     power = curve.power_mW
     near = (np.abs(np.log(power / centre)) < np.log(_NEARBY)) & np.isfinite(warp(power))
     used = curve.only(near)
-    power, lever = used.power_mW, used.lever_V
+    power = used.power_mW
     if power.size < _FEWEST or min((power < centre).sum(), (power > centre).sum()) < _FEWEST_BESIDE:
         raise InputError(
             f"{power.size} points with {centre / _NEARBY:.2f} to {centre * _NEARBY:.2f} mW, near "
             f"the knee, expected at least {_FEWEST} with {_FEWEST_BESIDE} on either side; measure "
             "more finely there"
         )
-    along = warp(power)
-    ln_root_R = np.log(lever) - 0.5 * np.log(power)
-    # an error in the current moves a point along power and voltage; what counts is how far it
-    # leaves the curve, whose slope is known better after each turn
-    by_current_V = -used.series_resistance_ohm / 1000.0
-    by_current_P = lever + by_current_V * used.current_mA
-    smooth = SmoothCurve(along, ln_root_R, used.current_mA / lever)
-    for _ in range(2):
-        slope = 0.5 / power + smooth.slope(along) * warp.slope(power)
-        leaving = np.abs(by_current_V / lever - slope * by_current_P) * used.current_mA
-        smooth = SmoothCurve(along, ln_root_R, leaving, smooth)
+    smooth = _smoothed(used, warp)
     low, high = max(centre / _SEARCH, power[0]), min(centre * _SEARCH, power[-1])
     grid = np.linspace(low, high, 3001)
     ln_V = 0.5 * np.log(grid) + smooth.value(warp(grid))
@@ -246,6 +236,51 @@ def _around(curve: IVCurve, centre: float, like: Characteristic | None) -> tuple
         power.size,
     )
     return knee, knee_power
+
+
+def _smoothed(curve: IVCurve, warp: _Warp) -> SmoothCurve:
+    """Smooth the logarithm of the root of the resistance, V_l = sqrt(P_l R_l), along `warp`."""
+    power, lever = curve.power_mW, curve.lever_V
+    along, ln_root_R = warp(power), np.log(lever) - 0.5 * np.log(power)
+    # an error in the current moves a point along power and voltage; what counts is how far it
+    # leaves the curve, whose slope is known better after each turn
+    by_current_V = -curve.series_resistance_ohm / 1000.0
+    by_current_P = lever + by_current_V * curve.current_mA
+    smooth = SmoothCurve(along, ln_root_R, curve.current_mA / lever)
+    for _ in range(2):
+        slope = 0.5 / power + smooth.slope(along) * warp.slope(power)
+        leaving = np.abs(by_current_V / lever - slope * by_current_P) * curve.current_mA
+        smooth = SmoothCurve(along, ln_root_R, leaving, smooth)
+    return smooth
+
+
+def smooth_rows(
+    curve: IVCurve, knee_mW: float, like: Characteristic | None = None, count: int = 101
+) -> tuple[Array, Array]:
+    """Return current (mA) at evenly spaced biases (V) over the measured range, smoothed.
+
+    Parameters
+    ----------
+    curve : IVCurve
+    knee_mW : float
+        Power of the knee, measured or estimated.
+    like : Characteristic, optional
+        See `find_knee`.
+    count : int
+
+    Returns
+    -------
+    bias, current : ndarray, shape (count,)
+    """
+    warp = _Warp(knee_mW, like)
+    used = curve.only(np.isfinite(warp(curve.power_mW)))
+    smooth = _smoothed(used, warp)
+    power = np.linspace(used.power_mW[0], used.power_mW[-1], 4000)
+    lever = np.sqrt(power) * np.exp(smooth.value(warp(power)))
+    current = power / lever
+    bias = np.maximum.accumulate(lever + used.series_resistance_ohm / 1000.0 * current)
+    asked = np.linspace(max(used.bias_V[0], bias[0]), min(used.bias_V.max(), bias[-1]), count)
+    return asked, np.interp(asked, bias, current)
 
 
 class _Warp:
