@@ -16,11 +16,11 @@ from typing import Any, TypeVar
 
 import dask
 import numpy as np
-from distributed import CancelledError, Client, LocalCluster, as_completed
+from distributed import CancelledError, Client, KilledWorker, LocalCluster, as_completed
 from distributed.diagnostics.plugin import WorkerPlugin
 
 from hotlever import __version__
-from hotlever.errors import ComputationError, InputError
+from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.threads import single_threaded_children
 
 T = TypeVar("T")
@@ -118,11 +118,11 @@ def _version() -> str:
 
 def run_all(
     client: Client, function: Callable[..., T], tasks: Iterable[tuple[Any, ...]]
-) -> Iterator[tuple[int, T | Exception]]:
+) -> Iterator[tuple[int, T | HotleverError]]:
     """Apply a function to each of many arguments; give number and result as each is done.
 
     Only a few tasks for each worker are sent ahead. A task whose worker dies goes to another one;
-    a task that kills several workers gives the exception, as one that raises does.
+    a task that kills several workers gives an error, as one that raises does.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def run_all(
             if number < 0:
                 exhausted = True
                 break
-            future = client.submit(function, *arguments, pure=False)
+            future = client.submit(_guarded, function, arguments, pure=False)
             running[future] = number
             done.add(future)
         if not running:
@@ -151,5 +151,19 @@ def run_all(
             yield number, future.result()
         except CancelledError as error:
             raise ComputationError("the scheduler is lost") from error
+        except KilledWorker:
+            yield number, ComputationError("every process that tried it died; too little memory?")
         except Exception as error:
-            yield number, error
+            yield number, ComputationError(f"{type(error).__name__}: {error}")
+
+
+def _guarded(function: Callable[..., T], arguments: tuple[Any, ...]) -> T | HotleverError:
+    """Call a function, in a worker; errors made for users come back as plain ones.
+
+    What some carry along is large, or cannot be sent.
+    """
+    try:
+        return function(*arguments)
+    except HotleverError as error:
+        kind = InputError if isinstance(error, InputError) else ComputationError
+        return kind(str(error))

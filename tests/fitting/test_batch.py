@@ -166,7 +166,7 @@ def test_the_worst_failure_decides_the_exit_status():
     [
         ((), "2 data files: expected -o FOLDER or --report DIR"),
         (("-o", "out", "--fix", "nd"), "did you mean 'n_d'"),
-        (("-o", "out", "--processes", "0"), "found processes = 0, expected 1 or more"),
+        (("-o", "out", "--processes", "0"), "--processes 0: expected 1 or more"),
         (("-o", "out", "--processes", "2", "--scheduler", "tcp://a:1"), "not both"),
         (("-o", "a.csv"), "a.csv: cannot be made a folder"),
         (("-o", "out", "--scheduler", "tcp://127.0.0.1:1"), "no scheduler answers there"),

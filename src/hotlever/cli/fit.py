@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hotlever.cli.app import app, fail, note, progress, progress_bars, stdout
 from hotlever.cli.options import check_medium, check_output, load_probe, parse_fixed
-from hotlever.errors import ComputationError, InputError
-from hotlever.probe import Probe
+from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.files import write_text
+
+if TYPE_CHECKING:
+    from hotlever.fitting import Fit
+    from hotlever.fitting.uncertainty import Uncertainty
 
 
 @app.command()
@@ -43,12 +48,17 @@ def fit(
     report: Annotated[
         Path | None, typer.Option(help="Write a page with figures to this folder.")
     ] = None,
+    posterior: Annotated[
+        bool,
+        typer.Option("--posterior", help="Sample the posterior; predict the tip with its band."),
+    ] = False,
+    samples: Annotated[int, typer.Option(metavar="N", help="Of the posterior, at least.")] = 10_000,
+    profiles: Annotated[
+        bool, typer.Option("--profiles", help="Profile the likelihood of each parameter.")
+    ] = False,
     processes: Annotated[
         int | None,
-        typer.Option(
-            metavar="N",
-            help="Local processes for several data files; one for each processor if left out.",
-        ),
+        typer.Option(metavar="N", help="Local processes; one for each processor if left out."),
     ] = None,
     scheduler: Annotated[
         str | None,
@@ -63,26 +73,54 @@ def fit(
     command again goes on where it was stopped.
     """
     check_medium(medium)
-    fixed = parse_fixed(fix or [])
-    chosen = None if observables is None else tuple(observables.split(","))
+    for name, number in (("samples", samples), ("processes", processes)):
+        if number is not None and number < 1:
+            raise InputError(f"--{name} {number}: expected 1 or more")
+    if processes is not None and scheduler is not None:
+        raise InputError("--processes and --scheduler: expected one of them, not both")
+    request = _Request(
+        probe_file,
+        None if observables is None else tuple(observables.split(",")),
+        parse_fixed(fix or []),
+        robust,
+    )
     if len(data) > 1:
-        if processes is not None and scheduler is not None:
-            raise InputError("--processes and --scheduler: expected one of them, not both")
-        probe = load_probe(probe_file)
-        _fit_several(data, probe, chosen, fixed, robust, output, report, processes, scheduler)
+        if posterior or profiles:
+            raise InputError("--posterior and --profiles: expected a single data file")
+        _fit_several(data, request, output, report, processes, scheduler)
     else:
+        if scheduler is not None:
+            raise InputError("--scheduler: expected several data files")
         check_output(output)
-        _fit_one(data[0], probe_file, chosen, fixed, robust, output, report)
+        examination = _Examination(samples if posterior else None, profiles, processes)
+        _fit_one(data[0], request, output, report, examination)
+
+
+@dataclass(frozen=True)
+class _Request:
+    """What is asked of each fit."""
+
+    probe_file: Path | None
+    observables: tuple[str, ...] | None
+    fixed: dict[str, float | None]
+    robust: bool
+
+
+@dataclass(frozen=True)
+class _Examination:
+    """What is asked about the uncertainty of one fit."""
+
+    samples: int | None
+    profiles: bool
+    processes: int | None
 
 
 def _fit_one(
     data: Path,
-    probe_file: Path | None,
-    observables: tuple[str, ...] | None,
-    fixed: dict[str, float | None],
-    robust: bool,
+    request: _Request,
     output: Path | None,
     report: Path | None,
+    examination: _Examination,
 ) -> None:
     from hotlever.fitting import fit as run_fit
     from hotlever.fitting import read_measurement
@@ -91,14 +129,14 @@ def _fit_one(
     measurement = read_measurement(data)
     for column in measurement.ignored:
         note(f"{data}: column '{column}' is not used")
-    probe = load_probe(probe_file)
+    probe = load_probe(request.probe_file)
     with progress("fit") as update:
         result = run_fit(
             measurement,
             probe,
-            observables=observables,
-            fixed=fixed,
-            robust=robust,
+            observables=request.observables,
+            fixed=request.fixed,
+            robust=request.robust,
             progress=update,
         )
     for text in result.notes:
@@ -106,22 +144,56 @@ def _fit_one(
     stdout.print(fit_text(result), markup=False)
     if output is not None:
         result.write(output)
+    found, failure = None, None
+    if examination.samples is not None or examination.profiles:
+        try:
+            found = _examine(result, examination)
+        except HotleverError as error:
+            failure = error
+    if found is not None and output is not None:
+        write_text(output, found.to_json())
     if report is not None:
-        stdout.print(f"report: {fit_page(result).write(report)}", markup=False)
+        from hotlever.report.uncertainty_report import add_uncertainty
+
+        page = fit_page(result)
+        if found is not None:
+            add_uncertainty(page, found)
+        stdout.print(f"report: {page.write(report)}", markup=False)
+    if failure is not None:
+        raise failure
+
+
+def _examine(result: Fit, examination: _Examination) -> Uncertainty:
+    """Sample and profile, with progress; print what was found."""
+    from dask.system import CPU_COUNT
+
+    from hotlever.fitting.uncertainty import examine
+    from hotlever.report.uncertainty_report import uncertainty_text
+
+    with progress_bars("profiles", "posterior", "band") as (profiling, sampling, banding):
+        found = examine(
+            result,
+            samples=examination.samples,
+            profiles=examination.profiles,
+            processes=examination.processes or CPU_COUNT,
+            sampling=sampling,
+            banding=banding,
+            profiling=profiling,
+        )
+    for text in found.statements():
+        note(text)
+    stdout.print(uncertainty_text(found), markup=False)
+    return found
 
 
 def _fit_several(
     data: list[Path],
-    probe: Probe,
-    observables: tuple[str, ...] | None,
-    fixed: dict[str, float | None],
-    robust: bool,
+    request: _Request,
     output: Path | None,
     report: Path | None,
     processes: int | None,
     scheduler: str | None,
 ) -> None:
-    from hotlever.files import write_text
     from hotlever.fitting.batch import FitRequest, fit_many
     from hotlever.fitting.levers import compare_levers, levers_csv
     from hotlever.report.levers_report import levers_page, levers_text
@@ -144,7 +216,12 @@ def _fit_several(
             batch = fit_many(
                 data,
                 folder,
-                FitRequest(probe, observables, fixed, robust),
+                FitRequest(
+                    load_probe(request.probe_file),
+                    request.observables,
+                    request.fixed,
+                    request.robust,
+                ),
                 processes=processes,
                 scheduler=scheduler,
                 reducing=reducing,

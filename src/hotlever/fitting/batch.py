@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from dask.system import CPU_COUNT
-from distributed import KilledWorker
 
 from hotlever import __version__
 from hotlever.cluster import local_client, remote_client, run_all
-from hotlever.errors import ComputationError, HotleverError, InputError, unknown_name
+from hotlever.errors import HotleverError, InputError, unknown_name
 from hotlever.files import output_folder, write_text
 from hotlever.fitting.fit import fit, with_measured_circuit
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement, read_measurement
@@ -185,12 +184,12 @@ def fit_many(
             tasks = ((measurement, request) for measurement in waiting.values())
             for number, result in run_all(client, _fitted, tasks):
                 name, measurement = names[number], waiting[names[number]]
-                if isinstance(result, dict):
+                if isinstance(result, HotleverError):
+                    batch.failures[measurement.path] = _failure(measurement.path, result)
+                else:
                     content = {**result, "request": request.record(measurement)}
                     _write(content, files[name])
                     batch.fits[name] = LeverFit(name, files[name], content)
-                else:
-                    batch.failures[measurement.path] = _failure(measurement.path, result)
                 tell()
     batch.fits = {name: batch.fits[name] for name in files if name in batch.fits}
     return batch
@@ -259,30 +258,19 @@ def _reduce(probe: Probe, waiting: Mapping[str, Measurement], progress: Progress
         cached_reduction(Lever(one), progress=progress)
 
 
-def _fitted(measurement: Measurement, request: FitRequest) -> dict[str, Any] | HotleverError:
-    """Fit one lever, in a worker; return the content of its fit file, or why there is none."""
-    try:
-        result = fit(
-            measurement,
-            request.probe,
-            observables=request.observables,
-            fixed=request.fixed,
-            robust=request.robust,
-        )
-    except HotleverError as error:
-        # a plain one: what some carry along is large, or cannot be sent
-        kind = InputError if isinstance(error, InputError) else ComputationError
-        return kind(str(error))
+def _fitted(measurement: Measurement, request: FitRequest) -> dict[str, Any]:
+    """Fit one lever, in a worker; return the content of its fit file."""
+    result = fit(
+        measurement,
+        request.probe,
+        observables=request.observables,
+        fixed=request.fixed,
+        robust=request.robust,
+    )
     return dict(json.loads(result.to_json()))
 
 
-def _failure(path: str, found: HotleverError | Exception) -> HotleverError:
+def _failure(path: str, found: HotleverError) -> HotleverError:
     """Return an error that names the data file."""
-    if isinstance(found, HotleverError):
-        text = str(found)
-    elif isinstance(found, KilledWorker):
-        text = "every process that fitted it died; is there enough memory?"
-    else:
-        text = f"{type(found).__name__}: {found}"
-    kind = InputError if isinstance(found, InputError) else ComputationError
-    return kind(text if text.startswith(path) else f"{path}: {text}")
+    text = str(found)
+    return type(found)(text if text.startswith(path) else f"{path}: {text}")

@@ -134,7 +134,7 @@ def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
             axes.set(xlabel=label, ylabel="Δχ²", ylim=(0, 8))
             axes.xaxis.set_major_locator(MaxNLocator(4))
             panel_letter(axes, "abcdefghijkl"[place])
-        grid[0, 0].legend(loc="upper center")
+        grid[0, 0].legend(loc="upper center", frameon=True, facecolor="white", edgecolor="none")
     return made
 
 
