@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -16,6 +17,13 @@ from hotlever.files import write_text
 if TYPE_CHECKING:
     from hotlever.fitting import Fit
     from hotlever.fitting.uncertainty import Uncertainty
+
+
+class Weights(StrEnum):
+    """What the differences of a fit are divided by."""
+
+    maximum = "maximum"
+    errors = "errors"
 
 
 @app.command()
@@ -38,6 +46,13 @@ def fit(
     robust: Annotated[
         bool, typer.Option("--robust", help="Lessen the weight of points far off the others.")
     ] = False,
+    drift: Annotated[
+        bool, typer.Option("--drift", help="Let the zeros of I_h and V_r drift along the file.")
+    ] = False,
+    weights: Annotated[
+        Weights,
+        typer.Option(help="Divide by each observable's maximum, or by measurement errors."),
+    ] = Weights.maximum,
     medium: Annotated[str, typer.Option(help="vacuum.")] = "vacuum",
     output: Annotated[
         Path | None,
@@ -83,6 +98,8 @@ def fit(
         None if observables is None else tuple(observables.split(",")),
         parse_fixed(fix or []),
         robust,
+        drift,
+        weights.value,
     )
     if len(data) > 1:
         if posterior or profiles:
@@ -104,6 +121,8 @@ class _Request:
     observables: tuple[str, ...] | None
     fixed: dict[str, float | None]
     robust: bool
+    drift: bool
+    weights: Literal["maximum", "errors"]
 
 
 @dataclass(frozen=True)
@@ -137,6 +156,8 @@ def _fit_one(
             observables=request.observables,
             fixed=request.fixed,
             robust=request.robust,
+            drift=request.drift,
+            weights=request.weights,
             progress=update,
         )
     for text in result.notes:
@@ -221,6 +242,8 @@ def _fit_several(
                     request.observables,
                     request.fixed,
                     request.robust,
+                    request.drift,
+                    request.weights,
                 ),
                 processes=processes,
                 scheduler=scheduler,

@@ -132,6 +132,7 @@ def fit(
     fixed: Mapping[str, float | None] | None = None,
     robust: bool = False,
     weights: Weights = "maximum",
+    drift: bool = False,
     model: Callable[[Probe], ForwardModel] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Fit:
@@ -157,6 +158,8 @@ def fit(
     weights : {"maximum", "errors"}
         Divide every observable by its largest measured value, as in the paper, or every datum by
         its measurement error; an observable without errors then takes its scatter about the fit.
+    drift : bool
+        Let the zeros of I_h and V_r lie on straight lines over the order of the rows.
     model : callable, optional
         Makes the forward model of a probe. By default a reduced lever (made once for each
         geometry, which takes some seconds) whose result is confirmed and corrected by the full
@@ -189,7 +192,9 @@ def fit(
         )
     used: NDArray[np.bool_] = np.any(present, axis=0)
     forward = model(probe) if model else fast_model(probe, progress)
-    problem = LeastSquares(forward, start, measurement, used, chosen, varied, weights, progress)
+    problem = LeastSquares(
+        forward, start, measurement, used, chosen, varied, weights, drift, progress
+    )
     if isinstance(forward, FastModel):
         problem.start = problem.found_start(forward.space, probe.circuit)
     try:
@@ -217,6 +222,7 @@ def fit(
     correlation = _correlation(covariance)
     band = problem.band(result.params, covariance, probe.circuit.series_resistance_ohm)
     notes += problem.suspicious(result.params, robust)
+    notes += problem.zeros(result.params)
     chi_square = problem.reduced_chi_square
     if chi_square is not None:
         notes.append(

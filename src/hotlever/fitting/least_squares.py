@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hotlever.errors import ComputationError, InputError
+from hotlever.fitting.drift import Drift
 from hotlever.fitting.measurement import Measurement
 from hotlever.fitting.models import ForwardModel
 from hotlever.fitting.start import aligned, starting_material
@@ -67,6 +68,8 @@ class LeastSquares:
     weights : {"maximum", "errors"}
         What differences are divided by. An observable without measurement errors takes its
         scatter about the fit for one.
+    drift : bool
+        Whether I_h and V_r have a zero that drifts along the file.
     progress : callable or None
         Called with the sweeps solved and how many there usually are.
 
@@ -90,6 +93,7 @@ class LeastSquares:
         observables: tuple[str, ...],
         varied: list[str],
         weights: Weights,
+        drift: bool,
         progress: Callable[[int, int], None] | None,
     ) -> None:
         self._model, self._varied = model, varied
@@ -108,6 +112,7 @@ class LeastSquares:
         if self._errors:
             self._scale = self._measured_errors(observables)
         self._weights = np.ones(data.shape)
+        self._lines, self._drift = Drift(observables, self._present), drift
         self.size = int(self._present.sum())
         self.evaluations = 0
         self.steps = 0
@@ -131,8 +136,7 @@ class LeastSquares:
 
     def _take_scatter(self, result: Any) -> None:
         """Give observables without measurement errors their scatter about the fit."""
-        values, _ = self._predict(self.material(result.params))
-        rms = np.sqrt(np.nanmean((values[self._rows] - self._data) ** 2, axis=1, keepdims=True))
+        rms = np.sqrt(np.nanmean(self._difference(result.params) ** 2, axis=1, keepdims=True))
         scatter = np.maximum(rms, 1e-6 * self._largest)
         self._scale = np.where(self._without_errors[:, None], scatter, self._scale)
 
@@ -141,7 +145,7 @@ class LeastSquares:
         """Of the observables with measurement errors, at the last prediction; None without."""
         if not self._errors or self._without_errors.all() or self._prediction is None:
             return None
-        residual = (self._prediction[0][self._rows] - self._data) / self._scale
+        residual = self._unexplained(self._prediction[0]) / self._scale
         known = residual[~self._without_errors]
         count = np.isfinite(known).sum()
         share = len(self._varied) * count / self.size
@@ -255,12 +259,26 @@ class LeastSquares:
     def residual_rms(self, parameters: Any) -> dict[str, float]:
         """Return the rms of data minus model per column, for every observable with data."""
         values, _ = self._predict(self.material(parameters))
+        fitted = dict(zip(self._rows, self._unexplained(values), strict=True))
         rms = {}
         for row, name in enumerate(OBSERVABLES):
-            difference = self._measurement.observable(name)[self._used] - values[row]
+            others = self._measurement.observable(name)[self._used] - values[row]
+            difference = fitted.get(row, others)
             if np.isfinite(difference).any():
                 rms[OBSERVABLE_COLUMNS[name]] = float(np.sqrt(np.nanmean(difference**2)))
         return rms
+
+    def zeros(self, parameters: Any) -> list[str]:
+        """Say how the zeros drift, or that they seem to."""
+        values, _ = self._predict(self.material(parameters))
+        difference = self._data - values[self._rows]
+        if self._drift:
+            return self._lines.lines_in_words(self._lines.line(difference, self._by))
+        if self.size <= len(self._varied) + 2 * len(self._rows):
+            return []
+        residual, jacobian = -self._residual(parameters), self._jacobian(parameters)
+        noticed = self._lines.noticed(residual, jacobian, self._by)
+        return [f"{text}; --drift would take that out" for text in noticed]
 
     def band(self, parameters: Any, covariance: Array, series_resistance_ohm: float) -> xr.Dataset:
         """Return the predicted tip temperature and its standard error: see `Fit.band`."""
@@ -297,8 +315,7 @@ class LeastSquares:
 
     def _deviations(self, parameters: Any) -> Array:
         """Return residuals in units of the scatter of their observable; 0 where nothing is."""
-        values, _ = self._predict(self.material(parameters))
-        residuals = np.where(self._present, values[self._rows] - self._data, np.nan)
+        residuals = self._difference(parameters)
         scatter = 1.4826 * np.nanmedian(np.abs(residuals), axis=1, keepdims=True)
         # data without noise have no scatter to measure against
         floor = 1e-4 * self._largest
@@ -312,8 +329,7 @@ class LeastSquares:
             if self.evaluations == 1:
                 raise
             return np.full(self.size, _UNSOLVED)
-        scaled = (values[self._rows] - self._data) / self._scale
-        return (self._weights * scaled)[self._present]
+        return (-self._by * self._unexplained(values))[self._present]
 
     def _jacobian(self, parameters: Any) -> Array:
         # Levenberg-Marquardt asks for this once per step, at parameters it has just accepted
@@ -321,8 +337,24 @@ class LeastSquares:
         _, sensitivities = self._predict(self.material(parameters))
         columns = [list(PARAMETERS).index(name) for name in self._varied]
         scale = np.array([PARAMETERS[name].scale for name in self._varied])
-        scaled = sensitivities[self._rows][:, :, columns] * scale / self._scale[:, :, None]
-        return (self._weights[:, :, None] * scaled)[self._present]
+        scaled = sensitivities[self._rows][:, :, columns] * scale
+        jacobian = (self._by[:, :, None] * scaled)[self._present]
+        return self._lines.removed(jacobian, self._by) if self._drift else jacobian
+
+    @property
+    def _by(self) -> Array:
+        """What differences are multiplied by, shape (observables, n)."""
+        by: Array = self._weights / self._scale
+        return by
+
+    def _difference(self, parameters: Any) -> Array:
+        """Return data minus prediction, NaN where nothing was measured."""
+        return self._unexplained(self._predict(self.material(parameters))[0])
+
+    def _unexplained(self, values: Array) -> Array:
+        """Return data minus prediction minus the drifting zeros."""
+        difference: Array = self._data - values[self._rows]
+        return difference - self._lines.line(difference, self._by) if self._drift else difference
 
     def _predict(self, material: Material) -> tuple[Array, Array]:
         if self._prediction is None or material != self._at:
