@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from hotlever.cli.app import app, fail, note, progress, progress_bars, stdout
 from hotlever.cli.options import check_medium, check_output, load_probe, parse_fixed
-from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.errors import ComputationError, HotleverError, InputError, unknown_name
 from hotlever.files import write_text
 
 if TYPE_CHECKING:
     from hotlever.fitting import Fit
+    from hotlever.fitting.least_squares import Weights
     from hotlever.fitting.uncertainty import Uncertainty
 
 
@@ -38,6 +39,10 @@ def fit(
     robust: Annotated[
         bool, typer.Option("--robust", help="Lessen the weight of points far off the others.")
     ] = False,
+    weights: Annotated[
+        str,
+        typer.Option(help="maximum: of each observable, as in the paper; or errors, as measured."),
+    ] = "maximum",
     medium: Annotated[str, typer.Option(help="vacuum.")] = "vacuum",
     output: Annotated[
         Path | None,
@@ -83,6 +88,7 @@ def fit(
         None if observables is None else tuple(observables.split(",")),
         parse_fixed(fix or []),
         robust,
+        _weights(weights),
     )
     if len(data) > 1:
         if posterior or profiles:
@@ -104,6 +110,13 @@ class _Request:
     observables: tuple[str, ...] | None
     fixed: dict[str, float | None]
     robust: bool
+    weights: Weights
+
+
+def _weights(name: str) -> Weights:
+    if name not in ("maximum", "errors"):
+        raise unknown_name("weights", name, ("maximum", "errors"))
+    return cast("Weights", name)
 
 
 @dataclass(frozen=True)
@@ -137,6 +150,7 @@ def _fit_one(
             observables=request.observables,
             fixed=request.fixed,
             robust=request.robust,
+            weights=request.weights,
             progress=update,
         )
     for text in result.notes:
@@ -221,6 +235,7 @@ def _fit_several(
                     request.observables,
                     request.fixed,
                     request.robust,
+                    request.weights,
                 ),
                 processes=processes,
                 scheduler=scheduler,

@@ -19,6 +19,7 @@ from hotlever.cluster import local_client, remote_client, run_all
 from hotlever.errors import HotleverError, InputError, unknown_name
 from hotlever.files import output_folder, write_text
 from hotlever.fitting.fit import fit, with_measured_circuit
+from hotlever.fitting.least_squares import Weights
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement, read_measurement
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduced_cache import CACHE_VARIABLE, cache_folder, cached_reduction
@@ -38,6 +39,7 @@ class FitRequest:
     observables : tuple of str or None
     fixed : mapping of str to float or None
     robust : bool
+    weights : {"maximum", "errors"}
 
     Raises
     ------
@@ -49,6 +51,7 @@ class FitRequest:
     observables: tuple[str, ...] | None = None
     fixed: Mapping[str, float | None] = field(default_factory=dict)
     robust: bool = False
+    weights: Weights = "maximum"
 
     def __post_init__(self) -> None:
         for name in self.fixed:
@@ -67,6 +70,7 @@ class FitRequest:
             "observables": self.observables,
             "fixed": self.fixed,
             "robust": self.robust,
+            "weights": self.weights,
             "version": __version__,
         }
         return dict(json.loads(json.dumps(record)))
@@ -266,6 +270,7 @@ def _fitted(measurement: Measurement, request: FitRequest) -> dict[str, Any]:
         observables=request.observables,
         fixed=request.fixed,
         robust=request.robust,
+        weights=request.weights,
     )
     return dict(json.loads(result.to_json()))
 
