@@ -103,7 +103,7 @@ def temperature_jump_length(
     --------
     >>> length, _ = temperature_jump_length([293.0, 1000.0], 1013.25, 1.0)
     >>> length.round(3).tolist()
-    [0.106, 0.525]
+    [0.106, 0.521]
     """
     T = np.asarray(T, dtype=float)
     c_v = GAS_CONSTANT / (HEAT_RATIO - 1.0)
