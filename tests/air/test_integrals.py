@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -29,7 +31,8 @@ def by_gauss(first: Panels, second: Panels) -> float:
 @pytest.mark.parametrize("other", range(3))
 def test_separate_rectangles(one, other):
     rng = np.random.default_rng(3 * one + other)
-    low = rng.uniform(-1, 1, (2, 3)) + [[0, 0, 0], [0, 0, 3]]
+    low = rng.uniform(-1, 1, (2, 3))
+    low[1, 2] += 3
     high = low + rng.uniform(0.3, 1, (2, 3))
     first, second = rectangle(one, low[0], high[0]), rectangle(other, low[1], high[1])
     expected = by_gauss(first, second)
@@ -72,8 +75,8 @@ def test_quadrature_and_closed_form_agree_in_the_matrix():
     lines = np.array([0.0, 0.1, 0.4, 1.0])
     corners = [
         [[a, c, z], [b, c, z], [b, d, z], [a, d, z]]
-        for a, b in zip(lines[:-1], lines[1:], strict=True)
-        for c, d in zip(lines[:-1], lines[1:], strict=True)
+        for a, b in pairwise(lines)
+        for c, d in pairwise(lines)
         for z in (0.0, 0.4)
     ]
     panels = Panels(np.array(corners))

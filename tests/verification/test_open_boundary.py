@@ -5,6 +5,8 @@ The panels are halved; the loss converges with order 2 and is extrapolated from 
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.linalg import cho_factor, cho_solve
@@ -50,7 +52,7 @@ def quarter_disc(cuts: int) -> Panels:
         np.array(
             [
                 [inner * ring[k], outer * ring[k], outer * ring[k + 1], inner * ring[k + 1]]
-                for inner, outer in zip(radii[:-1], radii[1:], strict=True)
+                for inner, outer in pairwise(radii)
                 for k in range(cuts)
             ]
         )
@@ -64,8 +66,8 @@ def quarter_square(cuts: int) -> Panels:
         np.array(
             [
                 [[a, c, 0.0], [b, c, 0.0], [b, d, 0.0], [a, d, 0.0]]
-                for a, b in zip(lines[:-1], lines[1:], strict=True)
-                for c, d in zip(lines[:-1], lines[1:], strict=True)
+                for a, b in pairwise(lines)
+                for c, d in pairwise(lines)
             ]
         )
     )
@@ -102,7 +104,7 @@ def test_disc_above_an_isothermal_plane_goes_to_both_limits():
     disc = quarter_disc(16)
 
     def above(height):
-        raised = Panels(disc.corners + [0, 0, height])
+        raised = Panels(disc.corners + np.array([0, 0, height]))
         return heat(raised, [*PLANES[:2], Mirror.in_plane((0, 0, 0), (0, 0, 1), -1.0)]) / 2
 
     assert above(1e4) == pytest.approx(heat(disc, PLANES[:2]), rel=1e-4)

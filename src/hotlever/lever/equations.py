@@ -313,9 +313,10 @@ class LeverEquations:
         -------
         dict
             ``current_mA``, ``lever_V``, ``reader_V`` (NaN without a reader), ``tip_K``,
-            ``power_mW``, ``air_heat_mW`` (0 in vacuum), resistances ``heater_ohm``, ``leg1_ohm``, ``leg2_ohm`` (Joule heat of
+            ``power_mW``, resistances ``heater_ohm``, ``leg1_ohm``, ``leg2_ohm`` (Joule heat of
             the part over I_h²; they add up to V_l / I_h; NaN without current), ``max_K``, and
-            for the balances ``ground_current_mA`` and ``end_heat_mW``.
+            for the balances ``ground_current_mA``, ``end_heat_mW`` and ``air_heat_mW`` (0 in
+            vacuum).
 
         Raises
         ------

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hotlever import __version__
 from hotlever.air.operator import AirOperator, air_operator
-from hotlever.errors import ComputationError, InputError, unknown_name
+from hotlever.errors import ComputationError, InputError
 from hotlever.files import read_text, whole_file, write_text
 from hotlever.lever.continuation import AT_BIAS, BranchFollower, ContinuationOptions
 from hotlever.lever.equations import LAWS, OBSERVABLES, LeverEquations
@@ -341,7 +341,7 @@ def checked_medium(medium: str) -> str:
         If it is neither vacuum nor air.
     """
     if medium not in MEDIA:
-        raise unknown_name("medium", medium, MEDIA)
+        raise InputError(f"medium {medium!r}: expected {' or '.join(MEDIA)}")
     return medium
 
 
