@@ -45,9 +45,9 @@ def test_reduced_lever_follows_the_full_one_in_its_box(coarse, space, seed):
 
 def test_few_points_with_positive_weights_integrate_the_area(coarse, space):
     weights = coarse.space.operators.weights
-    assert 100 < space.points.size < weights.size / 3
-    assert (space.weights > 0).all()
-    assert len(set(space.points.tolist())) == space.points.size
+    assert 100 < space.few_points.points.size < weights.size / 3
+    assert (space.few_points.weights > 0).all()
+    assert len(set(space.few_points.points.tolist())) == space.few_points.points.size
 
 
 def test_expanded_states_nearly_solve_the_full_equations(coarse, space):
@@ -112,7 +112,7 @@ def test_a_geometry_is_reduced_once(coarse, space, cache, monkeypatch):
 
     monkeypatch.setattr("hotlever.lever.reduced_cache.reduce", never)
     again = cached_reduction(coarse)
-    np.testing.assert_array_equal(again.points, space.points)
+    np.testing.assert_array_equal(again.few_points.points, space.few_points.points)
     np.testing.assert_array_equal(again.basis, space.basis)
 
 
@@ -124,7 +124,9 @@ def test_a_damaged_file_is_made_anew(coarse, space, tmp_path, monkeypatch, damag
     (file,) = tmp_path.iterdir()
     whole = file.read_bytes()
     file.write_bytes(whole[: len(whole) // 2] if damage is None else damage)
-    np.testing.assert_array_equal(cached_reduction(coarse).points, space.points)
+    np.testing.assert_array_equal(
+        cached_reduction(coarse).few_points.points, space.few_points.points
+    )
     assert file.read_bytes() == whole
 
 

@@ -27,7 +27,6 @@ from hotlever.lever.reduced import ReducedSpace, ReductionOptions, reduce
 
 #: Environment variable that moves the cache; empty switches it off.
 CACHE_VARIABLE = "HOTLEVER_CACHE"
-_ARRAYS = ("basis", "count", "lift", "points", "weights")
 
 
 def cached_reduction(
@@ -85,7 +84,7 @@ def _save(space: ReducedSpace, path: Path) -> None:
     try:
         output_folder(path.parent)
         with whole_file(path) as temporary:
-            np.savez(temporary, **dict[str, Any](zip(_ARRAYS, space.arrays(), strict=True)))
+            np.savez(temporary, **dict[str, Any](space.arrays()))
     except (InputError, OSError):
         return
 
@@ -97,8 +96,7 @@ def _load(lever: Lever, path: Path) -> ReducedSpace | None:
     try:
         # opened here: np.load leaves a file it cannot read open
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            arrays = [stored[name] for name in _ARRAYS]
-        return ReducedSpace.from_arrays(lever, *arrays)
+            return ReducedSpace.from_arrays(lever, dict(stored))
     except (OSError, ValueError, KeyError, IndexError, zipfile.BadZipFile, EOFError):
         path.unlink(missing_ok=True)
         return None
