@@ -69,10 +69,10 @@ def test_sensitivities_have_taylor_order_two(coarse, name):
 
 
 def test_halved_panels_change_less_than_a_thousandth(lever, in_air):
-    probe = lever.probe
-    finer = air_operator(probe.layout(), options=PanelOptions(refinement=1.6))
+    probe = in_air.probe
+    finer = air_operator(probe.layout(), options=PanelOptions(refinement=1.4))
     fine = Lever(probe, space=LeverSpace(lever.space.mesh, lever.space.operators, finer))
-    coarser = air_operator(probe.layout(), options=PanelOptions(refinement=0.8))
+    coarser = air_operator(probe.layout(), options=PanelOptions(refinement=0.7))
     coarse = Lever(probe, space=LeverSpace(lever.space.mesh, lever.space.operators, coarser))
     a, b, c = (one.sweep(BIAS) for one in (coarse, in_air, fine))
     rise = b.tip_K - 293.0
@@ -97,8 +97,8 @@ def test_knee_in_air_is_cooled(in_air):
 
 
 def test_a_sweep_says_its_medium_and_surroundings(coarse, tmp_path):
-    probe = coarse.probe.with_values({"surface_gap_um": 10.0})
-    data = Lever(probe, space=coarse.space).in_medium("air").sweep([2.0])
+    probe = coarse.probe.with_values({"surface_gap_um": 10.0, "medium": "air"})
+    data = Lever(probe, space=coarse.space).sweep([2.0])
     write_sweep(data, tmp_path / "sweep.nc")
     again = read_sweep(tmp_path / "sweep.nc")
     assert again.attrs["medium"] == "air"
@@ -107,6 +107,6 @@ def test_a_sweep_says_its_medium_and_surroundings(coarse, tmp_path):
 
 
 def test_a_lever_without_reader_works_in_air():
-    data = Lever(Probe.u_shape(), medium="air").sweep([5.0])
+    data = Lever(Probe.u_shape().in_medium("air")).sweep([5.0])
     balance = data.power_mW - data.end_heat_mW - data.air_heat_mW
     assert abs(balance.item()) < 1e-8 * data.power_mW.item()

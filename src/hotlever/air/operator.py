@@ -79,7 +79,7 @@ def air_operator(
     facts = {
         "version": __version__,
         "layout": asdict(layout),
-        "surroundings": surroundings.model_dump(),
+        "surroundings": surroundings.model_dump(exclude={"medium"}),
         "jump_um": surroundings.jump_length_um(base_temperature_K),
         "options": asdict(options),
     }
