@@ -30,10 +30,10 @@ from statistics import median
 import lmfit
 import numpy as np
 
+from hotlever.cache import CACHE_VARIABLE
 from hotlever.fitting import fit, read_measurement
 from hotlever.fitting.fit import with_measured_circuit
 from hotlever.lever import Lever
-from hotlever.lever.reduced_cache import CACHE_VARIABLE
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from problems import peer_problem, peer_server, table

@@ -15,6 +15,7 @@ from statistics import median
 
 import numpy as np
 
+from hotlever.cache import CACHE_VARIABLE
 from hotlever.fitting import fit, read_measurement
 from hotlever.fitting.models import full_model
 from hotlever.lever import Lever
@@ -22,7 +23,7 @@ from hotlever.lever.certificate import estimated_error
 from hotlever.lever.continuation import AT_BIAS
 from hotlever.lever.newton import NewtonOptions, newton
 from hotlever.lever.reduced import BOX, material_in_box
-from hotlever.lever.reduced_cache import CACHE_VARIABLE, cached_reduction
+from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.lever.reduced_lever import ReducedLever
 from hotlever.probe import Probe
 from problems import BIAS, peer_problem, solve_with_peer, table

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from hotlever.cli.app import app, fail, note, progress, progress_bars, stdout
-from hotlever.cli.options import check_medium, check_output, load_probe, parse_fixed
+from hotlever.cli.options import MediumOption, check_medium, check_output, load_probe, parse_fixed
 from hotlever.errors import ComputationError, HotleverError, InputError, unknown_name
 from hotlever.files import write_text
 
@@ -46,7 +46,7 @@ def fit(
         str,
         typer.Option(help="maximum: of each observable, as in the paper; or errors, as measured."),
     ] = "maximum",
-    medium: Annotated[str, typer.Option(help="vacuum.")] = "vacuum",
+    medium: MediumOption = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -93,6 +93,7 @@ def fit(
         robust,
         drift,
         _weights(weights),
+        medium,
     )
     if len(data) > 1:
         if posterior or profiles:
@@ -116,6 +117,7 @@ class _Request:
     robust: bool
     drift: bool
     weights: Weights
+    medium: str | None
 
 
 def _weights(name: str) -> Weights:
@@ -157,6 +159,7 @@ def _fit_one(
             robust=request.robust,
             drift=request.drift,
             weights=request.weights,
+            medium=request.medium,
             progress=update,
         )
     for text in result.notes:
@@ -243,6 +246,7 @@ def _fit_several(
                     request.robust,
                     request.drift,
                     request.weights,
+                    request.medium,
                 ),
                 processes=processes,
                 scheduler=scheduler,

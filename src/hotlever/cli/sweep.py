@@ -9,6 +9,7 @@ import typer
 
 from hotlever.cli.app import app, note, progress, stdout
 from hotlever.cli.options import (
+    MediumOption,
     ProbeFile,
     check_medium,
     check_output,
@@ -26,7 +27,7 @@ def sweep(
     bias: Annotated[str, typer.Option(help="START:STOP:COUNT in volts, ends included.")] = (
         "1:11:25"
     ),
-    medium: Annotated[str, typer.Option(help="vacuum.")] = "vacuum",
+    medium: MediumOption = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Change a value of the probe file."),
@@ -52,7 +53,11 @@ def sweep(
     check_medium(medium)
     check_output(output, ".csv", ".nc")
     check_output(plot, *FIGURE_TYPES)
-    lever = Lever(load_probe(probe_file).with_values(parse_settings(settings or [])))
+    probe = load_probe(probe_file).with_values(parse_settings(settings or []))
+    if medium is not None:
+        probe = probe.in_medium(medium)
+    with progress("air") as update:
+        lever = Lever(probe, progress=update)
 
     failure: ComputationError | None = None
     with progress("sweep") as update:

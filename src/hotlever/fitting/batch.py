@@ -15,6 +15,7 @@ from typing import Any
 from dask.system import CPU_COUNT
 
 from hotlever import __version__
+from hotlever.cache import CACHE_VARIABLE, cache_folder
 from hotlever.cluster import local_client, remote_client, run_all
 from hotlever.errors import HotleverError, InputError, unknown_name
 from hotlever.files import output_folder, write_text
@@ -22,7 +23,7 @@ from hotlever.fitting.fit import fit, with_measured_circuit
 from hotlever.fitting.least_squares import Weights
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement, read_measurement
 from hotlever.lever.lever import Lever
-from hotlever.lever.reduced_cache import CACHE_VARIABLE, cache_folder, cached_reduction
+from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.materials import parameter
 from hotlever.probe import Probe
 
@@ -40,6 +41,7 @@ class FitRequest:
     fixed : mapping of str to float or None
     robust, drift : bool
     weights : {"maximum", "errors"}
+    medium : {"vacuum", "air"} or None
 
     Raises
     ------
@@ -53,6 +55,7 @@ class FitRequest:
     robust: bool = False
     drift: bool = False
     weights: Weights = "maximum"
+    medium: str | None = None
 
     def __post_init__(self) -> None:
         for name in self.fixed:
@@ -73,6 +76,7 @@ class FitRequest:
             "robust": self.robust,
             "drift": self.drift,
             "weights": self.weights,
+            "medium": self.medium,
             "version": __version__,
         }
         return dict(json.loads(json.dumps(record)))
@@ -185,7 +189,7 @@ def fit_many(
     tell()
     with _shared_cache(), _client(min(processes or CPU_COUNT, len(waiting)), scheduler) as client:
         if client is not None:
-            _reduce(request.probe, waiting, reducing)
+            _reduce(request, waiting, reducing)
             names = list(waiting)
             tasks = ((measurement, request) for measurement in waiting.values())
             for number, result in run_all(client, _fitted, tasks):
@@ -257,10 +261,19 @@ def _shared_cache() -> Iterator[None]:
             os.environ[CACHE_VARIABLE] = ""
 
 
-def _reduce(probe: Probe, waiting: Mapping[str, Measurement], progress: Progress | None) -> None:
-    """Reduce each geometry once, before the workers need it; the base temperature is part of it."""
-    probes = (with_measured_circuit(probe, measurement)[0] for measurement in waiting.values())
-    for one in {probe.circuit.base_temperature_K: probe for probe in probes}.values():
+def _reduce(
+    request: FitRequest, waiting: Mapping[str, Measurement], progress: Progress | None
+) -> None:
+    """Reduce each geometry once, before the workers need it.
+
+    Base temperature and medium are part of it.
+    """
+    probes = (
+        with_measured_circuit(request.probe, measurement, request.medium)[0]
+        for measurement in waiting.values()
+    )
+    different = {(one.circuit.base_temperature_K, one.surroundings.medium): one for one in probes}
+    for one in different.values():
         cached_reduction(Lever(one), progress=progress)
 
 
@@ -274,6 +287,7 @@ def _fitted(measurement: Measurement, request: FitRequest) -> dict[str, Any]:
         robust=request.robust,
         drift=request.drift,
         weights=request.weights,
+        medium=request.medium,
     )
     return dict(json.loads(result.to_json()))
 

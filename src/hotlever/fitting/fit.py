@@ -133,6 +133,7 @@ def fit(
     robust: bool = False,
     weights: Weights = "maximum",
     drift: bool = False,
+    medium: str | None = None,
     model: Callable[[Probe], ForwardModel] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Fit:
@@ -145,8 +146,8 @@ def fit(
     ----------
     measurement : Measurement
     probe : Probe, optional
-        The reference probe by default. The measurement's series resistance and base
-        temperature win over the probe's.
+        The reference probe by default. The measurement's series resistance, base temperature
+        and medium win over the probe's.
     observables : sequence of {"current", "reader", "tip"}, optional
         Option I of the paper is ``["current"]``, option II ``["current", "reader"]``, option
         III all three. All that the measurement has, by default.
@@ -160,6 +161,8 @@ def fit(
         its measurement error; an observable without errors then takes its scatter about the fit.
     drift : bool
         Let the zeros of I_h and V_r lie on straight lines over the order of the rows.
+    medium : {"vacuum", "air"}, optional
+        What the lever was measured in; wins over measurement and probe.
     model : callable, optional
         Makes the forward model of a probe. By default a reduced lever (made once for each
         geometry, which takes some seconds) whose result is confirmed and corrected by the full
@@ -179,7 +182,7 @@ def fit(
     began = time.perf_counter()
     if weights not in ("maximum", "errors"):
         raise InputError(f"found weights = {weights!r}, expected 'maximum' or 'errors'")
-    probe, notes = with_measured_circuit(probe or Probe.reference(), measurement)
+    probe, notes = with_measured_circuit(probe or Probe.reference(), measurement, medium)
     fixed = dict(fixed or {})
     chosen = _chosen(observables, measurement)
     start = _held(probe.material, fixed)
@@ -248,9 +251,21 @@ def fit(
     )
 
 
-def with_measured_circuit(probe: Probe, measurement: Measurement) -> tuple[Probe, list[str]]:
-    """Return the probe in the circuit of the measurement, and a note on each difference."""
-    changes, notes = {}, []
+def with_measured_circuit(
+    probe: Probe, measurement: Measurement, medium: str | None = None
+) -> tuple[Probe, list[str]]:
+    """Return the probe in circuit and medium of the measurement, and a note on each difference.
+
+    A `medium` that is asked for wins over both.
+    """
+    changes: dict[str, Any] = {}
+    notes = []
+    measured_in, assumed_in = measurement.medium, probe.surroundings.medium
+    changes["medium"] = medium or measured_in or assumed_in
+    if measured_in is not None and measured_in != changes["medium"]:
+        notes.append(f"medium: {medium}, as asked, although the data file says {measured_in}")
+    elif medium is None and changes["medium"] != assumed_in:
+        notes.append(f"medium: the data file's {measured_in} is used, not the probe's {assumed_in}")
     for name in ("series_resistance_ohm", "base_temperature_K"):
         measured, assumed = getattr(measurement, name), getattr(probe.circuit, name)
         if measured is not None and not np.isclose(measured, assumed, rtol=1e-9):

@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from hotlever import __version__
+from hotlever.air.operator import AirOperator, air_operator
 from hotlever.errors import ComputationError, InputError
 from hotlever.files import read_text, whole_file, write_text
 from hotlever.lever.continuation import AT_BIAS, BranchFollower, ContinuationOptions
@@ -21,6 +22,7 @@ from hotlever.lever.newton import NewtonOptions, newton
 from hotlever.lever.space import LeverSpace
 from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import MeshOptions, Probe, mesh_layout
+from hotlever.probe.probe import SECTIONS
 from hotlever.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -45,6 +47,7 @@ _MORE: dict[str, tuple[str, str]] = {
     "max_K": ("K", "highest temperature in the lever"),
     "ground_current_mA": ("mA", "current leaving to ground"),
     "end_heat_mW": ("mW", "heat leaving by the leg ends"),
+    "air_heat_mW": ("mW", "heat leaving into the air"),
 }
 #: Error left after polishing: 10 µK, 0.1 µV.
 _POLISHED = NewtonOptions(tolerance=1e-5, keep_while=0.4)
@@ -92,7 +95,10 @@ class Lever:
     probe : Probe
     mesh : MeshOptions, optional
     space : LeverSpace, optional
-        Share the mesh and operators of another lever of the same shape.
+        Share the mesh and operators of another lever of the same shape, and its air if both are
+        in air: the surroundings must be the same then.
+    progress : callable, optional
+        Called while the air operator of a new geometry is made, with steps done and their number.
 
     Examples
     --------
@@ -107,10 +113,23 @@ class Lever:
         probe: Probe,
         mesh: MeshOptions | None = None,
         space: LeverSpace | None = None,
+        progress: Progress | None = None,
     ) -> None:
         self.probe = probe
-        self.space: LeverSpace = space or LeverSpace(mesh_layout(probe.layout(), mesh))
+        space = space or LeverSpace(mesh_layout(probe.layout(), mesh))
+        if (space.air is None) != (self.medium == "vacuum"):
+            space = space.in_air(_air(probe, progress))
+        self.space: LeverSpace = space
         self.equations = LeverEquations(self.space, probe.circuit, probe.material)
+
+    @property
+    def medium(self) -> str:
+        """What is around the lever: vacuum or air."""
+        return self.probe.surroundings.medium
+
+    def in_medium(self, medium: str) -> Lever:
+        """Return the same lever in vacuum or in air; mesh and operators are shared."""
+        return Lever(self.probe.in_medium(medium), space=self.space)
 
     def with_material(self, material: Material) -> Lever:
         """Return the same lever of another material; the mesh is shared."""
@@ -294,7 +313,7 @@ class Lever:
         values = self.probe.values()
         data.attrs = {
             **{name: json.dumps(section) for name, section in values.items()},
-            "medium": "vacuum",
+            "medium": self.medium,
             "notes": "\n".join([*ramp.notes, *self._range_notes(data)]),
             "software": f"hotlever {__version__}",
         }
@@ -310,6 +329,13 @@ class Lever:
             f"from a bias of {beyond.min():.4g} V part of the lever is above {limit:.0f} K, "
             "where the material laws are extrapolated"
         ]
+
+
+def _air(probe: Probe, progress: Progress | None) -> AirOperator | None:
+    if probe.surroundings.medium == "vacuum":
+        return None
+    base = probe.circuit.base_temperature_K
+    return air_operator(probe.layout(), probe.surroundings, base, progress=progress)
 
 
 def checked_bias(bias: ArrayLike) -> Array:
@@ -396,5 +422,5 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
 
 def probe_of(data: xr.Dataset) -> Probe:
     """Return the probe that a sweep was made of."""
-    sections = {name: json.loads(data.attrs[name]) for name in ("probe", "circuit", "material")}
+    sections = {name: json.loads(data.attrs[name]) for name in SECTIONS if name in data.attrs}
     return Probe.from_values(sections, "sweep")

@@ -22,6 +22,7 @@ from scipy.optimize import nnls
 from scipy.stats import qmc
 
 from hotlever.errors import BranchEndError, ComputationError
+from hotlever.lever.air_loss import AirLoss
 from hotlever.lever.atlas import Atlas, branch_on_grid, common_grid
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import Lever
@@ -41,6 +42,8 @@ BOX: dict[str, tuple[float, float]] = {
     "a0": (7.5e-4, 1.15e-3),
     "a1": (0.85e-6, 1.5e-6),
 }
+#: In air, where silicon competes with air, c_κ does change the shape.
+IN_AIR: dict[str, tuple[float, float]] = {"c_kappa": (0.55, 0.8)}
 #: Tip temperature (K) up to which states are collected.
 HOTTEST = 1350.0
 #: Modes that enrich a space are at least this large (K, and a hundredth in V).
@@ -87,8 +90,9 @@ class Snapshot:
     material : Material
     x : ndarray, shape (n,)
     changes : ndarray, shape (n, k)
-        Changes of the state with each parameter by `PARAMETER_STEP` of the box, and last by
-        `BRANCH_STEP` along the branch; the tip temperature is held for the former.
+        Changes of the state with each parameter by `PARAMETER_STEP` of the box, then by
+        `BRANCH_STEP` along the branch, and in air with c_κ; the tip temperature is held for the
+        parameters.
     tip_K : float
     """
 
@@ -177,6 +181,41 @@ class Samples:
         return matrix
 
 
+class ReducedAir:
+    """The air operator between temperature modes; see `hotlever.lever.equations.AirTerm`.
+
+    Parameters
+    ----------
+    full : AirLoss
+    modes : ndarray, shape (modes, full size)
+        Of the temperature.
+    size : int
+        Number of modes of both fields.
+    """
+
+    def __init__(self, full: AirLoss, modes: Array, size: int) -> None:
+        self.filling, self._size = full.filling, size
+        self._samples = full.sampling[:, : modes.shape[1]] @ modes.T
+        self._spread = self._samples.T @ full.matrix
+
+    def temperature(self, x: Array, base_temperature_K: float) -> Array:
+        """Return the temperature (K) at the sites, one column for each state."""
+        return base_temperature_K + self._samples @ x[: self._samples.shape[1]]
+
+    def weak_form(self, theta: Array) -> Array:
+        """Return the heat lost for θ (mW/µm) at the sites, tested with the modes."""
+        weak = np.zeros((self._size + 1, *theta.shape[1:]))
+        weak[: len(self._spread)] = self._spread @ theta
+        return weak
+
+    def added(self, jacobian: Any, kappa: Array) -> Any:
+        """Return the Jacobian with air; κ_air (mW/(K µm)) at the sites."""
+        columns = kappa.reshape(len(kappa), -1).T
+        return jacobian.plus(
+            np.stack([self._spread @ (column[:, None] * self._samples) for column in columns])
+        )
+
+
 class ReducedSpace:
     """Modes, and how they look at quadrature points: at all of them, and at a few.
 
@@ -195,6 +234,7 @@ class ReducedSpace:
         Number of modes of both fields.
     all_points, few_points : Samples
         The equations of `equations.Space` use the few, once `use_points` has chosen them.
+    air : ReducedAir or None
     atlas : Atlas or None
         Known branches to start from.
     """
@@ -238,6 +278,7 @@ class ReducedSpace:
             np.arange(operators.weights.size), operators.weights.ravel()
         )
         self.few_points, self.tapered = self.all_points, self.all_points.tapered
+        self.air = None if full.air is None else ReducedAir(full.air, modes_T, self.size)
         self.atlas: Atlas | None = None
 
     def use_points(self, points: Index, weights: Array) -> None:
@@ -417,7 +458,7 @@ class StackedSpace:
         self.tip_temperature = space.tip_temperature
         self.highest_temperature = space.highest_temperature
         self.reader_weights = space.reader_weights
-        self.fields, self.weak_form = samples.fields, samples.weak_form
+        self.fields, self.weak_form, self.air = samples.fields, samples.weak_form, space.air
         self._samples = samples
 
     def jacobian(self, tangent: Tangent) -> StackedJacobian:
@@ -437,6 +478,12 @@ class StackedJacobian:
     def __init__(self, matrices: Array) -> None:
         self.matrices = matrices
 
+    def plus(self, heat_T: Array) -> StackedJacobian:
+        """Return the sum with changes of the heat equations with T, (states, modes, modes)."""
+        count = heat_T.shape[1]
+        self.matrices[:, :count, :count] += heat_T
+        return self
+
     def inverses(self, series_resistance_kohm: float) -> Array:
         """Return the inverses at a given bias, with the circuit equation in the last row."""
         matrices = self.matrices.copy()
@@ -451,6 +498,12 @@ class DenseJacobian:
     def __init__(self, matrix: Array, tip: Array) -> None:
         self._matrix, self._tip = matrix, tip
         self.current_gradient = (np.arange(len(matrix)), matrix[-1])
+
+    def plus(self, heat_T: Array) -> DenseJacobian:
+        """Return the sum with changes of the heat equations with T, (1, modes, modes)."""
+        count = heat_T.shape[1]
+        self._matrix[:count, :count] += heat_T[0]
+        return self
 
     def completed(self, series_resistance_kohm: float, pin_bias: float, pin_tip: float) -> Array:
         """Return the square matrix; the last rows are circuit equation and pin."""
@@ -549,16 +602,23 @@ def collect(lever: Lever) -> Iterator[Snapshot]:
 
 
 def neighbourhood(equations: LeverEquations, x: Array) -> Array:
-    """Return how a state changes with each parameter of the box and along the branch."""
+    """Return the changes of a state with parameters and along the branch: see `Snapshot`."""
     # at a given tip temperature, so that a fold does no harm
     solver = equations.jacobian(x).factorised(equations.series_kohm, 0.0, 1.0)
     by_parameter = equations.by_parameter(x)
-    right_hand_side = np.zeros((x.size, len(BOX) + 1))
-    for column, (name, (low, high)) in enumerate(BOX.items()):
+    columns: list[tuple[str, float, float] | None] = [(name, *BOX[name]) for name in BOX]
+    columns.append(None)
+    if equations.space.air is not None:
+        columns += [(name, *IN_AIR[name]) for name in IN_AIR]
+    right_hand_side = np.zeros((x.size, len(columns)))
+    for place, entry in enumerate(columns):
+        if entry is None:
+            right_hand_side[-1, place] = BRANCH_STEP
+            continue
+        name, low, high = entry
         change = by_parameter[:, list(PARAMETERS).index(name)]
-        right_hand_side[:-1, column] = -change * PARAMETER_STEP * (high - low)
-    right_hand_side[-2, :-1] *= equations.series_kohm
-    right_hand_side[-1, -1] = BRANCH_STEP
+        right_hand_side[:-1, place] = -change * PARAMETER_STEP * (high - low)
+    right_hand_side[-2] *= equations.series_kohm
     changes: Array = solver.solve(right_hand_side)
     return changes
 
@@ -601,9 +661,9 @@ def _atlas(lever: Lever, space: ReducedSpace, branches: list[list[Snapshot]]) ->
         # the last unknown is V_b = V_l + R_s I_h
         for array in (values.T, np.moveaxis(by, 1, 0)):
             array[size + 1] = (array[size + 1] - array[size]) / kohm
-        along = by[:, :, -1] * (2.0 * rise[:, None] / BRANCH_STEP)
+        along = by[:, :, len(BOX)] * (2.0 * rise[:, None] / BRANCH_STEP)
         hot = rise > 0
-        u, values, along, by = rise[hot], values[hot], along[hot], by[hot, :, :-1]
+        u, values, along, by = rise[hot], values[hot], along[hot], by[hot, :, : len(BOX)]
         # at zero bias nothing is hot, and potentials grow evenly with u
         start = np.where(space.is_temperature(), 0.0, 2.0 * values[0] / u[0] - along[0])
         u = np.append(0.0, u)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from hotlever.air.surroundings import Surroundings
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import read_text, write_text
 from hotlever.materials import PARAMETERS, Material
@@ -32,11 +33,11 @@ class Circuit(Record):
     base_temperature_K: Annotated[float, Field(ge=250, le=1000)] = 293.0
 
 
-SECTIONS = ("probe", "circuit", "material")
+SECTIONS = ("probe", "circuit", "material", "surroundings")
 
 
 class Probe(Record):
-    """Shape, circuit and material of one lever: everything a solve needs.
+    """Shape, circuit, material and surroundings of one lever: everything a solve needs.
 
     Examples
     --------
@@ -50,6 +51,7 @@ class Probe(Record):
     shape: Shape
     circuit: Circuit = Circuit()
     material: Material = published("option III").material
+    surroundings: Surroundings = Surroundings()
 
     @classmethod
     def reference(cls) -> Probe:
@@ -110,6 +112,9 @@ class Probe(Record):
                 {**published("option III").material.model_dump(), **values.get("material", {})},
                 f"{where}: [material]",
             ),
+            surroundings=Surroundings.of(
+                values.get("surroundings", {}), f"{where}: [surroundings]"
+            ),
         )
 
     @classmethod
@@ -135,6 +140,7 @@ class Probe(Record):
             "probe": self.shape.model_dump(exclude_none=True),
             "circuit": self.circuit.model_dump(),
             "material": self.material.model_dump(),
+            "surroundings": self.surroundings.model_dump(exclude_none=True),
         }
 
     def with_values(self, changes: dict[str, Any]) -> Probe:
@@ -147,6 +153,7 @@ class Probe(Record):
         """
         sections = self.values()
         sections["probe"] = self.shape.model_dump()
+        sections["surroundings"] = self.surroundings.model_dump()
         for name, value in changes.items():
             section = next((values for values in sections.values() if name in values), None)
             if section is None:
@@ -154,6 +161,16 @@ class Probe(Record):
                 raise unknown_name("name", name, known)
             section[name] = value
         return Probe.from_values(sections, "probe")
+
+    def in_medium(self, medium: str) -> Probe:
+        """Return the probe in vacuum or in air.
+
+        Raises
+        ------
+        InputError
+            If the medium is neither.
+        """
+        return self.with_values({"medium": medium})
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip."""
@@ -167,6 +184,7 @@ class Probe(Record):
             "base_temperature_K": "of the leg ends",
             **{p.name: f"{p.meaning}, {p.symbol} ({p.unit})" for p in PARAMETERS.values()},
             "n_hd": "doping concentration of the high-doped silicon (cm⁻³)",
+            **Surroundings.description(),
         }
         lines = ["# A hotlever probe file: lengths in µm, temperatures in K."]
         if self.shape == Probe.reference().shape:
@@ -176,8 +194,10 @@ class Probe(Record):
             )
         for name, section in self.values().items():
             lines += ["", f"[{name}]"]
+            if name == "surroundings":
+                section = self.surroundings.model_dump()
             for key, value in section.items():
-                entry = f"{key} = {_toml(value)}"
+                entry = f"# {key} =" if value is None else f"{key} = {_toml(value)}"
                 lines.append(f"{entry:<32}# {comments[key]}" if key in comments else entry)
         return "\n".join(lines) + "\n"
 
@@ -187,4 +207,6 @@ class Probe(Record):
 
 
 def _toml(value: str | float) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
     return f'"{value}"' if isinstance(value, str) else f"{value:.12g}"
