@@ -10,9 +10,9 @@ import hashlib
 import json
 import os
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import platformdirs
@@ -25,6 +25,15 @@ from hotlever.files import output_folder, whole_file
 CACHE_VARIABLE = "HOTLEVER_CACHE"
 
 Arrays = dict[str, NDArray[Any]]
+T = TypeVar("T")
+
+
+def cache_folder() -> Path | None:
+    """Return where results are kept; None if the cache is switched off."""
+    chosen = os.environ.get(CACHE_VARIABLE)
+    if chosen == "":
+        return None
+    return Path(chosen) if chosen else Path(platformdirs.user_cache_dir("hotlever"))
 
 
 def cache_file(kind: str, facts: Mapping[str, Any]) -> Path | None:
@@ -37,10 +46,9 @@ def cache_file(kind: str, facts: Mapping[str, Any]) -> Path | None:
     facts : mapping
         Everything that the result depends on: what JSON knows, and arrays.
     """
-    chosen = os.environ.get(CACHE_VARIABLE)
-    if chosen == "":
+    top = cache_folder()
+    if top is None:
         return None
-    top = Path(chosen) if chosen else Path(platformdirs.user_cache_dir("hotlever"))
     content = hashlib.sha256()
     for name in sorted(facts):
         fact = facts[name]
@@ -52,20 +60,24 @@ def cache_file(kind: str, facts: Mapping[str, Any]) -> Path | None:
     return top / kind / f"{content.hexdigest()[:32]}.npz"
 
 
-def stored_arrays(path: Path | None) -> Arrays | None:
-    """Read a file; None if there is none, or it is damaged (it is then removed)."""
+def stored(path: Path | None, make: Callable[[Arrays], T]) -> T | None:
+    """Make something of a stored file's arrays.
+
+    None if there is no file, or if it is damaged or `make` raises KeyError or ValueError for its
+    content; it is then removed.
+    """
     if path is None or not path.is_file():
         return None
     try:
         # opened here: np.load leaves a file it cannot read open
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            return dict(stored)
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            return make(dict(arrays))
     except (OSError, ValueError, KeyError, IndexError, zipfile.BadZipFile, EOFError):
         path.unlink(missing_ok=True)
         return None
 
 
-def store_arrays(path: Path | None, arrays: Arrays) -> None:
+def store_arrays(path: Path | None, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write a file; a cache that cannot be written is no reason to stop."""
     if path is None:
         return

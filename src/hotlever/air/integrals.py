@@ -81,9 +81,7 @@ def rectangle_pairs(first: Panels, second: Panels) -> Array:
     low = [panels.corners.min(axis=1) for panels in (first, second)]
     high = [panels.corners.max(axis=1) for panels in (first, second)]
     # differences of the coordinates: high − low, low − low, high − high, low − high
-    differences = np.stack(
-        [high[0] - low[1], low[0] - low[1], high[0] - high[1], low[0] - high[1]]
-    )
+    differences = np.stack([high[0] - low[1], low[0] - low[1], high[0] - high[1], low[0] - high[1]])
     for one in range(3):
         for other in range(3):
             pairs = np.flatnonzero((first.flat_axis == one) & (second.flat_axis == other))
@@ -129,7 +127,11 @@ def _perpendicular(u: Array, v: Array, w: Array) -> Array:
     terms += (aa / 2 - bb / 6) * b * np.arcsinh(c / np.maximum(np.sqrt(aa + bb), _TINY))
     terms += a * b * c * np.arcsinh(a / np.maximum(np.sqrt(bb + cc), _TINY))
     terms -= b * c * distance / 3.0
-    for power, product, height in ((aa * a / 6, b * c, a), (a * bb / 2, a * c, b), (a * cc / 2, a * b, c)):
+    for power, product, height in (
+        (aa * a / 6, b * c, a),
+        (a * bb / 2, a * c, b),
+        (a * cc / 2, a * b, c),
+    ):
         terms -= power * np.arctan(product / _away_from_zero(height * distance))
     twice, once = np.array([1.0, -1.0, -1.0, 1.0]), np.array([1.0, -1.0])
     total: Array = np.einsum("u,v,w,uvwn->n", twice, once, once, terms)

@@ -21,7 +21,7 @@ from hotlever.air.panels import Panels, mirror_group
 from hotlever.air.single_layer import Progress, single_layer
 from hotlever.air.surface import PanelOptions, lever_surface
 from hotlever.air.surroundings import Surroundings
-from hotlever.cache import cache_file, store_arrays, stored_arrays
+from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout
 
@@ -79,17 +79,16 @@ def air_operator(
     facts = {
         "version": __version__,
         "layout": asdict(layout),
-        "surroundings": surroundings.model_dump(),
+        "surroundings": surroundings.model_dump(exclude={"medium"}),
         "jump_um": surroundings.jump_length_um(base_temperature_K),
         "options": asdict(options),
     }
     path = cache_file("air", facts)
-    stored = stored_arrays(path)
-    if stored is not None and stored.keys() >= {"sites", "matrix", "filling"}:
-        return AirOperator(stored["sites"], stored["matrix"], float(stored["filling"]))
+    known = stored(path, lambda a: AirOperator(a["sites"], a["matrix"], float(a["filling"])))
+    if known is not None:
+        return known
     operator = make_operator(layout, surroundings, base_temperature_K, options, progress)
-    arrays = {name: np.asarray(value) for name, value in vars(operator).items()}
-    store_arrays(path, arrays)
+    store_arrays(path, {name: np.asarray(value) for name, value in vars(operator).items()})
     return operator
 
 

@@ -100,4 +100,3 @@ def _by_quadrature(first: Panels, second: Panels) -> Array:
                 result[index] if panels is other else 0.0
             )
     return result
-

@@ -163,9 +163,7 @@ class _Sizes:
 def divided(at: Array, size: Array) -> Array:
     """Return break points between the ends of `at` whose distances follow `size`."""
     density = 1.0 / size
-    counted = np.concatenate(
-        [[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(at))]
-    )
+    counted = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(at))])
     pieces = max(1, int(np.ceil(counted[-1] - 1e-6)))
     breaks = np.interp(np.linspace(0.0, counted[-1], pieces + 1), counted, at)
     breaks[[0, -1]] = at[[0, -1]]

@@ -1,4 +1,4 @@
-"""What is around a lever in air (section ``[surroundings]`` of a probe file).
+"""What is around a lever (section ``[surroundings]`` of a probe file).
 
 Everything outside the lever that takes up heat is at the base temperature, so θ = 0 there. A flat
 surface is an image: every panel has a mirror panel of opposite density behind it.
@@ -7,7 +7,7 @@ surface is an image: every panel has a mirror panel of opposite density behind i
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -16,12 +16,15 @@ from hotlever.air.panels import Mirror
 from hotlever.materials.air import ATMOSPHERE, temperature_jump_length
 from hotlever.records import Record
 
+Medium = Literal["vacuum", "air"]
+
 
 class Surroundings(Record):
-    """What is around a lever in air; free space in dense air by default.
+    """What is around a lever: vacuum by default, and free space in air. The rest counts in air.
 
     Attributes
     ----------
+    medium : {"vacuum", "air"}
     surface_gap_um : float or None
         Distance from the lever's lower face, at the tip, to a flat isothermal surface below
         (µm): the tip's height, and what is between tip and surface. None: no surface.
@@ -41,6 +44,7 @@ class Surroundings(Record):
         surfaces it is the base temperature.
     """
 
+    medium: Medium = "vacuum"
     surface_gap_um: Annotated[float, Field(gt=0)] | None = None
     surface_tilt_deg: Annotated[float, Field(ge=-45, le=45)] = 0.0
     chip: bool = False
@@ -63,6 +67,7 @@ class Surroundings(Record):
     def description(cls) -> dict[str, str]:
         """Return what each value is, by key, for the comments of a probe file."""
         return {
+            "medium": "vacuum or air; the rest counts in air, all of it at the base temperature",
             "surface_gap_um": "lower face of the lever to a flat surface below, at the tip",
             "surface_tilt_deg": "of that surface; positive: the base is farther away",
             "chip": "whether the chip body behind the legs takes up heat from the air",

@@ -9,7 +9,9 @@ import typer
 
 from hotlever.cli.app import app, note, progress, stdout
 from hotlever.cli.options import (
+    MediumOption,
     ProbeFile,
+    check_medium,
     check_output,
     load_probe,
     parse_bias,
@@ -25,7 +27,7 @@ def sweep(
     bias: Annotated[str, typer.Option(help="START:STOP:COUNT in volts, ends included.")] = (
         "1:11:25"
     ),
-    medium: Annotated[str, typer.Option(help="vacuum or air.")] = "vacuum",
+    medium: MediumOption = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Change a value of the probe file."),
@@ -42,18 +44,20 @@ def sweep(
     ] = None,
 ) -> None:
     """Solve a lever over a range of bias."""
-    from hotlever.lever import Lever, checked_medium, sweep_csv, write_sweep
+    from hotlever.lever import Lever, sweep_csv, write_sweep
     from hotlever.lever.fields import FieldMapper, write_vtu
     from hotlever.report.figures import sweep_overview
     from hotlever.report.style import FIGURE_TYPES, save_figure
 
     values = parse_bias(bias)
-    checked_medium(medium)
+    check_medium(medium)
     check_output(output, ".csv", ".nc")
     check_output(plot, *FIGURE_TYPES)
     probe = load_probe(probe_file).with_values(parse_settings(settings or []))
+    if medium is not None:
+        probe = probe.in_medium(medium)
     with progress("air") as update:
-        lever = Lever(probe, medium=medium, progress=update)
+        lever = Lever(probe, progress=update)
 
     failure: ComputationError | None = None
     with progress("sweep") as update:

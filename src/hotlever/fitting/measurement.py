@@ -9,11 +9,12 @@ import re
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hotlever.air.surroundings import Medium
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import read_text
 
@@ -26,6 +27,8 @@ COLUMNS = {
     "V_r": ("reader_V", "V"),
     "T_tip": ("tip_K", "K"),
     "dT_tip": ("tip_error_K", "delta_K"),
+    "dI_h": ("current_error_mA", "mA"),
+    "dV_r": ("reader_error_V", "V"),
 }
 #: The columns a fit can compare, by the name users give it.
 OBSERVABLE_SYMBOLS = {"current": "I_h", "reader": "V_r", "tip": "T_tip"}
@@ -39,6 +42,7 @@ _NAME_AND_UNIT = re.compile(r"^\s*(?P<name>[^()\[\]]+?)\s*[(\[](?P<unit>[^)\]]*)
 _SETTING = re.compile(
     r"^#\s*(?P<name>[^():\[\]]+?)\s*[(\[](?P<unit>[^)\]]*)[)\]]\s*[:=]\s*(?P<value>\S+)\s*$"
 )
+_MEDIUM = re.compile(r"^#\s*medium\s*[:=]\s*([A-Za-z]+)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -48,8 +52,13 @@ class Measurement:
     Attributes
     ----------
     bias_V, current_mA, reader_V, tip_K, tip_error_K : ndarray, shape (n,)
+        The last is the standard error of the tip temperature.
+    current_error_mA, reader_error_V : ndarray, shape (n,), or None
+        Standard errors of the others.
     series_resistance_ohm, base_temperature_K : float or None
         If the file gives them.
+    medium : {"vacuum", "air"} or None
+        If the file says it.
     path, sha256 : str
         Origin; empty for data made in memory.
     ignored : tuple of str
@@ -63,9 +72,12 @@ class Measurement:
     tip_error_K: Array
     series_resistance_ohm: float | None = None
     base_temperature_K: float | None = None
+    medium: Medium | None = None
     path: str = ""
     sha256: str = ""
     ignored: tuple[str, ...] = field(default=())
+    current_error_mA: Array | None = None
+    reader_error_V: Array | None = None
 
     def observable(self, name: str) -> Array:
         """Return the data of ``current`` (mA), ``reader`` (V) or ``tip`` (K).
@@ -79,6 +91,12 @@ class Measurement:
             raise unknown_name("observable", name, OBSERVABLE_SYMBOLS)
         values: Array = getattr(self, COLUMNS[OBSERVABLE_SYMBOLS[name]][0])
         return values
+
+    def error(self, name: str) -> Array:
+        """Return the standard errors of an observable's data, NaN where there are none."""
+        self.observable(name)
+        values = getattr(self, COLUMNS["d" + OBSERVABLE_SYMBOLS[name]][0])
+        return np.full(self.bias_V.shape, np.nan) if values is None else values
 
     @property
     def observables(self) -> tuple[str, ...]:
@@ -94,8 +112,8 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     A header row names each column with its unit in brackets or parentheses, such as
     ``V_b (V),I_h [mA],V_r (mV),T_tip (K)``; SI prefixes are understood, columns come in any
     order, cells may be empty, lines starting with ``#`` are comments and may give
-    ``R_s (kOhm): 5.6`` and ``base temperature (K): 293``. Cells are separated by commas, tabs,
-    or semicolons; with the latter two a decimal comma is understood.
+    ``R_s (kOhm): 5.6``, ``base temperature (K): 293`` and ``medium: air``. Cells are separated by
+    commas, tabs, or semicolons; with the latter two a decimal comma is understood.
 
     Raises
     ------
@@ -104,6 +122,7 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     """
     text = read_text(path, encoding="utf-8-sig")
     settings: dict[str, float] = {}
+    medium: Medium | None = None
     header: list[str] | None = None
     separator = ","
     columns: dict[str, tuple[int, float, float]] = {}
@@ -113,6 +132,7 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
         where = f"{path}: line {number}"
         if line.startswith("#"):
             settings |= _setting(line, where)
+            medium = _medium(line) or medium
         elif not line.strip(" \t,;"):
             continue
         elif header is None:
@@ -125,17 +145,15 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
         raise InputError(f"{path}: no header row, expected one like 'V_b (V),I_h (mA),V_r (mV)'")
     if not rows:
         raise InputError(f"{path}: no data rows after the header")
-    bias, current, reader, tip, error = (
-        np.array([row.get(symbol, math.nan) for row in rows]) for symbol in COLUMNS
-    )
+    values = {
+        attribute: np.array([row.get(symbol, math.nan) for row in rows])
+        for symbol, (attribute, _) in COLUMNS.items()
+    }
     measurement = Measurement(
-        bias,
-        current,
-        reader,
-        tip,
-        error,
+        **values,
         series_resistance_ohm=settings.get("series_resistance_ohm"),
         base_temperature_K=settings.get("base_temperature_K"),
+        medium=medium,
         path=str(path),
         sha256=hashlib.sha256(Path(path).read_bytes()).hexdigest(),
         ignored=tuple(ignored),
@@ -153,6 +171,13 @@ def _setting(line: str, where: str) -> dict[str, float]:
     attribute, unit = SETTINGS[match["name"].lower()]
     factor, offset = _conversion(match["unit"], unit, f"{where}: {match['name']}")
     return {attribute: factor * _number(match["value"], True, f"{where}: {match['name']}") + offset}
+
+
+def _medium(line: str) -> Medium | None:
+    """Read the medium of a comment line such as ``# medium: air, 20 °C``; None for any other."""
+    match = _MEDIUM.match(line)
+    word = match[1].lower() if match else ""
+    return next((medium for medium in get_args(Medium) if medium == word), None)
 
 
 def _columns(

@@ -313,9 +313,10 @@ class LeverEquations:
         -------
         dict
             ``current_mA``, ``lever_V``, ``reader_V`` (NaN without a reader), ``tip_K``,
-            ``power_mW``, ``air_heat_mW`` (0 in vacuum), resistances ``heater_ohm``, ``leg1_ohm``, ``leg2_ohm`` (Joule heat of
+            ``power_mW``, resistances ``heater_ohm``, ``leg1_ohm``, ``leg2_ohm`` (Joule heat of
             the part over I_h²; they add up to V_l / I_h; NaN without current), ``max_K``, and
-            for the balances ``ground_current_mA`` and ``end_heat_mW``.
+            for the balances ``ground_current_mA``, ``end_heat_mW`` and ``air_heat_mW`` (0 in
+            vacuum).
 
         Raises
         ------
@@ -373,7 +374,7 @@ class LeverEquations:
             columns.append(
                 self.space.weak_form(-sigma * square, kappa * fields.grad_T, sigma * fields.grad_V)
             )
-        return np.column_stack(columns)
+        return np.stack(columns, axis=-1)
 
     def sensitivities(self, x: Array) -> Array:
         """Return derivatives of I_h, V_r and T_tip by the six parameters, at a fixed bias.
@@ -395,8 +396,28 @@ class LeverEquations:
         right_hand_side[-2] *= self.series_kohm
         jacobian = self.jacobian(x)
         change = jacobian.factorised(self.series_kohm, 1.0, 0.0).solve(right_hand_side)
+        observed = self._observed_change(jacobian, change)
+        observed[0] += by_parameter[-1]
+        return observed
+
+    def observed_change(self, x: Array, change: Array) -> Array:
+        """Return how I_h, V_r and T_tip change with the unknowns, to first order.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n,)
+        change : ndarray, shape (n,) or (n, k)
+
+        Returns
+        -------
+        ndarray, shape (3,) or (3, k)
+            mA, V (NaN without a reader) and K.
+        """
+        return self._observed_change(self.jacobian(x), change)
+
+    def _observed_change(self, jacobian: Jacobian, change: Array) -> Array:
         unknowns, slopes = jacobian.current_gradient
-        current = by_parameter[-1] + slopes @ change[unknowns]
+        current = slopes @ change[unknowns]
         tip_unknowns, tip_weights = self.space.tip
         tip = tip_weights @ change[tip_unknowns]
         reader = self.space.reader_weights()

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hotlever import __version__
 from hotlever.air.operator import AirOperator, air_operator
-from hotlever.errors import ComputationError, InputError, unknown_name
+from hotlever.errors import ComputationError, InputError
 from hotlever.files import read_text, whole_file, write_text
 from hotlever.lever.continuation import AT_BIAS, BranchFollower, ContinuationOptions
 from hotlever.lever.equations import LAWS, OBSERVABLES, LeverEquations
@@ -27,9 +27,6 @@ from hotlever.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
-
-#: What may be around a lever.
-MEDIA = ("vacuum", "air")
 
 #: Columns of a sweep file: name, unit, what it is.
 SWEEP_COLUMNS: dict[str, tuple[str, str]] = {
@@ -52,6 +49,8 @@ _MORE: dict[str, tuple[str, str]] = {
     "end_heat_mW": ("mW", "heat leaving by the leg ends"),
     "air_heat_mW": ("mW", "heat leaving into the air"),
 }
+#: Error left after polishing: 10 µK, 0.1 µV.
+_POLISHED = NewtonOptions(tolerance=1e-5, keep_while=0.4)
 #: Unit of each observable in a sweep, by its name.
 OBSERVABLE_COLUMNS = {"current": "current_mA", "reader": "reader_V", "tip": "tip_K"}
 
@@ -96,9 +95,8 @@ class Lever:
     probe : Probe
     mesh : MeshOptions, optional
     space : LeverSpace, optional
-        Share the mesh, operators and medium of another lever of the same shape.
-    medium : {"vacuum", "air"}
-        What is around the lever, if no `space` is given; in air the probe's surroundings count.
+        Share the mesh and operators of another lever of the same shape, and its air if both are
+        in air: the surroundings must be the same then.
     progress : callable, optional
         Called while the air operator of a new geometry is made, with steps done and their number.
 
@@ -115,26 +113,23 @@ class Lever:
         probe: Probe,
         mesh: MeshOptions | None = None,
         space: LeverSpace | None = None,
-        *,
-        medium: str = "vacuum",
         progress: Progress | None = None,
     ) -> None:
         self.probe = probe
-        if space is None:
-            space = LeverSpace(mesh_layout(probe.layout(), mesh))
-            space = space.in_medium(_air(probe, medium, progress))
+        space = space or LeverSpace(mesh_layout(probe.layout(), mesh))
+        if (space.air is None) != (self.medium == "vacuum"):
+            space = space.in_air(_air(probe, progress))
         self.space: LeverSpace = space
         self.equations = LeverEquations(self.space, probe.circuit, probe.material)
 
     @property
     def medium(self) -> str:
         """What is around the lever: vacuum or air."""
-        return "vacuum" if self.space.air is None else "air"
+        return self.probe.surroundings.medium
 
-    def in_medium(self, medium: str, progress: Progress | None = None) -> Lever:
+    def in_medium(self, medium: str) -> Lever:
         """Return the same lever in vacuum or in air; mesh and operators are shared."""
-        space = self.space.in_medium(_air(self.probe, medium, progress))
-        return Lever(self.probe, space=space)
+        return Lever(self.probe.in_medium(medium), space=self.space)
 
     def with_material(self, material: Material) -> Lever:
         """Return the same lever of another material; the mesh is shared."""
@@ -195,7 +190,8 @@ class Lever:
         Parameters
         ----------
         guesses : iterable of ndarray
-            Full states, such as a reduced lever's expanded ones.
+            Full states in the order of bias, such as a reduced lever's expanded ones. They are
+            so near that one state's factorised Jacobian often serves the next.
 
         Raises
         ------
@@ -203,10 +199,13 @@ class Lever:
             If one is too far from a solution.
         """
         states = []
+        jacobian = None
         for guess in guesses:
             bias = float(guess[-1])
-            root = newton(self.equations.pinned(AT_BIAS, bias), guess, NewtonOptions()).x
-            states.append(LeverState(bias, root))
+            equations = self.equations.pinned(AT_BIAS, bias)
+            found = newton(equations, guess, _POLISHED, jacobian)
+            jacobian = found.jacobian
+            states.append(LeverState(bias, found.x))
         return Ramp(states, [])
 
     @one_blas_thread
@@ -332,21 +331,8 @@ class Lever:
         ]
 
 
-def checked_medium(medium: str) -> str:
-    """Return a medium.
-
-    Raises
-    ------
-    InputError
-        If it is neither vacuum nor air.
-    """
-    if medium not in MEDIA:
-        raise unknown_name("medium", medium, MEDIA)
-    return medium
-
-
-def _air(probe: Probe, medium: str, progress: Progress | None) -> AirOperator | None:
-    if checked_medium(medium) == "vacuum":
+def _air(probe: Probe, progress: Progress | None) -> AirOperator | None:
+    if probe.surroundings.medium == "vacuum":
         return None
     base = probe.circuit.base_temperature_K
     return air_operator(probe.layout(), probe.surroundings, base, progress=progress)
@@ -371,7 +357,6 @@ def sweep(
     probe: Probe,
     bias: ArrayLike,
     *,
-    medium: str = "vacuum",
     sensitivities: bool = False,
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -383,7 +368,7 @@ def sweep(
     >>> data.tip_K.round(0).values.tolist()
     [295.0, 547.0]
     """
-    return Lever(probe, medium=medium).sweep(bias, sensitivities=sensitivities, progress=progress)
+    return Lever(probe).sweep(bias, sensitivities=sensitivities, progress=progress)
 
 
 def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:

@@ -125,7 +125,7 @@ class LeverSpace:
         }
         self.air = None if air is None else self._air_loss(air)
 
-    def in_medium(self, air: AirOperator | None) -> LeverSpace:
+    def in_air(self, air: AirOperator | None) -> LeverSpace:
         """Return the same space with this air around it, or in vacuum; everything is shared."""
         space = copy(self)
         space.air = None if air is None else space._air_loss(air)

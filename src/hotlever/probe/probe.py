@@ -162,6 +162,16 @@ class Probe(Record):
             section[name] = value
         return Probe.from_values(sections, "probe")
 
+    def in_medium(self, medium: str) -> Probe:
+        """Return the probe in vacuum or in air.
+
+        Raises
+        ------
+        InputError
+            If the medium is neither.
+        """
+        return self.with_values({"medium": medium})
+
     def layout(self) -> Layout:
         """Return the regions, terminals and tip."""
         return self.shape.layout()
@@ -185,7 +195,6 @@ class Probe(Record):
         for name, section in self.values().items():
             lines += ["", f"[{name}]"]
             if name == "surroundings":
-                lines[-1] = f"{lines[-1]:<32}# in air only; all of them at the base temperature"
                 section = self.surroundings.model_dump()
             for key, value in section.items():
                 entry = f"# {key} =" if value is None else f"{key} = {_toml(value)}"
