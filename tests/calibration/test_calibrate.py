@@ -167,9 +167,7 @@ def test_variations_are_of_the_size_asked_for():
     mean = np.mean([np.log(material.n_d) for material in materials])
     assert mean == pytest.approx(np.log(probe.material.n_d))
     stderr = {"c_kappa": 0.005, "p": 0.05}
-    fit = FitFile(
-        probe, list(stderr), np.diag(np.square(list(stderr.values()))), (), "vacuum", "", "", "f"
-    )
+    fit = FitFile(probe, list(stderr), np.diag(np.square(list(stderr.values()))), (), "", "", "f")
     moved = np.array(
         [
             [getattr(variation.probe.material, name) for name in stderr]
@@ -235,7 +233,7 @@ def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
     ("arguments", "message"),
     [
         (("--fit", "a", "--probe", "b"), "--fit and --probe: expected at most one of"),
-        (("--medium", "vacum"), "did you mean 'vacuum'"),
+        (("--medium", "vacum"), "--medium vacum: expected vacuum or air"),
         (("--table", "t.txt"), "unknown file type '.txt'"),
         (("--tolerance", "3"), "geometry = 3, expected a relative error"),
         (("--fit", "none.json"), "none.json: no such file"),
@@ -257,12 +255,12 @@ def test_a_file_without_current_is_refused(run, tmp_path):
 
 def test_air_calibration_uses_the_model_in_air(lever, reference):
     """A lever in air calibrated with the air model, and by the rule of a constant k."""
-    air = characteristic(lever.in_medium("air"))
+    air = characteristic(lever.in_medium("air"), 1050.0, step_K=50.0)
     curve = measurement_of(measured_curve(air, np.random.default_rng(5), to_V=12.0))
     with_model = calibrate(curve, medium="air", tolerances=FEW)
     assert with_model.k == pytest.approx(air.knee.power_mW / reference.knee.power_mW, rel=0.015)
     true = air.tip_temperature(with_model.table.power_mW)
-    assert np.nanmax(np.abs(with_model.table.tip_K - true)) < 10.0
+    assert np.nanmax(np.abs(with_model.table.tip_K - true)) < 15.0
 
 
 def test_published_materials_are_what_a_material_may_be():

@@ -199,8 +199,9 @@ def calibrate(
     law : PowerLaw, optional
         A power law in vacuum, in place of a model.
     medium : {"vacuum", "air"}, optional
-        Of the model whose temperatures are used; the fit's by default, else vacuum. With vacuum
-        the paper's rule is used in any medium: the same temperatures at k times the power.
+        Of the model whose temperatures are used; by default what the data file says, or else
+        the fit or the probe. With vacuum the paper's rule is used in any medium: the same
+        temperatures at k times the power.
     tolerances : Tolerances, optional
     progress : callable, optional
         Called with solved levers and their number.
@@ -235,10 +236,13 @@ class _Calibrator:
         self._measurement, self._fit, self._law = measurement, fit, law
         self._tolerances, self._progress = tolerances, progress
         origin = fit.probe if fit is not None else probe or Probe.reference()
-        self._probe, self._notes = with_measured_circuit(origin, measurement)
-        self._medium = medium or (fit.medium if fit is not None else "vacuum")
-        if law is not None and self._medium != "vacuum":
+        if law is not None and medium not in (None, "vacuum"):
             raise InputError("a power law holds in vacuum; with one, leave the medium out")
+        if law is not None:  # whatever the lever is in
+            measurement = replace(measurement, medium=None)
+            medium = "vacuum"
+        self._probe, self._notes = with_measured_circuit(origin, measurement, medium)
+        self._medium: str = self._probe.surroundings.medium
         self._models: dict[str, Characteristic] = {}
         self._done, self._total = 0, 4
 
@@ -304,7 +308,7 @@ class _Calibrator:
 
     def _model(self, medium: str) -> Characteristic:
         if medium not in self._models:
-            self._models[medium] = _with_knee(characteristic(Lever(self._probe, medium=medium)))
+            self._models[medium] = _with_knee(characteristic(Lever(self._probe.in_medium(medium))))
             self._step()
         return self._models[medium]
 
@@ -315,7 +319,7 @@ class _Calibrator:
             media.add(self._fit.medium)
         return {
             medium: _with_knee(
-                characteristic(Lever(probe, _COARSE_MESH, medium=medium), step_K=_COARSE_STEP)
+                characteristic(Lever(probe.in_medium(medium), _COARSE_MESH), step_K=_COARSE_STEP)
             )
             for medium in media
         }
@@ -454,7 +458,7 @@ class _Calibrator:
         variations: list[Variation] = []
         for variation in geometry_variations(self._probe, self._tolerances.geometry):
             if self._fit is not None and data is not None:
-                fit = replace(self._fit, probe=self._probe)
+                fit = replace(self._fit, probe=self._probe.in_medium(self._fit.medium))
                 probe = refitted(fit, data, variation.probe, _COARSE_MESH)
                 variation = replace(variation, probe=probe)
             variations.append(variation)
