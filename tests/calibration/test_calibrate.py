@@ -70,6 +70,17 @@ def test_the_table_gives_the_true_temperature(calibrated, reference):
     np.testing.assert_allclose(table.lever_V + 5.6 * table.current_mA, table.bias_V, rtol=1e-9)
 
 
+def test_the_bias_for_a_temperature_is_that_of_the_lever(calibrated, lever, reference):
+    wanted = np.array([400.0, 700.0, 1000.0])
+    exact = reference.bias(wanted, 5600.0)
+    np.testing.assert_allclose(lever.sweep(exact).tip_K, wanted, atol=0.05)
+    np.testing.assert_allclose(calibrated.bias_for(wanted), exact, atol=0.1)
+    np.testing.assert_allclose(
+        calibrated.bias_for(wanted, 3000.0), reference.bias(wanted, 3000.0), atol=0.1
+    )
+    assert np.isnan(calibrated.bias_for([294.0, 1500.0])).all()
+
+
 def test_k_is_the_power_of_the_knee_over_the_threshold(calibrated, reference):
     assert calibrated.k == pytest.approx(1.0, abs=0.015)
     assert calibrated.k == calibrated.knee_mW / calibrated.power_law.threshold_mW

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hotlever import __version__
 from hotlever.calibration.budget import (
@@ -118,6 +118,29 @@ class Calibration:
     def tip_temperature_uncertainty_K(self) -> float:
         """Largest standard error of the tip temperature in the table (K)."""
         return float(self.table.tip_stderr_K.max())
+
+    def bias_for(self, tip_K: ArrayLike, series_resistance_ohm: float | None = None) -> Array:
+        """Return the bias (V) that heats the tip to a temperature (K).
+
+        Parameters
+        ----------
+        tip_K : array_like
+        series_resistance_ohm : float, optional
+            That of the measurement by default; power and lever voltage do not depend on it.
+
+        Returns
+        -------
+        ndarray
+            NaN outside the measured range.
+        """
+        if series_resistance_ohm is None:
+            series_resistance_ohm = self.probe.circuit.series_resistance_ohm
+        known = self.table.isel(bias=np.flatnonzero(np.isfinite(self.table.tip_K)))
+        tip = np.asarray(tip_K, dtype=float)
+        power = np.interp(tip, known.tip_K, known.power_mW, left=np.nan, right=np.nan)
+        lever = np.interp(power, known.power_mW, known.lever_V)
+        bias: Array = lever + series_resistance_ohm / 1000.0 * power / lever
+        return bias
 
     def to_json(self) -> str:
         """Return the calibration file."""
