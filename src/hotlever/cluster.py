@@ -57,6 +57,10 @@ def local_client(processes: int) -> Iterator[Client]:
         "distributed.worker.multiprocessing-method": "spawn",
         # the default hands every freed array back to the system, to ask for it again
         "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
+        # Dask watches its workers many times a second, at the cost of their work
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.tick.interval": "1s",
+        "distributed.admin.system-monitor.interval": "5s",
     }
     with (
         dask.config.set(settings),
@@ -67,7 +71,9 @@ def local_client(processes: int) -> Iterator[Client]:
             cluster = LocalCluster(
                 n_workers=processes,
                 threads_per_worker=1,
-                dashboard_address=None,
+                # None would mean the usual port, with a warning where that is taken
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
                 silence_logs=logging.CRITICAL,
                 local_directory=folder,
             )

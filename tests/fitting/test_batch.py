@@ -118,7 +118,7 @@ def test_what_was_stopped_goes_on_and_bad_files_are_said(levers, run, tmp_path):
 
 
 def test_changed_data_options_or_files_are_fitted_anew(levers, tmp_path):
-    cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None)
+    cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0")
     with cluster:
         address = cluster.scheduler_address
 
@@ -138,7 +138,7 @@ SCHEDULER = """
 import time
 from distributed import LocalCluster
 options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "protocol": "tcp"}
-cluster = LocalCluster(dashboard_address=None, **options)
+cluster = LocalCluster(dashboard_address='127.0.0.1:0', **options)
 print(cluster.scheduler_address, flush=True)
 time.sleep(600)
 """
