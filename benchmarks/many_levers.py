@@ -4,8 +4,11 @@
 
 The efficiency is t(1) / (2 t(2)); the seconds run from the call to the last fit file, with the
 start and end of the processes, without reducing the geometry, which is in the cache by then. The
-two numbers of processes are measured in turn; medians. What else runs on the machine counts, so
-the load is printed: with two processors, both must be free.
+two numbers of processes are measured in turn; medians.
+
+Other work on the machine takes its share of two busy processors, but hardly of one, so the load
+is printed. The processor time of all processes, parent and scheduler included, does not mind: with
+N processes it shows what spreading the work costs.
 """
 
 from __future__ import annotations
@@ -51,35 +54,49 @@ def write_levers(folder: Path, count: int, seed: int = 0) -> list[Path]:
     return paths
 
 
-def seconds(paths: list[Path], processes: int) -> float:
-    """Fit all levers into an empty folder."""
+def seconds(paths: list[Path], processes: int) -> tuple[float, float]:
+    """Fit all levers into an empty folder; return wall and processor time."""
     with tempfile.TemporaryDirectory() as folder:
-        began = time.perf_counter()
+        began, used = time.perf_counter(), processor_time()
         batch = fit_many(paths, folder, processes=processes)
-        elapsed = time.perf_counter() - began
+        elapsed = time.perf_counter() - began, processor_time() - used
     if batch.failures:
         sys.exit(f"{len(batch.failures)} levers failed: {next(iter(batch.failures.values()))}")
     return elapsed
 
 
+def processor_time() -> float:
+    """Return the processor time (s) of this process and of those that it started and that ended."""
+    return sum(os.times()[:4])
+
+
 def main() -> None:
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 24
     runs = int(sys.argv[2]) if len(sys.argv) > 2 else 3
+    rows = []
     with tempfile.TemporaryDirectory() as folder:
         paths = write_levers(Path(folder), count)
-        times = []
-        for _ in range(runs):
-            one, two = seconds(paths, 1), seconds(paths, 2)
-            times.append((one, two, one / (2 * two), os.getloadavg()[0]))
-    rows = [
-        (number + 1, f"{one:.1f}", f"{two:.1f}", f"{100 * share:.0f}", f"{load:.1f}")
-        for number, (one, two, share, load) in enumerate(times)
-    ]
-    middle = [median(column) for column in zip(*times, strict=True)]
-    rows.append(("median", *(f"{value:.1f}" for value in middle[:2]), f"{100 * middle[2]:.0f}", ""))
+        for run in range(1, runs + 1):
+            (one, used_by_one), (two, used_by_two) = seconds(paths, 1), seconds(paths, 2)
+            share, same = 100 * one / (2 * two), 100 * used_by_one / used_by_two
+            rows.append((run, one, two, share, used_by_one, used_by_two, same, os.getloadavg()[0]))
+            print(f"run {run} of {runs}: {share:.0f} %", file=sys.stderr)
+    rows.append(("median", *(median(column) for column in list(zip(*rows, strict=True))[1:])))
     print(f"{count} levers, option III, {os.cpu_count()} processors (target: 90 %)\n")
-    table(("run", "1 process (s)", "2 processes (s)", "efficiency (%)", "load"), rows)
-    print(f"\n{count / middle[1]:.2f} levers per second on 2 processes")
+    table(
+        (
+            "run",
+            "1 process (s)",
+            "2 processes (s)",
+            "efficiency (%)",
+            "processor time, 1 (s)",
+            "processor time, 2 (s)",
+            "ratio (%)",
+            "load",
+        ),
+        [(row[0], *(f"{value:.1f}" for value in row[1:])) for row in rows],
+    )
+    print(f"\n{count / rows[-1][2]:.2f} levers per second on 2 processes")
 
 
 if __name__ == "__main__":

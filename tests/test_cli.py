@@ -167,6 +167,7 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
         (("fit", EXAMPLE, "--observables", "tpi"), "did you mean 'tip'"),
         (("fit", EXAMPLE, "--fix", "nd"), "did you mean 'n_d'"),
         (("fit", EXAMPLE, "--posterior", "--samples", "0"), "--samples 0: expected 1 or more"),
+        (("fit", EXAMPLE, "--weights", "error"), "did you mean 'errors'"),
         (("fit", EXAMPLE, "--scheduler", "tcp://a:1"), "--scheduler: expected several data"),
         (("fit", EXAMPLE, EXAMPLE, "--profiles"), "expected a single data file"),
         (("fit", EXAMPLE, "--fix", "n_d=a"), "--fix n_d: found 'a', expected a number"),

@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from hotlever.cli.app import app, fail, note, progress, progress_bars, stdout
 from hotlever.cli.options import MediumOption, check_medium, check_output, load_probe, parse_fixed
-from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.errors import ComputationError, HotleverError, InputError, unknown_name
 from hotlever.files import write_text
 
 if TYPE_CHECKING:
     from hotlever.fitting import Fit
+    from hotlever.fitting.least_squares import Weights
     from hotlever.fitting.uncertainty import Uncertainty
-
-
-class Weights(StrEnum):
-    """What the differences of a fit are divided by."""
-
-    maximum = "maximum"
-    errors = "errors"
 
 
 @app.command()
@@ -50,9 +43,9 @@ def fit(
         bool, typer.Option("--drift", help="Let the zeros of I_h and V_r drift along the file.")
     ] = False,
     weights: Annotated[
-        Weights,
-        typer.Option(help="Divide by each observable's maximum, or by measurement errors."),
-    ] = Weights.maximum,
+        str,
+        typer.Option(help="maximum: of each observable, as in the paper; or errors, as measured."),
+    ] = "maximum",
     medium: MediumOption = None,
     output: Annotated[
         Path | None,
@@ -99,7 +92,7 @@ def fit(
         parse_fixed(fix or []),
         robust,
         drift,
-        weights.value,
+        _weights(weights),
         medium,
     )
     if len(data) > 1:
@@ -123,8 +116,14 @@ class _Request:
     fixed: dict[str, float | None]
     robust: bool
     drift: bool
-    weights: Literal["maximum", "errors"]
+    weights: Weights
     medium: str | None
+
+
+def _weights(name: str) -> Weights:
+    if name not in ("maximum", "errors"):
+        raise unknown_name("weights", name, ("maximum", "errors"))
+    return cast("Weights", name)
 
 
 @dataclass(frozen=True)

@@ -176,7 +176,7 @@ def sample_posterior(
     walkers: int = 24,
     processes: int = 2,
     seed: int = 0,
-    noise: Noise = "common",
+    noise: Noise = "each",
     lever: Lever | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
