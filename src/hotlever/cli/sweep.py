@@ -45,6 +45,7 @@ def sweep(
 ) -> None:
     """Solve a lever over a range of bias."""
     from hotlever.lever import Lever, sweep_csv, write_sweep
+    from hotlever.lever.air_fields import AirFields
     from hotlever.lever.fields import FieldMapper, write_vtu
     from hotlever.report.figures import sweep_overview
     from hotlever.report.style import FIGURE_TYPES, save_figure
@@ -79,5 +80,9 @@ def sweep(
         folder = output_folder(fields)
         for state in ramp.states:
             write_vtu(mapper.map(state.x), folder / f"bias_{state.bias:08.4f}V.vtu")
+        if lever.medium == "air":
+            air = AirFields(lever)
+            for state in ramp.states:
+                air.write_vtu(state.x, folder / f"bias_{state.bias:08.4f}V_air.vtu")
     if failure is not None:
         raise failure
