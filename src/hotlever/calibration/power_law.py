@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+import os
+from dataclasses import asdict, dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import elementwise
+
+from hotlever.errors import InputError, unknown_name
+from hotlever.files import read_text
 
 
 @dataclass(frozen=True)
@@ -25,7 +31,7 @@ class PowerLaw:
 
     Notes
     -----
-    The law is not continuous: see `jump_K`.
+    In general the law is not continuous: see `jump_K`, and `meeting` for a law that is.
     """
 
     linear_K_per_mW: float
@@ -43,15 +49,121 @@ class PowerLaw:
         [917.0, 922.0]
         """
         power = np.asarray(power_mW, dtype=float)
-        cold = self.linear_K_per_mW * power + self.nonlinear_K * power**self.exponent
-        rise = np.where(power <= self.threshold_mW, cold, self.hot_K_per_mW * power)
+        rise = np.where(
+            power <= self.threshold_mW, self._cold_rise(power), self.hot_K_per_mW * power
+        )
         return base_temperature_K + rise
+
+    def _cold_rise(self, power: NDArray) -> NDArray:
+        return self.linear_K_per_mW * power + self.nonlinear_K * power**self.exponent
+
+    def power(self, tip_K: ArrayLike, base_temperature_K: float = 293.0) -> NDArray:
+        """Return the lowest power (mW) that gives a tip temperature (K).
+
+        Temperatures inside the jump belong to the threshold. Where the branches overlap (a
+        jump downwards) the power on the cold branch is given.
+
+        Raises
+        ------
+        InputError
+            If a temperature is below the base temperature.
+
+        Examples
+        --------
+        >>> EQ12.power([293.0, 600.0, 919.0, 1100.0]).round(3).tolist()
+        [0.0, 2.02, 2.95, 3.789]
+        """
+        rise = np.asarray(tip_K, dtype=float) - base_temperature_K
+        if np.any(rise < 0):
+            raise InputError(
+                f"a tip temperature of {np.min(tip_K):g} K, expected "
+                f"{base_temperature_K:g} K (no power) or more"
+            )
+        top = float(self._cold_rise(np.asarray(self.threshold_mW)))
+        wanted = np.minimum(rise, top)
+        cold = elementwise.find_root(
+            lambda power, wanted: self._cold_rise(power) - wanted,
+            (np.zeros_like(rise), np.full_like(rise, self.threshold_mW)),
+            args=(wanted,),
+        ).x
+        cold = np.where(wanted == top, self.threshold_mW, cold)
+        hot = np.maximum(rise / self.hot_K_per_mW, self.threshold_mW)
+        return np.where(rise <= top, cold, hot)
 
     @property
     def jump_K(self) -> float:
         """Step of the law at the threshold (K)."""
         below = self.tip_temperature(self.threshold_mW, 0.0)
         return float(self.hot_K_per_mW * self.threshold_mW - below)
+
+    def scaled(self, k: float) -> PowerLaw:
+        """Return the law of a lever that needs k times the power for the same temperatures.
+
+        The paper's transfer from vacuum to air: P is replaced by P / k.
+        """
+        return PowerLaw(
+            self.linear_K_per_mW / k,
+            self.nonlinear_K / k**self.exponent,
+            self.exponent,
+            self.hot_K_per_mW / k,
+            self.threshold_mW * k,
+        )
+
+    def meeting(self) -> PowerLaw:
+        """Return the law with its threshold moved to where the branches meet: continuous.
+
+        The same four coefficients; the temperature changes only between the two thresholds.
+
+        Raises
+        ------
+        InputError
+            If the branches do not meet at a positive power.
+
+        Examples
+        --------
+        >>> round(EQ12.meeting().threshold_mW, 3)
+        2.968
+        """
+        ratio = (self.hot_K_per_mW - self.linear_K_per_mW) / self.nonlinear_K
+        if not ratio > 0 or self.exponent == 1.0:
+            raise InputError("the branches of this power law do not meet at a positive power")
+        return replace(self, threshold_mW=float(ratio ** (1.0 / (self.exponent - 1.0))))
+
+    def values(self, base_temperature_K: float = 293.0) -> dict[str, float]:
+        """Return the coefficients and ``threshold_K``, as calibration files have them."""
+        threshold_K = float(self.tip_temperature(self.threshold_mW, base_temperature_K))
+        return {**asdict(self), "threshold_K": threshold_K}
+
+
+def read_power_law(path: str | os.PathLike[str]) -> PowerLaw:
+    """Read a power law: a JSON file with its coefficients, or a calibration file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or a coefficient is missing, misspelt or not positive.
+    """
+    try:
+        content = json.loads(read_text(path))
+    except json.JSONDecodeError as error:
+        raise InputError(f"{path}: not valid JSON: {error}") from None
+    section = content.get("power_law", content) if isinstance(content, dict) else content
+    if not isinstance(section, dict):
+        raise InputError(f"{path}: found no power law, expected an object with its coefficients")
+    known = [field.name for field in fields(PowerLaw)]
+    allowed = {*known, "threshold_K"}
+    for name in section:
+        if name not in allowed and section is content:
+            raise unknown_name("key", name, known, str(path))
+    values = {}
+    for name in known:
+        value = section.get(name)
+        if value is None:
+            raise InputError(f"{path}: {name} is missing")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
+            raise InputError(f"{path}: {name} = {value!r}, expected a positive number")
+        values[name] = float(value)
+    return PowerLaw(**values)
 
 
 #: As published, doi:10.1063/1.4981883.

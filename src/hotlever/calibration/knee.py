@@ -1,0 +1,376 @@
+"""The knee of a measured I-V curve: where dV_l/dI_h = 0, with its uncertainty.
+
+The lever voltage V_l = V_b - R_s I_h has its highest value at the knee. V_l(I_h) turns back
+there, but the curve is a single-valued function of the power P_l = V_l I_h, so the resistance is
+smoothed against the power, and the knee is where the smooth V_l(P_l) is highest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hotlever.calibration.characteristic import Characteristic, OperatingPoint
+from hotlever.calibration.smoothing import SmoothCurve
+from hotlever.errors import InputError
+
+Array = NDArray[np.float64]
+
+#: Points whose power is within this factor of the knee's are used.
+_NEARBY = 2.0
+#: Fewest points near the knee, and fewest on either side of it.
+_FEWEST, _FEWEST_BESIDE = 6, 2
+#: The knee has been passed once V_l has fallen by this share.
+_FALLEN = 0.05
+#: The knee is sought within this factor of the highest measured lever voltage's power.
+_SEARCH = 1.35
+
+
+@dataclass(frozen=True)
+class IVCurve:
+    """Measured points of a lever, rising in power.
+
+    Attributes
+    ----------
+    bias_V, current_mA : ndarray, shape (n,)
+    series_resistance_ohm : float
+    """
+
+    bias_V: Array
+    current_mA: Array
+    series_resistance_ohm: float
+
+    @classmethod
+    def of(cls, bias_V: ArrayLike, current_mA: ArrayLike, series_resistance_ohm: float) -> IVCurve:
+        """Sort the points by power, and leave out those without bias or current.
+
+        Raises
+        ------
+        InputError
+            If a lever voltage is not positive, or fewer than six points are left.
+        """
+        bias, current = np.asarray(bias_V, dtype=float), np.asarray(current_mA, dtype=float)
+        present = np.isfinite(bias) & np.isfinite(current) & (bias > 0)
+        bias, current = bias[present], current[present]
+        lever = bias - series_resistance_ohm / 1000.0 * current
+        wrong = (current <= 0) | (lever <= 0)
+        if wrong.any():
+            place = int(np.argmax(wrong))
+            raise InputError(
+                f"at a bias of {bias[place]:g} V the current is {current[place]:g} mA and the "
+                f"lever voltage {lever[place]:.4g} V with a series resistance of "
+                f"{series_resistance_ohm:g} ohm, expected positive ones"
+            )
+        if bias.size < _FEWEST:
+            raise InputError(
+                f"{bias.size} points with bias and current, expected at least {_FEWEST}"
+            )
+        order = np.argsort(lever * current, kind="stable")
+        return cls(bias[order], current[order], float(series_resistance_ohm))
+
+    @property
+    def lever_V(self) -> Array:
+        """V_l = V_b - R_s I_h."""
+        return self.bias_V - self.series_resistance_ohm / 1000.0 * self.current_mA
+
+    @property
+    def power_mW(self) -> Array:
+        """P_l = V_l I_h."""
+        return self.lever_V * self.current_mA
+
+    def only(self, here: NDArray[np.bool_]) -> IVCurve:
+        """Return some of the points."""
+        return IVCurve(self.bias_V[here], self.current_mA[here], self.series_resistance_ohm)
+
+
+@dataclass(frozen=True)
+class Knee:
+    """The knee of a measured I-V curve.
+
+    Attributes
+    ----------
+    lever_V, current_mA, power_mW, bias_V : float
+    lever_V_stderr, current_mA_stderr, power_mW_stderr, bias_V_stderr : float
+        From the scatter of the points.
+    current_noise : float
+        Standard deviation of the current over the current, as the points scatter.
+    points : int
+        How many were used.
+    """
+
+    lever_V: float
+    current_mA: float
+    power_mW: float
+    bias_V: float
+    lever_V_stderr: float
+    current_mA_stderr: float
+    power_mW_stderr: float
+    bias_V_stderr: float
+    current_noise: float
+    points: int
+
+
+class KneeOutsideError(InputError):
+    """The measured range does not include the knee; the text says which way to go."""
+
+
+def find_knee(curve: IVCurve, like: Characteristic | None = None) -> Knee:
+    """Find the knee in a measured I-V curve.
+
+    Parameters
+    ----------
+    curve : IVCurve
+        Noisy, unevenly spaced.
+    like : Characteristic, optional
+        Of a lever that resembles the measured one. Only its relation of temperature to power,
+        scaled to the measured knee, is used: the resistance is a smoother function of the
+        temperature than of the power. Halves the bias; also says where the knee is to be
+        expected when it is outside the range.
+
+    Raises
+    ------
+    KneeOutsideError
+        If the points end before the knee, or begin after it.
+    InputError
+        If there are too few points near it.
+    """
+    if curve.series_resistance_ohm == 0.0:
+        raise InputError(
+            "without a series resistance the lever jumps at its knee, so a measured curve ends "
+            "there and does not show it; measure with one of some kΩ"
+        )
+    peak = _highest(curve.lever_V)
+    centre = float(curve.power_mW[peak])
+    _check_sides(curve, peak, like)
+    for _ in range(4):
+        before, (knee, centre) = centre, _around(curve, centre, like)
+        if abs(centre - before) < 1e-4 * centre:
+            break
+    return knee
+
+
+def _highest(lever_V: Array) -> int:
+    """Place of the first maximum of V_l: hot legs can make it rise again."""
+    highest = np.maximum.accumulate(lever_V)
+    fallen = np.flatnonzero(lever_V < (1.0 - _FALLEN) * highest)
+    return int(np.argmax(lever_V[: fallen[0]] if fallen.size else lever_V))
+
+
+def _check_sides(curve: IVCurve, peak: int, like: Characteristic | None) -> None:
+    """Refuse a curve whose highest lever voltage is at one of its ends."""
+    if peak < _FEWEST_BESIDE:
+        raise KneeOutsideError(
+            f"the lever voltage falls from the first points on ({curve.lever_V[0]:.3f} V at a "
+            f"bias of {curve.bias_V[0]:.3f} V): the knee is below the measured range; measure "
+            "from a lower bias"
+        )
+    if peak >= curve.bias_V.size - _FEWEST_BESIDE:
+        raise KneeOutsideError(
+            f"the lever voltage still rises at the end of the measured range "
+            f"({curve.lever_V[-1]:.3f} V at a bias of {curve.bias_V[-1]:.3f} V): the knee is "
+            f"beyond it{_advice(curve, like)}"
+        )
+
+
+def _advice(curve: IVCurve, like: Characteristic | None) -> str:
+    """Say what bias to go to, by a lever that resembles the measured one."""
+    if like is None or like.knee is None:
+        return "; measure to a higher bias"
+    scale = scale_to(curve, like)
+    knee = scale.applied(like.knee)
+    bias = knee.lever_V + curve.series_resistance_ohm / 1000.0 * knee.current_mA
+    beyond = max(bias, float(curve.bias_V[-1])) * 1.1
+    return (
+        f", at about {bias:.1f} V by comparison with the model; measure to {beyond:.1f} V or more"
+    )
+
+
+def _around(curve: IVCurve, centre: float, like: Characteristic | None) -> tuple[Knee, float]:
+    """Smooth the points whose power is near `centre`, and find the knee."""
+    warp = _Warp(centre, like)
+    power = curve.power_mW
+    near = (np.abs(np.log(power / centre)) < np.log(_NEARBY)) & np.isfinite(warp(power))
+    used = curve.only(near)
+    power = used.power_mW
+    if power.size < _FEWEST or min((power < centre).sum(), (power > centre).sum()) < _FEWEST_BESIDE:
+        raise InputError(
+            f"{power.size} points with {centre / _NEARBY:.2f} to {centre * _NEARBY:.2f} mW, near "
+            f"the knee, expected at least {_FEWEST} with {_FEWEST_BESIDE} on either side; measure "
+            "more finely there"
+        )
+    smooth = _smoothed(used, warp)
+    low, high = max(centre / _SEARCH, power[0]), min(centre * _SEARCH, power[-1])
+    grid = np.linspace(low, high, 3001)
+    ln_V = 0.5 * np.log(grid) + smooth.value(warp(grid))
+    place = int(np.argmax(ln_V))
+    margin = 30
+    if not margin <= place < grid.size - margin:
+        raise KneeOutsideError(
+            f"the lever voltage is highest at the end of the points near the knee "
+            f"({grid[place]:.3f} mW): measure beyond it, and more finely"
+        )
+    around = slice(place - margin, place + margin + 1)
+    curvature, tilt, _ = np.polyfit(grid[around] - grid[place], ln_V[around], 2)
+    knee_power = float(grid[place] - tilt / (2.0 * curvature))
+    at = np.array(knee_power)
+    error_P = float(smooth.slope_stderr(float(warp(at))) * warp.slope(at) / (-2.0 * curvature))
+    lever_V = float(np.exp(0.5 * np.log(knee_power) + smooth.value(warp(at))))
+    error_V = lever_V * smooth.value_stderr(float(warp(at)))
+    current = knee_power / lever_V
+    error_I = current * np.hypot(error_P / knee_power, error_V / lever_V)
+    series = used.series_resistance_ohm / 1000.0
+    # V_b = V + R_s P / V
+    error_b = np.hypot(series * error_P / lever_V, error_V * (1.0 - series * current / lever_V))
+    knee = Knee(
+        lever_V,
+        current,
+        knee_power,
+        lever_V + series * current,
+        error_V,
+        float(error_I),
+        error_P,
+        float(error_b),
+        smooth.noise_factor,
+        power.size,
+    )
+    return knee, knee_power
+
+
+def _smoothed(curve: IVCurve, warp: _Warp) -> SmoothCurve:
+    """Smooth the logarithm of the root of the resistance, V_l = sqrt(P_l R_l), along `warp`."""
+    power, lever = curve.power_mW, curve.lever_V
+    along, ln_root_R = warp(power), np.log(lever) - 0.5 * np.log(power)
+    # an error in the current moves a point along power and voltage; what counts is how far it
+    # leaves the curve, whose slope is known better after each turn
+    by_current_V = -curve.series_resistance_ohm / 1000.0
+    by_current_P = lever + by_current_V * curve.current_mA
+    smooth = SmoothCurve(along, ln_root_R, curve.current_mA / lever)
+    for _ in range(2):
+        slope = 0.5 / power + smooth.slope(along) * warp.slope(power)
+        leaving = np.abs(by_current_V / lever - slope * by_current_P) * curve.current_mA
+        smooth = SmoothCurve(along, ln_root_R, leaving, smooth)
+    return smooth
+
+
+def smooth_rows(
+    curve: IVCurve, knee_mW: float, like: Characteristic | None = None, count: int = 101
+) -> tuple[Array, Array]:
+    """Return current (mA) at evenly spaced biases (V) over the measured range, smoothed.
+
+    Parameters
+    ----------
+    curve : IVCurve
+    knee_mW : float
+        Power of the knee, measured or estimated.
+    like : Characteristic, optional
+        See `find_knee`.
+    count : int
+
+    Returns
+    -------
+    bias, current : ndarray, shape (count,)
+    """
+    warp = _Warp(knee_mW, like)
+    used = curve.only(np.isfinite(warp(curve.power_mW)))
+    smooth = _smoothed(used, warp)
+    power = np.linspace(used.power_mW[0], used.power_mW[-1], 4000)
+    lever = np.sqrt(power) * np.exp(smooth.value(warp(power)))
+    current = power / lever
+    bias = np.maximum.accumulate(lever + used.series_resistance_ohm / 1000.0 * current)
+    asked = np.linspace(max(used.bias_V[0], bias[0]), min(used.bias_V.max(), bias[-1]), count)
+    return asked, np.interp(asked, bias, current)
+
+
+class _Warp:
+    """The coordinate in which the resistance is smooth: zero without power, one at the knee.
+
+    The temperature rise of a lever that resembles the measured one; without it, the power.
+    """
+
+    def __init__(self, centre: float, like: Characteristic | None) -> None:
+        self._centre, self._like = centre, like if like is not None and like.knee else None
+
+    def __call__(self, power: Array) -> Array:
+        if self._like is None or self._like.knee is None:
+            return power / self._centre
+        knee, base = self._like.knee, self._like.base_temperature_K
+        tip = self._like.tip_temperature(power / self._centre * knee.power_mW)
+        return (tip - base) / (knee.tip_K - base)
+
+    def slope(self, power: Array) -> Array:
+        """Return the derivative by the power."""
+        if self._like is None or self._like.knee is None:
+            return np.full_like(power, 1.0 / self._centre)
+        knee, base = self._like.knee, self._like.base_temperature_K
+        scale = knee.power_mW / self._centre
+        return self._like.tip_slope(power * scale) * scale / (knee.tip_K - base)
+
+
+# --- the scale between a measured curve and a lever that resembles it -----------------------------
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How a measured I-V curve is stretched against that of another lever.
+
+    The measured lever needs `power` times the power for the same temperature, and then has
+    `resistance` times the resistance.
+
+    Attributes
+    ----------
+    power, resistance : float
+    power_stderr : float
+        From the scatter of the points about the stretched curve.
+    """
+
+    power: float
+    resistance: float
+    power_stderr: float
+
+    def applied(self, point: OperatingPoint) -> OperatingPoint:
+        """Return a point of the other lever, stretched."""
+        power = self.power * point.power_mW
+        resistance = self.resistance * point.lever_V / point.current_mA
+        return OperatingPoint.of(float(np.sqrt(power * resistance)), power, point.tip_K)
+
+
+def scale_to(curve: IVCurve, like: Characteristic) -> Scale:
+    """Stretch the resistance against power of one lever to the points of another.
+
+    Uses every point up to the knee, and needs no knee: the resistance rises with the temperature,
+    so the power at which it has risen by as much tells the scale.
+
+    Raises
+    ------
+    InputError
+        If the points are so cold that the resistance does not tell.
+    """
+    power, resistance = curve.power_mW, curve.lever_V / curve.current_mA
+    below = np.arange(power.size) <= _highest(curve.lever_V)
+    power, resistance = power[below], resistance[below]
+    top = like.knee.power_mW if like.knee is not None else like.highest_power_mW
+
+    def misfit(ln_k: float) -> tuple[Array, float]:
+        tip = like.tip_temperature(np.minimum(power * np.exp(-ln_k), top))
+        expected = np.log(like.lever_voltage(tip) ** 2 / (power * np.exp(-ln_k)))
+        difference = np.log(resistance) - expected
+        return difference - difference.mean(), float(np.exp(difference.mean()))
+
+    lowest = np.log(power[-1] / top)
+    grid = np.linspace(lowest, lowest + np.log(20.0), 400)
+    squares = [float(np.sum(misfit(value)[0] ** 2)) for value in grid]
+    place = int(np.argmin(squares))
+    if place == grid.size - 1:
+        raise InputError(
+            "the resistance hardly changes over the measured points: they are too cold to tell "
+            "how much power the lever needs"
+        )
+    fine = np.linspace(grid[max(place - 1, 0)], grid[place + 1], 201)
+    ln_k = float(fine[np.argmin([np.sum(misfit(value)[0] ** 2) for value in fine])])
+    left, factor = misfit(ln_k)
+    slope = (misfit(ln_k + 1e-4)[0] - left) / 1e-4
+    variance = np.sum(left**2) / max(power.size - 2, 1)
+    stderr = np.sqrt(variance / np.sum(slope**2))
+    return Scale(float(np.exp(ln_k)), factor, float(np.exp(ln_k) * stderr))

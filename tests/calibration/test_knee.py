@@ -1,0 +1,148 @@
+"""The knee of measured I-V curves: no bias, honest errors, a clear word when it is not there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever.calibration.knee import IVCurve, KneeOutsideError, find_knee, scale_to
+from hotlever.calibration.knee_reasons import knee_reasons
+from hotlever.calibration.smoothing import SmoothCurve
+from hotlever.calibration.synthetic import current_at, measured_curve
+from hotlever.errors import ComputationError, InputError
+
+SERIES_OHM = 5600.0
+
+
+def test_without_noise_the_knee_is_found(reference, lever_3):
+    bias = np.linspace(1, 11, 400)
+    curve = IVCurve.of(bias, current_at(reference, bias, SERIES_OHM), SERIES_OHM)
+    for like in (None, reference, lever_3):
+        knee = find_knee(curve, like)
+        assert knee.power_mW == pytest.approx(reference.knee.power_mW, rel=1e-3)
+        assert knee.lever_V == pytest.approx(reference.knee.lever_V, rel=1e-4)
+        assert knee.current_mA == pytest.approx(reference.knee.current_mA, rel=1e-3)
+        assert knee.bias_V == pytest.approx(knee.lever_V + 5.6 * knee.current_mA)
+
+
+def test_noisy_knees_scatter_as_stated(reference, lever_3):
+    """40 points with 0.2 % noise; the curve is smoothed with the help of another lever."""
+    rng = np.random.default_rng(1)
+    true = reference.knee
+    knees = [find_knee(measured_curve(reference, rng), lever_3) for _ in range(50)]
+    error = np.array([knee.power_mW / true.power_mW - 1 for knee in knees])
+    assert np.sqrt(np.mean(error**2)) < 0.008
+    assert np.quantile(np.abs(error), 0.95) < 0.015
+    assert abs(error.mean()) < 0.004
+    for name in ("power_mW", "lever_V", "current_mA"):
+        pull = np.array(
+            [
+                (getattr(knee, name) - getattr(true, name)) / getattr(knee, f"{name}_stderr")
+                for knee in knees
+            ]
+        )
+        # 50 trials: two standard deviations of the counts are 13 and 6 %
+        assert 0.54 < np.mean(np.abs(pull) < 1.0) < 0.84, name
+        assert np.mean(np.abs(pull) < 1.96) > 0.87, name
+    assert np.median([knee.current_noise for knee in knees]) == pytest.approx(0.002, rel=0.2)
+
+
+def test_the_stated_error_follows_the_noise(reference, lever_3):
+    def typical(noise: float) -> float:
+        rng = np.random.default_rng(2)
+        curves = [measured_curve(reference, rng, noise=noise) for _ in range(6)]
+        return float(np.median([find_knee(curve, lever_3).power_mW_stderr for curve in curves]))
+
+    assert typical(0.004) > 1.5 * typical(0.001)
+
+
+@pytest.mark.parametrize(("to_V", "like"), [(7.5, True), (8.0, True), (7.5, False)])
+def test_a_knee_above_the_range_is_said_to_be_there(reference, lever_3, to_V, like):
+    curve = measured_curve(lever_3, np.random.default_rng(3), to_V=to_V - 0.5)
+    with pytest.raises(KneeOutsideError, match="still rises at the end") as no:
+        find_knee(curve, reference if like else None)
+    assert ("by comparison with the model; measure to" in str(no.value)) == like
+
+
+def test_a_knee_below_the_range_is_said_to_be_there(reference):
+    curve = measured_curve(reference, np.random.default_rng(4), from_V=8.6, points=12)
+    with pytest.raises(KneeOutsideError, match="below the measured range"):
+        find_knee(curve)
+
+
+def test_the_advised_bias_reaches_the_knee(reference, lever_3):
+    curve = measured_curve(lever_3, np.random.default_rng(5), to_V=7.0)
+    with pytest.raises(KneeOutsideError) as no:
+        find_knee(curve, reference)
+    advised = float(str(no.value).split("measure to ")[1].split(" V")[0])
+    knee = lever_3.knee
+    assert advised > knee.lever_V + 5.6 * knee.current_mA
+    further = measured_curve(lever_3, np.random.default_rng(5), to_V=min(advised, 11.0))
+    assert find_knee(further, reference).power_mW == pytest.approx(knee.power_mW, rel=0.015)
+
+
+def test_the_scale_of_a_cold_curve_of_the_same_lever_is_one(reference):
+    curve = measured_curve(reference, np.random.default_rng(6), to_V=7.0, noise=2e-4)
+    scale = scale_to(curve, reference)
+    assert scale.power == pytest.approx(1.0, abs=4 * scale.power_stderr)
+    assert scale.power_stderr < 0.02
+    assert scale.resistance == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_scaled_lever_gives_its_scale(reference):
+    """A lever of 1.3 times the heat conductance and 0.9 times the resistance."""
+    bias = np.linspace(1, 10, 60)
+    current = current_at(reference, bias, SERIES_OHM)
+    lever = bias - SERIES_OHM / 1000 * current
+    power, resistance = 1.3 * lever * current, 0.9 * lever / current
+    lever, current = np.sqrt(power * resistance), np.sqrt(power / resistance)
+    scaled = IVCurve.of(lever + SERIES_OHM / 1000 * current, current, SERIES_OHM)
+    scale = scale_to(scaled, reference)
+    assert (scale.power, scale.resistance) == pytest.approx((1.3, 0.9), rel=6e-3)
+    knee = scale.applied(reference.knee)
+    assert find_knee(scaled, reference).power_mW == pytest.approx(knee.power_mW, rel=5e-3)
+
+
+def test_curves_that_cannot_tell_are_refused(reference):
+    bias = np.linspace(1, 11, 40)
+    current = current_at(reference, bias, SERIES_OHM)
+    with pytest.raises(InputError, match="without a series resistance"):
+        find_knee(IVCurve.of(bias - 5.6 * current, current, 0.0))
+    with pytest.raises(InputError, match="expected at least 6"):
+        IVCurve.of(bias[:5], current[:5], SERIES_OHM)
+    with pytest.raises(InputError, match="series resistance of 56000 ohm, expected positive"):
+        IVCurve.of(bias, current, 56000.0)
+    sparse = np.array([1.0, 3.0, 5.0, 7.0, 8.0, 8.5, 9.5, 11.0])
+    few = IVCurve.of(sparse, current_at(reference, sparse, SERIES_OHM), SERIES_OHM)
+    with pytest.raises(InputError, match="on either side"):
+        find_knee(few)
+    cold = np.linspace(0.5, 1.0, 10)
+    with pytest.raises(InputError, match="too cold to tell"):
+        scale_to(IVCurve.of(cold, current_at(reference, cold, SERIES_OHM), SERIES_OHM), reference)
+
+
+def test_reasons_for_the_knee_add_up(coarse):
+    reasons = knee_reasons(coarse)
+    steps = dict(reasons.steps())
+    assert reasons.inversion_K + sum(steps.values()) == pytest.approx(reasons.knee_K["as it is"])
+    assert all(kelvins > 0 for kelvins in steps.values())
+    # the paper: approximately 15 K
+    assert steps["the legs have a resistance"] == pytest.approx(15, abs=3)
+    cold = coarse.with_material(coarse.probe.material.with_(n_d=5e18))
+    with pytest.raises(ComputationError, match=r"as it is.*no knee"):
+        knee_reasons(cold)
+
+
+def test_a_smooth_curve_covers_the_truth():
+    rng = np.random.default_rng(7)
+    x = np.linspace(0, 2, 50)
+    pulls = []
+    for _ in range(25):
+        noisy = np.sin(4 * x) + 0.02 * rng.standard_normal(x.size)
+        curve = SmoothCurve(x, noisy, np.ones_like(x))
+        pulls += [
+            (float(curve.value(np.array(1.1))) - np.sin(4.4)) / curve.value_stderr(1.1),
+            (float(curve.slope(np.array(1.1))) - 4 * np.cos(4.4)) / curve.slope_stderr(1.1),
+        ]
+        assert curve.noise_factor == pytest.approx(0.02, rel=0.4)
+    assert 0.5 < np.sqrt(np.mean(np.square(pulls))) < 1.4
