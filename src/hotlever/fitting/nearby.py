@@ -171,7 +171,11 @@ class _StackedSpace:
     """
 
     def __init__(self, space: ReducedSpace, count: int) -> None:
-        self.size, self.thickness_um = space.size, space.thickness_um
+        self.size = space.size
+        thickness = space.thickness_um
+        self.thickness_um = (
+            thickness if isinstance(thickness, float) else np.tile(thickness, (count, 1))
+        )
         self.is_temperature = space.is_temperature
         points = space.points.size
         starts = points * np.arange(count)[:, None]

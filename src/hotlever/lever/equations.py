@@ -87,8 +87,8 @@ class Space(Protocol):
     tapered: list[Tapered]
 
     @property
-    def thickness_um(self) -> float:
-        """Thickness of the silicon (µm)."""
+    def thickness_um(self) -> float | Array:
+        """Thickness of the silicon (µm), where it varies at the quadrature points."""
         ...
 
     def fields(self, x: Array, base_temperature_K: float) -> Fields:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterable
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import xarray as xr
@@ -108,12 +110,31 @@ class Lever:
     ) -> None:
         self.probe = probe
         self.space: LeverSpace = space or LeverSpace(mesh_layout(probe.layout(), mesh))
-        self.equations = LeverEquations(self.space, probe.circuit, probe.material)
+        self.equations = self._equations()
 
-    def with_material(self, material: Material) -> Lever:
+    def _equations(self) -> LeverEquations:
+        return LeverEquations(self.space, self.probe.circuit, self.probe.material)
+
+    @property
+    def medium(self) -> str:
+        """What surrounds the lever."""
+        return "vacuum"
+
+    @property
+    def more_columns(self) -> dict[str, tuple[str, str]]:
+        """Variables of a sweep beyond `SWEEP_COLUMNS`: name, unit, what it is."""
+        return _MORE
+
+    def with_probe(self, probe: Probe) -> Self:
+        """Return the same lever with another material or circuit; the mesh is shared."""
+        changed = copy(self)
+        changed.probe = probe
+        changed.equations = changed._equations()
+        return changed
+
+    def with_material(self, material: Material) -> Self:
         """Return the same lever of another material; the mesh is shared."""
-        changed = self.probe.model_copy(update={"material": material})
-        return Lever(changed, space=self.space)
+        return self.with_probe(self.probe.model_copy(update={"material": material}))
 
     def follower(self, options: ContinuationOptions | None = None) -> BranchFollower:
         """Return a follower of the lever's solutions, at zero bias."""
@@ -196,7 +217,7 @@ class Lever:
             If V_l keeps rising until the silicon melts.
         """
         bare = self.probe.with_values({"series_resistance_ohm": 0.0})
-        follower = Lever(bare, space=self.space).follower()
+        follower = self.with_probe(bare).follower()
         for _ in follower.follow_arc(lambda _: not follower.folds):
             pass
         fold = follower.folds[0]
@@ -271,7 +292,7 @@ class Lever:
         if rows:
             columns["legs_ohm"] = columns["leg1_ohm"] + columns["leg2_ohm"]
             columns["lever_ohm"] = columns["legs_ohm"] + columns["heater_ohm"]
-        described = {**SWEEP_COLUMNS, **_MORE}
+        described = {**SWEEP_COLUMNS, **self.more_columns}
         data = xr.Dataset(
             {
                 name: ("bias", columns.get(name, np.empty(0)), {"units": unit, "long_name": text})
@@ -288,7 +309,7 @@ class Lever:
         values = self.probe.values()
         data.attrs = {
             **{name: json.dumps(section) for name, section in values.items()},
-            "medium": "vacuum",
+            "medium": self.medium,
             "notes": "\n".join([*ramp.notes, *self._range_notes(data)]),
             "software": f"hotlever {__version__}",
         }

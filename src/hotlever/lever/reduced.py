@@ -162,9 +162,12 @@ class ReducedSpace:
         return space
 
     @property
-    def thickness_um(self) -> float:
-        """Thickness of the silicon (µm)."""
-        return self.full.thickness_um
+    def thickness_um(self) -> float | Array:
+        """Thickness of the silicon (µm), see `LeverSpace.thickness_um`."""
+        thickness = self.full.thickness_um
+        if isinstance(thickness, float):
+            return thickness
+        return thickness.ravel()[self.points][:, None]
 
     def use_points(self, points: Index, weights: Array) -> None:
         """Integrate with these of the full space's quadrature points from now on."""

@@ -65,11 +65,12 @@ def cache_folder() -> Path | None:
 
 
 def _key(lever: Lever, options: ReductionOptions) -> str:
-    mesh = lever.space.mesh.triangles
+    mesh = lever.space.mesh.elements
     content = hashlib.sha256()
     facts = {
         "version": __version__,
         "shape": lever.probe.shape.model_dump(),
+        "tip": lever.probe.tip and lever.probe.tip.model_dump(),
         "base_temperature_K": lever.probe.circuit.base_temperature_K,
         "n_hd": lever.probe.material.n_hd,
         "options": asdict(options),
