@@ -9,7 +9,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from hotlever.errors import InputError
+from hotlever.errors import InputError, unknown_name
 from hotlever.probe import Probe
 
 ProbeFile = Annotated[
@@ -93,6 +93,12 @@ def check_medium(medium: str) -> None:
     """Refuse a medium that this version cannot solve."""
     if medium != "vacuum":
         raise InputError(f"--medium {medium}: expected vacuum, the only medium of this version")
+
+
+def check_choice(option: str, value: str, choices: tuple[str, ...]) -> None:
+    """Refuse a value that is none of the choices, with the nearest one."""
+    if value not in choices:
+        raise unknown_name("value", value, choices, option)
 
 
 def check_output(path: Path | None, *suffixes: str) -> None:

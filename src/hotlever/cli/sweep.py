@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import typer
+from numpy.typing import NDArray
 
 from hotlever.cli.app import app, note, progress, stdout
 from hotlever.cli.options import (
     ProbeFile,
+    check_choice,
     check_medium,
     check_output,
     load_probe,
@@ -18,6 +22,15 @@ from hotlever.cli.options import (
 )
 from hotlever.errors import ComputationError
 from hotlever.files import output_folder
+from hotlever.probe import Probe
+
+if TYPE_CHECKING:
+    from hotlever.lever import Lever
+    from hotlever.lever.state_store import StateStore
+
+Array = NDArray[np.float64]
+
+MODELS, MEDIA = ("flat", "full-3d"), ("vacuum", "air")
 
 
 @app.command()
@@ -26,7 +39,14 @@ def sweep(
     bias: Annotated[str, typer.Option(help="START:STOP:COUNT in volts, ends included.")] = (
         "1:11:25"
     ),
-    medium: Annotated[str, typer.Option(help="vacuum.")] = "vacuum",
+    medium: Annotated[str, typer.Option(help="vacuum; air with --model full-3d.")] = "vacuum",
+    model: Annotated[
+        str,
+        typer.Option(
+            help="flat: the lever in its plane; full-3d: its true thickness and the air around it "
+            "(minutes; goes on where it was stopped)."
+        ),
+    ] = "flat",
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Change a value of the probe file."),
@@ -43,21 +63,22 @@ def sweep(
     ] = None,
 ) -> None:
     """Solve a lever over a range of bias."""
-    from hotlever.lever import Lever, sweep_csv, write_sweep
-    from hotlever.lever.fields import FieldMapper, write_vtu
+    from hotlever.lever import sweep_csv, write_sweep
     from hotlever.report.figures import sweep_overview
     from hotlever.report.style import FIGURE_TYPES, save_figure
 
     values = parse_bias(bias)
-    check_medium(medium)
+    check_choice("--model", model, MODELS)
+    check_choice("--medium", medium, MEDIA)
     check_output(output, ".csv", ".nc")
     check_output(plot, *FIGURE_TYPES)
-    lever = Lever(load_probe(probe_file).with_values(parse_settings(settings or [])))
+    probe = load_probe(probe_file).with_values(parse_settings(settings or []))
+    lever, store, write_fields = _made(probe, medium, model)
 
     failure: ComputationError | None = None
     with progress("sweep") as update:
         try:
-            ramp = lever.solve(values, update)
+            ramp = lever.solve(values, update, store)
         except ComputationError as error:
             ramp, failure = error.partial, error
     data = lever.dataset(ramp)
@@ -70,9 +91,38 @@ def sweep(
     if plot is not None:
         save_figure(sweep_overview(data), plot)
     if fields is not None:
-        mapper = FieldMapper(lever)
         folder = output_folder(fields)
         for state in ramp.states:
-            write_vtu(mapper.map(state.x), folder / f"bias_{state.bias:08.4f}V.vtu")
+            write_fields(state.x, folder / f"bias_{state.bias:08.4f}V")
     if failure is not None:
         raise failure
+
+
+def _made(
+    probe: Probe, medium: str, model: str
+) -> tuple[Lever, StateStore | None, Callable[[Array, Path], None]]:
+    """Make the lever, the place to keep its states, and what writes a state's fields."""
+    if model == "full-3d":
+        from hotlever.lever3d import SolidLever
+        from hotlever.lever3d.fields import write_solid_vtu
+        from hotlever.lever3d.lever import SPHERE_RADIUS
+        from hotlever.report.air_figures import temperature_slices
+        from hotlever.report.style import save_figure
+
+        with progress("mesh and air"):
+            solid = SolidLever(probe, sphere_radius_um=SPHERE_RADIUS if medium == "air" else None)
+
+        def write_solid(x: Array, name: Path) -> None:
+            write_solid_vtu(solid, x, name.with_name(f"{name.name}.vtu"))
+            if medium == "air":
+                save_figure(temperature_slices(solid, x), name.with_name(f"{name.name}.png"))
+
+        return solid, solid.store(), write_solid
+
+    from hotlever.lever import Lever
+    from hotlever.lever.fields import FieldMapper, write_vtu
+
+    check_medium(medium)
+    flat = Lever(probe)
+    mapper = FieldMapper(flat)
+    return flat, None, lambda x, name: write_vtu(mapper.map(x), name.with_name(f"{name.name}.vtu"))

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
+
 import numpy as np
 from numpy.typing import NDArray
 from skfem.element import ElementTetP2
 
+from hotlever import __version__
 from hotlever.errors import ComputationError
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import Lever
 from hotlever.lever.operators import FiniteElements
+from hotlever.lever.reduced_cache import cache_folder
 from hotlever.lever.space import LeverSpace
+from hotlever.lever.state_store import StateStore
 from hotlever.lever3d.equations import SolidEquations
 from hotlever.lever3d.still_air import OpenAir, ngsolve
 from hotlever.probe import Probe
@@ -58,6 +63,7 @@ class SolidLever(Lever):
         if sphere_radius_um is not None:
             ngsolve()  # says what to install, before the meshing
         solid = mesh_solid(probe.layout(), mesh, sphere_radius_um=sphere_radius_um)
+        self.solid = solid
         self.space = LeverSpace(solid, FiniteElements(solid.elements, ElementTetP2(), 4))
         self.air: OpenAir | None = None
         if sphere_radius_um is not None:
@@ -69,6 +75,22 @@ class SolidLever(Lever):
     def medium(self) -> str:
         """What surrounds the lever."""
         return "vacuum" if self.air is None else "air"
+
+    def store(self) -> StateStore | None:
+        """Return where the states of this very lever are kept; None if the cache is off."""
+        folder = cache_folder()
+        if folder is None:
+            return None
+        points = np.round(self.space.operators.nodes, 9).tobytes()
+        return StateStore(
+            folder,
+            {
+                "version": __version__,
+                "probe": self.probe.values(),
+                "nodes": hashlib.sha256(points).hexdigest(),
+                "air": self.air and (self.air.radius_um, self.air.order, self.air.size),
+            },
+        )
 
     @property
     def more_columns(self) -> dict[str, tuple[str, str]]:

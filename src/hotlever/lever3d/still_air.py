@@ -74,7 +74,7 @@ class OpenAir:
         order: int = 2,
     ) -> None:
         ng = ngsolve()
-        self.centre, self.radius_um = centre, radius_um
+        self.centre, self.radius_um, self.order = centre, radius_um, order
         self.mesh = ng.Mesh(mesh)
         self.mesh.Curve(2)
         self.space = ng.Periodic(ng.H1(self.mesh, order=order, definedon=f"{AIR}|{IMAGE}"))
@@ -172,6 +172,15 @@ class OpenAir:
         x, y, z = self.centre
         w = self.field(coefficients)(self.mesh(x + 3 * self.radius_um, y, z))
         return float(4 * np.pi * self.radius_um * w)
+
+    def at_vertices(self, coefficients: Array) -> Array:
+        """Return a solution at all vertices of the mesh; zero where there is no air."""
+        ng = ngsolve()
+        values = np.zeros(self.mesh.nv)
+        for vertex in range(self.mesh.nv):
+            (dof,) = self.space.GetDofNrs(ng.NodeId(ng.VERTEX, vertex))
+            values[vertex] = coefficients[dof] if dof >= 0 else 0.0
+        return values
 
     def field(self, coefficients: Array) -> Any:
         """Return a solution as a grid function of NGSolve."""
