@@ -13,11 +13,12 @@ from statistics import median
 
 import numpy as np
 
+from hotlever.cache import CACHE_VARIABLE
 from hotlever.fitting import fit, read_measurement
 from hotlever.fitting.models import FastModel, full_model
 from hotlever.lever import Lever
 from hotlever.lever.reduced import BOX, material_in_box
-from hotlever.lever.reduced_cache import CACHE_VARIABLE, cached_reduction
+from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.probe import Probe
 from problems import BIAS, peer_problem, solve_with_peer, table
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from hotlever.cache import CACHE_VARIABLE
 from hotlever.cli import main
 from hotlever.lever import Lever
-from hotlever.lever.reduced_cache import CACHE_VARIABLE
 from hotlever.probe import MeshOptions, Probe
 
 ROOT = Path(__file__).parents[1]

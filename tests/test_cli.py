@@ -119,7 +119,7 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
         (("sweep", "--set", "c_kappa"), "expected NAME=VALUE"),
         (("sweep", "--set", "c_kappa=high"), "--set c_kappa: found 'high', expected a number"),
         (("sweep", "--set", "c_kappa=-1"), "input should be greater than 0"),
-        (("sweep", "--medium", "water"), "--medium water: expected vacuum"),
+        (("sweep", "--medium", "water"), "--medium water: expected vacuum or air"),
         (("sweep", "-o", "a.xls"), "expected .csv or .nc"),
         (("sweep", "-o", "none/a.csv"), "the folder none does not exist"),
         (("sweep", "--plot", "a.bmp"), "unknown file type '.bmp'"),

@@ -115,3 +115,18 @@ def test_any_text_is_read_or_refused_in_one_line(tmp_path_factory, text):
     except InputError as error:
         message = str(error)  # either outcome is fine, a crash is not
         assert path.name in message
+
+
+@pytest.mark.parametrize(
+    ("comment", "medium"),
+    [
+        ("# medium: air, 21 °C", "air"),
+        ("# Medium: Vacuum, 1e-2 mbar", "vacuum"),
+        ("# medium: helium", None),
+        ("# taken in air", None),
+    ],
+)
+def test_a_comment_gives_the_medium(tmp_path, comment, medium):
+    path = tmp_path / "data.csv"
+    path.write_text(f"{comment}\nV_b (V),I_h (mA)\n1,0.1\n", encoding="utf-8")
+    assert read_measurement(path).medium == medium

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from taylor import remainder_orders
 
+from hotlever.cache import CACHE_VARIABLE, store_arrays, stored
 from hotlever.errors import ComputationError
 from hotlever.lever import Lever
 from hotlever.lever.continuation import BranchFollower
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.reduced import BOX, material_in_box
-from hotlever.lever.reduced_cache import CACHE_VARIABLE, cached_reduction
+from hotlever.lever.reduced import BOX, ReducedSpace, material_in_box
+from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.probe import MeshOptions, Probe
 
 BIAS = np.linspace(1.0, 11.0, 13)
@@ -45,9 +46,9 @@ def test_reduced_lever_follows_the_full_one_in_its_box(coarse, space, seed):
 
 def test_few_points_with_positive_weights_integrate_the_area(coarse, space):
     weights = coarse.space.operators.weights
-    assert 100 < space.points.size < weights.size / 3
-    assert (space.weights > 0).all()
-    assert len(set(space.points.tolist())) == space.points.size
+    assert 100 < space.few_points.points.size < weights.size / 3
+    assert (space.few_points.weights > 0).all()
+    assert len(set(space.few_points.points.tolist())) == space.few_points.points.size
 
 
 def test_expanded_states_nearly_solve_the_full_equations(coarse, space):
@@ -112,7 +113,7 @@ def test_a_geometry_is_reduced_once(coarse, space, cache, monkeypatch):
 
     monkeypatch.setattr("hotlever.lever.reduced_cache.reduce", never)
     again = cached_reduction(coarse)
-    np.testing.assert_array_equal(again.points, space.points)
+    np.testing.assert_array_equal(again.few_points.points, space.few_points.points)
     np.testing.assert_array_equal(again.basis, space.basis)
 
 
@@ -121,10 +122,12 @@ def test_a_damaged_file_is_made_anew(coarse, space, tmp_path, monkeypatch, damag
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
     monkeypatch.setattr("hotlever.lever.reduced_cache.reduce", lambda *_: space)
     cached_reduction(coarse)
-    (file,) = tmp_path.iterdir()
+    (file,) = (tmp_path / "reduced").iterdir()
     whole = file.read_bytes()
     file.write_bytes(whole[: len(whole) // 2] if damage is None else damage)
-    np.testing.assert_array_equal(cached_reduction(coarse).points, space.points)
+    np.testing.assert_array_equal(
+        cached_reduction(coarse).few_points.points, space.few_points.points
+    )
     assert file.read_bytes() == whole
 
 
@@ -145,29 +148,25 @@ def test_other_geometries_have_other_files(coarse, space, tmp_path, monkeypatch)
     cached_reduction(wider)
     warmer = Lever(coarse.probe.with_values({"base_temperature_K": 300.0}), space=coarse.space)
     cached_reduction(warmer)
-    assert len(list(tmp_path.iterdir())) == 3
+    assert len(list((tmp_path / "reduced").iterdir())) == 3
 
 
 def write_many_times(arguments):
-    from hotlever.lever.reduced_cache import _load, _save
-
     folder, count = arguments
     lever = Lever(Probe.reference(), MeshOptions(refinement=0.4))
     path = folder / "one.npz"
     space = None
     for _ in range(count):
-        space = _load(lever, path) or space
+        space = stored(path, lambda a: ReducedSpace.from_arrays(lever, a)) or space
         if space is not None:
-            _save(space, path)
+            store_arrays(path, space.arrays())
     return space is not None
 
 
 def test_two_processes_may_write_the_same_file(coarse, space, tmp_path):
-    from hotlever.lever.reduced_cache import _load, _save
-
-    _save(space, tmp_path / "one.npz")
+    store_arrays(tmp_path / "one.npz", space.arrays())
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         assert all(pool.map(write_many_times, [(tmp_path, 20)] * 2))
-    loaded = _load(coarse, tmp_path / "one.npz")
+    loaded = stored(tmp_path / "one.npz", lambda a: ReducedSpace.from_arrays(coarse, a))
     assert loaded is not None
     assert [path.name for path in tmp_path.iterdir()] == ["one.npz"]

@@ -53,7 +53,7 @@ def test_written_file_reads_back_the_same_and_comments_every_key(tmp_path, probe
     assert read(tmp_path, text) == probe
     entries = [line for line in text.splitlines() if "=" in line and not line.startswith("#")]
     assert all("#" in line for line in entries if "shape" not in line)
-    assert set(tomllib.loads(text)) == {"probe", "circuit", "material"}
+    assert set(tomllib.loads(text)) == {"probe", "circuit", "material", "surroundings"}
 
 
 def test_left_out_sections_take_the_reference_values(tmp_path):

@@ -27,7 +27,7 @@ CENTRE, RADIUS = (0.0, 0.0, 0.0), 4.0
 
 def heat(shape, order, largest=1.6):
     """Total heat for θ = 1 on the body: on its surface, and at infinity."""
-    mesh = OCCGeometry(shape).GenerateMesh(maxh=largest, grading=0.4)
+    mesh = OCCGeometry(shape).GenerateMesh(maxh=largest, grading=0.6)
     air = OpenAir(mesh, CENTRE, RADIUS, order=order)
     coefficients, nodal = air.solve(np.ones(air.vertices.size + len(air.edges)))
     return nodal.sum(), air.at_infinity(coefficients)

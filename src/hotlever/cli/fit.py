@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from hotlever.cli.app import app, note, progress, stdout
-from hotlever.cli.options import check_medium, check_output, load_probe, parse_fixed
+from hotlever.cli.options import MediumOption, check_medium, check_output, load_probe, parse_fixed
 
 
 @app.command()
@@ -28,7 +28,7 @@ def fit(
     robust: Annotated[
         bool, typer.Option("--robust", help="Lessen the weight of points far off the others.")
     ] = False,
-    medium: Annotated[str, typer.Option(help="vacuum.")] = "vacuum",
+    medium: MediumOption = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Fit file (JSON).")] = None,
     report: Annotated[
         Path | None, typer.Option(help="Write a page with figures to this folder.")
@@ -53,6 +53,7 @@ def fit(
             observables=None if observables is None else observables.split(","),
             fixed=fixed,
             robust=robust,
+            medium=medium,
             progress=update,
         )
     for text in result.notes:

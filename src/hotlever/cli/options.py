@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from hotlever.air.surroundings import Medium
 from hotlever.errors import InputError, unknown_name
 from hotlever.probe import Probe
 
@@ -18,9 +19,20 @@ ProbeFile = Annotated[
 ]
 
 
+MediumOption = Annotated[
+    str | None, typer.Option(help="vacuum or air; what the files say if left out.")
+]
+
+
 def load_probe(path: Path | None) -> Probe:
     """Read a probe file, or return the reference probe."""
     return Probe.reference() if path is None else Probe.from_file(path)
+
+
+def check_medium(medium: str | None) -> None:
+    """Refuse a medium that does not exist."""
+    if medium is not None and medium not in get_args(Medium):
+        raise InputError(f"--medium {medium}: expected {' or '.join(get_args(Medium))}")
 
 
 def parse_bias(text: str) -> NDArray[np.float64]:
@@ -87,12 +99,6 @@ def parse_fixed(settings: list[str]) -> dict[str, float | None]:
         name, equals, value = setting.partition("=")
         values[name.strip()] = parse_number(value, f"--fix {name}") if equals else None
     return values
-
-
-def check_medium(medium: str) -> None:
-    """Refuse a medium that this version cannot solve."""
-    if medium != "vacuum":
-        raise InputError(f"--medium {medium}: expected vacuum, the only medium of this version")
 
 
 def check_choice(option: str, value: str, choices: tuple[str, ...]) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hotlever.cli.app import app, note, progress, stdout
 from hotlever.cli.options import (
+    MediumOption,
     ProbeFile,
     check_choice,
     check_medium,
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-MODELS, MEDIA = ("flat", "full-3d"), ("vacuum", "air")
+MODELS = ("flat", "full-3d")
 
 
 @app.command()
@@ -39,7 +40,7 @@ def sweep(
     bias: Annotated[str, typer.Option(help="START:STOP:COUNT in volts, ends included.")] = (
         "1:11:25"
     ),
-    medium: Annotated[str, typer.Option(help="vacuum; air with --model full-3d.")] = "vacuum",
+    medium: MediumOption = None,
     model: Annotated[
         str,
         typer.Option(
@@ -69,11 +70,13 @@ def sweep(
 
     values = parse_bias(bias)
     check_choice("--model", model, MODELS)
-    check_choice("--medium", medium, MEDIA)
+    check_medium(medium)
     check_output(output, ".csv", ".nc")
     check_output(plot, *FIGURE_TYPES)
     probe = load_probe(probe_file).with_values(parse_settings(settings or []))
-    lever, store, write_fields = _made(probe, medium, model)
+    if medium is not None:
+        probe = probe.in_medium(medium)
+    lever, store, write_fields = _made(probe, model)
 
     failure: ComputationError | None = None
     with progress("sweep") as update:
@@ -99,22 +102,21 @@ def sweep(
 
 
 def _made(
-    probe: Probe, medium: str, model: str
+    probe: Probe, model: str
 ) -> tuple[Lever, StateStore | None, Callable[[Array, Path], None]]:
     """Make the lever, the place to keep its states, and what writes a state's fields."""
     if model == "full-3d":
         from hotlever.lever3d import SolidLever
         from hotlever.lever3d.fields import write_solid_vtu
-        from hotlever.lever3d.lever import SPHERE_RADIUS
         from hotlever.report.air_figures import temperature_slices
         from hotlever.report.style import save_figure
 
         with progress("mesh and air"):
-            solid = SolidLever(probe, sphere_radius_um=SPHERE_RADIUS if medium == "air" else None)
+            solid = SolidLever(probe)
 
         def write_solid(x: Array, name: Path) -> None:
             write_solid_vtu(solid, x, name.with_name(f"{name.name}.vtu"))
-            if medium == "air":
+            if solid.medium == "air":
                 save_figure(temperature_slices(solid, x), name.with_name(f"{name.name}.png"))
 
         return solid, solid.store(), write_solid
@@ -122,7 +124,7 @@ def _made(
     from hotlever.lever import Lever
     from hotlever.lever.fields import FieldMapper, write_vtu
 
-    check_medium(medium)
-    flat = Lever(probe)
+    with progress("air") as update:
+        flat = Lever(probe, progress=update)
     mapper = FieldMapper(flat)
     return flat, None, lambda x, name: write_vtu(mapper.map(x), name.with_name(f"{name.name}.vtu"))

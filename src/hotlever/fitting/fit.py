@@ -131,6 +131,7 @@ def fit(
     observables: Sequence[str] | None = None,
     fixed: Mapping[str, float | None] | None = None,
     robust: bool = False,
+    medium: str | None = None,
     model: Callable[[Probe], ForwardModel] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Fit:
@@ -143,8 +144,8 @@ def fit(
     ----------
     measurement : Measurement
     probe : Probe, optional
-        The reference probe by default. The measurement's series resistance and base
-        temperature win over the probe's.
+        The reference probe by default. The measurement's series resistance, base temperature
+        and medium win over the probe's.
     observables : sequence of {"current", "reader", "tip"}, optional
         Option I of the paper is ``["current"]``, option II ``["current", "reader"]``, option
         III all three. All that the measurement has, by default.
@@ -153,6 +154,8 @@ def fit(
     robust : bool
         Lessen the weight of points far from the others' fit (Tukey's biweight on the residuals
         in units of their median absolute deviation), down to nothing beyond 4.7 of them.
+    medium : {"vacuum", "air"}, optional
+        What the lever was measured in; wins over measurement and probe.
     model : callable, optional
         Makes the forward model of a probe. By default a reduced lever (made once for each
         geometry, which takes some seconds) whose result is confirmed and corrected by the full
@@ -170,7 +173,7 @@ def fit(
         If the lever cannot be solved at the start, or the fit does not converge.
     """
     began = time.perf_counter()
-    probe, notes = with_measured_circuit(probe or Probe.reference(), measurement)
+    probe, notes = with_measured_circuit(probe or Probe.reference(), measurement, medium)
     fixed = dict(fixed or {})
     chosen = _chosen(observables, measurement)
     start = _held(probe.material, fixed)
@@ -234,9 +237,21 @@ def fit(
     )
 
 
-def with_measured_circuit(probe: Probe, measurement: Measurement) -> tuple[Probe, list[str]]:
-    """Return the probe in the circuit of the measurement, and a note on each difference."""
-    changes, notes = {}, []
+def with_measured_circuit(
+    probe: Probe, measurement: Measurement, medium: str | None = None
+) -> tuple[Probe, list[str]]:
+    """Return the probe in circuit and medium of the measurement, and a note on each difference.
+
+    A `medium` that is asked for wins over both.
+    """
+    changes: dict[str, Any] = {}
+    notes = []
+    measured_in, assumed_in = measurement.medium, probe.surroundings.medium
+    changes["medium"] = medium or measured_in or assumed_in
+    if measured_in is not None and measured_in != changes["medium"]:
+        notes.append(f"medium: {medium}, as asked, although the data file says {measured_in}")
+    elif medium is None and changes["medium"] != assumed_in:
+        notes.append(f"medium: the data file's {measured_in} is used, not the probe's {assumed_in}")
     for name in ("series_resistance_ohm", "base_temperature_K"):
         measured, assumed = getattr(measurement, name), getattr(probe.circuit, name)
         if measured is not None and not np.isclose(measured, assumed, rtol=1e-9):

@@ -9,11 +9,12 @@ import re
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hotlever.air.surroundings import Medium
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import read_text
 
@@ -39,6 +40,7 @@ _NAME_AND_UNIT = re.compile(r"^\s*(?P<name>[^()\[\]]+?)\s*[(\[](?P<unit>[^)\]]*)
 _SETTING = re.compile(
     r"^#\s*(?P<name>[^():\[\]]+?)\s*[(\[](?P<unit>[^)\]]*)[)\]]\s*[:=]\s*(?P<value>\S+)\s*$"
 )
+_MEDIUM = re.compile(r"^#\s*medium\s*[:=]\s*([A-Za-z]+)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,8 @@ class Measurement:
     bias_V, current_mA, reader_V, tip_K, tip_error_K : ndarray, shape (n,)
     series_resistance_ohm, base_temperature_K : float or None
         If the file gives them.
+    medium : {"vacuum", "air"} or None
+        If the file says it.
     path, sha256 : str
         Origin; empty for data made in memory.
     ignored : tuple of str
@@ -63,6 +67,7 @@ class Measurement:
     tip_error_K: Array
     series_resistance_ohm: float | None = None
     base_temperature_K: float | None = None
+    medium: Medium | None = None
     path: str = ""
     sha256: str = ""
     ignored: tuple[str, ...] = field(default=())
@@ -94,8 +99,8 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     A header row names each column with its unit in brackets or parentheses, such as
     ``V_b (V),I_h [mA],V_r (mV),T_tip (K)``; SI prefixes are understood, columns come in any
     order, cells may be empty, lines starting with ``#`` are comments and may give
-    ``R_s (kOhm): 5.6`` and ``base temperature (K): 293``. Cells are separated by commas, tabs,
-    or semicolons; with the latter two a decimal comma is understood.
+    ``R_s (kOhm): 5.6``, ``base temperature (K): 293`` and ``medium: air``. Cells are separated by
+    commas, tabs, or semicolons; with the latter two a decimal comma is understood.
 
     Raises
     ------
@@ -104,6 +109,7 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     """
     text = read_text(path, encoding="utf-8-sig")
     settings: dict[str, float] = {}
+    medium: Medium | None = None
     header: list[str] | None = None
     separator = ","
     columns: dict[str, tuple[int, float, float]] = {}
@@ -113,6 +119,7 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
         where = f"{path}: line {number}"
         if line.startswith("#"):
             settings |= _setting(line, where)
+            medium = _medium(line) or medium
         elif not line.strip(" \t,;"):
             continue
         elif header is None:
@@ -136,6 +143,7 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
         error,
         series_resistance_ohm=settings.get("series_resistance_ohm"),
         base_temperature_K=settings.get("base_temperature_K"),
+        medium=medium,
         path=str(path),
         sha256=hashlib.sha256(Path(path).read_bytes()).hexdigest(),
         ignored=tuple(ignored),
@@ -153,6 +161,13 @@ def _setting(line: str, where: str) -> dict[str, float]:
     attribute, unit = SETTINGS[match["name"].lower()]
     factor, offset = _conversion(match["unit"], unit, f"{where}: {match['name']}")
     return {attribute: factor * _number(match["value"], True, f"{where}: {match['name']}") + offset}
+
+
+def _medium(line: str) -> Medium | None:
+    """Read the medium of a comment line such as ``# medium: air, 20 °C``; None for any other."""
+    match = _MEDIUM.match(line)
+    word = match[1].lower() if match else ""
+    return next((medium for medium in get_args(Medium) if medium == word), None)
 
 
 def _columns(

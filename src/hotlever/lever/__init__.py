@@ -1,4 +1,4 @@
-"""The coupled electro-thermal problem of a lever in vacuum, and sweeps over the bias."""
+"""The coupled electro-thermal problem of a lever in vacuum or air, and sweeps over the bias."""
 
 from hotlever.lever.lever import (
     Lever,

@@ -2,12 +2,15 @@
 
 Heat (paper's first equation, with the sign corrected) and charge:
 
-    −∇·(κ ∇T) = σ |∇V|²,    ∇·(σ ∇V) = 0,
+    −∇·(κ ∇T) = σ |∇V|² − heat lost to air,    ∇·(σ ∇V) = 0,
 
 with T = base temperature at all terminals, V = 0 at ground, V = V_l on the supply contact,
 no current into the reader, and V_l + R_s I_h = V_b. A state is the vector of the free nodal
 values, then V_l, then V_b; one more condition, the *pin*, selects a state on the branch: a
 given bias, or a point along the arc. Units are µm, V, mA, mW and K.
+
+The loss to air is linear in θ = ∫κ_air dT on the surface (`hotlever.air`). The air operator fills
+the plate itself with air too; κ is therefore κ_Si − κ_air where there is air.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from numpy.typing import NDArray
 from hotlever.lever.newton import LinearSolve
 from hotlever.lever.space import Fields, LeverSpace, Tangent, Tapered
 from hotlever.materials import PARAMETERS, Material
+from hotlever.materials.air import kirchhoff_variable, thermal_conductivity_of_air
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.silicon import (
     conductivity_high_doped,
@@ -76,6 +80,34 @@ class Jacobian(Protocol):
         ...
 
 
+class AirTerm(Protocol):
+    """Loss to air between the unknowns of a space: linear in θ at some sites.
+
+    Attributes
+    ----------
+    filling : float
+        See `hotlever.air.operator.AirOperator`.
+    """
+
+    filling: float
+
+    def temperature(self, x: Array, base_temperature_K: float) -> Array:
+        """Return the temperature (K) at the sites."""
+        ...
+
+    def weak_form(self, theta: Array) -> Array:
+        """Return the heat lost for θ (mW/µm) at the sites, as `Space.weak_form` does."""
+        ...
+
+    def heat(self, theta: Array) -> tuple[float, float]:
+        """Return the heat lost (mW), and its part that is tested at the leg ends."""
+        ...
+
+    def added(self, jacobian: Any, kappa: Array) -> Jacobian:
+        """Return the Jacobian with air; κ_air (mW/(K µm)) at the sites."""
+        ...
+
+
 class Space(Protocol):
     """Unknowns and operators of a lever: finite elements, or a reduced basis of them.
 
@@ -85,6 +117,7 @@ class Space(Protocol):
     size: int
     tip: tuple[NDArray[np.intp], Array]
     tapered: list[Tapered]
+    air: Any  # an AirTerm, or None in vacuum
 
     @property
     def thickness_um(self) -> float | Array:
@@ -173,6 +206,11 @@ class LeverEquations:
         """
         material, sheet = self.material, self._sheet
         kappa, kappa_by = thermal_conductivity(T, material.c_kappa)
+        if self.space.air is not None:
+            filling = self.space.air.filling
+            of_air, of_air_by = thermal_conductivity_of_air(T)
+            kappa = kappa - filling * of_air
+            kappa_by = {**kappa_by, "T": kappa_by["T"] - filling * of_air_by["T"]}
         sigma, sigma_by = conductivity_high_doped(T, material.a0, material.a1)
         sigma_by |= {name: np.zeros_like(sigma) for name in ("n_d", "delta", "p")}
         for region, (n, n_by) in zip(self.space.tapered, self._doping, strict=True):
@@ -218,6 +256,8 @@ class LeverEquations:
             laws.kappa * fields.grad_T,
             laws.sigma * fields.grad_V,
         )
+        if self.space.air is not None:
+            weak += self.space.air.weak_form(self._kirchhoff(x)[0])
         weak[-1] = x[-2] + self.series_kohm * weak[-1] - x[-1]
         return weak
 
@@ -234,7 +274,16 @@ class LeverEquations:
 
     def jacobian(self, x: Array) -> Jacobian:
         """Return the Jacobian of the free values and of the current, ready to be completed."""
-        return self.space.jacobian(self.tangent(*self.at(x)))
+        jacobian = self.space.jacobian(self.tangent(*self.at(x)))
+        if self.space.air is None:
+            return jacobian
+        return self.space.air.added(jacobian, self._kirchhoff(x)[1])
+
+    def _kirchhoff(self, x: Array) -> tuple[Array, Array]:
+        """Return θ (mW/µm) and κ_air (mW/(K µm)) at the sites of the air operator."""
+        base = self.circuit.base_temperature_K
+        theta, by = kirchhoff_variable(self.space.air.temperature(x, base), base)
+        return PER_CM_TO_MILLI_PER_UM * theta, PER_CM_TO_MILLI_PER_UM * by["T"]
 
     @property
     def series_kohm(self) -> float:
@@ -266,7 +315,8 @@ class LeverEquations:
             ``current_mA``, ``lever_V``, ``reader_V`` (NaN without a reader), ``tip_K``,
             ``power_mW``, resistances ``heater_ohm``, ``leg1_ohm``, ``leg2_ohm`` (Joule heat of
             the part over I_h²; they add up to V_l / I_h; NaN without current), ``max_K``, and
-            for the balances ``ground_current_mA`` and ``end_heat_mW``.
+            for the balances ``ground_current_mA``, ``end_heat_mW`` and ``air_heat_mW`` (0 in
+            vacuum).
 
         Raises
         ------
@@ -282,6 +332,10 @@ class LeverEquations:
         current = float(space.weak_form(-source, heat, charge)[-1])
         end_heat, ground_current = space.end_fluxes(-source, heat, charge)
         lever = float(x[-2])
+        air_heat = 0.0
+        if space.air is not None:
+            air_heat, at_ends = space.air.heat(self._kirchhoff(x)[0])
+            end_heat -= at_ends
 
         def resistance(part: Part) -> float:
             if current == 0.0:
@@ -300,6 +354,7 @@ class LeverEquations:
             "max_K": space.highest_temperature(x),
             "ground_current_mA": ground_current,
             "end_heat_mW": end_heat,
+            "air_heat_mW": air_heat,
         }
 
     def by_parameter(self, x: Array) -> Array:
@@ -319,7 +374,7 @@ class LeverEquations:
             columns.append(
                 self.space.weak_form(-sigma * square, kappa * fields.grad_T, sigma * fields.grad_V)
             )
-        return np.column_stack(columns)
+        return np.stack(columns, axis=-1)
 
     def sensitivities(self, x: Array) -> Array:
         """Return derivatives of I_h, V_r and T_tip by the six parameters, at a fixed bias.
@@ -341,8 +396,28 @@ class LeverEquations:
         right_hand_side[-2] *= self.series_kohm
         jacobian = self.jacobian(x)
         change = jacobian.factorised(self.series_kohm, 1.0, 0.0).solve(right_hand_side)
+        observed = self._observed_change(jacobian, change)
+        observed[0] += by_parameter[-1]
+        return observed
+
+    def observed_change(self, x: Array, change: Array) -> Array:
+        """Return how I_h, V_r and T_tip change with the unknowns, to first order.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n,)
+        change : ndarray, shape (n,) or (n, k)
+
+        Returns
+        -------
+        ndarray, shape (3,) or (3, k)
+            mA, V (NaN without a reader) and K.
+        """
+        return self._observed_change(self.jacobian(x), change)
+
+    def _observed_change(self, jacobian: Jacobian, change: Array) -> Array:
         unknowns, slopes = jacobian.current_gradient
-        current = by_parameter[-1] + slopes @ change[unknowns]
+        current = slopes @ change[unknowns]
         tip_unknowns, tip_weights = self.space.tip
         tip = tip_weights @ change[tip_unknowns]
         reader = self.space.reader_weights()

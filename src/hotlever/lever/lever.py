@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterable
-from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from hotlever import __version__
+from hotlever.air.operator import AirOperator, air_operator
 from hotlever.errors import ComputationError, InputError
 from hotlever.files import read_text, whole_file, write_text
 from hotlever.lever.continuation import AT_BIAS, BranchFollower, ContinuationOptions
@@ -24,6 +23,7 @@ from hotlever.lever.space import LeverSpace
 from hotlever.lever.state_store import StateStore
 from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import MeshOptions, Probe, mesh_layout
+from hotlever.probe.probe import SECTIONS
 from hotlever.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -48,7 +48,10 @@ _MORE: dict[str, tuple[str, str]] = {
     "max_K": ("K", "highest temperature in the lever"),
     "ground_current_mA": ("mA", "current leaving to ground"),
     "end_heat_mW": ("mW", "heat leaving by the leg ends"),
+    "air_heat_mW": ("mW", "heat leaving into the air"),
 }
+#: Error left after polishing: 10 µK, 0.1 µV.
+_POLISHED = NewtonOptions(tolerance=1e-5, keep_while=0.4)
 #: Unit of each observable in a sweep, by its name.
 OBSERVABLE_COLUMNS = {"current": "current_mA", "reader": "reader_V", "tip": "tip_K"}
 
@@ -93,7 +96,10 @@ class Lever:
     probe : Probe
     mesh : MeshOptions, optional
     space : LeverSpace, optional
-        Share the mesh and operators of another lever of the same shape.
+        Share the mesh and operators of another lever of the same shape, and its air if both are
+        in air: the surroundings must be the same then.
+    progress : callable, optional
+        Called while the air operator of a new geometry is made, with steps done and their number.
 
     Examples
     --------
@@ -108,34 +114,28 @@ class Lever:
         probe: Probe,
         mesh: MeshOptions | None = None,
         space: LeverSpace | None = None,
+        progress: Progress | None = None,
     ) -> None:
         self.probe = probe
-        self.space: LeverSpace = space or LeverSpace(mesh_layout(probe.layout(), mesh))
-        self.equations = self._equations()
-
-    def _equations(self) -> LeverEquations:
-        return LeverEquations(self.space, self.probe.circuit, self.probe.material)
+        space = space or LeverSpace(mesh_layout(probe.layout(), mesh))
+        if (space.air is None) != (self.medium == "vacuum"):
+            space = space.in_air(_air(probe, progress))
+        self.space: LeverSpace = space
+        self.equations = LeverEquations(self.space, probe.circuit, probe.material)
 
     @property
     def medium(self) -> str:
-        """What surrounds the lever."""
-        return "vacuum"
+        """What is around the lever: vacuum or air."""
+        return self.probe.surroundings.medium
 
-    @property
-    def more_columns(self) -> dict[str, tuple[str, str]]:
-        """Variables of a sweep beyond `SWEEP_COLUMNS`: name, unit, what it is."""
-        return _MORE
+    def in_medium(self, medium: str) -> Lever:
+        """Return the same lever in vacuum or in air; mesh and operators are shared."""
+        return Lever(self.probe.in_medium(medium), space=self.space)
 
-    def with_probe(self, probe: Probe) -> Self:
-        """Return the same lever with another material or circuit; the mesh is shared."""
-        changed = copy(self)
-        changed.probe = probe
-        changed.equations = changed._equations()
-        return changed
-
-    def with_material(self, material: Material) -> Self:
+    def with_material(self, material: Material) -> Lever:
         """Return the same lever of another material; the mesh is shared."""
-        return self.with_probe(self.probe.model_copy(update={"material": material}))
+        changed = self.probe.model_copy(update={"material": material})
+        return Lever(changed, space=self.space)
 
     def follower(self, options: ContinuationOptions | None = None) -> BranchFollower:
         """Return a follower of the lever's solutions, at zero bias."""
@@ -207,7 +207,8 @@ class Lever:
         Parameters
         ----------
         guesses : iterable of ndarray
-            Full states, such as a reduced lever's expanded ones.
+            Full states in the order of bias, such as a reduced lever's expanded ones. They are
+            so near that one state's factorised Jacobian often serves the next.
 
         Raises
         ------
@@ -215,10 +216,13 @@ class Lever:
             If one is too far from a solution.
         """
         states = []
+        jacobian = None
         for guess in guesses:
             bias = float(guess[-1])
-            root = newton(self.equations.pinned(AT_BIAS, bias), guess, NewtonOptions()).x
-            states.append(LeverState(bias, root))
+            equations = self.equations.pinned(AT_BIAS, bias)
+            found = newton(equations, guess, _POLISHED, jacobian)
+            jacobian = found.jacobian
+            states.append(LeverState(bias, found.x))
         return Ramp(states, [])
 
     @one_blas_thread
@@ -234,7 +238,7 @@ class Lever:
             If V_l keeps rising until the silicon melts.
         """
         bare = self.probe.with_values({"series_resistance_ohm": 0.0})
-        follower = self.with_probe(bare).follower()
+        follower = Lever(bare, space=self.space).follower()
         for _ in follower.follow_arc(lambda _: not follower.folds):
             pass
         fold = follower.folds[0]
@@ -309,7 +313,7 @@ class Lever:
         if rows:
             columns["legs_ohm"] = columns["leg1_ohm"] + columns["leg2_ohm"]
             columns["lever_ohm"] = columns["legs_ohm"] + columns["heater_ohm"]
-        described = {**SWEEP_COLUMNS, **self.more_columns}
+        described = {**SWEEP_COLUMNS, **_MORE}
         data = xr.Dataset(
             {
                 name: ("bias", columns.get(name, np.empty(0)), {"units": unit, "long_name": text})
@@ -342,6 +346,13 @@ class Lever:
             f"from a bias of {beyond.min():.4g} V part of the lever is above {limit:.0f} K, "
             "where the material laws are extrapolated"
         ]
+
+
+def _air(probe: Probe, progress: Progress | None) -> AirOperator | None:
+    if probe.surroundings.medium == "vacuum":
+        return None
+    base = probe.circuit.base_temperature_K
+    return air_operator(probe.layout(), probe.surroundings, base, progress=progress)
 
 
 def checked_bias(bias: ArrayLike) -> Array:
@@ -428,5 +439,5 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
 
 def probe_of(data: xr.Dataset) -> Probe:
     """Return the probe that a sweep was made of."""
-    sections = {name: json.loads(data.attrs[name]) for name in ("probe", "circuit", "material")}
+    sections = {name: json.loads(data.attrs[name]) for name in SECTIONS if name in data.attrs}
     return Probe.from_values(sections, "sweep")

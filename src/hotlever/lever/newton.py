@@ -71,7 +71,12 @@ class NewtonResult:
     iterations: int
 
 
-def newton(equations: Equations, x: Array, options: NewtonOptions) -> NewtonResult:
+def newton(
+    equations: Equations,
+    x: Array,
+    options: NewtonOptions,
+    jacobian: LinearSolve | None = None,
+) -> NewtonResult:
     """Find a root of F near `x`.
 
     Parameters
@@ -80,6 +85,8 @@ def newton(equations: Equations, x: Array, options: NewtonOptions) -> NewtonResu
     x : ndarray, shape (n,)
         Start.
     options : NewtonOptions
+    jacobian : LinearSolve, optional
+        Of a nearby place, to begin with; made at `x` by default.
 
     Raises
     ------
@@ -92,8 +99,8 @@ def newton(equations: Equations, x: Array, options: NewtonOptions) -> NewtonResu
     derivative of one per unit is pessimistic for a lever); with an old one the steps shrink
     by a steady ratio r and leave s r. Both estimates decide when to stop.
     """
-    jacobian = equations.factorised(x)
-    fresh, last = True, np.inf
+    fresh, last = jacobian is None, np.inf
+    jacobian = jacobian or equations.factorised(x)
     for iteration in range(1, options.max_iterations + 1):
         residual = equations.residual(x)
         step = -jacobian.solve(residual)
@@ -106,7 +113,9 @@ def newton(equations: Equations, x: Array, options: NewtonOptions) -> NewtonResu
             raise NewtonError(f"a step was not finite after {iteration} iterations", partial=x)
         shortening = max(1.0, _length(step, equations.step_limit))
         x = x + step / shortening
-        if shortening == 1.0 and length * (length if fresh else length / last) < options.tolerance:
+        # nothing is known yet of an old Jacobian's first step
+        ratio = length if fresh else length / last if np.isfinite(last) else 1.0
+        if shortening == 1.0 and length * ratio < options.tolerance:
             return NewtonResult(x, jacobian, iteration)
         fresh, last = False, length
     raise NewtonError(f"not converged after {options.max_iterations} iterations", partial=x)

@@ -159,6 +159,36 @@ class FiniteElements:
         """Return the numbers of the nodes on some facets of the mesh."""
         return np.asarray(self.basis.get_dofs(facets).flatten(), dtype=np.intp)
 
+    def at_points(self, points: Array) -> tuple[NDArray[np.intp], Array]:
+        """Return the element at each point, and its basis functions there.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 2)
+            In or on the edge of the mesh, which is of triangles; a point outside by rounding is
+            given the nearest element.
+
+        Returns
+        -------
+        elements : ndarray of int, shape (n,)
+        values : ndarray, shape (n, nodes)
+        """
+        mesh = self.basis.mesh
+        corners = mesh.p[:, mesh.t]
+        elements = np.empty(len(points), dtype=np.intp)
+        for number, point in enumerate(points):
+            offset = corners - np.reshape(point, (2, 1, 1))
+            following = np.roll(offset, -1, axis=1)
+            # twice the areas of the triangles that the point makes with each side
+            areas = offset[0] * following[1] - offset[1] * following[0]
+            elements[number] = np.argmax((areas / areas.sum(axis=0)).min(axis=0))
+        where = self.basis.mapping.invF(points.T[:, :, None], tind=elements)
+        values = [
+            np.asarray(self.basis.elem.gbasis(self.basis.mapping, where, node, tind=elements)[0])
+            for node in range(self.dofs.shape[1])
+        ]
+        return elements, np.stack([value.reshape(-1) for value in values], axis=1)
+
     def point_weights(self, point: tuple[float, ...]) -> tuple[NDArray[np.intp], Array]:
         """Return nodes and weights that interpolate a field at a point of the mesh.
 

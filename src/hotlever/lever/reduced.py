@@ -10,9 +10,10 @@ of the full lever.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ from scipy.optimize import nnls
 from scipy.stats import qmc
 
 from hotlever.errors import BranchEndError, ComputationError
+from hotlever.lever.air_loss import AirLoss
+from hotlever.lever.atlas import Atlas, branch_on_grid, common_grid
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import Lever
 from hotlever.lever.space import Fields, LeverSpace, Tangent, Tapered
@@ -39,8 +42,17 @@ BOX: dict[str, tuple[float, float]] = {
     "a0": (7.5e-4, 1.15e-3),
     "a1": (0.85e-6, 1.5e-6),
 }
+#: In air, where silicon competes with air, c_κ does change the shape.
+IN_AIR: dict[str, tuple[float, float]] = {"c_kappa": (0.55, 0.8)}
 #: Tip temperature (K) up to which states are collected.
 HOTTEST = 1350.0
+#: Modes that enrich a space are at least this large (K, and a hundredth in V).
+_SMALLEST = 1e-3
+#: Size of the changes of a snapshot: share of the box, and K.
+PARAMETER_STEP, BRANCH_STEP = 0.25, 50.0
+#: Training levers have this series resistance (Ω), with which the bias rises along a branch. The
+#: states of a given lever voltage do not depend on it.
+_TRAINING_OHM = 5000.0
 
 
 @dataclass(frozen=True)
@@ -51,8 +63,8 @@ class ReductionOptions:
     ----------
     parameter_sets : int
         Parameter sets whose whole branch is solved.
-    modes : int
-        Modes of each field.
+    modes_T, modes_V : int
+        Modes of each field. The reader voltage, a small potential, asks for more of the latter.
     rule_tolerance : float
         Relative accuracy of the empirical quadrature rule on the training integrals.
     sketch : int
@@ -62,9 +74,10 @@ class ReductionOptions:
     """
 
     parameter_sets: int = 8
-    modes: int = 32
+    modes_T: int = 36
+    modes_V: int = 48
     rule_tolerance: float = 1e-6
-    sketch: int = 700
+    sketch: int = 420
     seed: int = 0
 
 
@@ -77,16 +90,138 @@ class Snapshot:
     material : Material
     x : ndarray, shape (n,)
     changes : ndarray, shape (n, k)
-        Changes of the state along the branch and with each parameter, of the size of the box.
+        Changes of the state with each parameter by `PARAMETER_STEP` of the box, then by
+        `BRANCH_STEP` along the branch, and in air with c_κ; the tip temperature is held for the
+        parameters.
+    tip_K : float
     """
 
     material: Material
     x: Array
     changes: Array
+    tip_K: float
+
+
+class Samples:
+    """The modes of a reduced space at the points of a quadrature rule.
+
+    Parameters
+    ----------
+    full : LeverSpace
+    T : ndarray, shape (3, points, modes)
+        Value and slopes of the temperature modes.
+    V : ndarray, shape (2, points, modes + 1)
+        Slopes of the potential modes, and of the lift.
+    points : ndarray of int
+        Which of the full space's quadrature points they are.
+    weights : ndarray
+
+    Attributes
+    ----------
+    tapered : list of Tapered
+        With each point as an "element".
+    """
+
+    def __init__(self, full: LeverSpace, T: Array, V: Array, points: Index, weights: Array) -> None:
+        self.points, self.weights = points, weights
+        # value and slopes one below the other, so that products are single ones
+        self._T = np.ascontiguousarray(T.reshape(-1, T.shape[2]))
+        self._V = np.ascontiguousarray(V.reshape(-1, V.shape[2]))
+        per_element = full.operators.weights.shape[1]
+        thickness = full.thickness_um
+        self.thickness_um = (
+            thickness if isinstance(thickness, float) else thickness.ravel()[points][:, None]
+        )
+        self.tapered = []
+        for region in full.tapered:
+            along = np.full(full.operators.weights.size, np.nan)
+            numbers = region.elements[:, None] * per_element + np.arange(per_element)
+            along[numbers.ravel()] = region.along.ravel()
+            here = np.flatnonzero(np.isfinite(along[points]))
+            self.tapered.append(Tapered(here, along[points][here][:, None], region.length_um))
+
+    def fields(self, x: Array, base_temperature_K: float) -> Fields:
+        """Return the fields of states, shape (size + 2, states), at points x states."""
+        count, states = self._T.shape[1], x.shape[1]
+        samples_T = (self._T @ x[:count]).reshape(3, -1, states)
+        samples_V = (self._V @ x[count : count + self._V.shape[1]]).reshape(2, -1, states)
+        return Fields(base_temperature_K + samples_T[0], samples_T[1:], samples_V)
+
+    def weak_form(
+        self, heat_source: Array | float, heat_flux: Array | float, charge_flux: Array
+    ) -> Array:
+        """Return the projected equations and last the currents, shape (size + 1, states)."""
+        states = charge_flux.shape[-1]
+        w = self.weights[:, None]
+        heat = np.empty((3, w.size, states))
+        np.multiply(w, heat_source, out=heat[0])
+        np.multiply(w, heat_flux, out=heat[1:])
+        charge = charge_flux * w
+        return np.concatenate(
+            [self._T.T @ heat.reshape(-1, states), self._V.T @ charge.reshape(-1, states)]
+        )
+
+    def matrix(self, tangent: Tangent, state: int) -> Array:
+        """Return the projected linearised equations of one of the states."""
+        w, count = self.weights, self.weights.size
+        T = self._T.reshape(3, count, -1)
+        V = self._V.reshape(2, count, -1)
+        split, width = T.shape[2], V.shape[2]
+
+        def scaled(coefficient: Array) -> Array:
+            return (w * coefficient[..., state])[..., None]
+
+        heat_T = np.empty_like(T)
+        heat_T[0] = scaled(tangent.heat_source_T) * T[0]
+        heat_T[1:] = scaled(tangent.kappa) * T[1:] + scaled(tangent.heat_flux_T) * T[0]
+        heat_V = np.einsum("dqm,dqm->qm", scaled(tangent.heat_source_V), V)
+        charge_T = scaled(tangent.charge_flux_T) * T[0]
+        charge_V = scaled(tangent.sigma) * V
+        matrix = np.empty((split + width, split + width))
+        matrix[:split, :split] = self._T.T @ heat_T.reshape(-1, split)
+        matrix[:split, split:] = T[0].T @ heat_V
+        matrix[split:, :split] = self._V.T @ charge_T.reshape(-1, split)
+        matrix[split:, split:] = self._V.T @ charge_V.reshape(-1, width)
+        return matrix
+
+
+class ReducedAir:
+    """The air operator between temperature modes; see `hotlever.lever.equations.AirTerm`.
+
+    Parameters
+    ----------
+    full : AirLoss
+    modes : ndarray, shape (modes, full size)
+        Of the temperature.
+    size : int
+        Number of modes of both fields.
+    """
+
+    def __init__(self, full: AirLoss, modes: Array, size: int) -> None:
+        self.filling, self._size = full.filling, size
+        self._samples = full.sampling[:, : modes.shape[1]] @ modes.T
+        self._spread = self._samples.T @ full.matrix
+
+    def temperature(self, x: Array, base_temperature_K: float) -> Array:
+        """Return the temperature (K) at the sites, one column for each state."""
+        return base_temperature_K + self._samples @ x[: self._samples.shape[1]]
+
+    def weak_form(self, theta: Array) -> Array:
+        """Return the heat lost for θ (mW/µm) at the sites, tested with the modes."""
+        weak = np.zeros((self._size + 1, *theta.shape[1:]))
+        weak[: len(self._spread)] = self._spread @ theta
+        return weak
+
+    def added(self, jacobian: Any, kappa: Array) -> Any:
+        """Return the Jacobian with air; κ_air (mW/(K µm)) at the sites."""
+        columns = kappa.reshape(len(kappa), -1).T
+        return jacobian.plus(
+            np.stack([self._spread @ (column[:, None] * self._samples) for column in columns])
+        )
 
 
 class ReducedSpace:
-    """Modes, and their values at the points of an empirical quadrature rule.
+    """Modes, and how they look at quadrature points: at all of them, and at a few.
 
     Parameters
     ----------
@@ -101,8 +236,11 @@ class ReducedSpace:
     ----------
     size : int
         Number of modes of both fields.
-    points : ndarray of int
-        The quadrature points of the full space that are used.
+    all_points, few_points : Samples
+        The equations of `equations.Space` use the few, once `use_points` has chosen them.
+    air : ReducedAir or None
+    atlas : Atlas or None
+        Known branches to start from.
     """
 
     def __init__(
@@ -132,57 +270,71 @@ class ReducedSpace:
         self._all_V = np.stack([g for _, g in potentials], axis=-1)
         unknowns, weights = full.tip
         self.tip = (np.arange(self._count), modes_T[:, unknowns] @ weights)
-        self._reader = full.reader_weights()
+        reader = full.reader_weights()
+        self._reader = None
+        if reader is not None:
+            modes = np.vstack([modes_V, lift])[:, reader[0]] @ reader[1]
+            self._reader = (np.arange(self._count, self.size + 1), modes)
         # where it is hottest: the nodes on which the first, largest mode is largest
         hot = np.argsort(-np.abs(modes_T[0]))[:60]
         self._hot = modes_T[:, hot]
-        self.use_points(np.arange(operators.weights.size), operators.weights.ravel())
+        self.all_points = self._samples(
+            np.arange(operators.weights.size), operators.weights.ravel()
+        )
+        self.few_points, self.tapered = self.all_points, self.all_points.tapered
+        self.air = None if full.air is None else ReducedAir(full.air, modes_T, self.size)
+        self.atlas: Atlas | None = None
 
-    def arrays(self) -> tuple[Array, Index, Array, Index, Array]:
+    def use_points(self, points: Index, weights: Array) -> None:
+        """Choose the few points."""
+        self.few_points = self._samples(points, weights)
+        self.tapered = self.few_points.tapered
+
+    def _samples(self, points: Index, weights: Array) -> Samples:
+        return Samples(self.full, self._all_T[:, points], self._all_V[:, points], points, weights)
+
+    def arrays(self) -> dict[str, Array]:
         """Return what `from_arrays` makes the space of again."""
-        return self.basis, np.array([self._count]), self._lift, self.points, self.weights
+        few = self.few_points
+        atlas = {} if self.atlas is None else vars(self.atlas)
+        return {
+            "basis": self.basis,
+            "count": np.array(self._count),
+            "lift": self._lift,
+            "points": few.points,
+            "weights": few.weights,
+            **{f"atlas_{name}": np.asarray(values) for name, values in atlas.items()},
+        }
 
     @classmethod
-    def from_arrays(
-        cls, lever: Lever, basis: Array, count: Index, lift: Array, points: Index, weights: Array
-    ) -> ReducedSpace:
+    def from_arrays(cls, lever: Lever, arrays: Mapping[str, Array]) -> ReducedSpace:
         """Make a space of stored arrays.
 
         Raises
         ------
-        ValueError
+        KeyError, ValueError
             If they do not belong to the lever.
         """
-        size, split = lever.space.size, int(count[0])
+        basis, lift, split = arrays["basis"], arrays["lift"], int(arrays["count"])
+        points, weights, size = (
+            arrays["points"].astype(np.intp),
+            arrays["weights"],
+            lever.space.size,
+        )
         if basis.shape[1:] != (size,) or lift.shape != (size,) or points.shape != weights.shape:
             raise ValueError("the stored arrays are not of this lever")
         base = lever.probe.circuit.base_temperature_K
         space = cls(lever.space, basis[:split], basis[split:], lift, base)
         space.use_points(points, weights)
+        if "atlas_grid" in arrays:
+            names = [field.name for field in fields(Atlas)]
+            space.atlas = Atlas(**{name: arrays[f"atlas_{name}"] for name in names})
         return space
 
     @property
     def thickness_um(self) -> float | Array:
         """Thickness of the silicon (µm), see `LeverSpace.thickness_um`."""
-        thickness = self.full.thickness_um
-        if isinstance(thickness, float):
-            return thickness
-        return thickness.ravel()[self.points][:, None]
-
-    def use_points(self, points: Index, weights: Array) -> None:
-        """Integrate with these of the full space's quadrature points from now on."""
-        self.points, self.weights = points, weights
-        # value and slopes one below the other, so that products are single ones
-        self._T = np.ascontiguousarray(self._all_T[:, points].reshape(-1, self._count))
-        self._V = np.ascontiguousarray(self._all_V[:, points].reshape(-1, self._all_V.shape[2]))
-        per_element = self.full.operators.weights.shape[1]
-        self.tapered = []
-        for region in self.full.tapered:
-            along = np.full(self.full.operators.weights.size, np.nan)
-            numbers = region.elements[:, None] * per_element + np.arange(per_element)
-            along[numbers.ravel()] = region.along.ravel()
-            here = np.flatnonzero(np.isfinite(along[points]))
-            self.tapered.append(Tapered(here, along[points][here][:, None], region.length_um))
+        return self.few_points.thickness_um
 
     # --- between reduced and full states ---------------------------------------------------------
 
@@ -191,6 +343,48 @@ class ReducedSpace:
         free = x[: self.size] @ self.basis + x[self.size] * self._lift
         free[self._full_T] += self._base
         return np.append(free, x[self.size :])
+
+    def coordinates(self, x: Array, *, change: bool = False) -> Array:
+        """Return the reduced state nearest to a full one, or of changes of it, (n, k)."""
+        free = x[: self.full.size].copy()
+        if not change:
+            free[self._full_T] -= self._base
+        free -= np.multiply.outer(self._lift, x[self.full.size])
+        # the modes are orthogonal, but not of unit length
+        lengths = (self.basis**2).sum(axis=1)
+        return np.concatenate([((self.basis @ free).T / lengths).T, x[self.full.size :]])
+
+    def enriched(self, states: Array, changes: Array) -> ReducedSpace:
+        """Return a space with modes for some full states and changes of states as well.
+
+        Parameters
+        ----------
+        states, changes : ndarray, shape (full.size + 2, k)
+        """
+        missing = []
+        for x, change in ((states, False), (changes, True)):
+            place = self.coordinates(x, change=change)
+            free = x[: self.full.size] - self.basis.T @ place[: self.size]
+            free -= np.multiply.outer(self._lift, place[self.size])
+            if not change:
+                free[self._full_T] -= self._base
+            missing.append(free.T)
+        vectors = np.concatenate(missing)
+        hot = self._full_T
+        modes_T = _leading(np.where(hot, vectors, 0.0), len(vectors), smallest=_SMALLEST)
+        modes_V = _leading(np.where(hot, 0.0, vectors), len(vectors), smallest=0.01 * _SMALLEST)
+        count = self._count
+        space = ReducedSpace(
+            self.full,
+            np.concatenate([self.basis[:count], modes_T]),
+            np.concatenate([self.basis[count:], modes_V]),
+            self._lift,
+            self._base,
+        )
+        # the few points were chosen for the old modes: the new space stays with all
+        if self.atlas is not None:
+            space.atlas = self.atlas.widened(count, len(modes_T), self.size, len(modes_V))
+        return space
 
     def heat_integrands(self, source: Array, flux: Array) -> Array:
         """Return source φ + flux·∇φ at all points of the full space for every mode."""
@@ -204,7 +398,7 @@ class ReducedSpace:
         integrands: Array = self._all_V[0].T * flux[0] + self._all_V[1].T * flux[1]
         return integrands
 
-    # --- operators: see `equations.Space` ---------------------------------------------------------
+    # --- what is read off states of shape (size + 2,) or (size + 2, states) ----------------------
 
     def start(self, base_temperature_K: float) -> Array:
         """Return the exact state without bias."""
@@ -219,62 +413,87 @@ class ReducedSpace:
         """Return which of the unknowns are coefficients of temperature modes."""
         return np.arange(self.size + 2) < self._count
 
-    def tip_temperature(self, x: Array) -> float:
-        """Return T_tip (K)."""
-        return self._base + float(self.tip[1] @ x[: self._count])
+    def tip_temperature(self, x: Array) -> Any:
+        """Return T_tip (K), one for each state."""
+        return self._base + self.tip[1] @ x[: self._count]
 
-    def highest_temperature(self, x: Array) -> float:
+    def highest_temperature(self, x: Array) -> Any:
         """Return the highest temperature (K) of the nodes that heat up most."""
-        return self._base + float((x[: self._count] @ self._hot).max())
+        return self._base + (self._hot.T @ x[: self._count]).max(axis=0)
 
     def reader_weights(self) -> tuple[Index, Array] | None:
         """Return unknowns and weights that give V_r; None without a reader."""
-        if self._reader is None:
-            return None
-        unknowns, weights = self._reader
-        modes = np.vstack([self.basis[self._count :], self._lift])[:, unknowns] @ weights
-        return np.arange(self._count, self.size + 1), modes
+        return self._reader
+
+    # --- operators of one state: see `equations.Space` --------------------------------------------
 
     def fields(self, x: Array, base_temperature_K: float) -> Fields:
         """Return temperature and gradients at the points, each an "element" of one point."""
-        samples_T = (self._T @ x[: self._count]).reshape(3, -1, 1)
-        samples_V = (self._V @ x[self._count : self.size + 1]).reshape(2, -1, 1)
-        return Fields(base_temperature_K + samples_T[0], samples_T[1:], samples_V)
+        return self.few_points.fields(x[:, None], base_temperature_K)
 
     def weak_form(
         self, heat_source: Array | float, heat_flux: Array | float, charge_flux: Array
     ) -> Array:
         """Return the projected equations, and last the current I_h into V_l."""
-        count = self.points.size
-        heat = np.empty((3, count))
-        heat[0] = np.reshape(heat_source, -1)
-        heat[1:] = np.reshape(heat_flux, (2, -1)) if np.ndim(heat_flux) else heat_flux
-        heat *= self.weights
-        charge = charge_flux.reshape(2, -1) * self.weights
-        return np.concatenate([heat.ravel() @ self._T, charge.ravel() @ self._V])
+        return self.few_points.weak_form(heat_source, heat_flux, charge_flux)[:, 0]
 
     def jacobian(self, tangent: Tangent) -> DenseJacobian:
         """Assemble the projected linearised equations."""
-        w, count = self.weights, self.points.size
-        T = self._T.reshape(3, count, -1)
-        V = self._V.reshape(2, count, -1)
+        return DenseJacobian(self.few_points.matrix(tangent, 0), self.tip[1])
 
-        def scaled(coefficient: Array) -> Array:
-            return (w * coefficient.reshape(-1, count))[:, :, None]
 
-        heat_T = np.empty_like(T)
-        heat_T[0] = scaled(tangent.heat_source_T)[0] * T[0]
-        heat_T[1:] = scaled(tangent.kappa) * T[1:] + scaled(tangent.heat_flux_T) * T[0]
-        heat_V = np.einsum("dqm,dqm->qm", scaled(tangent.heat_source_V), V)
-        charge_T = scaled(tangent.charge_flux_T) * T[0]
-        charge_V = scaled(tangent.sigma) * V
-        matrix = np.empty((self.size + 1, self.size + 1))
-        split = self._count
-        matrix[:split, :split] = self._T.T @ heat_T.reshape(-1, split)
-        matrix[:split, split:] = T[0].T @ heat_V
-        matrix[split:, :split] = self._V.T @ charge_T.reshape(-1, split)
-        matrix[split:, split:] = self._V.T @ charge_V.reshape(2 * count, -1)
-        return DenseJacobian(matrix, self.tip[1])
+class StackedSpace:
+    """A reduced space whose states stand side by side: arrays of shape (size + 2, states).
+
+    With it `LeverEquations` evaluates residuals and parameter derivatives of all biases at once:
+    arrays of a few hundred points cost as much in calls as in arithmetic.
+
+    Parameters
+    ----------
+    space : ReducedSpace
+    samples : Samples
+        The points to integrate with.
+    """
+
+    def __init__(self, space: ReducedSpace, samples: Samples) -> None:
+        self.size, self.tip, self.tapered = space.size, space.tip, samples.tapered
+        self.thickness_um = samples.thickness_um
+        self.start, self.is_temperature = space.start, space.is_temperature
+        self.tip_temperature = space.tip_temperature
+        self.highest_temperature = space.highest_temperature
+        self.reader_weights = space.reader_weights
+        self.fields, self.weak_form, self.air = samples.fields, samples.weak_form, space.air
+        self._samples = samples
+
+    def jacobian(self, tangent: Tangent) -> StackedJacobian:
+        """Assemble the projected linearised equations of every state."""
+        states = tangent.sigma.shape[-1]
+        return StackedJacobian(
+            np.stack([self._samples.matrix(tangent, state) for state in range(states)])
+        )
+
+
+class StackedJacobian:
+    """The projected linearised equations of several states, shape (states, size + 1, size + 1).
+
+    The last row is the current.
+    """
+
+    def __init__(self, matrices: Array) -> None:
+        self.matrices = matrices
+
+    def plus(self, heat_T: Array) -> StackedJacobian:
+        """Return the sum with changes of the heat equations with T, (states, modes, modes)."""
+        count = heat_T.shape[1]
+        self.matrices[:, :count, :count] += heat_T
+        return self
+
+    def inverses(self, series_resistance_kohm: float) -> Array:
+        """Return the inverses at a given bias, with the circuit equation in the last row."""
+        matrices = self.matrices.copy()
+        matrices[:, -1] *= series_resistance_kohm
+        matrices[:, -1, -1] += 1.0
+        return np.asarray(np.linalg.inv(matrices), dtype=float)
 
 
 class DenseJacobian:
@@ -283,6 +502,12 @@ class DenseJacobian:
     def __init__(self, matrix: Array, tip: Array) -> None:
         self._matrix, self._tip = matrix, tip
         self.current_gradient = (np.arange(len(matrix)), matrix[-1])
+
+    def plus(self, heat_T: Array) -> DenseJacobian:
+        """Return the sum with changes of the heat equations with T, (1, modes, modes)."""
+        count = heat_T.shape[1]
+        self._matrix[:count, :count] += heat_T[0]
+        return self
 
     def completed(self, series_resistance_kohm: float, pin_bias: float, pin_tip: float) -> Array:
         """Return the square matrix; the last rows are circuit equation and pin."""
@@ -328,18 +553,20 @@ def reduce(
     Parameters
     ----------
     lever : Lever
-        Its material does not matter; its base temperature does.
+        Its material and series resistance do not matter; its base temperature does.
     options : ReductionOptions, optional
     progress : callable, optional
         Called with the parameter sets done and their number.
     """
     options = options or ReductionOptions()
-    snapshots: list[Snapshot] = []
-    for done, material in enumerate(training_materials(lever.probe.material, options), start=1):
-        snapshots.extend(collect(lever.with_material(material)))
+    probe = lever.probe.with_values({"series_resistance_ohm": _TRAINING_OHM})
+    training = Lever(probe, space=lever.space)
+    branches: list[list[Snapshot]] = []
+    for done, material in enumerate(training_materials(probe.material, options), start=1):
+        branches.append(list(collect(training.with_material(material))))
         if progress is not None:
             progress(done, options.parameter_sets)
-    return reduced_space(lever, snapshots, options)
+    return reduced_space(training, branches, options)
 
 
 def training_materials(material: Material, options: ReductionOptions) -> list[Material]:
@@ -357,6 +584,16 @@ def material_in_box(material: Material, shares: Array) -> Material:
     return material.with_(**values)
 
 
+def place_in_box(material: Material) -> Array:
+    """Invert `material_in_box`, beyond the box too."""
+    shares = []
+    for name, (low, high) in BOX.items():
+        value = getattr(material, name)
+        even = np.log(value / low) / np.log(high / low) if name == "n_d" else None
+        shares.append((value - low) / (high - low) if even is None else even)
+    return np.array(shares)
+
+
 def collect(lever: Lever) -> Iterator[Snapshot]:
     """Follow the branch of one material and yield states and their neighbourhoods."""
     follower = lever.follower()
@@ -364,51 +601,100 @@ def collect(lever: Lever) -> Iterator[Snapshot]:
     hottest = lever.space.highest_temperature
     with suppress(BranchEndError):  # legs can run away before the tip is hot
         for state in follower.follow_arc(lambda state: hottest(state.x) < HOTTEST):
-            yield Snapshot(lever.probe.material, state.x, neighbourhood(equations, state.x))
+            changes = neighbourhood(equations, state.x)
+            yield Snapshot(lever.probe.material, state.x, changes, state.tip)
 
 
 def neighbourhood(equations: LeverEquations, x: Array) -> Array:
-    """Return how a state changes along the branch and with each parameter of the box."""
+    """Return the changes of a state with parameters and along the branch: see `Snapshot`."""
     # at a given tip temperature, so that a fold does no harm
     solver = equations.jacobian(x).factorised(equations.series_kohm, 0.0, 1.0)
     by_parameter = equations.by_parameter(x)
-    right_hand_side = np.zeros((x.size, len(BOX) + 1))
-    for column, (name, (low, high)) in enumerate(BOX.items()):
+    columns: list[tuple[str, float, float] | None] = [(name, *BOX[name]) for name in BOX]
+    columns.append(None)
+    if equations.space.air is not None:
+        columns += [(name, *IN_AIR[name]) for name in IN_AIR]
+    right_hand_side = np.zeros((x.size, len(columns)))
+    for place, entry in enumerate(columns):
+        if entry is None:
+            right_hand_side[-1, place] = BRANCH_STEP
+            continue
+        name, low, high = entry
         change = by_parameter[:, list(PARAMETERS).index(name)]
-        right_hand_side[:-1, column] = -change * 0.25 * (high - low)
-    right_hand_side[-2, :-1] *= equations.series_kohm
-    right_hand_side[-1, -1] = 50.0  # K along the branch
+        right_hand_side[:-1, place] = -change * PARAMETER_STEP * (high - low)
+    right_hand_side[-2] *= equations.series_kohm
     changes: Array = solver.solve(right_hand_side)
     return changes
 
 
 @one_blas_thread
 def reduced_space(
-    lever: Lever, snapshots: list[Snapshot], options: ReductionOptions
+    lever: Lever, branches: list[list[Snapshot]], options: ReductionOptions
 ) -> ReducedSpace:
-    """Find modes and quadrature rule from snapshots."""
+    """Find modes, quadrature rule and atlas from the snapshots of some branches."""
     full, base = lever.space, lever.probe.circuit.base_temperature_K
     is_T = full.is_temperature()[: full.size]
     cold = lever.follower().state.tangent
     lift = np.where(is_T, 0.0, cold[: full.size] / cold[full.size])
+    snapshots = [snapshot for branch in branches for snapshot in branch]
     states = np.stack([snapshot.x for snapshot in snapshots])
     changes = np.concatenate([snapshot.changes.T for snapshot in snapshots])
     vectors = np.concatenate([states, changes])
     free = vectors[:, : full.size] - vectors[:, full.size : full.size + 1] * lift
     free[: len(states), is_T] -= base
-    modes_T = _leading(np.where(is_T, free, 0.0), options.modes)
-    modes_V = _leading(np.where(is_T, 0.0, free), options.modes)
+    modes_T = _leading(np.where(is_T, free, 0.0), options.modes_T)
+    modes_V = _leading(np.where(is_T, 0.0, free), options.modes_V)
     space = ReducedSpace(full, modes_T, modes_V, lift, base)
     space.use_points(*_empirical_rule(lever, space, snapshots, options))
+    space.atlas = _atlas(lever, space, branches)
     return space
 
 
-def _leading(vectors: Array, count: int) -> Array:
-    """Return the leading modes of some vectors, scaled so that their largest entry is one."""
+def _atlas(lever: Lever, space: ReducedSpace, branches: list[list[Snapshot]]) -> Atlas:
+    base, size = lever.probe.circuit.base_temperature_K, space.size
+    kohm = lever.probe.circuit.series_resistance_ohm / 1000.0
+    rises = [
+        np.sqrt(np.maximum(0.0, [snapshot.tip_K - base for snapshot in branch]))
+        for branch in branches
+    ]
+    grid = common_grid(np.array([rise[-1] for rise in rises]))
+    states, slopes = [], []
+    for rise, branch in zip(rises, branches, strict=True):
+        values = np.stack([space.coordinates(snapshot.x) for snapshot in branch])
+        by = np.stack([space.coordinates(snapshot.changes, change=True) for snapshot in branch])
+        # the last unknown is V_b = V_l + R_s I_h
+        for array in (values.T, np.moveaxis(by, 1, 0)):
+            array[size + 1] = (array[size + 1] - array[size]) / kohm
+        along = by[:, :, len(BOX)] * (2.0 * rise[:, None] / BRANCH_STEP)
+        hot = rise > 0
+        u, values, along, by = rise[hot], values[hot], along[hot], by[hot, :, : len(BOX)]
+        # at zero bias nothing is hot, and potentials grow evenly with u
+        start = np.where(space.is_temperature(), 0.0, 2.0 * values[0] / u[0] - along[0])
+        u = np.append(0.0, u)
+        values = np.vstack([np.zeros_like(start), values])
+        along = np.vstack([start, along])
+        by = np.concatenate([np.zeros_like(by[:1]), by]) / PARAMETER_STEP
+        (low, high), n_d = BOX["n_d"], branch[0].material.n_d
+        by[..., list(BOX).index("n_d")] *= n_d * np.log(high / low) / (high - low)
+        state, slope = branch_on_grid(u, values, along, by, grid)
+        states.append(state)
+        slopes.append(slope)
+    places = np.stack([place_in_box(branch[0].material) for branch in branches])
+    c_kappa = branches[0][0].material.c_kappa
+    return Atlas.fitted(grid, places, np.stack(states), np.stack(slopes), c_kappa)
+
+
+def _leading(vectors: Array, count: int, smallest: float = 0.0) -> Array:
+    """Return the leading modes of some vectors, scaled so that their largest entry is one.
+
+    Modes that contribute less than `smallest` to every vector are left out.
+    """
     # the eigenvectors of the Gram matrix: far fewer vectors than values
     gram = vectors @ vectors.T
     _, combinations = np.linalg.eigh(gram)
     modes = combinations[:, ::-1][:, :count].T @ vectors
+    if smallest:
+        modes = modes[np.abs(modes).max(axis=1) > smallest]
     modes = np.linalg.qr(modes.T)[0].T
     scaled: Array = modes / np.abs(modes).max(axis=1, keepdims=True)
     return scaled

@@ -8,6 +8,7 @@ lever voltage V_l. This module knows where things are, not which laws hold there
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -17,6 +18,8 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import SuperLU, splu
 from skfem import Mesh
 
+from hotlever.air.operator import AirOperator
+from hotlever.lever.air_loss import AirLoss, SurfaceOperator
 from hotlever.lever.operators import FiniteElements, sums_by_index
 from hotlever.probe.layout import Layout, Part
 
@@ -108,16 +111,24 @@ class LeverSpace:
         Of triangles in the lever's plane, or of tetrahedra.
     operators : FiniteElements, optional
         Made on ``mesh.elements`` by default.
+    air : AirOperator, optional
+        The air around the lever; vacuum by default.
 
     Attributes
     ----------
     size : int
         Number of free nodal values. Vectors of unknowns have this many entries and then V_l.
+    air : AirLoss or None
     tip : tuple of (ndarray of int, ndarray)
         Unknowns and weights that give the tip temperature.
     """
 
-    def __init__(self, mesh: MeshedLever, operators: FiniteElements | None = None) -> None:
+    def __init__(
+        self,
+        mesh: MeshedLever,
+        operators: FiniteElements | None = None,
+        air: AirOperator | None = None,
+    ) -> None:
         self.mesh = mesh
         self.operators = operators or FiniteElements(mesh.elements)
         terminal_nodes = {
@@ -140,6 +151,42 @@ class LeverSpace:
             )
             for part in ("heater", "leg 1", "leg 2", "reader branch")
         }
+        self.air = None if air is None else self._air_loss(air)
+
+    def in_air(self, air: AirOperator | None) -> LeverSpace:
+        """Return the same space with this air around it, or in vacuum; everything is shared."""
+        space = copy(self)
+        space.air = None if air is None else space._air_loss(air)
+        return space
+
+    def in_air_at_nodes(self, air: SurfaceOperator, surface: Index) -> LeverSpace:
+        """Return the same space in air whose sites are these nodes; everything is shared."""
+        # any element around a node knows where its diagonal entry is
+        count, nodes = self.operators.dofs.shape
+        _, first = np.unique(self.operators.dofs, return_index=True)
+        element, place = np.divmod(first[surface], nodes)
+        slots = self._element_slots.reshape(count, 2 * nodes, 2 * nodes)
+        space = copy(self)
+        space.air = AirLoss(
+            air,
+            self._T[surface, None],
+            np.ones((surface.size, 1)),
+            slots[element, place, place][:, None, None],
+            self.size + 2,
+        )
+        return space
+
+    def _air_loss(self, operator: AirOperator) -> AirLoss:
+        elements, shares = self.operators.at_points(operator.sites)
+        nodes = self.operators.dofs.shape[1]
+        slots = self._element_slots.reshape(len(self._unknowns), 2 * nodes, 2 * nodes)
+        return AirLoss(
+            operator,
+            self._T[self.operators.dofs[elements]],
+            shares,
+            slots[elements, :nodes, :nodes],
+            self.size + 2,
+        )
 
     def _number_unknowns(self) -> None:
         """Give every nodal value its unknown; eliminated ones get -1, the supply V_l."""
@@ -354,11 +401,18 @@ class SparseJacobian:
     ----------
     current_gradient : tuple of (ndarray of int, ndarray)
         Unknowns on which the current I_h depends, and its derivatives.
+    entries : int
+        Of the sparse structure, see `plus`.
     """
 
     def __init__(self, space: LeverSpace, data: Array) -> None:
         self._space, self._data = space, data
+        self.entries = data.size
         self.current_gradient = (space._lever_columns, data[space._lever_row])
+
+    def plus(self, data: Array) -> SparseJacobian:
+        """Return the sum with other entries of the same structure."""
+        return SparseJacobian(self._space, self._data + data)
 
     def factorised(self, series_resistance_kohm: float, pin_bias: float, pin_tip: float) -> SuperLU:
         """Complete and factorise; the unknowns are already ordered for little fill."""

@@ -9,9 +9,9 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
+from hotlever.errors import InputError
 from hotlever.files import whole_file
 from hotlever.lever.equations import PER_CM_TO_MILLI_PER_UM
-from hotlever.lever3d.equations import SolidEquations
 from hotlever.lever3d.lever import SolidLever
 from hotlever.lever3d.still_air import ngsolve
 from hotlever.materials.air import temperature_from_kirchhoff
@@ -53,7 +53,7 @@ def solid_fields(lever: SolidLever, x: Array) -> SolidFields:
     potential = np.full(len(points), np.nan)
     tetrahedra, region = solid.vertices[solid.elements.t.T], solid.region
     if lever.air is not None:
-        theta = lever.air.at_vertices(_equations_in_air(lever).loss(x).coefficients)
+        theta = lever.air.at_vertices(lever.in_the_air(x)[0])
         temperature = temperature_from_kirchhoff(theta / PER_CM_TO_MILLI_PER_UM, base)
         elements = solid.netgen.Elements3D().NumPy()
         names = [solid.netgen.GetMaterial(int(k)) for k in range(1, elements["index"].max() + 1)]
@@ -106,7 +106,9 @@ def temperature_at(lever: SolidLever, x: Array, points: Array) -> Array:
     ndarray, shape (n,)
         K, linear between the vertices of the mesh; NaN outside the sphere.
     """
-    air = _equations_in_air(lever).air
+    air = lever.air
+    if air is None:
+        raise InputError("this lever is in vacuum: expected one in air")
     fields = solid_fields(lever, x)
     every = np.full(air.mesh.nv, lever.probe.circuit.base_temperature_K)
     inside = np.unique(
@@ -128,9 +130,8 @@ def heat_by_region(lever: SolidLever, x: Array) -> dict[str, float]:
 
     A node on the border of regions gives to each by its share of the surface around the node.
     """
-    equations = _equations_in_air(lever)
     heat = np.zeros(lever.space.operators.size)
-    heat[equations.surface] = equations.loss(x).heat
+    heat[lever.surface] = lever.in_the_air(x)[1]
     mesh, basis = lever.solid.elements, lever.space.operators.basis
     facets = mesh.boundary_facets()
     a, b, c = np.moveaxis(mesh.p[:, mesh.facets[:, facets]], 1, 0)
@@ -153,10 +154,3 @@ def _edges(mesh: object, facets: NDArray[np.intp]) -> NDArray[np.intp]:
     """Numbers of the three edges of each facet, shape (3, facets)."""
     edges: NDArray[np.intp] = np.asarray(mesh.f2e)[:, facets]  # type: ignore[attr-defined]
     return edges
-
-
-def _equations_in_air(lever: SolidLever) -> SolidEquations:
-    equations = lever.equations
-    if not isinstance(equations, SolidEquations):
-        raise TypeError("this lever is in vacuum")
-    return equations

@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
-import hashlib
-
 import numpy as np
 from numpy.typing import NDArray
 from skfem.element import ElementTetP2
 
 from hotlever import __version__
-from hotlever.errors import ComputationError
-from hotlever.lever.equations import LeverEquations
+from hotlever.errors import ComputationError, InputError
+from hotlever.lever.equations import PER_CM_TO_MILLI_PER_UM
 from hotlever.lever.lever import Lever
 from hotlever.lever.operators import FiniteElements
-from hotlever.lever.reduced_cache import cache_folder
 from hotlever.lever.space import LeverSpace
 from hotlever.lever.state_store import StateStore
-from hotlever.lever3d.equations import SolidEquations
 from hotlever.lever3d.still_air import OpenAir, ngsolve
+from hotlever.materials.air import kirchhoff_variable
 from hotlever.probe import Probe
 from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid
 
+Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 #: Radius of the sphere of air in the paper (µm).
 SPHERE_RADIUS = 60.0
-
-#: What the sweep of a lever in air tells about the air.
-AIR_COLUMNS = {
-    "air_heat_mW": ("mW", "net heat from the lever into the air"),
-    "far_heat_mW": ("mW", "heat that the air takes to infinity"),
-}
 
 
 class SolidLever(Lever):
@@ -39,17 +31,26 @@ class SolidLever(Lever):
     Parameters
     ----------
     probe : Probe
+        Its surroundings say whether it is in vacuum or in air, and then in free space.
     mesh : SolidMeshOptions, optional
-    sphere_radius_um : float or None
-        Radius of the meshed air around the lever; None for vacuum. The air reaches to
-        infinity with any radius.
+    sphere_radius_um : float
+        Radius of the meshed air around the lever. The air reaches to infinity with any radius.
     air_order : int
-        Order of the elements in the air.
+        Order of the elements in the air, 2 or more.
+
+    Attributes
+    ----------
+    solid : SolidMesh
+    air : OpenAir or None
+        None in vacuum.
+    surface : ndarray of int
+        Nodes of the silicon on its surface, in the order of `air`.
 
     Raises
     ------
     InputError
-        If the sphere does not hold the lever, or NGSolve is not installed.
+        If the sphere does not hold the lever, NGSolve is not installed, or the surroundings are
+        more than free space.
     """
 
     def __init__(
@@ -57,52 +58,64 @@ class SolidLever(Lever):
         probe: Probe,
         mesh: SolidMeshOptions | None = None,
         *,
-        sphere_radius_um: float | None = SPHERE_RADIUS,
+        sphere_radius_um: float = SPHERE_RADIUS,
         air_order: int = 2,
     ) -> None:
-        if sphere_radius_um is not None:
+        around = probe.surroundings
+        in_air = around.medium == "air"
+        if in_air:
             ngsolve()  # says what to install, before the meshing
-        solid = mesh_solid(probe.layout(), mesh, sphere_radius_um=sphere_radius_um)
-        self.solid = solid
-        self.space = LeverSpace(solid, FiniteElements(solid.elements, ElementTetP2(), 4))
+            if around != type(around)(medium="air"):
+                raise InputError(
+                    "[surroundings]: the full 3-D simulation knows free space only; expected no "
+                    "surface below, no chip and no temperature jump"
+                )
+        self.solid = mesh_solid(
+            probe.layout(), mesh, sphere_radius_um=sphere_radius_um if in_air else None
+        )
+        space = LeverSpace(self.solid, FiniteElements(self.solid.elements, ElementTetP2(), 4))
         self.air: OpenAir | None = None
-        if sphere_radius_um is not None:
-            self.air = OpenAir(solid.netgen, solid.centre, sphere_radius_um, order=air_order)
-            self._surface = surface_nodes(solid, self.space.operators, self.air)
-        super().__init__(probe, space=self.space)
+        self.surface: Index = np.empty(0, dtype=np.intp)
+        if in_air:
+            self.air = OpenAir(
+                self.solid.netgen, self.solid.centre, sphere_radius_um, order=air_order
+            )
+            self.surface = surface_nodes(self.solid, space.operators, self.air)
+            space = space.in_air_at_nodes(self.air, self.surface)
+        super().__init__(probe, space=space)
 
-    @property
-    def medium(self) -> str:
-        """What surrounds the lever."""
-        return "vacuum" if self.air is None else "air"
-
-    def store(self) -> StateStore | None:
-        """Return where the states of this very lever are kept; None if the cache is off."""
-        folder = cache_folder()
-        if folder is None:
-            return None
-        points = np.round(self.space.operators.nodes, 9).tobytes()
+    def store(self) -> StateStore:
+        """Return where the states of this very lever are kept."""
+        air = self.air
         return StateStore(
-            folder,
             {
                 "version": __version__,
                 "probe": self.probe.values(),
-                "nodes": hashlib.sha256(points).hexdigest(),
-                "air": self.air and (self.air.radius_um, self.air.order, self.air.size),
-            },
+                "nodes": self.space.operators.nodes,
+                "air": None if air is None else [air.radius_um, air.order, air.size],
+            }
         )
 
-    @property
-    def more_columns(self) -> dict[str, tuple[str, str]]:
-        """Variables of a sweep beyond `SWEEP_COLUMNS`: name, unit, what it is."""
-        return super().more_columns | ({} if self.air is None else AIR_COLUMNS)
+    def in_the_air(self, x: Array) -> tuple[Array, Array]:
+        """Return what a state gives to the air.
 
-    def _equations(self) -> LeverEquations:
+        Returns
+        -------
+        coefficients : ndarray
+            Of θ in the air (mW/µm); see `OpenAir`.
+        heat : ndarray
+            From each node of `surface` (mW).
+
+        Raises
+        ------
+        InputError
+            If the lever is in vacuum.
+        """
         if self.air is None:
-            return super()._equations()
-        return SolidEquations(
-            self.space, self._surface, self.air, self.probe.circuit, self.probe.material
-        )
+            raise InputError("this lever is in vacuum: it gives no heat to air")
+        base = self.probe.circuit.base_temperature_K
+        theta, _ = kirchhoff_variable(self.space.nodal(x, base)[0][self.surface], base)
+        return self.air.solve(PER_CM_TO_MILLI_PER_UM * theta)
 
 
 def surface_nodes(mesh: SolidMesh, operators: FiniteElements, air: OpenAir) -> Index:

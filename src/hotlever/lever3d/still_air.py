@@ -10,11 +10,13 @@ D. A. Lowther, IEEE Trans. Magn. 25, 4135 (1989), with the factor r'/R taken out
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
+from scipy.sparse.linalg import LinearOperator
 
 from hotlever.errors import InputError
 from hotlever.probe.solid import AIR, IMAGE, LEVER_SURFACE, SPHERE
@@ -144,6 +146,26 @@ class OpenAir:
 
         values = fem.H1FE(ng.ET.SEGM, 2).CalcShape(0.5)
         return float(values[2])
+
+    @property
+    def matrix(self) -> LinearOperator:
+        """The operator from θ to heat, for `hotlever.lever.air_loss.AirLoss`."""
+        return self._operator(lambda theta: self.solve(theta)[1])
+
+    @property
+    def filling(self) -> float:
+        """No air is modelled inside the silicon."""
+        return 0.0
+
+    def less(self, diagonal: Array) -> LinearOperator:
+        """Return the operator less a diagonal matrix."""
+        return self._operator(lambda theta: self.solve(theta)[1] - diagonal * theta)
+
+    def _operator(self, product: Callable[[Array], Array]) -> LinearOperator:
+        count = self._to_coefficients.shape[1]
+        return LinearOperator(
+            (count, count), matvec=lambda theta: product(theta.ravel()), dtype=float
+        )
 
     def solve(self, theta: Array) -> tuple[Array, Array]:
         """Solve the air for θ on the body.

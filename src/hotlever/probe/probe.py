@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, model_validator
 
+from hotlever.air.surroundings import Surroundings
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import read_text, write_text
 from hotlever.materials import PARAMETERS, Material
@@ -35,11 +36,11 @@ class Circuit(Record):
     base_temperature_K: Annotated[float, Field(ge=250, le=1000)] = 293.0
 
 
-SECTIONS = ("probe", "circuit", "material", "tip")
+SECTIONS = ("probe", "circuit", "material", "surroundings", "tip")
 
 
 class Probe(Record):
-    """Shape, circuit, material and tip of one lever: everything a solve needs.
+    """Shape, circuit, material, surroundings and tip of one lever: everything a solve needs.
 
     Without a `tip` the lever is flat, as in the paper.
 
@@ -55,6 +56,7 @@ class Probe(Record):
     shape: Shape
     circuit: Circuit = Circuit()
     material: Material = published("option III").material
+    surroundings: Surroundings = Surroundings()
     tip: Tip | None = None
 
     @model_validator(mode="after")
@@ -129,6 +131,9 @@ class Probe(Record):
                 {**published("option III").material.model_dump(), **values.get("material", {})},
                 f"{where}: [material]",
             ),
+            "surroundings": Surroundings.of(
+                values.get("surroundings", {}), f"{where}: [surroundings]"
+            ),
             "tip": None if tip is None else Tip.of(tip, f"{where}: [tip]"),
         }
         return cls.of(sections, where)
@@ -156,6 +161,7 @@ class Probe(Record):
             "probe": self.shape.model_dump(exclude_none=True),
             "circuit": self.circuit.model_dump(),
             "material": self.material.model_dump(),
+            "surroundings": self.surroundings.model_dump(exclude_none=True),
         }
         if self.tip is not None:
             sections["tip"] = self.tip.model_dump()
@@ -171,6 +177,7 @@ class Probe(Record):
         """
         sections = self.values()
         sections["probe"] = self.shape.model_dump()
+        sections["surroundings"] = self.surroundings.model_dump()
         for name, value in changes.items():
             section = next((values for values in sections.values() if name in values), None)
             if section is None:
@@ -178,6 +185,16 @@ class Probe(Record):
                 raise unknown_name("name", name, known)
             section[name] = value
         return Probe.from_values(sections, "probe")
+
+    def in_medium(self, medium: str) -> Probe:
+        """Return the probe in vacuum or in air.
+
+        Raises
+        ------
+        InputError
+            If the medium is neither.
+        """
+        return self.with_values({"medium": medium})
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip."""
@@ -191,6 +208,7 @@ class Probe(Record):
             "base_temperature_K": "of the leg ends",
             **{p.name: f"{p.meaning}, {p.symbol} ({p.unit})" for p in PARAMETERS.values()},
             "n_hd": "doping concentration of the high-doped silicon (cm⁻³)",
+            **Surroundings.description(),
             **Tip.description(),
         }
         lines = ["# A hotlever probe file: lengths in µm, temperatures in K."]
@@ -201,8 +219,10 @@ class Probe(Record):
             )
         for name, section in self.values().items():
             lines += ["", f"[{name}]"]
+            if name == "surroundings":
+                section = self.surroundings.model_dump()
             for key, value in section.items():
-                entry = f"{key} = {_toml(value)}"
+                entry = f"# {key} =" if value is None else f"{key} = {_toml(value)}"
                 lines.append(f"{entry:<32}# {comments[key]}" if key in comments else entry)
         if self.tip is None:
             example = Tip(height_um=0.7, half_angle_deg=20, apex_radius_um=0.02)
@@ -218,4 +238,6 @@ class Probe(Record):
 
 
 def _toml(value: str | float) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
     return f'"{value}"' if isinstance(value, str) else f"{value:.12g}"

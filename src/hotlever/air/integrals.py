@@ -1,0 +1,171 @@
+"""Integrals of 1/R over flat panels, in closed form.
+
+`potential` integrates over one polygon (Wilton et al., IEEE Trans. Antennas Propag. 32, 276
+(1984), doi:10.1109/TAP.1984.1143304); `rectangle_pairs` over two axis-parallel rectangles (the
+integrals of Ruehli and Brennan, IEEE Trans. Microw. Theory Tech. 21, 76 (1973),
+doi:10.1109/TMTT.1973.1127927); `far_pairs` expands 1/R about the centroids. Logarithms are
+written as inverse hyperbolic sines: the two differ by terms that cancel between the limits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hotlever.air.panels import Panels
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+#: Stands for zero below a fraction whose factor vanishes there.
+_TINY = 1e-150
+
+
+def potential(points: Array, corners: Array) -> Array:
+    """Return ∫ 1/|p − y| dA(y) over polygons.
+
+    Parameters
+    ----------
+    points : ndarray, shape (..., 3)
+        Where (µm).
+    corners : ndarray, shape (..., k, 3)
+        Corners of the flat convex polygon that belongs to each point; leading dimensions are
+        broadcast.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        µm.
+    """
+    following = np.roll(corners, -1, axis=-2)
+    edges = following - corners
+    lengths = np.linalg.norm(edges, axis=-1)
+    along = edges / np.maximum(lengths, _TINY)[..., None]
+    area_vector = np.cross(
+        corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
+    )
+    normal = area_vector / np.linalg.norm(area_vector, axis=-1, keepdims=True)
+    outward = np.cross(along, normal[..., None, :])
+    to_start = corners - points[..., None, :]
+    height = np.abs(np.einsum("...d,...d->...", to_start[..., 0, :], normal))[..., None]
+    across = np.einsum("...kd,...kd->...k", to_start, outward)
+    start = np.einsum("...kd,...kd->...k", to_start, along)
+    end = start + lengths
+    square = across**2 + height**2
+    nearest = np.maximum(np.sqrt(square), _TINY)
+
+    def angle(position: Array) -> Array:
+        distance = np.sqrt(square + position**2)
+        return np.arctan2(across * position, square + height * distance)
+
+    terms = across * (np.arcsinh(end / nearest) - np.arcsinh(start / nearest))
+    terms -= height * (angle(end) - angle(start))
+    total: Array = np.where(lengths > 0, terms, 0.0).sum(axis=-1)
+    return total
+
+
+def rectangle_pairs(first: Panels, second: Panels) -> Array:
+    """Return ∫∫ 1/R over pairs of axis-parallel rectangles.
+
+    Parameters
+    ----------
+    first, second : Panels, n each
+        The pairs; ``flat_axis`` of none is −1.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        µm³.
+    """
+    result = np.empty(len(first))
+    low = [panels.corners.min(axis=1) for panels in (first, second)]
+    high = [panels.corners.max(axis=1) for panels in (first, second)]
+    # differences of the coordinates: high − low, low − low, high − high, low − high
+    differences = np.stack([high[0] - low[1], low[0] - low[1], high[0] - high[1], low[0] - high[1]])
+    for one in range(3):
+        for other in range(3):
+            pairs = np.flatnonzero((first.flat_axis == one) & (second.flat_axis == other))
+            if not pairs.size:
+                continue
+            d = differences[:, pairs]
+            if one == other:
+                u, v = (axis for axis in range(3) if axis != one)
+                result[pairs] = _parallel(d[:, :, u], d[:, :, v], d[0, :, one])
+            else:
+                shared = 3 - one - other
+                # along the normal of one rectangle only the other extends
+                result[pairs] = _perpendicular(
+                    d[:, :, shared], d[[0, 1], :, other], d[[0, 2], :, one]
+                )
+    return result
+
+
+def _parallel(u: Array, v: Array, w: Array) -> Array:
+    """Return ∫∫ 1/R over parallel rectangles: differences (4, n) along both sides, distance."""
+    a, b, c = u[:, None], v[None, :], np.abs(w)
+    aa, bb, cc = a * a, b * b, c * c
+    distance = np.sqrt(aa + bb + cc)
+    terms = 0.5 * (bb - cc) * a * np.arcsinh(a / np.maximum(np.sqrt(bb + cc), _TINY))
+    terms += 0.5 * (aa - cc) * b * np.arcsinh(b / np.maximum(np.sqrt(aa + cc), _TINY))
+    terms -= (aa + bb - 2.0 * cc) * distance / 6.0
+    terms -= a * b * c * np.arctan2(a * b, c * distance)
+    signs = np.array([1.0, -1.0, -1.0, 1.0])
+    total: Array = np.einsum("u,v,uvn->n", signs, signs, terms)
+    return total
+
+
+def _perpendicular(u: Array, v: Array, w: Array) -> Array:
+    """Return ∫∫ 1/R over rectangles at right angles.
+
+    Differences along the side that both share (4, n), and (2, n) along the other side of the
+    first and of the second rectangle.
+    """
+    a, b, c = u[:, None, None], v[None, :, None], w[None, None, :]
+    aa, bb, cc = a * a, b * b, c * c
+    distance = np.sqrt(aa + bb + cc)
+    terms = (aa / 2 - cc / 6) * c * np.arcsinh(b / np.maximum(np.sqrt(aa + cc), _TINY))
+    terms += (aa / 2 - bb / 6) * b * np.arcsinh(c / np.maximum(np.sqrt(aa + bb), _TINY))
+    terms += a * b * c * np.arcsinh(a / np.maximum(np.sqrt(bb + cc), _TINY))
+    terms -= b * c * distance / 3.0
+    for power, product, height in (
+        (aa * a / 6, b * c, a),
+        (a * bb / 2, a * c, b),
+        (a * cc / 2, a * b, c),
+    ):
+        terms -= power * np.arctan(product / _away_from_zero(height * distance))
+    twice, once = np.array([1.0, -1.0, -1.0, 1.0]), np.array([1.0, -1.0])
+    total: Array = np.einsum("u,v,w,uvwn->n", twice, once, once, terms)
+    return total
+
+
+def _away_from_zero(values: Array) -> Array:
+    return np.where(np.abs(values) < _TINY, _TINY, values)
+
+
+def far_pairs(first: Panels, second: Panels, offsets: Array) -> Array:
+    """Return ∫∫ 1/R over distant pairs, to second order in size over distance.
+
+    Parameters
+    ----------
+    first : Panels, n
+    second : Panels, m
+    offsets : ndarray, shape (n, m, 3)
+        Between their centroids (µm).
+
+    Returns
+    -------
+    ndarray, shape (n, m)
+        µm³.
+    """
+    square = np.einsum("nmd,nmd->nm", offsets, offsets)
+    inverse = 1.0 / np.sqrt(np.maximum(square, _TINY))
+    # pairs of moments with offsets as matrix products: this is done for all pairs of panels
+    flat = (offsets[..., :, None] * offsets[..., None, :]).reshape(*square.shape, 9)
+    spread = np.einsum("nmk,nk->nm", flat, first.moments.reshape(-1, 9))
+    spread += np.einsum("nmk,mk->nm", flat, second.moments.reshape(-1, 9))
+    traces = np.trace(first.moments, axis1=1, axis2=2)[:, None] + np.trace(
+        second.moments, axis1=1, axis2=2
+    )
+    correction = 0.5 * (3.0 * spread * inverse**2 - traces) * inverse**2
+    expanded: Array = np.outer(first.areas, second.areas) * inverse * (1.0 + correction)
+    return expanded

@@ -1,0 +1,178 @@
+"""Flat panels that cover a surface, and the mirrors that copy them.
+
+A panel is a convex quadrilateral; a triangle is one whose last two corners coincide. Lengths are
+in µm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """Reflection of space in planes, with the sign that an image source takes.
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (3, 3)
+    shift : ndarray, shape (3,)
+        A point p goes to ``matrix @ p + shift``.
+    sign : float
+        +1 where the plane is one of symmetry (no flux through it), −1 where it is isothermal.
+    """
+
+    matrix: Array
+    shift: Array
+    sign: float
+
+    @classmethod
+    def in_plane(cls, point: ArrayLike, normal: ArrayLike, sign: float) -> Mirror:
+        """Return the reflection in the plane through `point` (µm) with this normal."""
+        direction = np.asarray(normal, dtype=float)
+        direction = direction / np.linalg.norm(direction)
+        offset = 2.0 * (direction @ np.asarray(point, dtype=float)) * direction
+        return cls(np.eye(3) - 2.0 * np.outer(direction, direction), offset, sign)
+
+    def height(self, points: Array) -> Array:
+        """Return the distances (µm) of points (..., 3) from the plane of a single reflection.
+
+        Positive on the side of +z, or of the plane's own normal where that is horizontal.
+        """
+        normal = np.linalg.eigh(self.matrix)[1][:, 0]
+        normal = normal * np.copysign(1.0, normal[2])
+        return points @ normal - 0.5 * self.shift @ normal
+
+    def after(self, other: Mirror) -> Mirror:
+        """Return `other` followed by this one."""
+        return Mirror(
+            self.matrix @ other.matrix,
+            self.matrix @ other.shift + self.shift,
+            self.sign * other.sign,
+        )
+
+
+IDENTITY = Mirror(np.eye(3), np.zeros(3), 1.0)
+
+
+def mirror_group(mirrors: Sequence[Mirror]) -> list[Mirror]:
+    """Return all products of reflections in planes at right angles, the identity first."""
+    group = []
+    for count in range(len(mirrors) + 1):
+        for chosen in combinations(mirrors, count):
+            product = IDENTITY
+            for mirror in chosen:
+                product = mirror.after(product)
+            group.append(product)
+    return group
+
+
+@dataclass(frozen=True)
+class Panels:
+    """Flat convex panels.
+
+    Attributes
+    ----------
+    corners : ndarray, shape (n, 4, 3)
+        In order around the panel (µm).
+    """
+
+    corners: Array
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Panels]) -> Panels:
+        """Return the panels of all parts, in order."""
+        return cls(np.concatenate([part.corners for part in parts]))
+
+    @classmethod
+    def triangles(cls, points: Array, triangles: NDArray[np.intp]) -> Panels:
+        """Return triangles, given by points (n, 3) and corner numbers (m, 3)."""
+        return cls(points[triangles[:, [0, 1, 2, 2]]])
+
+    def chosen(self, index: NDArray[np.intp]) -> Panels:
+        """Return some of the panels."""
+        return Panels(self.corners[index])
+
+    def reflected(self, mirror: Mirror) -> Panels:
+        """Return the images of the panels."""
+        return Panels(self.corners @ mirror.matrix.T + mirror.shift)
+
+    @cached_property
+    def _halves(self) -> tuple[Array, Array]:
+        """Areas (n, 2) and centroids (n, 2, 3) of the two triangles of each panel."""
+        c = self.corners
+        crossed = np.stack(
+            [
+                np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]),
+                np.cross(c[:, 2] - c[:, 0], c[:, 3] - c[:, 0]),
+            ],
+            axis=1,
+        )
+        centroids = np.stack([c[:, [0, 1, 2]].mean(axis=1), c[:, [0, 2, 3]].mean(axis=1)], axis=1)
+        return 0.5 * np.linalg.norm(crossed, axis=2), centroids
+
+    @cached_property
+    def areas(self) -> Array:
+        """Areas (µm²), shape (n,)."""
+        return self._halves[0].sum(axis=1)
+
+    @cached_property
+    def centres(self) -> Array:
+        """Centroids (µm), shape (n, 3)."""
+        areas, centroids = self._halves
+        return np.einsum("nh,nhd->nd", areas, centroids) / self.areas[:, None]
+
+    @cached_property
+    def radii(self) -> Array:
+        """Distance from the centroid to the farthest corner (µm), shape (n,)."""
+        return np.linalg.norm(self.corners - self.centres[:, None], axis=2).max(axis=1)
+
+    @cached_property
+    def moments(self) -> Array:
+        """Mean of the outer square of the position about the centroid (µm²), shape (n, 3, 3)."""
+        areas, _ = self._halves
+        total = np.zeros((len(self), 3, 3))
+        for half, places in enumerate(([0, 1, 2], [0, 2, 3])):
+            at = self.corners[:, places] - self.centres[:, None]
+            # of a triangle: (Σ v vᵀ + (Σ v)(Σ v)ᵀ) / 12
+            whole = at.sum(axis=1)
+            square = np.einsum("nkd,nke->nde", at, at) + np.einsum("nd,ne->nde", whole, whole)
+            total += (areas[:, half] / 12.0)[:, None, None] * square
+        return total / self.areas[:, None, None]
+
+    @cached_property
+    def flat_axis(self) -> NDArray[np.intp]:
+        """Coordinate axis normal to each axis-parallel rectangle; −1 for any other panel."""
+        edges = np.roll(self.corners, -1, axis=1) - self.corners
+        tolerance = 1e-12 * self.radii[:, None]
+        along = np.abs(edges) > tolerance[:, :, None]
+        proper = (along.sum(axis=2) == 1).all(axis=1)
+        thin = ~along.any(axis=1)
+        single = thin.sum(axis=1) == 1
+        return np.where(proper & single, np.argmax(thin, axis=1), -1)
+
+    def points(self, order: int) -> tuple[Array, Array]:
+        """Return Gauss points (n, order², 3) and weights (n, order²) on each panel."""
+        nodes, weights = np.polynomial.legendre.leggauss(order)
+        s, t = (grid.ravel() for grid in np.meshgrid(nodes, nodes, indexing="ij"))
+        signs_s, signs_t = np.array([-1, 1, 1, -1]), np.array([-1, -1, 1, 1])
+        shape = 0.25 * (1 + np.outer(s, signs_s)) * (1 + np.outer(t, signs_t))
+        by_s = 0.25 * signs_s * (1 + np.outer(t, signs_t))
+        by_t = 0.25 * signs_t * (1 + np.outer(s, signs_s))
+        at = np.einsum("qk,nkd->nqd", shape, self.corners)
+        jacobian = np.cross(
+            np.einsum("qk,nkd->nqd", by_s, self.corners),
+            np.einsum("qk,nkd->nqd", by_t, self.corners),
+        )
+        return at, np.linalg.norm(jacobian, axis=2) * np.outer(weights, weights).ravel()

@@ -1,0 +1,102 @@
+"""The single-layer operator of a surface: densities on its panels to potentials.
+
+Galerkin's method with constant densities: V_ij = Σ_m s_m ∫_i ∫_{m(j)} 1/(4π|x − y|), where m runs
+over the mirrors that stand for symmetry or for isothermal planes and s_m is their sign. V is
+symmetric and positive definite; for ∇²θ = 0 outside the surface, θ given on it and no flux at
+infinity, the heat that leaves panel i is A_i q_i with V q = b, b_i = ∫_i θ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hotlever.air.integrals import far_pairs, potential, rectangle_pairs
+from hotlever.air.panels import IDENTITY, Mirror, Panels
+from hotlever.threads import one_blas_thread
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Progress = Callable[[int, int], None]
+
+#: Pairs whose centroids are this many times the sum of their radii apart are far.
+FAR = 3.0
+#: Gauss points per direction for near pairs that have no closed form: touching, and others.
+TOUCHING_ORDER, NEAR_ORDER = 6, 4
+_TOUCHING = 1.5
+#: Panels expanded, and pairs integrated, at once: arrays that stay in the cache.
+_ROWS, _PAIRS = 32, 8192
+
+
+@one_blas_thread
+def single_layer(
+    panels: Panels, mirrors: Sequence[Mirror] = (IDENTITY,), progress: Progress | None = None
+) -> Array:
+    """Return the Galerkin matrix of 1/(4πR).
+
+    Parameters
+    ----------
+    panels : Panels
+    mirrors : sequence of Mirror, optional
+        The identity among them; each its own inverse.
+    progress : callable, optional
+        Called with steps done and their number.
+
+    Returns
+    -------
+    ndarray, shape (n, n)
+        µm³, symmetric.
+    """
+    count = len(panels)
+    matrix = np.zeros((count, count))
+    for done, mirror in enumerate(mirrors):
+        images = panels.reflected(mirror)
+        one = np.empty_like(matrix)
+        near: list[tuple[Index, Index]] = []
+        for start in range(0, count, _ROWS):
+            rows = np.arange(start, min(start + _ROWS, count))
+            some = panels.chosen(rows)
+            offsets = some.centres[:, None] - images.centres
+            one[rows] = far_pairs(some, images, offsets)
+            reach = FAR * (some.radii[:, None] + images.radii)
+            i, j = np.nonzero(np.einsum("nmd,nmd->nm", offsets, offsets) < reach**2)
+            half = rows[i] <= j
+            near.append((rows[i][half], j[half]))
+        first, second = (np.concatenate(numbers) for numbers in zip(*near, strict=True))
+        closed = (panels.flat_axis[first] >= 0) & (images.flat_axis[second] >= 0)
+        for pairs, integrals in ((closed, rectangle_pairs), (~closed, _by_quadrature)):
+            some_i, some_j = first[pairs], second[pairs]
+            for start in range(0, some_i.size, _PAIRS):
+                i, j = some_i[start : start + _PAIRS], some_j[start : start + _PAIRS]
+                values = integrals(panels.chosen(i), images.chosen(j))
+                one[i, j] = values
+                one[j, i] = values
+                if progress is not None:
+                    share = int(100 * min(start + _PAIRS, some_i.size) / some_i.size)
+                    progress(100 * done + share, 100 * len(mirrors))
+        matrix += mirror.sign * one
+    return matrix / (4.0 * np.pi)
+
+
+def _by_quadrature(first: Panels, second: Panels) -> Array:
+    """Integrate 1/R over pairs of any panels: in closed form on one, by Gauss points on the other.
+
+    Both ways are averaged, so that swapping the panels changes nothing.
+    """
+    gaps = np.linalg.norm(first.centres - second.centres, axis=1)
+    touching = gaps < _TOUCHING * (first.radii + second.radii)
+    result = np.empty(len(first))
+    for pairs, order in ((touching, TOUCHING_ORDER), (~touching, NEAR_ORDER)):
+        index = np.flatnonzero(pairs)
+        if not index.size:
+            continue
+        one, other = first.chosen(index), second.chosen(index)
+        for panels, source in ((one, other), (other, one)):
+            points, weights = panels.points(order)
+            values = potential(points, source.corners[:, None])
+            result[index] = np.einsum("nq,nq->n", weights, values) / 2 + (
+                result[index] if panels is other else 0.0
+            )
+    return result

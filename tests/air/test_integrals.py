@@ -1,0 +1,119 @@
+"""Integrals of 1/R over panels against Gauss quadrature and each other."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hotlever.air.integrals import far_pairs, potential, rectangle_pairs
+from hotlever.air.panels import Mirror, Panels, mirror_group
+from hotlever.air.single_layer import single_layer
+
+
+def rectangle(axis: int, low, high) -> Panels:
+    """An axis-parallel rectangle at the low end of its normal axis."""
+    u, v = (other for other in range(3) if other != axis)
+    corners = np.tile(np.asarray(low, dtype=float), (4, 1))
+    corners[1:3, u] = high[u]
+    corners[2:4, v] = high[v]
+    return Panels(corners[None])
+
+
+def by_gauss(first: Panels, second: Panels) -> float:
+    (x,), (wx,) = first.points(12)
+    (y,), (wy,) = second.points(12)
+    return wx @ (1 / np.linalg.norm(x[:, None] - y, axis=2)) @ wy
+
+
+@pytest.mark.parametrize("one", range(3))
+@pytest.mark.parametrize("other", range(3))
+def test_separate_rectangles(one, other):
+    rng = np.random.default_rng(3 * one + other)
+    low = rng.uniform(-1, 1, (2, 3))
+    low[1, 2] += 3
+    high = low + rng.uniform(0.3, 1, (2, 3))
+    first, second = rectangle(one, low[0], high[0]), rectangle(other, low[1], high[1])
+    expected = by_gauss(first, second)
+    assert (first.flat_axis[0], second.flat_axis[0]) == (one, other)
+    assert rectangle_pairs(first, second)[0] == pytest.approx(expected, rel=1e-11)
+    (points,), (weights,) = first.points(12)
+    assert weights @ potential(points, second.corners[0]) == pytest.approx(expected, rel=1e-11)
+    offsets = (first.centres - second.centres)[:, None]
+    assert far_pairs(first, second, offsets)[0, 0] == pytest.approx(expected, rel=2e-3)
+
+
+def test_a_square_on_itself():
+    # ∫∫ 1/R over the unit square: 4 ln(1 + √2) + 4 (1 − √2)/3
+    square = rectangle(2, (0, 0, 0), (1, 1, 0))
+    exact = 4 * np.log(1 + np.sqrt(2)) + 4 * (1 - np.sqrt(2)) / 3
+    assert rectangle_pairs(square, square)[0] == pytest.approx(exact, rel=1e-13)
+
+
+@pytest.mark.parametrize("second", [(1, (0, 0, 0), (1, 0, 1)), (2, (1, 0, 0), (2, 0.3, 0))])
+def test_rectangles_that_share_an_edge(second):
+    first, second = rectangle(2, (0, 0, 0), (1, 1, 0)), rectangle(*second)
+    (points,), (weights,) = second.points(60)
+    outer = weights @ potential(points, first.corners[0])
+    assert rectangle_pairs(first, second)[0] == pytest.approx(outer, rel=1e-6)
+
+
+def test_far_expansion_has_order_four():
+    panel = rectangle(2, (0, 0, 0), (1, 0.4, 0))
+    errors = []
+    for distance in (6.0, 12.0):
+        other = rectangle(0, (distance, 0.2, 0.1), (distance, 1.0, 0.7))
+        exact = rectangle_pairs(panel, other)[0]
+        offsets = (panel.centres - other.centres)[:, None]
+        errors.append(abs(far_pairs(panel, other, offsets)[0, 0] / exact - 1))
+    assert np.log2(errors[0] / errors[1]) > 2.8
+
+
+def test_quadrature_and_closed_form_agree_in_the_matrix():
+    # the same rectangles, turned away from the axes: then Gauss points are used
+    lines = np.array([0.0, 0.1, 0.4, 1.0])
+    corners = [
+        [[a, c, z], [b, c, z], [b, d, z], [a, d, z]]
+        for a, b in pairwise(lines)
+        for c, d in pairwise(lines)
+        for z in (0.0, 0.4)
+    ]
+    panels = Panels(np.array(corners))
+    angle = 0.3
+    turn = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    turned = Panels(panels.corners @ turn.T)
+    assert (panels.flat_axis == 2).all()
+    assert (turned.flat_axis == -1).all()
+    exact, quadrature = single_layer(panels), single_layer(turned)
+    assert np.abs(quadrature / exact - 1).max() < 2e-3  # six Gauss points each way
+    heats = [panels.areas @ np.linalg.solve(layer, panels.areas) for layer in (exact, quadrature)]
+    assert heats[1] == pytest.approx(heats[0], rel=1e-4)
+
+
+def test_panel_geometry():
+    triangle = Panels.triangles(
+        np.array([[0, 0, 0], [3, 0, 0], [0, 3, 0.0]]), np.array([[0, 1, 2]])
+    )
+    assert triangle.areas == pytest.approx([4.5])
+    assert triangle.centres[0] == pytest.approx([1, 1, 0])
+    for panels in (triangle, rectangle(1, (0, 2, 0), (2, 0, 1))):
+        points, weights = panels.points(4)
+        assert weights.sum() == pytest.approx(panels.areas[0])
+        offset = points[0] - panels.centres[0]
+        moments = np.einsum("q,qd,qe->de", weights[0], offset, offset) / panels.areas[0]
+        assert moments == pytest.approx(panels.moments[0], abs=1e-14)
+
+
+def test_mirrors_at_right_angles_form_a_group():
+    planes = [Mirror.in_plane((1, 0, 0), (1, 0, 0), -1.0), Mirror.in_plane((0, 0, 2), (0, 0, 1), 1)]
+    group = mirror_group(planes)
+    assert [mirror.sign for mirror in group] == [1, -1, 1, -1]
+    point = np.array([0.2, 0.3, 0.5])
+    images = np.array([mirror.matrix @ point + mirror.shift for mirror in group])
+    assert images == pytest.approx(
+        np.array([[0.2, 0.3, 0.5], [1.8, 0.3, 0.5], [0.2, 0.3, 3.5], [1.8, 0.3, 3.5]])
+    )
+    assert planes[1].height(point) == pytest.approx(-1.5)
