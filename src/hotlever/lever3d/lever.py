@@ -96,6 +96,16 @@ class SolidLever(Lever):
             }
         )
 
+    def apex_temperature(self, x: Array) -> float:
+        """Return the temperature (K) of the tip's apex; without a tip that of the lever there."""
+        base = self.probe.circuit.base_temperature_K
+        points, (tip_x, tip_y) = self.solid.elements.p, self.solid.layout.tip
+        lowest = points[2] + 1e-3 * np.hypot(points[0] - tip_x, points[1] - tip_y)
+        near = np.hypot(points[0] - tip_x, points[1] - tip_y) < self.solid.layout.thickness_um
+        vertex = int(np.argmin(np.where(near, lowest, np.inf)))
+        node = self.space.operators.basis.nodal_dofs[0, vertex]
+        return float(self.space.nodal(x, base)[0][node])
+
     def in_the_air(self, x: Array) -> tuple[Array, Array]:
         """Return what a state gives to the air.
 
