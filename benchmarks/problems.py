@@ -8,7 +8,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -62,12 +63,58 @@ def solve_with_peer(problem: dict[str, Any], *, plain: bool = False) -> dict[str
         question, answer = Path(folder, "problem.json"), Path(folder, "result.json")
         question.write_text(json.dumps(problem))
         command = [DEBIAN_PYTHON, str(PEER), str(question), "-o", str(answer)]
-        environment = {"PATH": os.environ["PATH"], "HOME": folder, "OMP_NUM_THREADS": "1"}
-        environment["HOME"] = os.environ.get("HOME", folder)  # keeps the peer's compiled forms
         subprocess.run(
-            command + ["--plain"] * plain, check=True, env=environment, stdout=subprocess.DEVNULL
+            command + ["--plain"] * plain,
+            check=True,
+            env=_peer_environment(folder),
+            stdout=subprocess.DEVNULL,
         )
         return json.loads(answer.read_text())
+
+
+@contextmanager
+def peer_server(
+    problem: dict[str, Any], *, plain: bool = False
+) -> Iterator[Callable[[dict[str, float]], dict[str, Any]]]:
+    """Give a function that sweeps with legacy FEniCS, which keeps its mesh and forms.
+
+    It takes material values and returns results; ``error`` where the peer found no solution.
+    """
+    check_peer()
+    with tempfile.TemporaryDirectory() as folder:
+        question = Path(folder, "problem.json")
+        question.write_text(json.dumps(problem))
+        command = [DEBIAN_PYTHON, str(PEER), str(question), "--serve"] + ["--plain"] * plain
+        with subprocess.Popen(
+            command,
+            env=_peer_environment(folder),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        ) as process:
+
+            def answer() -> dict[str, Any]:
+                for line in process.stdout:
+                    if line.startswith("{"):  # dolfin may print lines of its own
+                        return json.loads(line)
+                sys.exit("legacy FEniCS stopped")
+
+            def ask(material: dict[str, float]) -> dict[str, Any]:
+                process.stdin.write(json.dumps(material) + "\n")
+                process.stdin.flush()
+                return answer()
+
+            answer()
+            yield ask
+            process.stdin.close()
+
+
+def _peer_environment(folder: str) -> dict[str, str]:
+    return {
+        "PATH": os.environ["PATH"],
+        "HOME": os.environ.get("HOME", folder),  # keeps the peer's compiled forms
+        "OMP_NUM_THREADS": "1",
+    }
 
 
 def check_peer() -> None:

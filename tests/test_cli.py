@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 from hotlever import __version__
+from hotlever.errors import ComputationError
 from hotlever.probe import Probe
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "lever-a.csv"
@@ -90,6 +91,43 @@ def test_fit_prints_writes_and_reports(run, tmp_path):
     assert page.count("<img") == 5
 
 
+def test_a_fit_is_written_even_if_its_posterior_cannot_be_sampled(run, tmp_path, monkeypatch):
+    def fails(*_, **__):
+        raise ComputationError("no start found")
+
+    monkeypatch.setattr("hotlever.fitting.uncertainty.sample_posterior", fails)
+    options = ("--observables", "current", "--fix", "delta", "--fix", "p", "--fix", "a0")
+    status, out, err = run(
+        "fit", EXAMPLE, *options, "--posterior", "-o", "fit.json", "--report", "report"
+    )
+    assert status == 1
+    assert err.strip().endswith("hotlever: no start found")
+    assert "inversion temperature" in out
+    assert "posterior" not in json.loads((tmp_path / "fit.json").read_text())
+    assert (tmp_path / "report" / "index.html").exists()
+
+
+@pytest.mark.slow
+def test_fit_samples_and_profiles(run, tmp_path):
+    rows = EXAMPLE.read_text().splitlines()
+    (tmp_path / "data.csv").write_text("\n".join(rows[:5] + rows[5::3]) + "\n")
+    status, out, err = run(
+        "fit", "data.csv", "--fix", "delta", "--fix", "n_d", "--fix", "a0", "--fix", "a1",
+        "--posterior", "--samples", "100", "--profiles", "--report", "report", "-o", "fit.json",
+    )  # fmt: skip
+    assert status == 0, err
+    assert "effective samples" in out
+    assert "is not settled" in err
+    content = json.loads((tmp_path / "fit.json").read_text())
+    for name in ("c_kappa", "p"):
+        low, high = content["profiles"][name]["interval"]["95"]
+        assert low < content["parameters"][name]["value"] < high
+        assert low < content["posterior"]["quantities"][name]["quantiles"]["50"] < high
+    assert "inversion_temperature" in content["posterior"]["quantities"]
+    assert len(content["posterior"]["band"]["tip_K"]) == 5
+    assert (tmp_path / "report" / "index.html").read_text().count("<img") == 8
+
+
 def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
     text = EXAMPLE.read_text().replace("5.6", "5.5", 1)
     (tmp_path / "data.csv").write_text(text)
@@ -128,6 +166,10 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
         (("fit",), "Missing argument"),
         (("fit", EXAMPLE, "--observables", "tpi"), "did you mean 'tip'"),
         (("fit", EXAMPLE, "--fix", "nd"), "did you mean 'n_d'"),
+        (("fit", EXAMPLE, "--posterior", "--samples", "0"), "--samples 0: expected 1 or more"),
+        (("fit", EXAMPLE, "--weights", "error"), "did you mean 'errors'"),
+        (("fit", EXAMPLE, "--scheduler", "tcp://a:1"), "--scheduler: expected several data"),
+        (("fit", EXAMPLE, EXAMPLE, "--profiles"), "expected a single data file"),
         (("fit", EXAMPLE, "--fix", "n_d=a"), "--fix n_d: found 'a', expected a number"),
     ],
 )

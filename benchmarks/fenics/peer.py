@@ -1,6 +1,10 @@
 """Independent legacy-FEniCS solver of the paper's two-dimensional vacuum model.
 
     /usr/bin/python3 peer.py PROBLEM.json -o RESULT.json [--plain]
+    /usr/bin/python3 peer.py PROBLEM.json --serve [--plain]
+
+With --serve it keeps mesh and forms, and answers each line on standard input, a JSON dictionary of
+material values, with a line of results, until the input ends.
 
 Solves, on a Joule-heated silicon lever of uniform thickness,
 
@@ -28,6 +32,7 @@ which is not (0.33 / 0.55)^(1/2) = 0.775.
 import argparse
 import dataclasses
 import json
+import sys
 import time
 
 import dolfin as df
@@ -259,6 +264,7 @@ class Lever:
         space = df.FunctionSpace(mesh, element)
         self.state = df.Function(space)
 
+        self.material = {name: df.Constant(problem["material"][name]) for name in MATERIAL_NAMES}
         residual, jacobian = coupled_forms(
             space,
             self.state,
@@ -267,7 +273,7 @@ class Lever:
                 [df.Constant(regions[name][key]) for key in ("centre_um", "axis", "length_um")]
                 for name in tapered
             ],
-            {name: df.Constant(problem["material"][name]) for name in MATERIAL_NAMES},
+            self.material,
             df.Constant(problem["thickness_um"]),
             problem["quadrature_degree"],
         )
@@ -292,8 +298,8 @@ class Lever:
             self.reader_weights = mean_weights(space, edges, READER)
 
         self.series_kohm = problem["circuit"]["series_resistance_ohm"] / 1e3
-        self.values = np.zeros(space.dim())
-        self.values[self.temperature_dofs] = problem["circuit"]["base_temperature_K"]
+        self.cold = np.zeros(space.dim())
+        self.cold[self.temperature_dofs] = problem["circuit"]["base_temperature_K"]
         self.kelvin_per_unit = np.full(space.dim(), KELVIN_PER_VOLT)
         self.kelvin_per_unit[self.temperature_dofs] = 1.0
 
@@ -306,10 +312,17 @@ class Lever:
         self.unit_rise[:] = indicator
         self.current_row = self.state.vector().copy()
         self.solver = None  # made with the first matrix
-        self.is_stale = True
         self.iterations = 0
         self.factorisations = 0
+        self.start({})
+
+    def start(self, material):
+        """Go back to zero bias, with some of the material values changed."""
+        for name, value in material.items():
+            self.material[name].assign(value)
+        self.values = self.cold
         self.history = {0.0: self.values}  # bias [V] -> solution, the latest last
+        self.is_stale = True
 
     def residual(self):
         """Return the residual [mW, mA] of the present values, fixed rows included.
@@ -451,8 +464,8 @@ def warm_up(problem):
     Lever(tiny, TUNED).sweep([0.0])
 
 
-def solve_problem(problem, strategy):
-    """Return the result dictionary; the compilation of generated code is not timed."""
+def prepare(problem):
+    """Choose the back end, and compile the generated code."""
     df.set_log_level(df.LogLevel.ERROR)
     df.parameters["linear_algebra_backend"] = "PETSc"
     df.parameters["form_compiler"]["representation"] = "uflacs"
@@ -461,6 +474,10 @@ def solve_problem(problem, strategy):
     df.parameters["form_compiler"]["cpp_optimize_flags"] = "-O3"
     warm_up(problem)
 
+
+def solve_problem(problem, strategy):
+    """Return the result dictionary; the compilation of generated code is not timed."""
+    prepare(problem)
     start = time.perf_counter()
     lever = Lever(problem, strategy)
     result = lever.sweep(problem["bias_V"])
@@ -474,16 +491,36 @@ def solve_problem(problem, strategy):
     }
 
 
+def serve(problem, strategy):
+    """Answer lines of material values with lines of results; the first line says it is ready."""
+    prepare(problem)
+    lever = Lever(problem, strategy)
+    print(json.dumps({"unknowns": len(lever.values)}), flush=True)
+    for line in sys.stdin:
+        lever.start(json.loads(line))
+        try:
+            result = lever.sweep(problem["bias_V"])
+        except RuntimeError as error:
+            result = {"error": str(error)}
+        print(json.dumps(result), flush=True)
+
+
 def main():
-    """Solve a problem file and write the result file."""
+    """Solve a problem file and write the result file, or serve."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("problem", help="PROBLEM.json")
-    parser.add_argument("-o", "--output", required=True, help="RESULT.json")
+    action = parser.add_mutually_exclusive_group(required=True)
+    action.add_argument("-o", "--output", help="RESULT.json")
+    action.add_argument("--serve", action="store_true", help="answer lines of material values")
     parser.add_argument("--plain", action="store_true", help="solve as dolfin's NewtonSolver does")
     arguments = parser.parse_args()
     with open(arguments.problem, encoding="utf-8") as file:
         problem = json.load(file)
-    result = solve_problem(problem, PLAIN if arguments.plain else TUNED)
+    strategy = PLAIN if arguments.plain else TUNED
+    if arguments.serve:
+        serve(problem, strategy)
+        return
+    result = solve_problem(problem, strategy)
     with open(arguments.output, "w", encoding="utf-8") as file:
         json.dump(result, file, indent=1)
 

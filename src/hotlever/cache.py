@@ -28,6 +28,14 @@ Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
 
 
+def cache_folder() -> Path | None:
+    """Return where results are kept; None if the cache is switched off."""
+    chosen = os.environ.get(CACHE_VARIABLE)
+    if chosen == "":
+        return None
+    return Path(chosen) if chosen else Path(platformdirs.user_cache_dir("hotlever"))
+
+
 def cache_file(kind: str, facts: Mapping[str, Any]) -> Path | None:
     """Return the file of a result of some kind; None if the cache is switched off.
 
@@ -38,10 +46,9 @@ def cache_file(kind: str, facts: Mapping[str, Any]) -> Path | None:
     facts : mapping
         Everything that the result depends on: what JSON knows, and arrays.
     """
-    chosen = os.environ.get(CACHE_VARIABLE)
-    if chosen == "":
+    top = cache_folder()
+    if top is None:
         return None
-    top = Path(chosen) if chosen else Path(platformdirs.user_cache_dir("hotlever"))
     content = hashlib.sha256()
     for name in sorted(facts):
         fact = facts[name]

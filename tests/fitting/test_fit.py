@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 from importlib.resources import as_file, files
@@ -277,4 +278,70 @@ def test_example_fit_on_the_default_mesh():
     assert result.residual_rms["tip_K"] < 10.0
     for fitted in result.parameters.values():
         assert fitted.stderr is not None
-        assert fitted.stderr < 0.1 * fitted.value
+        assert fitted.stderr < 0.2 * fitted.value
+
+
+# --- measurement errors as weights, and what standard errors are worth ---------------------------
+
+
+def with_errors(measurement, current=None, reader=None, tip=None):
+    size = measurement.bias_V.size
+
+    def column(value):
+        return None if value is None else np.full(size, value)
+
+    return dataclasses.replace(
+        measurement,
+        current_error_mA=column(current),
+        reader_error_V=column(reader),
+        tip_error_K=np.full(size, np.nan) if tip is None else column(tip),
+    )
+
+
+def test_measurement_errors_weigh_the_data(coarse, coarse_fast):
+    measurement = twin(coarse, noise=0.003)
+    trusted = with_errors(measurement, current=1e-5, reader=1.0, tip=1e3)
+    result = fit(trusted, coarse.probe, weights="errors", model=coarse_fast)
+    alone = fit(measurement, coarse.probe, observables=["current"], model=coarse_fast)
+    assert result.residual_rms["current_mA"] == pytest.approx(
+        alone.residual_rms["current_mA"], rel=1e-3
+    )
+    assert any("times the measurement errors" in note for note in result.notes)
+
+
+def test_without_measurement_errors_the_scatter_takes_their_place(coarse, coarse_fast):
+    measurement = twin(coarse, noise=0.003)
+    weighed = fit(measurement, coarse.probe, weights="errors", model=coarse_fast)
+    scatter = {
+        name: weighed.residual_rms[column]
+        for name, column in (("current", "current_mA"), ("reader", "reader_V"), ("tip", "tip_K"))
+    }
+    again = fit(
+        with_errors(measurement, **scatter), coarse.probe, weights="errors", model=coarse_fast
+    )
+    for name, parameter in weighed.parameters.items():
+        assert abs(again.parameters[name].value - parameter.value) < 0.1 * parameter.stderr
+
+
+def test_some_missing_measurement_errors_are_an_error(coarse, coarse_fast):
+    measurement = with_errors(twin(coarse, noise=0.003), tip=5.0)
+    measurement.tip_error_K[3] = np.nan
+    with pytest.raises(InputError, match=r"tip has no error above 0 at 3\.5 V"):
+        fit(measurement, coarse.probe, weights="errors", model=coarse_fast)
+
+
+def test_unknown_weights_are_an_error(coarse):
+    with pytest.raises(InputError, match="weights = 'error', expected 'maximum' or 'errors'"):
+        fit(twin(coarse), coarse.probe, weights="error")
+
+
+def test_standard_errors_follow_the_noise_of_each_observable(coarse, coarse_fast):
+    # a reader a hundred times as noisy widens the resistivity, not the heater's parameters
+    quiet = twin(coarse, noise=1e-4)
+    rng = np.random.default_rng(3)
+    noise = 1e-2 * np.nanmax(quiet.reader_V) * rng.normal(size=quiet.bias_V.size)
+    noisy = dataclasses.replace(quiet, reader_V=quiet.reader_V + noise)
+    before = fit(quiet, coarse.probe, model=coarse_fast).parameters
+    after = fit(noisy, coarse.probe, model=coarse_fast).parameters
+    assert after["a0"].stderr > 20.0 * before["a0"].stderr
+    assert after["p"].stderr / after["p"].value < after["a0"].stderr / after["a0"].value

@@ -51,13 +51,23 @@ def note(text: str) -> None:
     stderr.print(f"note: {text}", markup=False)
 
 
+Update = Callable[[int, int], None]
+
+
 @contextmanager
-def progress(label: str) -> Iterator[Callable[[int, int], None]]:
+def progress(label: str) -> Iterator[Update]:
     """Show a progress bar on standard error while the block runs.
 
     The block gets a function to call with (steps done, steps in all); library functions
     that can take longer than two seconds accept it as their ``progress`` argument.
     """
+    with progress_bars(label) as (update,):
+        yield update
+
+
+@contextmanager
+def progress_bars(*labels: str) -> Iterator[tuple[Update, ...]]:
+    """Show several progress bars, each from its first call on."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -65,12 +75,13 @@ def progress(label: str) -> Iterator[Callable[[int, int], None]]:
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=stderr, transient=True) as bar:
-        task = bar.add_task(label, total=None)
 
-        def update(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total)
+        def updater(label: str, visible: bool) -> Update:
+            task = bar.add_task(label, total=None, visible=visible)
+            return lambda done, total: bar.update(task, completed=done, total=total, visible=True)
 
-        yield update
+        # the first is there at once, to show that work has begun
+        yield tuple(updater(label, place == 0) for place, label in enumerate(labels))
 
 
 @app.callback()
@@ -90,13 +101,13 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         status = app(arguments or ["--help"], standalone_mode=False)
     except typer.TyperException as error:
-        _fail(error.format_message(), error.exit_code)
+        _exit(error.format_message(), error.exit_code)
     except typer.Abort:
-        _fail("stopped by the user", 1)
+        _exit("stopped by the user", 1)
     except HotleverError as error:
-        _fail(str(error), error.exit_status)
+        _exit(str(error), error.exit_status)
     except KeyboardInterrupt:
-        _fail("stopped by the user", 1)
+        _exit("stopped by the user", 1)
     except BrokenPipeError:
         # the reader of our standard output has gone (`| head`): nothing left to say to it
         sys.stderr.close()
@@ -104,8 +115,13 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(status if isinstance(status, int) else 0)
 
 
-def _fail(message: str, status: int) -> None:
+def fail(message: str) -> None:
+    """Say in one line on standard error what went wrong."""
     one_line = " ".join(message.split())
     if one_line:
         stderr.print(f"hotlever: {one_line}", markup=False)
+
+
+def _exit(message: str, status: int) -> None:
+    fail(message)
     sys.exit(status)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.files import write_text
-from hotlever.fitting.least_squares import LeastSquares
+from hotlever.fitting.least_squares import LeastSquares, Weights
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement
-from hotlever.fitting.models import ForwardModel, fast_model, full_model
+from hotlever.fitting.models import FastModel, ForwardModel, fast_model, full_model
 from hotlever.lever.equations import OBSERVABLES
 from hotlever.lever.lever import Lever
 from hotlever.materials import PARAMETERS, Material, parameter
@@ -131,14 +131,16 @@ def fit(
     observables: Sequence[str] | None = None,
     fixed: Mapping[str, float | None] | None = None,
     robust: bool = False,
+    weights: Weights = "maximum",
+    drift: bool = False,
     medium: str | None = None,
     model: Callable[[Probe], ForwardModel] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Fit:
     """Find the material parameters that make the model match a measurement.
 
-    Levenberg-Marquardt (lmfit) with the exact Jacobian; every observable is divided by its
-    largest measured value, as in the paper. The start is the probe's material.
+    Levenberg-Marquardt (lmfit) with the exact Jacobian. It starts from a material found from the
+    data (see `hotlever.fitting.start`), or from the probe's if that suits them better.
 
     Parameters
     ----------
@@ -154,6 +156,11 @@ def fit(
     robust : bool
         Lessen the weight of points far from the others' fit (Tukey's biweight on the residuals
         in units of their median absolute deviation), down to nothing beyond 4.7 of them.
+    weights : {"maximum", "errors"}
+        Divide every observable by its largest measured value, as in the paper, or every datum by
+        its measurement error; an observable without errors then takes its scatter about the fit.
+    drift : bool
+        Let the zeros of I_h and V_r lie on straight lines over the order of the rows.
     medium : {"vacuum", "air"}, optional
         What the lever was measured in; wins over measurement and probe.
     model : callable, optional
@@ -173,6 +180,8 @@ def fit(
         If the lever cannot be solved at the start, or the fit does not converge.
     """
     began = time.perf_counter()
+    if weights not in ("maximum", "errors"):
+        raise InputError(f"found weights = {weights!r}, expected 'maximum' or 'errors'")
     probe, notes = with_measured_circuit(probe or Probe.reference(), measurement, medium)
     fixed = dict(fixed or {})
     chosen = _chosen(observables, measurement)
@@ -185,15 +194,12 @@ def fit(
             "parameters; fix some or measure more"
         )
     used: NDArray[np.bool_] = np.any(present, axis=0)
+    forward = model(probe) if model else fast_model(probe, progress)
     problem = LeastSquares(
-        model(probe) if model else fast_model(probe, progress),
-        start,
-        measurement,
-        used,
-        chosen,
-        varied,
-        progress,
+        forward, start, measurement, used, chosen, varied, weights, drift, progress
     )
+    if isinstance(forward, FastModel):
+        problem.start = problem.found_start(forward.space, probe.circuit)
     try:
         result = problem.solve_and_confirm(robust)
     except ComputationError:
@@ -205,19 +211,27 @@ def fit(
         result = problem.solve_and_confirm(robust)
     material = problem.material(result.params)
     fitted_probe = probe.model_copy(update={"material": material})
+    covariance = problem.covariance(result)
+    spread = dict(zip(varied, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     parameters = {
         name: FittedParameter(
             value=getattr(material, name),
-            stderr=problem.stderr(result, name),
+            stderr=spread[name] if np.isfinite(spread.get(name, np.nan)) else None,
             unit=PARAMETERS[name].unit,
             vary=name in varied,
         )
         for name in PARAMETERS
     }
-    covariance = problem.covariance(result)
     correlation = _correlation(covariance)
     band = problem.band(result.params, covariance, probe.circuit.series_resistance_ohm)
     notes += problem.suspicious(result.params, robust)
+    notes += problem.zeros(result.params)
+    chi_square = problem.reduced_chi_square
+    if chi_square is not None:
+        notes.append(
+            f"the scatter about the fit is {np.sqrt(chi_square):.2f} times the measurement errors; "
+            "standard errors follow the scatter"
+        )
     notes += statements(parameters, varied, correlation, band)
     return Fit(
         parameters=parameters,

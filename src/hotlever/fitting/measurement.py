@@ -27,6 +27,8 @@ COLUMNS = {
     "V_r": ("reader_V", "V"),
     "T_tip": ("tip_K", "K"),
     "dT_tip": ("tip_error_K", "delta_K"),
+    "dI_h": ("current_error_mA", "mA"),
+    "dV_r": ("reader_error_V", "V"),
 }
 #: The columns a fit can compare, by the name users give it.
 OBSERVABLE_SYMBOLS = {"current": "I_h", "reader": "V_r", "tip": "T_tip"}
@@ -50,6 +52,9 @@ class Measurement:
     Attributes
     ----------
     bias_V, current_mA, reader_V, tip_K, tip_error_K : ndarray, shape (n,)
+        The last is the standard error of the tip temperature.
+    current_error_mA, reader_error_V : ndarray, shape (n,), or None
+        Standard errors of the others.
     series_resistance_ohm, base_temperature_K : float or None
         If the file gives them.
     medium : {"vacuum", "air"} or None
@@ -71,6 +76,8 @@ class Measurement:
     path: str = ""
     sha256: str = ""
     ignored: tuple[str, ...] = field(default=())
+    current_error_mA: Array | None = None
+    reader_error_V: Array | None = None
 
     def observable(self, name: str) -> Array:
         """Return the data of ``current`` (mA), ``reader`` (V) or ``tip`` (K).
@@ -84,6 +91,12 @@ class Measurement:
             raise unknown_name("observable", name, OBSERVABLE_SYMBOLS)
         values: Array = getattr(self, COLUMNS[OBSERVABLE_SYMBOLS[name]][0])
         return values
+
+    def error(self, name: str) -> Array:
+        """Return the standard errors of an observable's data, NaN where there are none."""
+        self.observable(name)
+        values = getattr(self, COLUMNS["d" + OBSERVABLE_SYMBOLS[name]][0])
+        return np.full(self.bias_V.shape, np.nan) if values is None else values
 
     @property
     def observables(self) -> tuple[str, ...]:
@@ -132,15 +145,12 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
         raise InputError(f"{path}: no header row, expected one like 'V_b (V),I_h (mA),V_r (mV)'")
     if not rows:
         raise InputError(f"{path}: no data rows after the header")
-    bias, current, reader, tip, error = (
-        np.array([row.get(symbol, math.nan) for row in rows]) for symbol in COLUMNS
-    )
+    values = {
+        attribute: np.array([row.get(symbol, math.nan) for row in rows])
+        for symbol, (attribute, _) in COLUMNS.items()
+    }
     measurement = Measurement(
-        bias,
-        current,
-        reader,
-        tip,
-        error,
+        **values,
         series_resistance_ohm=settings.get("series_resistance_ohm"),
         base_temperature_K=settings.get("base_temperature_K"),
         medium=medium,

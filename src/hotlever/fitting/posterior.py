@@ -9,7 +9,6 @@ The parameters have uniform priors within the bounds of `PARAMETERS`.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -33,6 +32,7 @@ from hotlever.lever.lever import Lever
 from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.materials import PARAMETERS, Material
 from hotlever.materials.silicon import inversion_temperature
+from hotlever.threads import single_threaded_children
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -48,8 +48,6 @@ _BLOCK = 10
 _GAUSSIAN_SHARE = 0.6
 #: Degrees of freedom of that proposal, whose tails must be wider than the posterior's.
 _TAILS = 5.0
-#: Variables that keep the linear algebra of a worker on one thread.
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 #: Quantiles (%) of a predictive band: median, 68 % and 95 %.
 BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)
@@ -178,7 +176,7 @@ def sample_posterior(
     walkers: int = 24,
     processes: int = 2,
     seed: int = 0,
-    noise: Noise = "common",
+    noise: Noise = "each",
     lever: Lever | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -568,28 +566,13 @@ def _mapper(target: Target, processes: int) -> Iterator[Callable[..., list[Any]]
         return list(pool.map(_on_target, [function] * len(tasks), tasks))
 
     try:
-        with _single_threaded_children(), pool:
+        with single_threaded_children(), pool:
             yield run
     except BrokenProcessPool as error:
         raise ComputationError(
             "a process that sampled the posterior died; with too little memory, or in a script "
             'without `if __name__ == "__main__"`, use processes=1'
         ) from error
-
-
-@contextmanager
-def _single_threaded_children() -> Iterator[None]:
-    """Let processes started meanwhile do their linear algebra on one thread."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 def _keep_target(target: Target) -> None:

@@ -23,8 +23,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-#: Krylov's method stops at this residual, relative to the right-hand side.
-_TOLERANCE = 1e-8
+#: Krylov's method stops at this residual, relative to the right-hand side: for a step of Newton's
+#: method or a tangent, which are corrected later, and for several right-hand sides at once, which
+#: are derivatives and are not.
+_STEP_TOLERANCE, _TOLERANCE = 1e-5, 1e-7
 _MOST_DIRECTIONS = 200
 
 
@@ -152,11 +154,14 @@ class AirSolver:
 
     def solve(self, right_hand_side: Array) -> Array:
         """Solve for one right-hand side (n,) or several (n, k)."""
-        if right_hand_side.ndim == 2:
-            return np.stack([self.solve(column) for column in right_hand_side.T], axis=1)
+        if right_hand_side.ndim == 1:
+            return self._solve(right_hand_side, _STEP_TOLERANCE)
+        return np.stack([self._solve(b, _TOLERANCE) for b in right_hand_side.T], axis=1)
+
+    def _solve(self, right_hand_side: Array, tolerance: float) -> Array:
         x: Array = self._factors.solve(right_hand_side)
         residual = self._air.sampling @ x
-        goal = _TOLERANCE * np.linalg.norm(residual)
+        goal = tolerance * np.linalg.norm(residual)
         used = 0
         while True:
             images = self._images[used : self._known]

@@ -107,6 +107,25 @@ class Atlas:
         found[-1] = bias
         return np.asarray(found)
 
+    def branch(
+        self, place: Array, stretched: NDArray[np.bool_], c_kappa: float, functionals: Array
+    ) -> Array:
+        """Return linear functionals of the unknowns and of I_h on the grid.
+
+        Parameters
+        ----------
+        place, stretched, c_kappa
+            As for `guess`.
+        functionals : ndarray, shape (f, n)
+
+        Returns
+        -------
+        ndarray, shape (f, g)
+        """
+        stretch = np.where(stretched, np.sqrt(c_kappa / self.c_kappa), 1.0)
+        weights = (functionals * stretch) @ np.moveaxis(self.surface, 1, 2)
+        return np.asarray(np.tensordot(_terms(place)[0], weights, axes=1))
+
 
 def _terms(place: Array) -> tuple[Array, Array]:
     """Return the terms of a quadratic function, (terms,), and their gradients, (terms, p)."""

@@ -38,12 +38,22 @@ def parameter_rows(fit: Fit) -> list[tuple[str, str, str, str]]:
     """Return symbol, value with error, unit and a remark for each parameter."""
     rows = []
     for name, fitted in fit.parameters.items():
-        known = PARAMETERS[name]
-        power = "" if known.scale == 1 else f"{known.scale:.0e}".replace("e+", "e") + " "
-        unit = (power + ("" if known.unit == "1" else known.unit)).strip()
-        shown = value_with_error(fitted.value, fitted.stderr, known.scale)
-        rows.append((name, shown, unit, "" if fitted.vary else "fixed"))
+        shown = value_with_error(fitted.value, fitted.stderr, PARAMETERS[name].scale)
+        rows.append((name, shown, scaled_unit(name), "" if fitted.vary else "fixed"))
     return rows
+
+
+def scaled_unit(name: str) -> str:
+    """Return the unit a parameter is printed in.
+
+    Examples
+    --------
+    >>> scaled_unit("n_d")
+    '1e17 cm⁻³'
+    """
+    known = PARAMETERS[name]
+    power = "" if known.scale == 1 else f"{known.scale:.0e}".replace("e+", "e") + " "
+    return (power + ("" if known.unit == "1" else known.unit)).strip()
 
 
 def fit_text(fit: Fit) -> str:

@@ -45,7 +45,7 @@ def posterior_corner(posterior: xr.Dataset, result: Fit | None = None) -> Figure
         Its optimum is marked.
     """
     names = posterior.quantity.values.tolist()
-    shown = {name: _shown(name) for name in names}
+    shown = {name: axis_label(name) for name in names}
     values = {name: posterior[name].values.ravel() / shown[name][1] for name in names}
     size = 1.3 * len(names) + 0.8
     with figure(size, size) as made:
@@ -107,7 +107,7 @@ def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
                 axes.remove()
                 continue
             profile = profiles[place]
-            label, unit = _shown(profile.attrs["parameter"])
+            label, unit = axis_label(profile.attrs["parameter"])
             value, optimum = profile.value.values / unit, profile.attrs["optimum"] / unit
             fine = np.linspace(value.min(), value.max(), 200)
             away = np.abs(value - optimum).argmax()
@@ -134,7 +134,7 @@ def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
             axes.set(xlabel=label, ylabel="Δχ²", ylim=(0, 8))
             axes.xaxis.set_major_locator(MaxNLocator(4))
             panel_letter(axes, "abcdefghijkl"[place])
-        grid[0, 0].legend(loc="upper center")
+        grid[0, 0].legend(loc="upper center", frameon=True, facecolor="white", edgecolor="none")
     return made
 
 
@@ -191,7 +191,7 @@ def predictive_bands(
     return made
 
 
-def _shown(name: str) -> tuple[str, float]:
+def axis_label(name: str) -> tuple[str, float]:
     """Return a quantity's axis label and the unit (of its own) that it is drawn in."""
     if name == "inversion_temperature":
         return "T$_i$ (K)", 1.0
@@ -233,7 +233,7 @@ def _mark(axes: Axes, result: Fit, across: str, down: str | None) -> None:
 def _optimum(result: Fit, name: str) -> float:
     if name == "inversion_temperature":
         return result.inversion_temperature_K
-    return result.parameters[name].value / _shown(name)[1]
+    return result.parameters[name].value / axis_label(name)[1]
 
 
 def _abscissa(measurement: Measurement, place: int, series_ohm: float | None) -> Array | None:

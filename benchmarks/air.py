@@ -1,0 +1,202 @@
+"""Air by boundary elements: what the operator costs, what a sweep costs, what the panels do.
+
+python benchmarks/air.py
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from statistics import median
+
+import numpy as np
+
+from hotlever.air.operator import make_operator
+from hotlever.air.surface import PanelOptions
+from hotlever.air.surroundings import Surroundings
+from hotlever.cache import CACHE_VARIABLE
+from hotlever.lever import Lever
+from hotlever.lever.reduced import BOX, material_in_box
+from hotlever.lever.reduced_cache import cached_reduction
+from hotlever.lever.reduced_lever import ReducedLever
+from hotlever.lever.space import LeverSpace
+from hotlever.probe import Probe
+from problems import BIAS, table
+
+RUNS = 7
+PLACES = {
+    "free space": Surroundings(),
+    "surface 8 µm below": Surroundings(surface_gap_um=8.0),
+    "the same, tilted by 10°, and chip": Surroundings(
+        surface_gap_um=8.0, surface_tilt_deg=10.0, chip=True
+    ),
+}
+
+
+def build(place: str) -> None:
+    """Print panels, seconds and GB of making an operator in a process of its own."""
+    layout = Probe.reference().layout()
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began = time.perf_counter()
+    operator = make_operator(layout, PLACES[place], 293.0, PanelOptions())
+    seconds = time.perf_counter() - began
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(len(operator.sites), f"{seconds:.2f}", f"{peak / 2**20:.2f}", f"{before / 2**20:.2f}")
+
+
+def building():
+    print("Making the operator of the reference probe, in a process of its own (≤ 10 s, ≤ 4 GB)\n")
+    rows = []
+    for place in PLACES:
+        command = [sys.executable, __file__, "--build", place]
+        out = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+        rows.append((place, *out))
+    table(("", "sites", "seconds", "peak GB", "of which imports"), rows)
+
+
+def alternating(actions):
+    """Median seconds of some actions, taken in turns so that the machine's mood is shared."""
+    times = {name: [] for name in actions}
+    for _ in range(RUNS):
+        for name, action in actions.items():
+            began = time.perf_counter()
+            action()
+            times[name].append(time.perf_counter() - began)
+    return {name: median(values) for name, values in times.items()}
+
+
+def speed(vacuum, air):
+    spaces = {"vacuum": cached_reduction(vacuum), "air": cached_reduction(air)}
+    material, circuit = vacuum.probe.material, vacuum.probe.circuit
+    reduced = {name: ReducedLever(space, circuit) for name, space in spaces.items()}
+
+    def with_slopes(name):
+        reduced[name].linearise(reduced[name].solve(material, BIAS))
+
+    kinds = {
+        "full lever": lambda lever, name: lever.solve(BIAS),
+        "full, with sensitivities": lambda lever, name: lever.sweep(BIAS, sensitivities=True),
+        "reduced lever": lambda lever, name: reduced[name].solve(material, BIAS),
+        "reduced, with sensitivities": lambda lever, name: with_slopes(name),
+    }
+    rows = []
+    for kind, action in kinds.items():
+        found = alternating(
+            {
+                "vacuum": lambda action=action: action(vacuum, "vacuum"),
+                "air": lambda action=action: action(air, "air"),
+            }
+        )
+        ratio = found["air"] / found["vacuum"]
+        rows.append((kind, *(f"{found[name]:.3f}" for name in found), f"{ratio:.2f}"))
+    print("\n25-point sweep, operator at hand: seconds, median (air ≤ 2 × vacuum)\n")
+    table(("", "vacuum", "air", "ratio"), rows)
+    return reduced["air"]
+
+
+def accuracy(air, reduced, count=8):
+    rng = np.random.default_rng(5)
+    rows = []
+    for _ in range(count):
+        material = material_in_box(air.probe.material, rng.random(len(BOX)))
+        material = material.with_(c_kappa=rng.uniform(0.6, 0.76))
+        full = air.with_material(material).sweep(BIAS)
+        current, reader, tip = reduced.solve(material, BIAS).observables
+        rows.append(
+            (
+                np.abs(current / full.current_mA.values - 1).max(),
+                np.abs(reader / full.reader_V.values - 1).max(),
+                np.abs(tip - full.tip_K.values).max(),
+            )
+        )
+    print(f"\nReduced against full lever in air, {count} random parameter sets, 25 biases\n")
+    largest = np.max(rows, axis=0)
+    table(
+        ("", "I_h (relative)", "V_r (relative)", "T_tip (K)"),
+        [("largest", *(f"{value:.1e}" for value in largest))],
+    )
+
+
+def refinement(vacuum, air):
+    probe = air.probe
+    bias = [4.0, 8.268, 10.748]
+
+    def observed(options):
+        operator = make_operator(probe.layout(), probe.surroundings, 293.0, options)
+        space = LeverSpace(vacuum.space.mesh, vacuum.space.operators, operator)
+        return len(operator.sites), Lever(probe, space=space).sweep(bias)
+
+    _, finest = observed(PanelOptions(refinement=2.2, edge=0.25))
+    choices = {
+        "sizes × 2": PanelOptions(refinement=0.5),
+        "default": PanelOptions(),
+        "sizes / 2": PanelOptions(refinement=2.0),
+        "half the size at edges only": PanelOptions(edge=0.25),
+        "half the size in the heater only": PanelOptions(heater=0.1),
+    }
+    rows = []
+    for name, options in choices.items():
+        count, data = observed(options)
+        tip = (data.tip_K - finest.tip_K) / (finest.tip_K - 293.0)
+        current = data.current_mA / finest.current_mA - 1
+        heat = data.air_heat_mW / finest.air_heat_mW - 1
+        rows.append((name, count, *(f"{np.abs(x).max().item():.1e}" for x in (heat, tip, current))))
+    print("\nPanels: largest relative distance from 2.2 times finer ones, 4 to 10.7 V\n")
+    table(("", "sites", "heat into air", "rise of T_tip", "I_h"), rows)
+
+
+def scale_factor(vacuum, air):
+    """P in air over P in vacuum at the same tip temperature (the paper: 1.29)."""
+    bias = np.linspace(1.0, 11.0, 101)
+    in_vacuum, in_air = vacuum.sweep(bias), air.sweep(bias)
+    tips = np.array([330.0, 400.0, 500.0, 600.0, 700.0, 800.0, 900.0, 1006.0])
+
+    def power(sweep):
+        return np.interp(tips, sweep.tip_K.values, sweep.power_mW.values)
+
+    share = np.interp(tips, in_air.tip_K.values, (in_air.air_heat_mW / in_air.power_mW).values)
+    k = power(in_air) / power(in_vacuum)
+    print("\nPower in air over power in vacuum at the same tip temperature\n")
+    table(
+        ("T_tip (K)", "k", "air's share of the power"),
+        [(f"{t:.0f}", f"{a:.3f}", f"{b:.3f}") for t, a, b in zip(tips, k, share, strict=True)],
+    )
+    trials = np.linspace(1.1, 1.5, 401)
+    off = [
+        np.abs(
+            np.interp(
+                in_air.power_mW.values / trial, in_vacuum.power_mW.values, in_vacuum.tip_K.values
+            )
+            - in_air.tip_K.values
+        ).max()
+        for trial in trials
+    ]
+    best = int(np.argmin(off))
+    at_paper = off[int(np.argmin(np.abs(trials - 1.29)))]
+    print(
+        f"\nbest single k: {trials[best]:.3f}, which leaves {off[best]:.0f} K; "
+        f"1.29 leaves {at_paper:.0f} K (1 to 11 V)"
+    )
+
+
+def main():
+    if "--build" in sys.argv:
+        build(sys.argv[-1])
+        return
+    building()
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ.setdefault(CACHE_VARIABLE, folder)
+        vacuum = Lever(Probe.reference())
+        air = vacuum.in_medium("air")
+        reduced = speed(vacuum, air)
+        accuracy(air, reduced)
+        refinement(vacuum, air)
+        scale_factor(vacuum, air)
+
+
+if __name__ == "__main__":
+    main()

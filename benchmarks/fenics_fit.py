@@ -1,0 +1,164 @@
+"""The option-III fit of examples/lever-a.csv: the paper's stack beside ours, in the same run.
+
+    python benchmarks/fenics_fit.py [RUNS] [plain] [tuned]
+
+5 runs of ours, and both ways of using FEniCS, if nothing is said; needs
+benchmarks/fenics/install.sh, and some minutes.
+
+The paper's stack is legacy FEniCS, lmfit's Levenberg-Marquardt and finite differences. It gets the
+same data, weights, bounds, tolerances, mesh and cubic element as ours, and starts from the
+reference probe's material, which is close to the optimum; ours finds its own start. What it would
+have to pay as well is given to it for nothing: starting Python, meshing, compiling forms. *Plain*
+is FEniCS as its own Newton solver works; *tuned* keeps factors, predicts, and uses the fastest LU
+of Debian's packages.
+
+*Warm* is `hotlever.fit` with the geometry reduced before (median of the runs), *cold* the whole
+command `hotlever fit` with an empty cache (median of up to 3 runs). The load of the machine is
+printed: other work slows all of them.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+
+import lmfit
+import numpy as np
+
+from hotlever.cache import CACHE_VARIABLE
+from hotlever.fitting import fit, read_measurement
+from hotlever.fitting.fit import with_measured_circuit
+from hotlever.lever import Lever
+from hotlever.materials import PARAMETERS
+from hotlever.probe import Probe
+from problems import peer_problem, peer_server, table
+
+DATA = Path(__file__).parents[1] / "examples" / "lever-a.csv"
+COLUMNS = {"current": "current_mA", "reader": "reader_V", "tip": "tip_K"}
+#: Relative step of the finite differences is its root: far above the solver's tolerance.
+EPSFCN = 1e-8
+WAYS = ["plain", "tuned"]
+#: Residual of parameters for which no solution is found.
+FAR = 10.0
+
+
+def paper_fit(measurement, probe, plain):
+    """Fit as the paper did; return lmfit's result, the sweeps it took and the seconds."""
+    lever = Lever(probe)
+    order = np.argsort(measurement.bias_V)
+    problem = peer_problem(
+        probe, lever.space.mesh, degree=3, quadrature=5, bias=measurement.bias_V[order].tolist()
+    )
+    data = np.stack([measurement.observable(name)[order] for name in COLUMNS])
+    largest = np.nanmax(np.abs(data), axis=1, keepdims=True)
+    present = np.isfinite(data)
+    parameters = lmfit.Parameters()
+    for name, known in PARAMETERS.items():
+        parameters.add(
+            name,
+            value=getattr(probe.material, name) / known.scale,
+            min=known.lower / known.scale,
+            max=known.upper / known.scale,
+        )
+    sweeps = 0
+
+    with peer_server(problem, plain=plain) as ask:
+
+        def residual(trial):
+            nonlocal sweeps
+            sweeps += 1
+            print(f"\rFEniCS: sweep {sweeps}", end="", file=sys.stderr, flush=True)
+            values = {name: trial[name].value * known.scale for name, known in PARAMETERS.items()}
+            found = ask(values)
+            if "error" in found:
+                return np.full(present.sum(), FAR)
+            model = np.stack([found[column] for column in COLUMNS.values()])
+            return ((model - data) / largest)[present]
+
+        began = time.perf_counter()
+        minimizer = lmfit.Minimizer(residual, parameters)
+        result = minimizer.leastsq(xtol=1e-5, ftol=1e-6, epsfcn=EPSFCN)
+        seconds = time.perf_counter() - began
+        print(file=sys.stderr)
+        return result, sweeps, seconds
+
+
+def cold_command():
+    """Return the seconds of the whole command with an empty cache."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-c", "from hotlever.cli import main; main()", "fit", str(DATA)]
+        began = time.perf_counter()
+        subprocess.run(
+            [*command, "-o", str(Path(folder, "fit.json"))],
+            check=True,
+            env=os.environ | {CACHE_VARIABLE: str(Path(folder, "cache"))},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        return time.perf_counter() - began
+
+
+def warm_fit(measurement):
+    began = time.perf_counter()
+    result = fit(measurement)
+    return result, time.perf_counter() - began
+
+
+def main():
+    numbers = [int(argument) for argument in sys.argv[1:] if argument.isdecimal()]
+    runs = numbers[0] if numbers else 5
+    ways = [argument for argument in sys.argv[1:] if argument in WAYS] or WAYS
+    measurement = read_measurement(DATA)
+    probe, _ = with_measured_circuit(Probe.reference(), measurement)
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ[CACHE_VARIABLE] = folder
+        fit(measurement)  # reduces the geometry
+        warm_times = [warm_fit(measurement)[1] for _ in range(runs)]
+        peers = {}
+        for way in ways:
+            peers[way] = paper_fit(measurement, probe, plain=way == "plain")
+            # beside each peer, so that a slow spell of the machine meets both
+            warm_times += [warm_fit(measurement)[1] for _ in range(runs)]
+        ours, _ = warm_fit(measurement)
+    cold = median(cold_command() for _ in range(min(runs, 3)))
+    warm = median(warm_times)
+
+    print("Option-III fit of lever-a.csv: the same optimum\n")
+    rows = []
+    worst = dict.fromkeys(peers, 0.0)
+    for name, known in PARAMETERS.items():
+        mine = ours.parameters[name]
+        row = [name, f"{mine.value / known.scale:.5f}", f"{mine.stderr / known.scale:.5f}"]
+        for way, (result, _, _) in peers.items():
+            theirs = result.params[name].value
+            apart = abs(theirs - mine.value / known.scale) / (mine.stderr / known.scale)
+            worst[way] = max(worst[way], apart)
+            row += [f"{theirs:.5f}", f"{apart:.3f}"]
+        rows.append(row)
+    columns = ["parameter (in its scale)", "hotlever", "standard error"]
+    for way in peers:
+        columns += [f"FEniCS {way}", "apart (standard errors)"]
+    table(columns, rows)
+    apart = max(worst.values())
+    print(f"\nlargest distance: {apart:.3f} standard errors (target: at most 0.05)")
+    print(f"\nTime (s); load of the machine at the end {os.getloadavg()[0]:.1f}\n")
+    rows = [
+        (f"FEniCS {way}, lmfit", sweeps, f"{seconds:.1f}", f"{seconds / warm:.0f}",
+         f"{seconds / cold:.1f}")
+        for way, (_, sweeps, seconds) in peers.items()
+    ]  # fmt: skip
+    rows += [
+        ("hotlever, geometry reduced before", ours.evaluations, f"{warm:.2f}", "", ""),
+        ("hotlever, whole command, empty cache", "", f"{cold:.1f}", "", ""),
+    ]
+    table(("", "sweeps", "seconds", "times ours warm", "times ours cold"), rows)
+    print("\ntargets: 200 times ours warm, 30 times ours cold")
+
+
+if __name__ == "__main__":
+    main()

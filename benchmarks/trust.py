@@ -1,0 +1,110 @@
+"""Can a fit be trusted? Coverage of its intervals over noisy twins, and its starting points.
+
+python benchmarks/trust.py [TWINS] [STARTS]
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from hotlever.fitting import Measurement, fit, read_measurement
+from hotlever.lever import Lever
+from hotlever.lever.reduced import BOX, material_in_box
+from hotlever.materials import PARAMETERS
+from hotlever.probe import Probe
+from problems import BIAS, table
+
+#: Noise of a twin: of its own value, or of the largest; K for the temperature.
+ELECTRICAL, KELVIN = 0.002, 6.0
+
+
+def twin(sweep, rng, proportional):
+    """Return noisy data of a sweep."""
+
+    def noisy(values):
+        size = values if proportional else values.max()
+        return values + ELECTRICAL * size * rng.normal(size=values.size)
+
+    tip = sweep.tip_K.values
+    spread = KELVIN * (1.0 + (tip - tip[0]) / 600.0) if proportional else KELVIN
+    return Measurement(
+        BIAS,
+        noisy(sweep.current_mA.values),
+        noisy(sweep.reader_V.values),
+        tip + spread * rng.normal(size=tip.size),
+        np.full(tip.size, np.nan),
+    )
+
+
+def coverage(probe, twins, proportional):
+    """Print how often the intervals of a fit hold the truth."""
+    sweep, rng = Lever(probe).sweep(BIAS), np.random.default_rng(1)
+    names = [*PARAMETERS, "T_tip, hottest", "T_tip, 900 K"]
+    hot, warm = BIAS.size - 1, int(np.argmin(np.abs(sweep.tip_K.values - 900.0)))
+    pulls = []
+    for _ in range(twins):
+        found = fit(twin(sweep, rng, proportional))
+        pull = [
+            (found.parameters[name].value - getattr(probe.material, name))
+            / found.parameters[name].stderr
+            for name in PARAMETERS
+        ]
+        missed = (found.band.tip_K.values - sweep.tip_K.values) / found.band.tip_stderr_K.values
+        pulls.append([*pull, missed[hot], missed[warm]])
+    pulls = np.array(pulls)
+    kind = "noise in proportion to each value" if proportional else "constant noise"
+    print(f"\n{twins} twins of Table 1's option III, {kind}\n")
+    rows = [
+        (
+            name,
+            f"{column.mean():+.2f}",
+            f"{column.std():.2f}",
+            f"{100 * (np.abs(column) < 1.0).mean():.0f} %",
+            f"{100 * (np.abs(column) < 1.96).mean():.0f} %",
+        )
+        for name, column in zip(names, pulls.T, strict=True)
+    ]
+    every = np.abs(pulls)
+    rows.append(
+        (
+            "all",
+            "",
+            "",
+            f"{100 * (every < 1.0).mean():.0f} %",
+            f"{100 * (every < 1.96).mean():.0f} %",
+        )
+    )
+    table(("", "mean pull", "spread", "in the 68 % interval", "in the 95 % interval"), rows)
+
+
+def starts(count):
+    """Print how far from each other fits from random materials end."""
+    data, rng = read_measurement("examples/lever-a.csv"), np.random.default_rng(2)
+    probe = Probe.reference()
+    best = fit(data, probe)
+    apart = []
+    for _ in range(count):
+        material = material_in_box(probe.material, rng.random(len(BOX)))
+        material = material.with_(c_kappa=rng.uniform(0.4, 1.0))
+        found = fit(data, probe.model_copy(update={"material": material}))
+        apart.append(
+            max(
+                abs(found.parameters[name].value - parameter.value) / parameter.stderr
+                for name, parameter in best.parameters.items()
+            )
+        )
+    apart = np.array(apart)
+    print(
+        f"\n{count} random starting points: {int((apart < 0.05).sum())} end at the same optimum; "
+        f"the largest distance of a parameter is {apart.max():.1e} standard errors."
+    )
+
+
+if __name__ == "__main__":
+    TWINS = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    STARTS = int(sys.argv[2]) if len(sys.argv) > 2 else 100
+    for each in (True, False):
+        coverage(Probe.reference(), TWINS, each)
+    starts(STARTS)

@@ -1,0 +1,183 @@
+"""Fits of many levers: what is stopped goes on, what dies is done again, what is bad is said."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from distributed import LocalCluster
+
+from hotlever.errors import ComputationError, InputError
+from hotlever.fitting.batch import Batch, FitRequest, fit_many, lever_names
+from hotlever.lever import Lever
+
+BIAS = np.linspace(2, 11, 7)
+#: Two parameters are left to find: the fits are not what is tested.
+REQUEST = FitRequest(
+    observables=("current", "tip"), fixed={"n_d": None, "p": None, "a0": None, "a1": None}
+)
+COMMAND = ("--observables", "current,tip", "--fix", "n_d", "--fix", "p", "--fix", "a0")
+COMMAND += ("--fix", "a1")
+
+
+TRUTHS = [0.66, 0.67, 0.68, 0.69]
+
+
+@pytest.fixture(scope="module")
+def texts(lever: Lever) -> list[str]:
+    """Data of levers that differ in c_kappa."""
+    made = []
+    for c_kappa in TRUTHS:
+        material = lever.probe.material.with_(c_kappa=c_kappa)
+        sweep = lever.with_material(material).sweep(BIAS)
+        rows = zip(BIAS, sweep.current_mA.values, sweep.tip_K.values, strict=True)
+        lines = [",".join(map(str, row)) for row in rows]
+        made.append("\n".join(["V_b (V),I_h (mA),T_tip (K)", *lines, ""]))
+    return made
+
+
+@pytest.fixture
+def levers(texts: list[str], tmp_path: Path) -> list[Path]:
+    """Files of these data."""
+    paths = [tmp_path / f"lever-{number}.csv" for number in range(len(texts))]
+    for path, text in zip(paths, texts, strict=True):
+        path.write_text(text)
+    return paths
+
+
+def workers() -> list[psutil.Process]:
+    return [
+        child
+        for child in psutil.Process().children(recursive=True)
+        if any("spawn_main" in word for word in child.cmdline())
+    ]
+
+
+def found(batch: Batch) -> list[float]:
+    return [one.content["parameters"]["c_kappa"]["value"] for one in batch.fits.values()]
+
+
+def test_killing_a_worker_loses_nothing(levers, tmp_path):
+    killed = []
+
+    def kill_one(done: int, total: int) -> None:
+        if done == 1:
+            killed.append(workers()[0])
+            killed[0].kill()
+
+    batch = fit_many(levers, tmp_path / "out", REQUEST, processes=2, progress=kill_one)
+    assert len(killed) == 1
+    assert batch.exit_status == 0
+    assert list(batch.fits) == ["lever-0", "lever-1", "lever-2", "lever-3"]
+    assert found(batch) == pytest.approx(TRUTHS, abs=1e-3)
+    assert workers() == []
+
+
+def test_what_was_stopped_goes_on_and_bad_files_are_said(levers, run, tmp_path):
+    def stop(done: int, total: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    out = tmp_path / "report" / "fits"
+    with pytest.raises(KeyboardInterrupt):
+        fit_many(levers, out, REQUEST, processes=2, progress=stop)
+    written = {path: path.read_text() for path in out.iterdir()}
+    assert len(written) == 2
+    assert workers() == []
+
+    (tmp_path / "bad.csv").write_text("V_b (V),I_h (mA)\n1,high\n")
+    (tmp_path / "few.csv").write_text("V_b (V),I_h (mA),T_tip (K)\n1,0.1,\n,,\n2,,\n")
+    names = ["bad.csv", "few.csv", *(path.name for path in levers)]
+    status, printed, err = run("fit", *names, *COMMAND, "--processes", "2", "--report", "report")
+    assert status == 2
+    assert "bad.csv: line 2: I_h: found 'high', expected a number" in err
+    assert "few.csv: no values of tip" in err
+    assert "2 of 6 levers were fitted before" in err
+    assert "Traceback" not in err
+    assert {path: path.read_text() for path in written} == written
+    for path, truth in zip(levers, TRUTHS, strict=True):
+        content = json.loads((out / f"{path.stem}.json").read_text())
+        assert content["parameters"]["c_kappa"]["value"] == pytest.approx(truth, abs=1e-3)
+        assert content["request"]["sha256"] == content["data"]["sha256"]
+    for words in ("lever-3", "mean standard error", "scatter between levers"):
+        assert words in printed
+    assert len((out / "levers.csv").read_text().splitlines()) == 5
+    page = (tmp_path / "report" / "index.html").read_text()
+    assert page.count("<img") == 1
+    assert "few.csv: no values of tip" in page
+
+    # all is there: no process is started, and the same table comes again
+    again = run("fit", *names[2:], *COMMAND, "--report", "report")
+    assert again[0] == 0
+    assert again[1] == printed
+
+
+def test_changed_data_options_or_files_are_fitted_anew(levers, tmp_path):
+    cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None)
+    with cluster:
+        address = cluster.scheduler_address
+
+        def reused(request: FitRequest = REQUEST) -> int:
+            return fit_many(levers[:1], tmp_path / "out", request, scheduler=address).reused
+
+        assert reused() == 0
+        assert reused() == 1
+        levers[0].write_text(levers[0].read_text() + "# a comment\n")
+        assert reused() == 0
+        (tmp_path / "out" / "lever-0.json").write_text("{damaged")
+        assert reused() == 0
+        assert reused(FitRequest(observables=("current",), fixed=REQUEST.fixed)) == 0
+
+
+def test_levers_of_the_same_name_are_told_apart_by_their_folders():
+    named = lever_names(["w1/a.csv", "w2/a.csv", "w2/b.csv", "w1/a.csv"])
+    assert named == {
+        "w1_a.csv": Path("w1/a.csv"),
+        "w2_a.csv": Path("w2/a.csv"),
+        "b": Path("w2/b.csv"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"observables": ("tpi",)}, "did you mean 'tip'"),
+        ({"fixed": {"ckappa": None}}, "did you mean 'c_kappa'"),
+        ({"fixed": {"c_kappa": -1.0}}, "greater than 0"),
+    ],
+)
+def test_impossible_requests_are_refused_before_any_fit(settings, message):
+    with pytest.raises(InputError, match=message):
+        FitRequest(**settings)
+
+
+def test_the_worst_failure_decides_the_exit_status():
+    batch = Batch(failures={"a": ComputationError("no convergence")})
+    assert batch.exit_status == 1
+    batch.failures["b"] = InputError("no such file")
+    assert batch.exit_status == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "2 data files: expected -o FOLDER or --report DIR"),
+        (("-o", "out", "--fix", "nd"), "did you mean 'n_d'"),
+        (("-o", "out", "--processes", "0"), "--processes 0: expected 1 or more"),
+        (("-o", "out", "--processes", "2", "--scheduler", "tcp://a:1"), "not both"),
+        (("-o", "a.csv"), "a.csv: cannot be made a folder"),
+        (("-o", "out", "--scheduler", "tcp://127.0.0.1:1"), "no scheduler answers there"),
+    ],
+)
+def test_requests_for_many_levers_that_cannot_be_met(run, monkeypatch, arguments, message):
+    monkeypatch.setattr("hotlever.cluster._PATIENCE_S", 1)
+    for name in ("a.csv", "b.csv"):
+        Path(name).write_text("V_b (V),I_h (mA)\n1,0.1\n")
+    status, out, err = run("fit", "a.csv", "b.csv", *arguments)
+    assert status == 2
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
+    assert out == ""
