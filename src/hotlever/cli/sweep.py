@@ -6,9 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from hotlever.cli.app import app, note, progress, stdout
 from hotlever.cli.options import (
@@ -27,9 +25,9 @@ from hotlever.probe import Probe
 
 if TYPE_CHECKING:
     from hotlever.lever import Lever
+    from hotlever.lever.lever import LeverState
     from hotlever.lever.state_store import StateStore
-
-Array = NDArray[np.float64]
+    from hotlever.lever3d import SolidLever
 
 MODELS = ("flat", "full-3d")
 
@@ -76,7 +74,7 @@ def sweep(
     probe = load_probe(probe_file).with_values(parse_settings(settings or []))
     if medium is not None:
         probe = probe.in_medium(medium)
-    lever, store, write_fields = _made(probe, model)
+    lever, store, fields_writer = _made(probe, model)
 
     failure: ComputationError | None = None
     with progress("sweep") as update:
@@ -94,37 +92,58 @@ def sweep(
     if plot is not None:
         save_figure(sweep_overview(data), plot)
     if fields is not None:
-        folder = output_folder(fields)
+        write = fields_writer(output_folder(fields))
         for state in ramp.states:
-            write_fields(state.x, folder / f"bias_{state.bias:08.4f}V")
+            write(state)
     if failure is not None:
         raise failure
 
 
 def _made(
     probe: Probe, model: str
-) -> tuple[Lever, StateStore | None, Callable[[Array, Path], None]]:
-    """Make the lever, the place to keep its states, and what writes a state's fields."""
+) -> tuple[Lever, StateStore | None, Callable[[Path], Callable[[LeverState], None]]]:
+    """Make the lever, the place to keep its states, and what writes fields to a folder."""
     if model == "full-3d":
         from hotlever.lever3d import SolidLever
-        from hotlever.lever3d.fields import write_solid_vtu
-        from hotlever.report.air_figures import temperature_slices
-        from hotlever.report.style import save_figure
 
         with progress("mesh and air"):
             solid = SolidLever(probe)
-
-        def write_solid(x: Array, name: Path) -> None:
-            write_solid_vtu(solid, x, name.with_name(f"{name.name}.vtu"))
-            if solid.medium == "air":
-                save_figure(temperature_slices(solid, x), name.with_name(f"{name.name}.png"))
-
-        return solid, solid.store(), write_solid
+        return solid, solid.store(), lambda folder: _solid_writer(solid, folder)
 
     from hotlever.lever import Lever
-    from hotlever.lever.fields import FieldMapper, write_vtu
 
     with progress("air") as update:
         flat = Lever(probe, progress=update)
-    mapper = FieldMapper(flat)
-    return flat, None, lambda x, name: write_vtu(mapper.map(x), name.with_name(f"{name.name}.vtu"))
+    return flat, None, lambda folder: _flat_writer(flat, folder)
+
+
+def _flat_writer(lever: Lever, folder: Path) -> Callable[[LeverState], None]:
+    from hotlever.lever.air_fields import AirFields
+    from hotlever.lever.fields import FieldMapper, write_vtu
+
+    mapper = FieldMapper(lever)
+    air = AirFields(lever) if lever.medium == "air" else None
+
+    def write(state: LeverState) -> None:
+        write_vtu(mapper.map(state.x), folder / f"{_name(state)}.vtu")
+        if air is not None:
+            air.write_vtu(state.x, folder / f"{_name(state)}_air.vtu")
+
+    return write
+
+
+def _solid_writer(lever: SolidLever, folder: Path) -> Callable[[LeverState], None]:
+    from hotlever.lever3d.fields import write_solid_vtu
+    from hotlever.report.air_figures import temperature_slices
+    from hotlever.report.style import save_figure
+
+    def write(state: LeverState) -> None:
+        write_solid_vtu(lever, state.x, folder / f"{_name(state)}.vtu")
+        if lever.medium == "air":
+            save_figure(temperature_slices(lever, state.x), folder / f"{_name(state)}.png")
+
+    return write
+
+
+def _name(state: LeverState) -> str:
+    return f"bias_{state.bias:08.4f}V"

@@ -39,6 +39,11 @@ class SurfaceOperator(Protocol):
         ...
 
     @property
+    def sites(self) -> Array:
+        """Places (µm), one row each."""
+        ...
+
+    @property
     def filling(self) -> float:
         """Share of κ_air to be taken off the silicon; see `AirOperator`."""
         ...
@@ -67,7 +72,7 @@ class AirLoss:
     def __init__(
         self, operator: SurfaceOperator, unknowns: Index, shares: Array, slots: Index, size: int
     ) -> None:
-        self.matrix, self.filling = operator.matrix, operator.filling
+        self.sites, self.matrix, self.filling = operator.sites, operator.matrix, operator.filling
         held = unknowns < 0
         self._held = np.where(held, shares, 0.0).sum(axis=1)
         rows = np.broadcast_to(np.arange(len(unknowns))[:, None], unknowns.shape)

@@ -153,6 +153,12 @@ class OpenAir:
         return self._operator(lambda theta: self.solve(theta)[1])
 
     @property
+    def sites(self) -> Array:
+        """The body's nodes, shape (n + m, 3) (µm)."""
+        points = np.array(self.mesh.ngmesh.Coordinates())
+        return np.concatenate([points[self.vertices], points[self.edges].mean(axis=1)])
+
+    @property
     def filling(self) -> float:
         """No air is modelled inside the silicon."""
         return 0.0
