@@ -9,7 +9,7 @@ what that air would conduct along the plate is taken off the silicon in
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,10 @@ class AirOperator:
     matrix: Array
     filling: float = 1.0
 
+    def less(self, diagonal: Array) -> Array:
+        """Return the matrix less a diagonal one."""
+        return self.matrix - np.diag(diagonal)
+
 
 def air_operator(
     layout: Layout,
@@ -78,7 +82,8 @@ def air_operator(
     surroundings, options = surroundings or Surroundings(), options or PanelOptions()
     facts = {
         "version": __version__,
-        "layout": asdict(layout),
+        "layout": asdict(replace(layout, cone=None)),
+        "cone": layout.cone and layout.cone.model_dump(),
         "surroundings": surroundings.model_dump(exclude={"medium"}),
         "jump_um": surroundings.jump_length_um(base_temperature_K),
         "options": asdict(options),
