@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from statistics import median
 
 import numpy as np
@@ -23,7 +24,6 @@ from hotlever.lever import Lever
 from hotlever.lever.reduced import BOX, material_in_box
 from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.lever.reduced_lever import ReducedLever
-from hotlever.lever.space import LeverSpace
 from hotlever.probe import Probe
 from problems import BIAS, table
 
@@ -125,28 +125,54 @@ def refinement(vacuum, air):
     probe = air.probe
     bias = [4.0, 8.268, 10.748]
 
-    def observed(options):
+    def observed(options, **changes):
         operator = make_operator(probe.layout(), probe.surroundings, 293.0, options)
-        space = LeverSpace(vacuum.space.mesh, vacuum.space.operators, operator)
+        space = vacuum.space.in_air(replace(operator, **changes))
         return len(operator.sites), Lever(probe, space=space).sweep(bias)
 
     _, finest = observed(PanelOptions(refinement=2.2, edge=0.25))
     choices = {
-        "sizes × 2": PanelOptions(refinement=0.5),
-        "default": PanelOptions(),
-        "sizes / 2": PanelOptions(refinement=2.0),
-        "half the size at edges only": PanelOptions(edge=0.25),
-        "half the size in the heater only": PanelOptions(heater=0.1),
+        "sizes × 2": observed(PanelOptions(refinement=0.5)),
+        "default": observed(PanelOptions()),
+        "sizes / 2": observed(PanelOptions(refinement=2.0)),
+        "half the size at edges only": observed(PanelOptions(edge=0.25)),
+        "half the size in the heater only": observed(PanelOptions(heater=0.1)),
+        "default, κ_Si in the plate, not κ_Si - κ_air": observed(PanelOptions(), filling=0.0),
     }
     rows = []
-    for name, options in choices.items():
-        count, data = observed(options)
+    for name, (count, data) in choices.items():
         tip = (data.tip_K - finest.tip_K) / (finest.tip_K - 293.0)
         current = data.current_mA / finest.current_mA - 1
         heat = data.air_heat_mW / finest.air_heat_mW - 1
         rows.append((name, count, *(f"{np.abs(x).max().item():.1e}" for x in (heat, tip, current))))
     print("\nPanels: largest relative distance from 2.2 times finer ones, 4 to 10.7 V\n")
     table(("", "sites", "heat into air", "rise of T_tip", "I_h"), rows)
+
+
+def surroundings(vacuum):
+    """What is around the lever, at the bias of the knee in vacuum."""
+    jump = {"accommodation": 0.9}
+    places = {
+        "free space": {},
+        **{f"surface {gap:g} µm below": {"surface_gap_um": gap} for gap in (100, 10, 1, 0.3)},
+        "surface 10 µm below, 10° tilt": {"surface_gap_um": 10.0, "surface_tilt_deg": 10.0},
+        "chip": {"chip": True},
+        **{
+            f"α = 0.9, {pressure:g} mbar": jump | {"pressure_mbar": pressure}
+            for pressure in (1013.25, 100.0, 10.0, 1.0, 0.1)
+        },
+        "α = 0.9, jump of 300 K air": jump | {"jump_temperature_K": 300.0},
+        "α = 0.9, jump of 1000 K air": jump | {"jump_temperature_K": 1000.0},
+    }
+    rows = []
+    for name, values in places.items():
+        probe = vacuum.probe.with_values({"medium": "air", **values})
+        data = Lever(probe, space=vacuum.space).sweep([8.268])
+        share = (data.air_heat_mW / data.power_mW).item()
+        rows.append((name, f"{data.tip_K.item():.1f}", f"{100 * share:.1f} %"))
+    rows.append(("vacuum", f"{vacuum.sweep([8.268]).tip_K.item():.1f}", "0 %"))
+    print("\nSurroundings, at 8.268 V\n")
+    table(("", "T_tip (K)", "air's share of the power"), rows)
 
 
 def scale_factor(vacuum, air):
@@ -195,6 +221,7 @@ def main():
         reduced = speed(vacuum, air)
         accuracy(air, reduced)
         refinement(vacuum, air)
+        surroundings(vacuum)
         scale_factor(vacuum, air)
 
 

@@ -13,8 +13,8 @@ is FEniCS as its own Newton solver works; *tuned* keeps factors, predicts, and u
 of Debian's packages.
 
 *Warm* is `hotlever.fit` with the geometry reduced before (median of the runs), *cold* the whole
-command `hotlever fit` with an empty cache (median of up to 3 runs). The load of the machine is
-printed: other work slows all of them.
+command `hotlever fit` with an empty cache (median of up to 3 runs). All use one thread, but for
+BLAS in places; where other work shares the machine, compare the processor time instead.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ FAR = 10.0
 
 
 def paper_fit(measurement, probe, plain):
-    """Fit as the paper did; return lmfit's result, the sweeps it took and the seconds."""
+    """Fit as the paper did; return lmfit's result, the sweeps it took, and its times."""
     lever = Lever(probe)
     order = np.argsort(measurement.bias_V)
     problem = peer_problem(
@@ -65,16 +65,17 @@ def paper_fit(measurement, probe, plain):
             min=known.lower / known.scale,
             max=known.upper / known.scale,
         )
-    sweeps = 0
+    sweeps, processor = 0, 0.0
 
     with peer_server(problem, plain=plain) as ask:
 
         def residual(trial):
-            nonlocal sweeps
+            nonlocal sweeps, processor
             sweeps += 1
             print(f"\rFEniCS: sweep {sweeps}", end="", file=sys.stderr, flush=True)
             values = {name: trial[name].value * known.scale for name, known in PARAMETERS.items()}
             found = ask(values)
+            processor += found["processor_seconds"]
             if "error" in found:
                 return np.full(present.sum(), FAR)
             model = np.stack([found[column] for column in COLUMNS.values()])
@@ -85,14 +86,14 @@ def paper_fit(measurement, probe, plain):
         result = minimizer.leastsq(xtol=1e-5, ftol=1e-6, epsfcn=EPSFCN)
         seconds = time.perf_counter() - began
         print(file=sys.stderr)
-        return result, sweeps, seconds
+        return result, sweeps, (seconds, processor)
 
 
 def cold_command():
-    """Return the seconds of the whole command with an empty cache."""
+    """Return wall and processor time (s) of the whole command with an empty cache."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", "from hotlever.cli import main; main()", "fit", str(DATA)]
-        began = time.perf_counter()
+        began, used = time.perf_counter(), sum(os.times()[2:4])
         subprocess.run(
             [*command, "-o", str(Path(folder, "fit.json"))],
             check=True,
@@ -100,13 +101,18 @@ def cold_command():
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        return time.perf_counter() - began
+        return time.perf_counter() - began, sum(os.times()[2:4]) - used
 
 
 def warm_fit(measurement):
-    began = time.perf_counter()
-    result = fit(measurement)
-    return result, time.perf_counter() - began
+    """Return wall and processor time (s) of a fit with the geometry reduced before."""
+    began, used = time.perf_counter(), time.process_time()
+    fit(measurement)
+    return time.perf_counter() - began, time.process_time() - used
+
+
+def medians(times):
+    return [median(column) for column in zip(*times, strict=True)]
 
 
 def main():
@@ -118,15 +124,15 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         os.environ[CACHE_VARIABLE] = folder
         fit(measurement)  # reduces the geometry
-        warm_times = [warm_fit(measurement)[1] for _ in range(runs)]
+        warm_times = [warm_fit(measurement) for _ in range(runs)]
         peers = {}
         for way in ways:
             peers[way] = paper_fit(measurement, probe, plain=way == "plain")
             # beside each peer, so that a slow spell of the machine meets both
-            warm_times += [warm_fit(measurement)[1] for _ in range(runs)]
-        ours, _ = warm_fit(measurement)
-    cold = median(cold_command() for _ in range(min(runs, 3)))
-    warm = median(warm_times)
+            warm_times += [warm_fit(measurement) for _ in range(runs)]
+        ours = fit(measurement)
+    cold = medians(cold_command() for _ in range(min(runs, 3)))
+    warm = medians(warm_times)
 
     print("Option-III fit of lever-a.csv: the same optimum\n")
     rows = []
@@ -146,17 +152,21 @@ def main():
     table(columns, rows)
     apart = max(worst.values())
     print(f"\nlargest distance: {apart:.3f} standard errors (target: at most 0.05)")
-    print(f"\nTime (s); load of the machine at the end {os.getloadavg()[0]:.1f}\n")
-    rows = [
-        (f"FEniCS {way}, lmfit", sweeps, f"{seconds:.1f}", f"{seconds / warm:.0f}",
-         f"{seconds / cold:.1f}")
-        for way, (_, sweeps, seconds) in peers.items()
-    ]  # fmt: skip
-    rows += [
-        ("hotlever, geometry reduced before", ours.evaluations, f"{warm:.2f}", "", ""),
-        ("hotlever, whole command, empty cache", "", f"{cold:.1f}", "", ""),
-    ]
-    table(("", "sweeps", "seconds", "times ours warm", "times ours cold"), rows)
+    print(f"\nTime; load of the machine at the end {os.getloadavg()[0]:.1f}\n")
+    rows = []
+    for place, kind in enumerate(("seconds", "processor seconds")):
+        for way, (_, sweeps, times) in peers.items():
+            ratios = times[place] / warm[place], times[place] / cold[place]
+            rows.append(
+                (f"FEniCS {way}, lmfit", sweeps, kind, f"{times[place]:.1f}",
+                 *(f"{ratio:.0f}" for ratio in ratios))
+            )  # fmt: skip
+        for name, sweeps, times in (
+            ("hotlever, geometry reduced before", ours.evaluations, warm),
+            ("hotlever, whole command, empty cache", "", cold),
+        ):
+            rows.append((name, sweeps, kind, f"{times[place]:.2f}", "", ""))
+    table(("", "sweeps", "unit", "time", "times ours warm", "times ours cold"), rows)
     print("\ntargets: 200 times ours warm, 30 times ours cold")
 
 

@@ -44,7 +44,7 @@ def peer_problem(
         "regions": regions,
         "terminals": {
             name: triangles.facets[:, facets].T.tolist()
-            for name, facets in mesh.terminal_edges.items()
+            for name, facets in mesh.terminal_facets.items()
         },
         "tip_um": layout.tip,
         "thickness_um": layout.thickness_um,

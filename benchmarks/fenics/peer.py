@@ -497,11 +497,13 @@ def serve(problem, strategy):
     lever = Lever(problem, strategy)
     print(json.dumps({"unknowns": len(lever.values)}), flush=True)
     for line in sys.stdin:
+        began = time.process_time()
         lever.start(json.loads(line))
         try:
             result = lever.sweep(problem["bias_V"])
         except RuntimeError as error:
             result = {"error": str(error)}
+        result["processor_seconds"] = time.process_time() - began
         print(json.dumps(result), flush=True)
 
 

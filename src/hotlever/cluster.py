@@ -29,13 +29,15 @@ T = TypeVar("T")
 _AHEAD = 2
 #: How long a scheduler, and then its first worker, may take to answer.
 _PATIENCE_S = 10
+#: Those that Dask gives levels of their own.
+_LOGGERS = ("distributed", "distributed.client")
 
 
 class _Quiet(WorkerPlugin):
     """What a local worker does when it starts, and when it starts again."""
 
     def setup(self, worker: Any) -> None:
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        _silence()
         # Ctrl-C reaches all processes of a terminal; the one that started the workers ends them
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         # freeing a large block once teaches glibc to keep the memory of intermediate arrays
@@ -55,6 +57,10 @@ def local_client(processes: int) -> Iterator[Client]:
         "distributed.worker.multiprocessing-method": "spawn",
         # the default hands every freed array back to the system, to ask for it again
         "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
+        # Dask watches its workers many times a second, at the cost of their work
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.tick.interval": "1s",
+        "distributed.admin.system-monitor.interval": "5s",
     }
     with (
         dask.config.set(settings),
@@ -65,14 +71,16 @@ def local_client(processes: int) -> Iterator[Client]:
             cluster = LocalCluster(
                 n_workers=processes,
                 threads_per_worker=1,
-                dashboard_address=None,
+                # None would mean the usual port, with a warning where that is taken
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
                 silence_logs=logging.CRITICAL,
                 local_directory=folder,
             )
         except (RuntimeError, OSError) as error:
             raise ComputationError(
-                "the worker processes could not be started; with too little memory, or in a "
-                'script without `if __name__ == "__main__"`, use one process'
+                "the worker processes could not be started; is there enough memory, and does a "
+                'script that starts them have `if __name__ == "__main__"`?'
             ) from error
         with cluster, Client(cluster, set_as_default=False) as client:
             client.register_plugin(_Quiet())
@@ -89,7 +97,17 @@ def remote_client(address: str) -> Iterator[Client]:
         If nothing answers at the address, or a worker has another version or none.
     """
     where = f"--scheduler {address}"
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    levels = _silence()
+    try:
+        with _connected(address, where) as client:
+            yield client
+    finally:
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
+
+
+@contextmanager
+def _connected(address: str, where: str) -> Iterator[Client]:
     try:
         client = Client(address, timeout=_PATIENCE_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
@@ -104,10 +122,19 @@ def remote_client(address: str) -> Iterator[Client]:
         versions = client.run(_version, on_error="return")
         for worker, found in versions.items():
             if found != __version__:
+                found = found if isinstance(found, str) else "missing"
                 raise InputError(
-                    f"{where}: worker {worker} has hotlever {found}, expected {__version__}"
+                    f"{where}: at worker {worker} hotlever is {found}, expected {__version__}"
                 )
         yield client
+
+
+def _silence() -> dict[str, int]:
+    """Keep Dask's logs from standard error; return the levels they had."""
+    levels = {name: logging.getLogger(name).level for name in _LOGGERS}
+    for name in levels:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    return levels
 
 
 def _version() -> str:
@@ -134,7 +161,12 @@ def run_all(
     done = as_completed(loop=client.loop)
     exhausted = False
     while True:
-        threads = sum(client.nthreads().values())
+        try:
+            threads = sum(client.nthreads().values())
+        except (OSError, TimeoutError) as error:
+            raise ComputationError(
+                "the scheduler is lost; what was done until then is written"
+            ) from error
         while not exhausted and len(running) < max(1, _AHEAD * threads):
             number, arguments = next(waiting, (-1, ()))
             if number < 0:
@@ -150,7 +182,9 @@ def run_all(
         try:
             yield number, future.result()
         except CancelledError as error:
-            raise ComputationError("the scheduler is lost") from error
+            raise ComputationError(
+                "the scheduler is lost; what was done until then is written"
+            ) from error
         except KilledWorker:
             yield number, ComputationError("every process that tried it died; too little memory?")
         except Exception as error:

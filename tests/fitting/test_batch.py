@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -116,7 +118,7 @@ def test_what_was_stopped_goes_on_and_bad_files_are_said(levers, run, tmp_path):
 
 
 def test_changed_data_options_or_files_are_fitted_anew(levers, tmp_path):
-    cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None)
+    cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0")
     with cluster:
         address = cluster.scheduler_address
 
@@ -130,6 +132,33 @@ def test_changed_data_options_or_files_are_fitted_anew(levers, tmp_path):
         (tmp_path / "out" / "lever-0.json").write_text("{damaged")
         assert reused() == 0
         assert reused(FitRequest(observables=("current",), fixed=REQUEST.fixed)) == 0
+
+
+SCHEDULER = """
+import time
+from distributed import LocalCluster
+options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "protocol": "tcp"}
+cluster = LocalCluster(dashboard_address='127.0.0.1:0', **options)
+print(cluster.scheduler_address, flush=True)
+time.sleep(600)
+"""
+
+
+def test_a_lost_scheduler_is_said_and_what_was_done_is_written(levers, tmp_path, capfd):
+    with subprocess.Popen([sys.executable, "-c", SCHEDULER], stdout=subprocess.PIPE) as process:
+        try:
+            address = process.stdout.readline().decode().strip()
+
+            def lose(done: int, total: int) -> None:
+                if done == 1:
+                    process.kill()
+
+            with pytest.raises(ComputationError, match="the scheduler is lost"):
+                fit_many(levers, tmp_path / "out", REQUEST, scheduler=address, progress=lose)
+        finally:
+            process.kill()
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["lever-0.json"]
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_levers_of_the_same_name_are_told_apart_by_their_folders():

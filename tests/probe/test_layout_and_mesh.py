@@ -37,7 +37,7 @@ def test_terminals_have_edges_of_their_full_length(name):
     mesh = mesh_layout(layout)
     for terminal in layout.terminals:
         a, b = mesh.triangles.p[
-            :, mesh.triangles.facets[:, mesh.terminal_edges[terminal.name]]
+            :, mesh.triangles.facets[:, mesh.terminal_facets[terminal.name]]
         ].T.swapaxes(0, 1)
         length = np.linalg.norm(a - b, axis=1).sum()
         assert length == pytest.approx(math.dist(terminal.start, terminal.end))

@@ -9,7 +9,7 @@ what that air would conduct along the plate is taken off the silicon in
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from hotlever import __version__
 from hotlever.air.chip import chip_panels
 from hotlever.air.panels import Panels, mirror_group
-from hotlever.air.single_layer import Progress, single_layer
+from hotlever.air.single_layer import Progress, layer_potential, single_layer
 from hotlever.air.surface import PanelOptions, lever_surface
 from hotlever.air.surroundings import Surroundings
 from hotlever.cache import cache_file, store_arrays, stored
@@ -47,6 +47,10 @@ class AirOperator:
     sites: Array
     matrix: Array
     filling: float = 1.0
+
+    def less(self, diagonal: Array) -> Array:
+        """Return the matrix less a diagonal one."""
+        return self.matrix - np.diag(diagonal)
 
 
 def air_operator(
@@ -78,7 +82,8 @@ def air_operator(
     surroundings, options = surroundings or Surroundings(), options or PanelOptions()
     facts = {
         "version": __version__,
-        "layout": asdict(layout),
+        "layout": asdict(replace(layout, cone=None)),
+        "cone": layout.cone and layout.cone.model_dump(),
         "surroundings": surroundings.model_dump(exclude={"medium"}),
         "jump_um": surroundings.jump_length_um(base_temperature_K),
         "options": asdict(options),
@@ -100,30 +105,75 @@ def make_operator(
     progress: Progress | None = None,
 ) -> AirOperator:
     """Make the operator: see `air_operator`."""
-    surface = lever_surface(layout, options, mirrored=surroundings.symmetric)
-    below = surroundings.surface(layout.tip, layout.thickness_um, base_temperature_K)
-    chip = [chip_panels(layout, options)] if surroundings.chip else []
-    panels = Panels.joined([surface.panels, *chip])
-    for mirror in below:
-        heights = mirror.height(panels.corners)
-        if heights.min() <= 0:
+    return PanelledAir(layout, surroundings, base_temperature_K, options, progress).operator()
+
+
+class PanelledAir:
+    """Panels on a lever and its surroundings, with their single layer factorised.
+
+    Parameters are those of `air_operator`.
+
+    Attributes
+    ----------
+    surface : LeverSurface
+        The lever's own panels: the first of `panels`.
+    panels : Panels
+        These, and the chip's.
+    mirrors : list of Mirror
+        That make the rest of the sources.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        surroundings: Surroundings,
+        base_temperature_K: float,
+        options: PanelOptions | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        options = options or PanelOptions()
+        self.surface = lever_surface(layout, options, mirrored=surroundings.symmetric)
+        chip = [chip_panels(layout, options)] if surroundings.chip else []
+        self.panels = Panels.joined([self.surface.panels, *chip])
+        below = surroundings.surface(layout.tip, layout.thickness_um, base_temperature_K)
+        if any(mirror.height(self.panels.corners).min() <= 0 for mirror in below):
             raise InputError(
                 "surroundings: the surface below crosses the lever or its chip; expected a larger "
                 "surface_gap_um or another surface_tilt_deg"
             )
-    layer = single_layer(panels, mirror_group([*surface.mid_plane, *below]), progress)
-    jump = np.full(len(panels), surroundings.jump_length_um(base_temperature_K))
-    jump[: len(surface.panels)] = surroundings.jump_length_um(surroundings.jump_temperature_K)
-    layer[np.diag_indices_from(layer)] += jump * panels.areas
-    moments = np.zeros((len(panels), len(surface.sites)))
-    moments[np.arange(len(surface.panels)), surface.site] = surface.panels.areas
-    try:
-        density = cho_solve(cho_factor(layer, overwrite_a=True), moments)
-    except LinAlgError as error:
-        raise ComputationError("the air operator of this geometry is not positive") from error
-    halves = 2.0 if surface.mirrored else 1.0
-    heat = halves * (moments.T @ density)
-    # of a lever of one temperature: θ of the air at the surface as a share of the lever's; the
-    # energy of the air inside goes with its square
-    jumped = (jump * panels.areas) @ density.sum(axis=1) / surface.panels.areas.sum()
-    return AirOperator(surface.sites, 0.5 * (heat + heat.T), float((1.0 - jumped) ** 2))
+        self.mirrors = mirror_group([*self.surface.mid_plane, *below])
+        layer = single_layer(self.panels, self.mirrors, progress)
+        own = np.arange(len(self.surface.panels))
+        jump = np.full(len(self.panels), surroundings.jump_length_um(base_temperature_K))
+        jump[own] = surroundings.jump_length_um(surroundings.jump_temperature_K)
+        self._resistances = jump * self.panels.areas
+        layer[np.diag_indices_from(layer)] += self._resistances
+        self._moments = np.zeros((len(self.panels), len(self.surface.sites)))
+        self._moments[own, self.surface.site] = self.surface.panels.areas
+        try:
+            self._factors = cho_factor(layer, overwrite_a=True)
+        except LinAlgError as error:
+            raise ComputationError("the air operator of this geometry is not positive") from error
+
+    def densities(self, theta: Array) -> Array:
+        """Return the heat flux (mW/µm²) into air from every panel, for θ (mW/µm) at the sites."""
+        flux: Array = cho_solve(self._factors, self._moments @ theta)
+        return flux
+
+    def operator(self) -> AirOperator:
+        """Return the matrix from θ at the sites to heat, and how full of air the lever seems."""
+        flux = cho_solve(self._factors, self._moments)
+        halves = 2.0 if self.surface.mirrored else 1.0
+        heat = halves * (self._moments.T @ flux)
+        # of a lever of one temperature: θ of the air at the surface as a share of the lever's; the
+        # energy of the air inside goes with its square
+        own = len(self.surface.panels)
+        jumped = self._resistances[:own] @ flux[:own].sum(axis=1) / self.panels.areas[:own].sum()
+        return AirOperator(self.surface.sites, 0.5 * (heat + heat.T), float((1.0 - jumped) ** 2))
+
+    def theta(self, points: Array, flux: Array) -> Array:
+        """Return θ (mW/µm) of the air at some points (n, 3), for the flux from every panel."""
+        total = np.zeros(len(points))
+        for mirror in self.mirrors:
+            total += mirror.sign * layer_potential(points, self.panels.reflected(mirror), flux)
+        return total

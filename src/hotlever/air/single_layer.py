@@ -80,6 +80,39 @@ def single_layer(
     return matrix / (4.0 * np.pi)
 
 
+@one_blas_thread
+def layer_potential(points: Array, panels: Panels, density: Array) -> Array:
+    """Return the potential of densities on panels.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        µm.
+    panels : Panels
+    density : ndarray, shape (len(panels),)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        ∫ density/(4πR).
+    """
+    result = np.empty(len(points))
+    traces = np.trace(panels.moments, axis1=1, axis2=2)
+    for start in range(0, len(points), 4 * _ROWS):
+        some = points[start : start + 4 * _ROWS]
+        offsets = some[:, None] - panels.centres
+        square = np.einsum("nmd,nmd->nm", offsets, offsets)
+        near = square < (FAR * panels.radii) ** 2
+        inverse = 1.0 / np.sqrt(np.where(near, np.inf, square))
+        spread = np.einsum("nmd,mde,nme->nm", offsets, panels.moments, offsets, optimize=True)
+        integrals = inverse + 0.5 * inverse**3 * (3.0 * spread * inverse**2 - traces)
+        integrals *= panels.areas
+        i, j = np.nonzero(near)
+        integrals[i, j] = potential(some[i], panels.corners[j])
+        result[start : start + len(some)] = integrals @ density
+    return result / (4.0 * np.pi)
+
+
 def _by_quadrature(first: Panels, second: Panels) -> Array:
     """Integrate 1/R over pairs of any panels: in closed form on one, by Gauss points on the other.
 

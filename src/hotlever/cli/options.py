@@ -10,7 +10,7 @@ import typer
 from numpy.typing import NDArray
 
 from hotlever.air.surroundings import Medium
-from hotlever.errors import InputError
+from hotlever.errors import InputError, unknown_name
 from hotlever.probe import Probe
 
 ProbeFile = Annotated[
@@ -99,6 +99,12 @@ def parse_fixed(settings: list[str]) -> dict[str, float | None]:
         name, equals, value = setting.partition("=")
         values[name.strip()] = parse_number(value, f"--fix {name}") if equals else None
     return values
+
+
+def check_choice(option: str, value: str, choices: tuple[str, ...]) -> None:
+    """Refuse a value that is none of the choices, with the nearest one."""
+    if value not in choices:
+        raise unknown_name("value", value, choices, option)
 
 
 def check_output(path: Path | None, *suffixes: str) -> None:

@@ -7,14 +7,13 @@ Krylov's method for the rest.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import LinearOperator, SuperLU
 
-from hotlever.air.operator import AirOperator
 from hotlever.errors import ComputationError
 from hotlever.lever.operators import sums_by_index
 
@@ -31,12 +30,35 @@ _STEP_TOLERANCE, _TOLERANCE = 1e-5, 1e-7
 _MOST_DIRECTIONS = 200
 
 
+class SurfaceOperator(Protocol):
+    """From θ at the sites to the heat lost there: a matrix, or what multiplies like one."""
+
+    @property
+    def matrix(self) -> Any:
+        """The operator, symmetric and positive semi-definite; see `AirOperator`."""
+        ...
+
+    @property
+    def sites(self) -> Array:
+        """Places (µm), one row each."""
+        ...
+
+    @property
+    def filling(self) -> float:
+        """Share of κ_air to be taken off the silicon; see `AirOperator`."""
+        ...
+
+    def less(self, diagonal: Array) -> Any:
+        """Return the operator less a diagonal matrix."""
+        ...
+
+
 class AirLoss:
     """The air operator between the unknowns of a finite-element lever.
 
     Parameters
     ----------
-    operator : AirOperator
+    operator : SurfaceOperator
     unknowns : ndarray of int, shape (sites, nodes)
         Unknowns of the temperatures of the element at each site; −1 where the node is held.
     shares : ndarray, shape (sites, nodes)
@@ -48,9 +70,9 @@ class AirLoss:
     """
 
     def __init__(
-        self, operator: AirOperator, unknowns: Index, shares: Array, slots: Index, size: int
+        self, operator: SurfaceOperator, unknowns: Index, shares: Array, slots: Index, size: int
     ) -> None:
-        self.matrix, self.filling = operator.matrix, operator.filling
+        self.sites, self.matrix, self.filling = operator.sites, operator.matrix, operator.filling
         held = unknowns < 0
         self._held = np.where(held, shares, 0.0).sum(axis=1)
         rows = np.broadcast_to(np.arange(len(unknowns))[:, None], unknowns.shape)
@@ -60,8 +82,8 @@ class AirLoss:
         self.spreading = self.sampling.T.tocsr()
         self._slots = slots
         self._products = shares[:, :, None] * shares[:, None, :]
-        self._local = self.matrix.sum(axis=1)
-        self.rest = self.matrix - np.diag(self._local)
+        self._local = self.matrix @ np.ones(len(unknowns))
+        self.rest = operator.less(self._local)
 
     def temperature(self, x: Array, base_temperature_K: float) -> Array:
         """Return the temperature (K) at the sites."""

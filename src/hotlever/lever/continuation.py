@@ -128,6 +128,10 @@ class BranchFollower:
         for bias in biases:
             yield self.advance_to(bias)
 
+    def resume(self, state: State) -> None:
+        """Go on from a state that a ramp of the same lever has reached before."""
+        self.state, self._previous = state, None
+
     def advance_to(self, bias: float) -> State:
         """Move along the curve to a bias (V) not below the present one; see `ramp`."""
         for _ in range(self.options.max_steps):

@@ -120,8 +120,8 @@ class Space(Protocol):
     air: Any  # an AirTerm, or None in vacuum
 
     @property
-    def thickness_um(self) -> float:
-        """Thickness of the silicon (µm)."""
+    def thickness_um(self) -> float | Array:
+        """Thickness of the silicon (µm), where it varies at the quadrature points."""
         ...
 
     def fields(self, x: Array, base_temperature_K: float) -> Fields:

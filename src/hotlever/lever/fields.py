@@ -66,14 +66,14 @@ class FieldMapper:
         mesh = lever.space.mesh
         element = lever.space.operators.basis.elem
         corners = FiniteElements(
-            mesh.triangles, element, (reference.p, np.full(reference.p.shape[1], 1.0))
+            mesh.elements, element, (reference.p, np.full(reference.p.shape[1], 1.0))
         )
         centres = reference.p[:, reference.t].mean(axis=1)
         self._corners = corners
         space = LeverSpace(
             mesh,
             FiniteElements(
-                mesh.triangles, element, (centres, np.full(centres.shape[1], 0.5 / cuts**2))
+                mesh.elements, element, (centres, np.full(centres.shape[1], 0.5 / cuts**2))
             ),
         )
         self._centres = LeverEquations(space, lever.probe.circuit, lever.probe.material)
@@ -91,10 +91,10 @@ class FieldMapper:
         elements, per_element = corners.weights.shape
         offsets = per_element * np.arange(elements)[:, None, None]
         fields, laws = self._centres.at(x)
-        thickness = lever.space.mesh.layout.thickness_um
+        thickness = self._centres.space.thickness_um
 
         def per_triangle(vector: Array) -> Array:
-            return np.moveaxis(vector, 0, -1).reshape(-1, 2)
+            return np.moveaxis(vector / thickness, 0, -1).reshape(-1, 2)
 
         return FieldMap(
             bias=float(x[-1]),
@@ -103,9 +103,9 @@ class FieldMapper:
             temperature=corners.evaluate(T)[0].ravel(),
             potential=corners.evaluate(V)[0].ravel(),
             region=np.repeat(lever.space.mesh.region, len(self._cell)),
-            current_density=per_triangle(-laws.sigma * fields.grad_V) / thickness,
-            heat_flux=per_triangle(-laws.kappa * fields.grad_T) / thickness,
-            resistivity=1.0 / self._centres.per_cm(laws.sigma.ravel()),
+            current_density=per_triangle(-laws.sigma * fields.grad_V),
+            heat_flux=per_triangle(-laws.kappa * fields.grad_T),
+            resistivity=1.0 / self._centres.per_cm(laws.sigma).ravel(),
         )
 
 

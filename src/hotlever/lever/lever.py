@@ -20,6 +20,7 @@ from hotlever.lever.continuation import AT_BIAS, BranchFollower, ContinuationOpt
 from hotlever.lever.equations import LAWS, OBSERVABLES, LeverEquations
 from hotlever.lever.newton import NewtonOptions, newton
 from hotlever.lever.space import LeverSpace
+from hotlever.lever.state_store import StateStore
 from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import MeshOptions, Probe, mesh_layout
 from hotlever.probe.probe import SECTIONS
@@ -141,7 +142,12 @@ class Lever:
         return BranchFollower(self.equations, options)
 
     @one_blas_thread
-    def solve(self, bias: ArrayLike, progress: Progress | None = None) -> Ramp:
+    def solve(
+        self,
+        bias: ArrayLike,
+        progress: Progress | None = None,
+        store: StateStore | None = None,
+    ) -> Ramp:
         """Find the states that a slow ramp of the bias from zero passes.
 
         Parameters
@@ -150,6 +156,8 @@ class Lever:
             Biases (V) in any order, not negative; repeated ones are solved once.
         progress : callable, optional
             Called with the states done and their number.
+        store : StateStore, optional
+            States found there are taken as they are; others are added as they are solved.
 
         Returns
         -------
@@ -167,14 +175,23 @@ class Lever:
         ramp = Ramp([], [])
         follower = self.follower()
         try:
-            for state in follower.ramp(values.tolist()):
-                ramp.notes.extend(
-                    f"at a bias of {fold.bias:.4f} V the lever jumps from a tip at "
-                    f"{fold.tip:.0f} K to a hotter branch; the next state given is at "
-                    f"{state.bias:.4f} V, {state.tip:.0f} K"
-                    for fold in follower.folds
-                )
-                follower.folds.clear()
+            for value in values.tolist():
+                found = None if store is None else store.load(value)
+                if found is not None:
+                    state, notes = found
+                    follower.resume(state)
+                else:
+                    state = follower.advance_to(value)
+                    notes = [
+                        f"at a bias of {fold.bias:.4f} V the lever jumps from a tip at "
+                        f"{fold.tip:.0f} K to a hotter branch; the next state given is at "
+                        f"{state.bias:.4f} V, {state.tip:.0f} K"
+                        for fold in follower.folds
+                    ]
+                    follower.folds.clear()
+                    if store is not None:
+                        store.save(state, notes)
+                ramp.notes.extend(notes)
                 ramp.states.append(LeverState(state.bias, state.x))
                 if progress is not None:
                     progress(len(ramp.states), len(values))

@@ -128,6 +128,10 @@ class Samples:
         self._T = np.ascontiguousarray(T.reshape(-1, T.shape[2]))
         self._V = np.ascontiguousarray(V.reshape(-1, V.shape[2]))
         per_element = full.operators.weights.shape[1]
+        thickness = full.thickness_um
+        self.thickness_um = (
+            thickness if isinstance(thickness, float) else thickness.ravel()[points][:, None]
+        )
         self.tapered = []
         for region in full.tapered:
             along = np.full(full.operators.weights.size, np.nan)
@@ -328,9 +332,9 @@ class ReducedSpace:
         return space
 
     @property
-    def thickness_um(self) -> float:
-        """Thickness of the silicon (µm)."""
-        return self.full.thickness_um
+    def thickness_um(self) -> float | Array:
+        """Thickness of the silicon (µm), see `LeverSpace.thickness_um`."""
+        return self.few_points.thickness_um
 
     # --- between reduced and full states ---------------------------------------------------------
 
@@ -453,7 +457,7 @@ class StackedSpace:
 
     def __init__(self, space: ReducedSpace, samples: Samples) -> None:
         self.size, self.tip, self.tapered = space.size, space.tip, samples.tapered
-        self.thickness_um = space.thickness_um
+        self.thickness_um = samples.thickness_um
         self.start, self.is_temperature = space.start, space.is_temperature
         self.tip_temperature = space.tip_temperature
         self.highest_temperature = space.highest_temperature

@@ -41,10 +41,11 @@ def cached_reduction(
 
 
 def _facts(lever: Lever, options: ReductionOptions) -> dict[str, object]:
-    mesh, air = lever.space.mesh.triangles, lever.space.air
+    mesh, air = lever.space.mesh.elements, lever.space.air
     return {
         "version": __version__,
         "shape": lever.probe.shape.model_dump(),
+        "tip": lever.probe.tip and lever.probe.tip.model_dump(),
         "base_temperature_K": lever.probe.circuit.base_temperature_K,
         "n_hd": lever.probe.material.n_hd,
         "options": asdict(options),

@@ -7,22 +7,48 @@ lever voltage V_l. This module knows where things are, not which laws hold there
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import SuperLU, splu
+from skfem import Mesh
 
 from hotlever.air.operator import AirOperator
-from hotlever.lever.air_loss import AirLoss
+from hotlever.lever.air_loss import AirLoss, SurfaceOperator
 from hotlever.lever.operators import FiniteElements, sums_by_index
-from hotlever.probe.layout import Part
-from hotlever.probe.mesh import ProbeMesh
+from hotlever.probe.layout import Layout, Part
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+
+
+class MeshedLever(Protocol):
+    """What the unknowns need of a mesh, in two or three dimensions; see `ProbeMesh`."""
+
+    @property
+    def layout(self) -> Layout:
+        """Regions, terminals and tip."""
+        ...
+
+    @property
+    def elements(self) -> Mesh:
+        """Triangles or tetrahedra."""
+        ...
+
+    @property
+    def region(self) -> Index:
+        """Index into the layout's regions of each element."""
+        ...
+
+    @property
+    def terminal_facets(self) -> Mapping[str, Index]:
+        """Facets of the elements on each terminal."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -81,9 +107,10 @@ class LeverSpace:
 
     Parameters
     ----------
-    mesh : ProbeMesh
+    mesh : MeshedLever
+        Of triangles in the lever's plane, or of tetrahedra.
     operators : FiniteElements, optional
-        Made on ``mesh.triangles`` by default.
+        Made on ``mesh.elements`` by default.
     air : AirOperator, optional
         The air around the lever; vacuum by default.
 
@@ -98,21 +125,22 @@ class LeverSpace:
 
     def __init__(
         self,
-        mesh: ProbeMesh,
+        mesh: MeshedLever,
         operators: FiniteElements | None = None,
         air: AirOperator | None = None,
     ) -> None:
         self.mesh = mesh
-        self.operators = operators or FiniteElements(mesh.triangles)
+        self.operators = operators or FiniteElements(mesh.elements)
         terminal_nodes = {
-            name: self.operators.facet_nodes(facets) for name, facets in mesh.terminal_edges.items()
+            name: self.operators.facet_nodes(facets)
+            for name, facets in mesh.terminal_facets.items()
         }
         self._ends = np.unique(np.concatenate(list(terminal_nodes.values())))
         self._ground, self._supply = terminal_nodes["ground"], terminal_nodes["supply"]
         self._reader = terminal_nodes.get("reader")
         self._number_unknowns()
         self._lay_out_matrix()
-        nodes, weights = self.operators.point_weights(mesh.layout.tip)
+        nodes, weights = self._tip_weights()
         self.tip = (self._T[nodes], weights)
         self.tapered = self._tapered_regions()
         self._part_elements = {
@@ -129,6 +157,23 @@ class LeverSpace:
         """Return the same space with this air around it, or in vacuum; everything is shared."""
         space = copy(self)
         space.air = None if air is None else space._air_loss(air)
+        return space
+
+    def in_air_at_nodes(self, air: SurfaceOperator, surface: Index) -> LeverSpace:
+        """Return the same space in air whose sites are these nodes; everything is shared."""
+        # any element around a node knows where its diagonal entry is
+        count, nodes = self.operators.dofs.shape
+        _, first = np.unique(self.operators.dofs, return_index=True)
+        element, place = np.divmod(first[surface], nodes)
+        slots = self._element_slots.reshape(count, 2 * nodes, 2 * nodes)
+        space = copy(self)
+        space.air = AirLoss(
+            air,
+            self._T[surface, None],
+            np.ones((surface.size, 1)),
+            slots[element, place, place][:, None, None],
+            self.size + 2,
+        )
         return space
 
     def _air_loss(self, operator: AirOperator) -> AirLoss:
@@ -168,7 +213,7 @@ class LeverSpace:
         The matrix has two rows and columns beyond the free values: V_l with the circuit
         equation, and the bias V_b with the condition that pins a state on the branch.
         """
-        nodes, _ = self.operators.point_weights(self.mesh.layout.tip)
+        nodes, _ = self._tip_weights()
         lever, bias = self.size, self.size + 1
         unknowns = self._element_unknowns()
         width = unknowns.shape[1]
@@ -206,12 +251,18 @@ class LeverSpace:
             self._lever_row
         ]
 
+    def _tip_weights(self) -> tuple[Index, Array]:
+        """Nodes and weights of the point of the tip, in the middle of the silicon's thickness."""
+        point = np.zeros(len(self.operators.positions))
+        point[:2] = self.mesh.layout.tip
+        return self.operators.point_weights(tuple(point))
+
     def _tapered_regions(self) -> list[Tapered]:
         found = []
         for index, region in enumerate(self.mesh.layout.regions):
             if region.taper is not None:
                 elements = np.flatnonzero(self.mesh.region == index)
-                offset = self.operators.positions[:, elements] - np.reshape(
+                offset = self.operators.positions[:2, elements] - np.reshape(
                     region.taper.centre, (2, 1, 1)
                 )
                 along = np.tensordot(region.taper.axis, offset, axes=1)
@@ -219,9 +270,25 @@ class LeverSpace:
         return found
 
     @property
-    def thickness_um(self) -> float:
-        """Thickness of the silicon (µm)."""
-        return self.mesh.layout.thickness_um
+    def thickness_um(self) -> float | Array:
+        """Thickness of the silicon (µm); where there is a cone, at the quadrature points.
+
+        One if the elements are solid and have their thickness themselves.
+        """
+        layout = self.mesh.layout
+        if len(self.operators.positions) == 3:
+            return 1.0
+        if layout.cone is None:
+            return layout.thickness_um
+        distance = np.linalg.norm(
+            self.operators.positions - np.reshape(layout.tip, (2, 1, 1)), axis=0
+        )
+        return layout.thickness_um + layout.cone.thickening_um(distance)
+
+    @property
+    def temperature_unknowns(self) -> Index:
+        """Unknown of each node's temperature; -1 where it is held."""
+        return self._T
 
     # --- unknowns to fields -------------------------------------------------------------
 
@@ -349,12 +416,7 @@ class SparseJacobian:
 
     def factorised(self, series_resistance_kohm: float, pin_bias: float, pin_tip: float) -> SuperLU:
         """Complete and factorise; the unknowns are already ordered for little fill."""
-        return splu(
-            self.completed(series_resistance_kohm, pin_bias, pin_tip),
-            permc_spec="NATURAL",
-            diag_pivot_thresh=0.01,
-            options={"SymmetricMode": True},
-        )
+        return factorised(self.completed(series_resistance_kohm, pin_bias, pin_tip))
 
     def completed(
         self, series_resistance_kohm: float, pin_bias: float, pin_tip: float
@@ -369,6 +431,16 @@ class SparseJacobian:
         data[space._pin_slots] = np.concatenate([[pin_bias], pin_tip * space.tip[1]])
         size = space.size + 2
         return csc_matrix((data, space._matrix_rows, space._matrix_starts), shape=(size, size))
+
+
+def factorised(matrix: csc_matrix) -> SuperLU:
+    """Factorise a matrix whose unknowns are already ordered for little fill."""
+    return splu(
+        matrix,
+        permc_spec="NATURAL",
+        diag_pivot_thresh=0.01,
+        options={"SymmetricMode": True},
+    )
 
 
 def _fill_reducing_order(rows: Index, columns: Index, size: int) -> Index:

@@ -4,6 +4,7 @@ from hotlever.probe.layout import Layout, Region, Taper, Terminal
 from hotlever.probe.mesh import MeshOptions, ProbeMesh, mesh_layout
 from hotlever.probe.probe import Circuit, Probe
 from hotlever.probe.shapes import ThreeLeg, UShape
+from hotlever.probe.tip import Tip
 
 __all__ = [
     "Circuit",
@@ -15,6 +16,7 @@ __all__ = [
     "Taper",
     "Terminal",
     "ThreeLeg",
+    "Tip",
     "UShape",
     "mesh_layout",
 ]

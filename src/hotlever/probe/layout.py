@@ -10,6 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from hotlever.probe.tip import Tip
+
 Point = tuple[float, float]
 
 #: What a region is to the measuring circuit: R_h, R_l1, R_l2 of the paper's Fig. 1(c), or
@@ -72,12 +74,15 @@ class Layout:
         Position of the tip (µm).
     thickness_um : float
         Thickness of the silicon (µm).
+    cone : Tip, optional
+        The tip's body; left out where it is not modelled.
     """
 
     regions: tuple[Region, ...]
     terminals: tuple[Terminal, ...]
     tip: Point
     thickness_um: float
+    cone: Tip | None = None
 
     @property
     def heater(self) -> Region:

@@ -55,14 +55,19 @@ class ProbeMesh:
         Vertices (2, n) in µm and triangles (3, m).
     region : ndarray of int, shape (m,)
         Index into ``layout.regions`` of each triangle.
-    terminal_edges : mapping of str to ndarray of int
+    terminal_facets : mapping of str to ndarray of int
         Facet indices of `triangles` on each terminal, by the terminal's name.
     """
 
     layout: Layout
     triangles: MeshTri
     region: NDArray[np.intp]
-    terminal_edges: Mapping[str, NDArray[np.intp]]
+    terminal_facets: Mapping[str, NDArray[np.intp]]
+
+    @property
+    def elements(self) -> MeshTri:
+        """The triangles."""
+        return self.triangles
 
 
 def mesh_layout(layout: Layout, options: MeshOptions | None = None) -> ProbeMesh:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import tomllib
+from dataclasses import replace
 from typing import Annotated, Any
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, model_validator
 
 from hotlever.air.surroundings import Surroundings
 from hotlever.errors import InputError, unknown_name
@@ -15,6 +17,7 @@ from hotlever.materials import PARAMETERS, Material
 from hotlever.materials.spieser2017 import DOI, published
 from hotlever.probe.layout import Layout
 from hotlever.probe.shapes import Shape, ThreeLeg, UShape, shape_of
+from hotlever.probe.tip import Tip
 from hotlever.records import Record
 
 
@@ -33,11 +36,13 @@ class Circuit(Record):
     base_temperature_K: Annotated[float, Field(ge=250, le=1000)] = 293.0
 
 
-SECTIONS = ("probe", "circuit", "material", "surroundings")
+SECTIONS = ("probe", "circuit", "material", "surroundings", "tip")
 
 
 class Probe(Record):
-    """Shape, circuit, material and surroundings of one lever: everything a solve needs.
+    """Shape, circuit, material, surroundings and tip of one lever: everything a solve needs.
+
+    Without a `tip` the lever is flat, as in the paper.
 
     Examples
     --------
@@ -52,6 +57,19 @@ class Probe(Record):
     circuit: Circuit = Circuit()
     material: Material = published("option III").material
     surroundings: Surroundings = Surroundings()
+    tip: Tip | None = None
+
+    @model_validator(mode="after")
+    def _tip_stands_on_the_heater(self) -> Probe:
+        if self.tip is not None:
+            heater = np.array(self.shape.layout().heater.outline)
+            room = np.ptp(heater, axis=0).min() / 2
+            if not self.tip.base_radius_um < room:
+                raise ValueError(
+                    f"the tip's base has a radius of {self.tip.base_radius_um:.4g} µm, expected "
+                    f"less than {room:.4g} µm, half the heater's narrow side"
+                )
+        return self
 
     @classmethod
     def reference(cls) -> Probe:
@@ -105,17 +123,20 @@ class Probe(Record):
                 raise InputError(f"{where}: [{name}] must be a section, found {section!r}")
         if "probe" not in values:
             raise InputError(f"{where}: section [probe] is missing")
-        return cls(
-            shape=shape_of(values["probe"], f"{where}: [probe]"),
-            circuit=Circuit.of(values.get("circuit", {}), f"{where}: [circuit]"),
-            material=Material.of(
+        tip = values.get("tip")
+        sections = {
+            "shape": shape_of(values["probe"], f"{where}: [probe]"),
+            "circuit": Circuit.of(values.get("circuit", {}), f"{where}: [circuit]"),
+            "material": Material.of(
                 {**published("option III").material.model_dump(), **values.get("material", {})},
                 f"{where}: [material]",
             ),
-            surroundings=Surroundings.of(
+            "surroundings": Surroundings.of(
                 values.get("surroundings", {}), f"{where}: [surroundings]"
             ),
-        )
+            "tip": None if tip is None else Tip.of(tip, f"{where}: [tip]"),
+        }
+        return cls.of(sections, where)
 
     @classmethod
     def from_file(cls, path: str | os.PathLike[str]) -> Probe:
@@ -136,12 +157,15 @@ class Probe(Record):
 
     def values(self) -> dict[str, dict[str, Any]]:
         """Return the sections as plain values: what `from_values` takes."""
-        return {
+        sections = {
             "probe": self.shape.model_dump(exclude_none=True),
             "circuit": self.circuit.model_dump(),
             "material": self.material.model_dump(),
             "surroundings": self.surroundings.model_dump(exclude_none=True),
         }
+        if self.tip is not None:
+            sections["tip"] = self.tip.model_dump()
+        return sections
 
     def with_values(self, changes: dict[str, Any]) -> Probe:
         """Return a copy with some values changed, each named by its key in a probe file.
@@ -174,7 +198,7 @@ class Probe(Record):
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip."""
-        return self.shape.layout()
+        return replace(self.shape.layout(), cone=self.tip)
 
     def to_toml(self) -> str:
         """Return the probe as a commented probe file."""
@@ -185,6 +209,7 @@ class Probe(Record):
             **{p.name: f"{p.meaning}, {p.symbol} ({p.unit})" for p in PARAMETERS.values()},
             "n_hd": "doping concentration of the high-doped silicon (cm⁻³)",
             **Surroundings.description(),
+            **Tip.description(),
         }
         lines = ["# A hotlever probe file: lengths in µm, temperatures in K."]
         if self.shape == Probe.reference().shape:
@@ -199,6 +224,12 @@ class Probe(Record):
             for key, value in section.items():
                 entry = f"# {key} =" if value is None else f"{key} = {_toml(value)}"
                 lines.append(f"{entry:<32}# {comments[key]}" if key in comments else entry)
+        if self.tip is None:
+            example = Tip(height_um=0.7, half_angle_deg=20, apex_radius_um=0.02)
+            lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]
+            lines.append("# [tip]")
+            for key, value in example.model_dump().items():
+                lines.append(f"{f'# {key} = {_toml(value)}':<32}# {comments[key]}")
         return "\n".join(lines) + "\n"
 
     def to_file(self, path: str | os.PathLike[str]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from uncertainties import ufloat
 
 from hotlever.fitting.fit import Fit
@@ -80,6 +82,18 @@ def fit_text(fit: Fit) -> str:
     return "\n".join(lines)
 
 
+def sentence(text: str) -> str:
+    """Make a note a sentence; names of parameters keep their small letters.
+
+    Examples
+    --------
+    >>> sentence("the levers differ"), sentence("n_d is not determined")
+    ('The levers differ.', 'n_d is not determined.')
+    """
+    begins_with_name = re.split(r"\W", text, maxsplit=1)[0] in PARAMETERS
+    return f"{text if begins_with_name else text[0].upper() + text[1:]}."
+
+
 def add_fit(page: Page, fit: Fit, prefix: str = "fit_") -> None:
     """Add tables and figures of a fit to a page; `prefix` begins their file names."""
     model = fit.model()
@@ -89,7 +103,7 @@ def add_fit(page: Page, fit: Fit, prefix: str = "fit_") -> None:
         "Material parameters; standard errors in units of the last digits.",
     )
     for text in fit.notes:
-        page.text(f"{text[0].upper()}{text[1:]}.")
+        page.text(sentence(text))
     page.text(fit_text(fit).split("\n", len(fit.parameters))[-1].replace("\n", "; ") + ".")
     page.figure(
         f"{prefix}data_and_model",

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from hotlever.fitting.batch import Batch
 from hotlever.fitting.levers import INVERSION, compare_levers, statements
-from hotlever.report.fit_report import scaled_unit, value_with_error
+from hotlever.report.fit_report import scaled_unit, sentence, value_with_error
 from hotlever.report.page import Page
 from hotlever.report.style import BLUE, VERMILION, figure, panel_letter
 from hotlever.report.uncertainty_figures import axis_label
@@ -140,7 +140,7 @@ def levers_page(batch: Batch) -> Page:
         f"{' or '.join(', '.join(names) for names in sorted(observables))}.",
     )
     for text in statements(data):
-        page.text(f"{text[0].upper()}{text[1:]}.")
+        page.text(sentence(text))
     page.figure(
         "lever_parameters",
         lever_parameters(data),

@@ -394,7 +394,7 @@ def _mesh_section(page: Page, lever: Lever) -> None:
             mesh_row("default", lever, fine),
             mesh_row("sizes / 2", Lever(lever.probe, MeshOptions(refinement=2.0)), fine),
         ],
-        f"Largest difference over 1 to 11 V from a mesh of {fine.space.mesh.triangles.nelements} "
+        f"Largest difference over 1 to 11 V from a mesh of {fine.space.mesh.elements.nelements} "
         "triangles (sizes / 3).",
     )
 
@@ -408,7 +408,7 @@ def mesh_row(name: str, lever: Lever, fine: Lever) -> tuple[str, str, str, str, 
     }
     return (
         name,
-        str(lever.space.mesh.triangles.nelements),
+        str(lever.space.mesh.elements.nelements),
         f"{(differences['current'] / best.current_mA).max().item():.1e}",
         f"{(differences['reader'] / best.reader_V).max().item():.1e}",
         f"{differences['tip'].max().item():.3f}",

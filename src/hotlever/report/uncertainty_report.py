@@ -9,7 +9,7 @@ import numpy as np
 from hotlever.fitting.posterior import BAND_QUANTILES
 from hotlever.fitting.uncertainty import Uncertainty
 from hotlever.materials import PARAMETERS
-from hotlever.report.fit_report import scaled_unit
+from hotlever.report.fit_report import scaled_unit, sentence
 from hotlever.report.page import Page
 from hotlever.report.uncertainty_figures import (
     posterior_corner,
@@ -37,7 +37,7 @@ def add_uncertainty(page: Page, found: Uncertainty) -> None:
     """Add what was sampled and profiled of a fit to its page."""
     page.heading("How sure")
     for text in found.statements():
-        page.text(f"{text[0].upper()}{text[1:]}.")
+        page.text(sentence(text))
     for caption, columns, rows in _tables(found):
         page.table(columns, rows, caption)
     if found.profiles:

@@ -1,0 +1,133 @@
+"""The full 3-D simulation of the reference probe in air: its numbers, and what moves them.
+
+python benchmarks/air_3d.py [points|study|vacuum|sweep]
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from scipy.interpolate import PchipInterpolator
+
+from hotlever.lever import Lever
+from hotlever.lever3d import SolidLever
+from hotlever.probe import Probe
+from hotlever.probe.solid import SolidMeshOptions
+from problems import BIAS, table
+
+#: Biases of the published operating points on the reference probe (V).
+POINTS = (7.22, 8.268, 10.748)
+
+AIR = Probe.reference().in_medium("air")
+
+#: What is varied, and how.
+STUDY: dict[str, dict] = {
+    "default": {},
+    "sizes × 1.5": {"mesh": SolidMeshOptions(refinement=2 / 3)},
+    "sizes / 1.5": {"mesh": SolidMeshOptions(refinement=1.5)},
+    "sphere of 45 µm": {"sphere_radius_um": 45.0},
+    "sphere of 90 µm": {"sphere_radius_um": 90.0},
+    "cubic elements in the air": {"air_order": 3},
+}
+
+
+def scale_factor(sweep: xr.Dataset, vacuum: xr.Dataset) -> np.ndarray:
+    """Power in air over power in vacuum at the same tip temperature."""
+    in_vacuum = PchipInterpolator(vacuum.tip_K, vacuum.power_mW)(sweep.tip_K)
+    return sweep.power_mW.values / in_vacuum
+
+
+def points() -> None:
+    """Print temperature, power and heat into the air at the operating points."""
+    probe = AIR
+    vacuum = Lever(Probe.reference()).sweep(np.linspace(1.0, 11.5, 200))
+    sweep = SolidLever(probe).sweep(POINTS)
+    columns = ("tip_K", "current_mA", "lever_V", "power_mW", "air_heat_mW")
+    rows = [
+        (
+            f"{sweep.bias_V.values[k]:g}",
+            *(f"{sweep[name].values[k]:.4f}" for name in columns),
+            f"{sweep.air_heat_mW.values[k] / sweep.power_mW.values[k]:.4f}",
+            f"{factor:.4f}",
+        )
+        for k, factor in enumerate(scale_factor(sweep, vacuum))
+    ]
+    table(("bias_V", *columns, "air share", "k"), rows)
+
+
+def study(names: Sequence[str] = tuple(STUDY)) -> None:
+    """Print what mesh, sphere and order do to the observables."""
+    probe = AIR
+    rows = []
+    for name in names:
+        began = time.perf_counter()
+        lever = SolidLever(probe, **STUDY[name])
+        assert lever.air is not None
+        _, alike = lever.air.solve(np.ones(lever.surface.size))
+        sweep = lever.sweep(POINTS[:1])
+        seconds = time.perf_counter() - began
+        balance = (sweep.end_heat_mW + sweep.air_heat_mW) / sweep.power_mW - 1
+        rows.append(
+            (
+                name,
+                lever.space.mesh.elements.nelements,
+                lever.air.size,
+                f"{alike.sum():.3f}",
+                f"{sweep.tip_K.item():.3f}",
+                f"{sweep.current_mA.item():.6f}",
+                f"{sweep.air_heat_mW.item():.6f}",
+                f"{np.abs(balance).max().item():.0e}",
+                f"{seconds:.0f}",
+            )
+        )
+    print(f"bias {POINTS[0]:g} V\n")
+    table(
+        (
+            "variant",
+            "tetrahedra",
+            "air unknowns",
+            "heat at one θ (µm)",
+            "T_tip (K)",
+            "I_h (mA)",
+            "air heat (mW)",
+            "balance",
+            "s",
+        ),
+        rows,
+    )
+
+
+def vacuum() -> None:
+    """Print the 3-D lever without air against the 2-D lever."""
+    probe = Probe.reference()
+    flat = Lever(probe).sweep(BIAS)
+    rows = []
+    for refinement in (0.5, 1.0, 1.5):
+        lever = SolidLever(probe, SolidMeshOptions(refinement=refinement))
+        sweep = lever.sweep(BIAS)
+        rows.append(
+            (
+                f"{refinement:g}",
+                lever.space.mesh.elements.nelements,
+                f"{np.abs(sweep.tip_K - flat.tip_K).max().item():.3f}",
+                f"{np.abs(sweep.current_mA / flat.current_mA - 1).max().item():.1e}",
+                f"{np.abs(sweep.reader_V / flat.reader_V - 1).max().item():.1e}",
+            )
+        )
+    table(("refinement", "tetrahedra", "T_tip (K)", "I_h (relative)", "V_r (relative)"), rows)
+
+
+def main() -> None:
+    """Print the tables asked for."""
+    known = {"points": points, "study": study, "vacuum": vacuum}
+    for name in sys.argv[1:] or known:
+        print(f"\n## {name}\n")
+        known[name]()
+
+
+if __name__ == "__main__":
+    main()

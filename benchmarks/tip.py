@@ -1,0 +1,118 @@
+"""What a tip changes at the knee and in T(P), and whether it explains the paper's knee error.
+
+python benchmarks/tip.py [fitted|solid|air]
+
+fitted: the flat lever with an equivalent thickening, in vacuum and in air, and a tipless model
+fitted to it. solid: the thickening against the cone as a real body, in vacuum. air: the cone as a
+real body in air.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from hotlever.lever import Lever
+from hotlever.lever3d import SolidLever
+from hotlever.probe import Probe, Tip
+from hotlever.report.tip_effect import MEASURED_KNEE, PREDICTED_KNEE, SIZES, tip_effects
+from problems import table
+
+
+def fitted() -> None:
+    """Print what the tip does to knee and T(P), and what a tipless fit makes of it."""
+    for medium in ("vacuum", "air"):
+        effects = tip_effects(Probe.reference().in_medium(medium))
+        print(f"\nin {medium}\n")
+        table(
+            (
+                "height (µm)",
+                "half-angle (°)",
+                "base radius (µm)",
+                "knee without (K)",
+                "knee with (K)",
+                "V_l at the knee (V)",
+                "T at equal power (K)",
+                "knee of tipless fit (K)",
+                "missed (K)",
+            ),
+            [
+                (
+                    effect.tip.height_um,
+                    effect.tip.half_angle_deg,
+                    f"{effect.tip.base_radius_um:.3f}",
+                    f"{effect.knee_without_K:.1f}",
+                    f"{effect.knee_K:.1f}",
+                    f"{effect.knee_without_V:.3f} → {effect.knee_V:.3f}",
+                    f"{effect.at_power_K:+.1f}",
+                    f"{effect.fitted_knee_K:.1f}",
+                    f"{effect.missed_K:+.1f}",
+                )
+                for effect in effects
+            ],
+        )
+        largest = max(effects, key=lambda effect: abs(effect.missed_K))
+        print(
+            f"\nlargest miss {largest.missed_K:+.1f} K; the paper's knee was missed by "
+            f"{MEASURED_KNEE - PREDICTED_KNEE:+.0f} K"
+        )
+
+
+def solid() -> None:
+    """Print the change of T_tip and I_h by a tip: equivalent thickening and real cone."""
+    bias = [5.0, 7.22, 8.268, 10.748]
+    probe = Probe.reference()
+    bare = {Lever: Lever(probe).sweep(bias), SolidLever: SolidLever(probe).sweep(bias)}
+    rows = []
+    for height, angle in SIZES:
+        tipped = probe.model_copy(update={"tip": Tip(height_um=height, half_angle_deg=angle)})
+        for kind, name in ((Lever, "thickening"), (SolidLever, "cone")):
+            sweep = kind(tipped).sweep(bias)
+            rows.append(
+                (
+                    height,
+                    angle,
+                    name,
+                    *(f"{value:+.2f}" for value in (sweep.tip_K - bare[kind].tip_K).values),
+                    f"{np.abs(sweep.current_mA / bare[kind].current_mA - 1).max().item():.1e}",
+                )
+            )
+    columns = tuple(f"T_tip at {value:g} V (K)" for value in bias)
+    table(("height (µm)", "half-angle (°)", "model", *columns, "I_h (relative)"), rows)
+
+
+def air() -> None:
+    """Print what the cone changes in air, as a real body in the full 3-D simulation."""
+    bias = [7.22, 8.268, 10.748]
+    probe = Probe.reference().in_medium("air")
+    rows = []
+    for tip in (None, Tip(height_um=0.7, half_angle_deg=20), Tip(height_um=1, half_angle_deg=30)):
+        lever = SolidLever(probe.model_copy(update={"tip": tip}))
+        ramp = lever.solve(bias)
+        sweep = lever.dataset(ramp)
+        name = "none" if tip is None else f"{tip.height_um:g} µm, {tip.half_angle_deg:g}°"
+        for row, state in enumerate(ramp.states):
+            rows.append(
+                (
+                    name,
+                    f"{state.bias:g}",
+                    f"{sweep.tip_K.values[row]:.2f}",
+                    "" if tip is None else f"{lever.apex_temperature(state.x):.2f}",
+                    f"{sweep.power_mW.values[row]:.4f}",
+                    f"{sweep.air_heat_mW.values[row] / sweep.power_mW.values[row]:.4f}",
+                )
+            )
+    table(("tip", "bias (V)", "T_tip (K)", "T_apex (K)", "power (mW)", "air share"), rows)
+
+
+def main() -> None:
+    """Print the tables asked for."""
+    known = {"fitted": fitted, "solid": solid, "air": air}
+    for name in sys.argv[1:] or known:
+        print(f"\n## {name}\n")
+        known[name]()
+
+
+if __name__ == "__main__":
+    main()

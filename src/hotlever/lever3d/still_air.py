@@ -1,0 +1,217 @@
+"""Still air around a body, to infinity: Laplace's equation for the Kirchhoff variable θ.
+
+Inside a sphere of radius R the air is meshed as it is. All space outside is mapped into a ball
+of the same radius by the Kelvin transform: a point at the distance r from the centre goes to
+r' = R²/r, and θ = (r'/R) w with a smooth w that is harmonic in the ball. The energy of the
+outside is then ∫|∇w|² over the ball plus (1/R) ∫w² over its surface (E. M. Freeman and
+D. A. Lowther, IEEE Trans. Magn. 25, 4135 (1989), with the factor r'/R taken out). At infinity
+θ = 0; the heat that arrives there is 4π R w(0).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.linalg import LinearOperator
+
+from hotlever.errors import InputError
+from hotlever.probe.solid import AIR, IMAGE, LEVER_SURFACE, SPHERE
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+def ngsolve() -> Any:
+    """Import NGSolve.
+
+    Raises
+    ------
+    InputError
+        If it is not installed.
+    """
+    try:
+        import ngsolve
+    except ImportError:
+        raise InputError(
+            "the full 3-D simulation in air needs NGSolve: install it with "
+            "pip install 'hotlever[air3d]'"
+        ) from None
+    return ngsolve
+
+
+class OpenAir:
+    """The linear operator from θ on a body's surface to the heat it gives to the air.
+
+    Parameters
+    ----------
+    mesh : netgen.meshing.Mesh
+        Made by `hotlever.probe.solid.in_a_sphere`: air and image ball, surfaces named.
+    centre : tuple of float
+        Of the sphere (µm).
+    radius_um : float
+        Radius of the sphere.
+    order : int
+        Of the elements in the air, 2 or more. On the body θ is quadratic.
+
+    Attributes
+    ----------
+    size : int
+        Unknowns, those on the body included.
+    vertices : ndarray of int, shape (n,)
+        Vertices of the mesh on the body.
+    edges : ndarray of int, shape (m, 2)
+        Edges of the mesh on the body, each by its vertices, the smaller one first.
+    """
+
+    def __init__(
+        self,
+        mesh: Any,
+        centre: tuple[float, float, float],
+        radius_um: float,
+        *,
+        order: int = 2,
+    ) -> None:
+        ng = ngsolve()
+        self.centre, self.radius_um, self.order = centre, radius_um, order
+        self.mesh = ng.Mesh(mesh)
+        self.mesh.Curve(2)
+        self.space = ng.Periodic(ng.H1(self.mesh, order=order, definedon=f"{AIR}|{IMAGE}"))
+        trial, test = self.space.TnT()
+        form = ng.BilinearForm(self.space, symmetric=True)
+        for part in (AIR, IMAGE):
+            form += ng.grad(trial) * ng.grad(test) * ng.dx(part)
+        form += (1.0 / radius_um) * trial * test * ng.ds(SPHERE)
+        form.Assemble()
+        rows, columns, values = form.mat.COO()
+        shape = (self.space.ndof, self.space.ndof)
+        self._matrix = csr_matrix(
+            (np.array(values), (np.array(rows), np.array(columns))), shape=shape
+        )
+        diagonal = self._matrix.diagonal()
+        self.size = int((diagonal != 0).sum())
+        surface = self._lay_out_surface(ng)
+        free = ng.BitArray(shape[0])
+        free.Clear()
+        for dof in np.flatnonzero(diagonal != 0):
+            free.Set(int(dof))
+        for dof in surface:
+            free.Clear(int(dof))
+        self._inverse = form.mat.Inverse(free, inverse="sparsecholesky")
+        self._right, self._left = form.mat.CreateColVector(), form.mat.CreateColVector()
+        self._form = form  # the inverse refers to its matrix
+
+    def _lay_out_surface(self, ng: Any) -> Index:
+        """Number the body's nodes, vertices first, and map their values to coefficients.
+
+        Returns the degrees of freedom on the body, which θ there determines.
+        """
+        vertices: set[int] = set()
+        edges: dict[int, Any] = {}
+        dofs: set[int] = set()
+        for element in self.mesh.Boundaries(LEVER_SURFACE).Elements():
+            vertices.update(vertex.nr for vertex in element.vertices)
+            edges.update({edge.nr: edge for edge in element.edges if edge.nr not in edges})
+            dofs.update(self.space.GetDofNrs(element))
+        numbers = sorted(edges)
+        ends = np.array(
+            [sorted(v.nr for v in self.mesh[edges[number]].vertices) for number in numbers]
+        ).reshape(-1, 2)
+        self.vertices = np.array(sorted(vertices), dtype=np.intp)
+        self.edges = ends.astype(np.intp)
+        first = [self.space.GetDofNrs(edges[number])[0] for number in numbers]
+        # hierarchical basis: an edge's function is zero at its ends and `peak` in its middle
+        peak = self._edge_peak(ng)
+        count = self.vertices.size
+        position = np.searchsorted(self.vertices, self.edges)
+        middle = count + np.arange(len(first))
+        rows = [[self.space.GetDofNrs(ng.NodeId(ng.VERTEX, int(v)))[0] for v in self.vertices]]
+        columns, values = [np.arange(count)], [np.ones(count)]
+        for column, value in ((middle, 1.0), (position[:, 0], -0.5), (position[:, 1], -0.5)):
+            rows.append(first)
+            columns.append(column)
+            values.append(np.full(len(first), value / peak))
+        self._to_coefficients = csr_matrix(
+            (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+            shape=(self.space.ndof, count + len(first)),
+        )
+        return np.array(sorted(dofs), dtype=np.intp)
+
+    def _edge_peak(self, ng: Any) -> float:
+        """Value of an edge's quadratic basis function in the middle of the edge."""
+        from ngsolve import fem
+
+        values = fem.H1FE(ng.ET.SEGM, 2).CalcShape(0.5)
+        return float(values[2])
+
+    @property
+    def matrix(self) -> LinearOperator:
+        """The operator from θ to heat, for `hotlever.lever.air_loss.AirLoss`."""
+        return self._operator(lambda theta: self.solve(theta)[1])
+
+    @property
+    def sites(self) -> Array:
+        """The body's nodes, shape (n + m, 3) (µm)."""
+        points = np.array(self.mesh.ngmesh.Coordinates())
+        return np.concatenate([points[self.vertices], points[self.edges].mean(axis=1)])
+
+    @property
+    def filling(self) -> float:
+        """No air is modelled inside the silicon."""
+        return 0.0
+
+    def less(self, diagonal: Array) -> LinearOperator:
+        """Return the operator less a diagonal matrix."""
+        return self._operator(lambda theta: self.solve(theta)[1] - diagonal * theta)
+
+    def _operator(self, product: Callable[[Array], Array]) -> LinearOperator:
+        count = self._to_coefficients.shape[1]
+        return LinearOperator(
+            (count, count), matvec=lambda theta: product(theta.ravel()), dtype=float
+        )
+
+    def solve(self, theta: Array) -> tuple[Array, Array]:
+        """Solve the air for θ on the body.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (n + m,)
+            At the vertices and then in the middles of the edges.
+
+        Returns
+        -------
+        coefficients : ndarray
+            Of θ in the air and of w in the image ball.
+        heat : ndarray, shape (n + m,)
+            Heat given to the air at each node (θ times µm): the reactions, whose sum is the
+            total.
+        """
+        coefficients = self._to_coefficients @ theta
+        self._right.FV().NumPy()[:] = -(self._matrix @ coefficients)
+        self._left.data = self._inverse * self._right
+        coefficients += self._left.FV().NumPy()
+        return coefficients, self._to_coefficients.T @ (self._matrix @ coefficients)
+
+    def at_infinity(self, coefficients: Array) -> float:
+        """Return the heat that arrives at infinity (θ times µm), by the value of w at zero."""
+        x, y, z = self.centre
+        w = self.field(coefficients)(self.mesh(x + 3 * self.radius_um, y, z))
+        return float(4 * np.pi * self.radius_um * w)
+
+    def at_vertices(self, coefficients: Array) -> Array:
+        """Return a solution at all vertices of the mesh; zero where there is no air."""
+        ng = ngsolve()
+        values = np.zeros(self.mesh.nv)
+        for vertex in range(self.mesh.nv):
+            (dof,) = self.space.GetDofNrs(ng.NodeId(ng.VERTEX, vertex))
+            values[vertex] = coefficients[dof] if dof >= 0 else 0.0
+        return values
+
+    def field(self, coefficients: Array) -> Any:
+        """Return a solution as a grid function of NGSolve."""
+        field = ngsolve().GridFunction(self.space)
+        field.vec.FV().NumPy()[:] = coefficients
+        return field

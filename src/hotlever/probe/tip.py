@@ -1,0 +1,94 @@
+"""The tip: a cone under the heater."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
+
+from hotlever.records import Record
+
+#: First zero of J₁', the slope of the Bessel function: the slowest sideways mode of a cylinder
+#: of radius a dies out as exp(−1.841 z/a) along its axis.
+SIDEWAYS_MODE = 1.841184
+
+
+class Tip(Record):
+    """A cone of silicon that points down from the heater (section ``[tip]`` of a probe file).
+
+    Its doping is that of the heater above it.
+
+    Attributes
+    ----------
+    height_um : float
+        From the lever's surface to the apex (µm).
+    half_angle_deg : float
+        Between the axis and the side (degrees).
+    apex_radius_um : float
+        Radius of the flat end (µm).
+
+    Examples
+    --------
+    >>> Tip(height_um=0.5, half_angle_deg=45, apex_radius_um=0.02).base_radius_um
+    0.52
+    """
+
+    height_um: Annotated[float, Field(gt=0)]
+    half_angle_deg: Annotated[float, Field(ge=1, le=80)] = 20.0
+    apex_radius_um: Annotated[float, Field(gt=0)] = 0.02
+
+    @classmethod
+    def description(cls) -> dict[str, str]:
+        """Return what each dimension is, by key."""
+        return {
+            "height_um": "from the lever's surface to the apex",
+            "half_angle_deg": "between the axis and the side",
+            "apex_radius_um": "of the flat end",
+        }
+
+    @property
+    def slope(self) -> float:
+        """How much radius is lost per height, the tangent of the half-angle."""
+        return math.tan(math.radians(self.half_angle_deg))
+
+    @property
+    def base_radius_um(self) -> float:
+        """Radius where the cone meets the lever (µm)."""
+        return self.apex_radius_um + self.height_um * self.slope
+
+    @property
+    def side_area_um2(self) -> float:
+        """Area of side and flat end (µm²), which the cone adds to the surface with its base."""
+        side = math.hypot(self.height_um, self.base_radius_um - self.apex_radius_um)
+        return math.pi * (
+            (self.base_radius_um + self.apex_radius_um) * side + self.apex_radius_um**2
+        )
+
+    def thickening_um(self, distance: ArrayLike) -> NDArray[np.float64]:
+        """Return what the lever must be thicker to conduct along its plane as with the cone.
+
+        A current along the lever enters the cone only near its base. In a slice of radius a
+        its slowest mode dies out as exp(−1.841 z/a); followed through the shrinking slices,
+        the share that is left at the radius a is (a/base radius)^(1.841/slope). The thickening
+        is this share, integrated over the height of the cone above the point. A flat cone
+        counts in full, a steep one with at most 0.54 base radii.
+
+        Parameters
+        ----------
+        distance : array_like
+            Distance from the cone's axis (µm).
+
+        Returns
+        -------
+        ndarray
+            µm; zero beyond the base.
+        """
+        base, power = self.base_radius_um, 1.0 + SIDEWAYS_MODE / self.slope
+        radius = np.clip(np.asarray(distance, dtype=float), self.apex_radius_um, base)
+        thickening: NDArray[np.float64] = (
+            base / (self.slope * power) * (1.0 - (radius / base) ** power)
+        )
+        return thickening

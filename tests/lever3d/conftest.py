@@ -1,0 +1,32 @@
+"""A coarse lever in air, shared by the tests."""
+
+from __future__ import annotations
+
+import pytest
+import xarray as xr
+
+from hotlever.lever.lever import Ramp
+from hotlever.lever3d import SolidLever
+from hotlever.probe import Probe
+from hotlever.probe.solid import SolidMeshOptions
+
+COARSE = SolidMeshOptions(refinement=0.4, grading=0.7)
+
+
+@pytest.fixture(scope="session")
+def in_air() -> SolidLever:
+    """The reference lever in air on a coarse mesh."""
+    pytest.importorskip("ngsolve")
+    return SolidLever(Probe.reference().in_medium("air"), COARSE)
+
+
+@pytest.fixture(scope="session")
+def ramp(in_air: SolidLever) -> Ramp:
+    """Its state at 5 V."""
+    return in_air.solve([5.0])
+
+
+@pytest.fixture(scope="session")
+def sweep(in_air: SolidLever, ramp: Ramp) -> xr.Dataset:
+    """What is measured in that state, with sensitivities."""
+    return in_air.dataset(ramp, sensitivities=True)
