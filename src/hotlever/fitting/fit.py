@@ -61,7 +61,10 @@ class Fit:
     names : list of str
         The parameters that were varied.
     correlation : ndarray, shape (len(names), len(names))
-        NaN if it could not be estimated.
+        That the standard errors belong to; NaN if it could not be estimated.
+    common_noise_correlation : ndarray, shape (len(names), len(names))
+        What it would be if all data, divided by their weights, had the same noise: the paper's
+        and lmfit's assumption.
     observables : tuple of str
         What was fitted.
     inversion_temperature_K, inversion_temperature_stderr_K : float
@@ -85,6 +88,7 @@ class Fit:
     parameters: dict[str, FittedParameter]
     names: list[str]
     correlation: Array
+    common_noise_correlation: Array
     observables: tuple[str, ...]
     inversion_temperature_K: float
     inversion_temperature_stderr_K: float
@@ -237,6 +241,7 @@ def fit(
         parameters=parameters,
         names=varied,
         correlation=correlation,
+        common_noise_correlation=problem.common_noise_correlation(result),
         observables=chosen,
         inversion_temperature_K=float(inversion_temperature(material.n_d, material.p)),
         inversion_temperature_stderr_K=_inversion_error(material, varied, covariance),

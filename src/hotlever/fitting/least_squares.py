@@ -256,6 +256,14 @@ class LeastSquares:
         covariance: Array = influence @ influence.T * np.outer(scale, scale)
         return covariance
 
+    def common_noise_correlation(self, result: Any) -> Array:
+        """Return the correlation if all weighted data had the same noise, as lmfit takes them."""
+        covariance = getattr(result, "covar", None)
+        if covariance is None:
+            return np.full((len(self._varied), len(self._varied)), np.nan)
+        spread = np.sqrt(np.diag(covariance))
+        return np.asarray(covariance / np.outer(spread, spread))
+
     def residual_rms(self, parameters: Any) -> dict[str, float]:
         """Return the rms of data minus model per column, for every observable with data."""
         values, _ = self._predict(self.material(parameters))
