@@ -169,7 +169,8 @@ def sweep() -> None:
 
 def main() -> None:
     """Print the tables asked for."""
-    known = {"points": points, "operator": operator, "study": study, "vacuum": vacuum, "sweep": sweep}
+    tables = (points, operator, study, vacuum, sweep)
+    known = {one.__name__: one for one in tables}
     for name in sys.argv[1:] or known:
         print(f"\n## {name}\n")
         known[name]()
