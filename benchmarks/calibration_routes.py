@@ -25,7 +25,6 @@ from hotlever.calibration.synthetic import current_at, measured_curve
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import HotleverError
 from hotlever.fitting import Measurement, fit
-from hotlever.fitting.models import FullModel
 from hotlever.lever import Lever
 from hotlever.materials import Material
 from hotlever.materials.silicon import inversion_temperature
@@ -65,7 +64,7 @@ def twin(rng: np.random.Generator) -> Probe:
 
 
 def models_of(probe: Probe) -> dict[str, Characteristic]:
-    lever = Lever(probe, MESH)
+    lever = Lever(probe.in_medium("vacuum"), MESH)
     return {medium: characteristic(lever.in_medium(medium)) for medium in MEDIA}
 
 
@@ -75,7 +74,7 @@ def full_measurement(
     """Measure current, reader voltage and tip temperature at 25 biases."""
     bias = np.linspace(1.0, HIGHEST_BIAS[medium], 25)
     bias = bias[np.isfinite(current_at(known, bias, 5600.0))]
-    sweep = Lever(probe, MESH, medium=medium).sweep(bias)
+    sweep = Lever(probe.in_medium(medium), MESH).sweep(bias)
     error = 5.0 + 0.02 * (sweep.tip_K.values - BASE)  # the paper's calibration error
     tip = sweep.tip_K.values + 0.5 * error * rng.standard_normal(bias.size)
     return Measurement(
@@ -89,13 +88,7 @@ def full_measurement(
 
 def fitted(measurement: Measurement, medium: str) -> tuple[dict[str, Characteristic], float]:
     """Fit the reference shape; return the fitted models and the power of the measured knee."""
-    model = None
-    if medium == "air":
-
-        def model(probe: Probe) -> FullModel:
-            return FullModel(Lever(probe, MESH, medium="air"))
-
-    models = models_of(fit(measurement, Probe.reference(), model=model).probe)
+    models = models_of(fit(measurement, Probe.reference(), medium=medium).probe)
     curve = IVCurve.of(measurement.bias_V, measurement.current_mA, 5600.0)
     return models, find_knee(curve, models[medium]).power_mW
 

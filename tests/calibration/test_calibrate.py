@@ -70,6 +70,17 @@ def test_the_table_gives_the_true_temperature(calibrated, reference):
     np.testing.assert_allclose(table.lever_V + 5.6 * table.current_mA, table.bias_V, rtol=1e-9)
 
 
+def test_the_bias_for_a_temperature_is_that_of_the_lever(calibrated, lever, reference):
+    wanted = np.array([400.0, 700.0, 1000.0])
+    exact = reference.bias(wanted, 5600.0)
+    np.testing.assert_allclose(lever.sweep(exact).tip_K, wanted, atol=0.05)
+    np.testing.assert_allclose(calibrated.bias_for(wanted), exact, atol=0.1)
+    np.testing.assert_allclose(
+        calibrated.bias_for(wanted, 3000.0), reference.bias(wanted, 3000.0), atol=0.1
+    )
+    assert np.isnan(calibrated.bias_for([294.0, 1500.0])).all()
+
+
 def test_k_is_the_power_of_the_knee_over_the_threshold(calibrated, reference):
     assert calibrated.k == pytest.approx(1.0, abs=0.015)
     assert calibrated.k == calibrated.knee_mW / calibrated.power_law.threshold_mW
@@ -167,9 +178,7 @@ def test_variations_are_of_the_size_asked_for():
     mean = np.mean([np.log(material.n_d) for material in materials])
     assert mean == pytest.approx(np.log(probe.material.n_d))
     stderr = {"c_kappa": 0.005, "p": 0.05}
-    fit = FitFile(
-        probe, list(stderr), np.diag(np.square(list(stderr.values()))), (), "vacuum", "", "", "f"
-    )
+    fit = FitFile(probe, list(stderr), np.diag(np.square(list(stderr.values()))), (), "", "", "f")
     moved = np.array(
         [
             [getattr(variation.probe.material, name) for name in stderr]
@@ -235,7 +244,7 @@ def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
     ("arguments", "message"),
     [
         (("--fit", "a", "--probe", "b"), "--fit and --probe: expected at most one of"),
-        (("--medium", "vacum"), "did you mean 'vacuum'"),
+        (("--medium", "vacum"), "--medium vacum: expected vacuum or air"),
         (("--table", "t.txt"), "unknown file type '.txt'"),
         (("--tolerance", "3"), "geometry = 3, expected a relative error"),
         (("--fit", "none.json"), "none.json: no such file"),
@@ -257,12 +266,12 @@ def test_a_file_without_current_is_refused(run, tmp_path):
 
 def test_air_calibration_uses_the_model_in_air(lever, reference):
     """A lever in air calibrated with the air model, and by the rule of a constant k."""
-    air = characteristic(lever.in_medium("air"))
+    air = characteristic(lever.in_medium("air"), 1050.0, step_K=50.0)
     curve = measurement_of(measured_curve(air, np.random.default_rng(5), to_V=12.0))
     with_model = calibrate(curve, medium="air", tolerances=FEW)
     assert with_model.k == pytest.approx(air.knee.power_mW / reference.knee.power_mW, rel=0.015)
     true = air.tip_temperature(with_model.table.power_mW)
-    assert np.nanmax(np.abs(with_model.table.tip_K - true)) < 10.0
+    assert np.nanmax(np.abs(with_model.table.tip_K - true)) < 15.0
 
 
 def test_published_materials_are_what_a_material_may_be():

@@ -29,7 +29,7 @@ def test_noisy_knees_scatter_as_stated(reference, lever_3):
     """40 points with 0.2 % noise; the curve is smoothed with the help of another lever."""
     rng = np.random.default_rng(1)
     true = reference.knee
-    knees = [find_knee(measured_curve(reference, rng), lever_3) for _ in range(50)]
+    knees = [find_knee(measured_curve(reference, rng), lever_3) for _ in range(40)]
     error = np.array([knee.power_mW / true.power_mW - 1 for knee in knees])
     assert np.sqrt(np.mean(error**2)) < 0.008
     assert np.quantile(np.abs(error), 0.95) < 0.015
@@ -41,8 +41,8 @@ def test_noisy_knees_scatter_as_stated(reference, lever_3):
                 for knee in knees
             ]
         )
-        # 50 trials: two standard deviations of the counts are 13 and 6 %
-        assert 0.54 < np.mean(np.abs(pull) < 1.0) < 0.84, name
+        # 40 trials: two standard deviations of the counts are 15 and 7 %
+        assert 0.52 < np.mean(np.abs(pull) < 1.0) < 0.86, name
         assert np.mean(np.abs(pull) < 1.96) > 0.87, name
     assert np.median([knee.current_noise for knee in knees]) == pytest.approx(0.002, rel=0.2)
 

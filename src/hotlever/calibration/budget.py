@@ -152,7 +152,7 @@ def refitted(fit: FitFile, data: Measurement, changed: Probe, mesh: MeshOptions)
     bias = np.unique(bias)
 
     def seen(probe: Probe, sensitivities: bool) -> tuple[Array, Array]:
-        lever = Lever(probe, mesh, medium=fit.medium)
+        lever = Lever(probe.in_medium(fit.medium), mesh)
         sweep = lever.sweep(bias, sensitivities=sensitivities)
         values = np.stack([sweep[OBSERVABLE_COLUMNS[name]].values for name in fit.observables])
         if not sensitivities:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hotlever import __version__
 from hotlever.calibration.budget import (
@@ -119,6 +119,29 @@ class Calibration:
         """Largest standard error of the tip temperature in the table (K)."""
         return float(self.table.tip_stderr_K.max())
 
+    def bias_for(self, tip_K: ArrayLike, series_resistance_ohm: float | None = None) -> Array:
+        """Return the bias (V) that heats the tip to a temperature (K).
+
+        Parameters
+        ----------
+        tip_K : array_like
+        series_resistance_ohm : float, optional
+            That of the measurement by default; power and lever voltage do not depend on it.
+
+        Returns
+        -------
+        ndarray
+            NaN outside the measured range.
+        """
+        if series_resistance_ohm is None:
+            series_resistance_ohm = self.probe.circuit.series_resistance_ohm
+        known = self.table.isel(bias=np.flatnonzero(np.isfinite(self.table.tip_K)))
+        tip = np.asarray(tip_K, dtype=float)
+        power = np.interp(tip, known.tip_K, known.power_mW, left=np.nan, right=np.nan)
+        lever = np.interp(power, known.power_mW, known.lever_V)
+        bias: Array = lever + series_resistance_ohm / 1000.0 * power / lever
+        return bias
+
     def to_json(self) -> str:
         """Return the calibration file."""
         at = self._knee_point()
@@ -199,8 +222,9 @@ def calibrate(
     law : PowerLaw, optional
         A power law in vacuum, in place of a model.
     medium : {"vacuum", "air"}, optional
-        Of the model whose temperatures are used; the fit's by default, else vacuum. With vacuum
-        the paper's rule is used in any medium: the same temperatures at k times the power.
+        Of the model whose temperatures are used; by default what the data file says, or else
+        the fit or the probe. With vacuum the paper's rule is used in any medium: the same
+        temperatures at k times the power.
     tolerances : Tolerances, optional
     progress : callable, optional
         Called with solved levers and their number.
@@ -235,10 +259,13 @@ class _Calibrator:
         self._measurement, self._fit, self._law = measurement, fit, law
         self._tolerances, self._progress = tolerances, progress
         origin = fit.probe if fit is not None else probe or Probe.reference()
-        self._probe, self._notes = with_measured_circuit(origin, measurement)
-        self._medium = medium or (fit.medium if fit is not None else "vacuum")
-        if law is not None and self._medium != "vacuum":
+        if law is not None and medium not in (None, "vacuum"):
             raise InputError("a power law holds in vacuum; with one, leave the medium out")
+        if law is not None:  # whatever the lever is in
+            measurement = replace(measurement, medium=None)
+            medium = "vacuum"
+        self._probe, self._notes = with_measured_circuit(origin, measurement, medium)
+        self._medium: str = self._probe.surroundings.medium
         self._models: dict[str, Characteristic] = {}
         self._done, self._total = 0, 4
 
@@ -304,7 +331,7 @@ class _Calibrator:
 
     def _model(self, medium: str) -> Characteristic:
         if medium not in self._models:
-            self._models[medium] = _with_knee(characteristic(Lever(self._probe, medium=medium)))
+            self._models[medium] = _with_knee(characteristic(Lever(self._probe.in_medium(medium))))
             self._step()
         return self._models[medium]
 
@@ -315,7 +342,7 @@ class _Calibrator:
             media.add(self._fit.medium)
         return {
             medium: _with_knee(
-                characteristic(Lever(probe, _COARSE_MESH, medium=medium), step_K=_COARSE_STEP)
+                characteristic(Lever(probe.in_medium(medium), _COARSE_MESH), step_K=_COARSE_STEP)
             )
             for medium in media
         }
@@ -454,7 +481,7 @@ class _Calibrator:
         variations: list[Variation] = []
         for variation in geometry_variations(self._probe, self._tolerances.geometry):
             if self._fit is not None and data is not None:
-                fit = replace(self._fit, probe=self._probe)
+                fit = replace(self._fit, probe=self._probe.in_medium(self._fit.medium))
                 probe = refitted(fit, data, variation.probe, _COARSE_MESH)
                 variation = replace(variation, probe=probe)
             variations.append(variation)

@@ -171,6 +171,22 @@ class Characteristic:
         """Return V_l (V) by tip temperature (K); NaN outside the states."""
         return self._inside(tip_K, lambda tip: np.sqrt(np.maximum(self._voltage(tip), 0.0)))
 
+    def bias(self, tip_K: ArrayLike, series_resistance_ohm: float) -> Array:
+        """Return the bias (V) that heats the tip to a temperature (K), for any R_s.
+
+        The exact inverse of a model. Between the folds of a lever with a small or very large
+        series resistance the state at this bias depends on where one comes from.
+
+        Examples
+        --------
+        >>> from hotlever.probe import Probe
+        >>> model = characteristic(Lever(Probe.reference()), 900.0)
+        >>> model.bias([700.0, 800.0], 5600.0).round(2).tolist()
+        [7.73, 7.93]
+        """
+        lever = self.lever_voltage(tip_K)
+        return lever + series_resistance_ohm / 1000.0 * self.power(tip_K) / lever
+
     def _inside(self, tip_K: ArrayLike, function: Callable[[Array], Array]) -> Array:
         tip = np.asarray(tip_K, dtype=float)
         inside = (tip >= self.base_temperature_K) & (tip <= self.hottest_K)

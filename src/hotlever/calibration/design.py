@@ -110,7 +110,7 @@ def quantities(probe: Probe, power_mW: float, air: bool = True) -> dict[str, flo
     air : bool
         Solve the lever in air too, for k.
     """
-    lever = Lever(probe, _MESH)
+    lever = Lever(probe.in_medium("vacuum"), _MESH)
     vacuum = characteristic(lever, step_K=_STEP_K)
     material, series = probe.material, probe.circuit.series_resistance_ohm / 1000.0
     knee = vacuum.knee

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from hotlever.cli.app import app, note, progress, stdout
-from hotlever.cli.options import check_output, load_probe
+from hotlever.cli.options import MediumOption, check_medium, check_output, load_probe
 from hotlever.errors import InputError
 from hotlever.files import write_text
 
@@ -29,10 +29,7 @@ def calibrate(
         Path | None,
         typer.Option("--power-law", help="Power law in vacuum (JSON), or a calibration file."),
     ] = None,
-    medium: Annotated[
-        str | None,
-        typer.Option(help="vacuum or air; the fit's if left out, else vacuum times k."),
-    ] = None,
+    medium: MediumOption = None,
     tolerance: Annotated[
         float, typer.Option(help="Relative standard error of the lever's dimensions.")
     ] = 0.05,
@@ -52,7 +49,6 @@ def calibrate(
     from hotlever.calibration.power_law import read_power_law
     from hotlever.fitting import read_measurement
     from hotlever.fitting.fit_file import read_fit
-    from hotlever.lever import checked_medium
     from hotlever.report.calibration_report import calibration_figure, calibration_text
     from hotlever.report.style import FIGURE_TYPES, save_figure
 
@@ -60,8 +56,7 @@ def calibrate(
     several = [name for name, path in given.items() if path is not None]
     if len(several) > 1:
         raise InputError(f"{' and '.join(several)}: expected at most one of {', '.join(given)}")
-    if medium is not None:
-        checked_medium(medium)
+    check_medium(medium)
     check_output(output)
     check_output(table, ".csv")
     check_output(plot, *FIGURE_TYPES)

@@ -34,8 +34,6 @@ class FitFile:
     covariance : ndarray, shape (len(names), len(names))
         In the parameters' own units; NaN where it could not be estimated.
     observables : tuple of str
-    medium : str
-        What was around the lever.
     data_path, data_sha256 : str
         The measurement.
     path : str
@@ -45,10 +43,14 @@ class FitFile:
     names: list[str]
     covariance: Array
     observables: tuple[str, ...]
-    medium: str
     data_path: str
     data_sha256: str
     path: str
+
+    @property
+    def medium(self) -> str:
+        """What was around the lever."""
+        return self.probe.surroundings.medium
 
     def measurement(self) -> Measurement | None:
         """Read the measurement that was fitted; None if it is gone or has changed."""
@@ -95,7 +97,6 @@ def read_fit(path: str | os.PathLike[str]) -> FitFile:
         names=list(names),
         covariance=_covariance(section("parameters", dict), correlation, names, str(path)),
         observables=tuple(section("observables", list)),
-        medium=str(content.get("medium", "vacuum")),
         data_path=str(content.get("data", {}).get("path", "")),
         data_sha256=str(content.get("data", {}).get("sha256", "")),
         path=str(path),
