@@ -1,10 +1,11 @@
 # make test       all tests: ruff, mypy, pytest (with the README's examples)
 # make reproduce  the main job: the paper's results as one page in reproduce/
-# Both make the environment in .venv first. FORM=quick shortens reproduce.
+# make docs       the documentation as a site in docs/_build/
+# Each makes the environment in .venv first. FORM=quick shortens reproduce.
 FORM ?= full
 BIN := .venv/bin
 
-.PHONY: test test-slow reproduce lock env clean
+.PHONY: test test-slow reproduce docs lock env clean
 
 env: .venv/.ready
 
@@ -24,10 +25,13 @@ test-slow: env
 reproduce: env
 	$(BIN)/hotlever reproduce -o reproduce $(if $(filter quick,$(FORM)),--quick)
 
+docs: env
+	$(BIN)/python -m sphinx --quiet -W --keep-going -n -d docs/_build/.doctrees docs docs/_build
+
 lock: env
 	$(BIN)/pip install "pip-tools>=7.4"
 	$(BIN)/pip-compile --quiet --strip-extras --no-emit-index-url --no-emit-find-links \
 	    --no-header --all-extras --output-file requirements.lock pyproject.toml
 
 clean:
-	rm -rf .venv reproduce benchmarks/results
+	rm -rf .venv reproduce docs/_build benchmarks/results
