@@ -64,6 +64,7 @@ def reproduce_page(quick: bool, progress: Callable[[int, int], None]) -> Page:
         ("where", "claim", "verdict", "found in this run"),
         [(claim.where, claim.statement, claim.verdict, claim.found) for claim in study.claims],
         "Every verdict is computed from the sections below.",
+        prose=True,
     )
     page.blocks.extend(study.page.blocks)
     return page
