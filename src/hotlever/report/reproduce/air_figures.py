@@ -83,7 +83,6 @@ def scale_factor_figure(curves: Mapping[str, tuple[Array, Array]], published: fl
         axes.axhline(published, color="0.5", ls=":", label=f"paper, {published}")
         axes.set(xlabel="tip temperature (K)", ylabel="k = P$_{air}$ / P$_{vacuum}$")
         if many:
-            axes.set(yscale="log")
             axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         else:
             axes.legend(loc="upper left")
