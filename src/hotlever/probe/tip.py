@@ -32,7 +32,7 @@ class Tip(Record):
 
     Examples
     --------
-    >>> Tip(height_um=0.5, half_angle_deg=45, apex_radius_um=0.02).base_radius_um
+    >>> round(Tip(height_um=0.5, half_angle_deg=45, apex_radius_um=0.02).base_radius_um, 6)
     0.52
     """
 
