@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 
@@ -28,6 +29,7 @@ myst_heading_anchors = 3
 default_role = "autolink"
 autodoc_typehints = "none"  # the docstrings say them
 autodoc_member_order = "bysource"
+autodoc_default_options = {"exclude-members": "model_config"}
 autosummary_generate = False
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
@@ -40,3 +42,17 @@ html_css_files = ["math.css"]
 html_math_renderer = "svg"
 html_copy_source = False
 html_show_copyright = False
+
+
+def by_last_name(app: Any, env: Any, node: Any, contents: Any) -> Any:
+    """Find what a docstring means by a name without its module, where only one thing has it."""
+    domain, target = env.domains["py"], node.get("reftarget", "")
+    full = [name for name in domain.objects if name.endswith(f".{target}")]
+    if node.get("refdomain") != "py" or len(full) != 1:
+        return None
+    return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", full[0], node, contents)
+
+
+def setup(app: Any) -> None:
+    """Connect to Sphinx."""
+    app.connect("missing-reference", by_last_name)
