@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
+
+from docutils import nodes
+from sphinx import addnodes
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 
@@ -53,6 +57,25 @@ def by_last_name(app: Any, env: Any, node: Any, contents: Any) -> Any:
     return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", full[0], node, contents)
 
 
+def link_names(app: Any, page: nodes.document) -> None:
+    """Make every name of the package that stands in the text a link into the API reference."""
+    for name in list(page.findall(nodes.literal)):
+        dotted = name.astext()
+        linked = isinstance(name.parent, nodes.title | nodes.reference | addnodes.pending_xref)
+        if not linked and re.fullmatch(r"hotlever(\.\w+)+", dotted):
+            link = addnodes.pending_xref(
+                "",
+                name.deepcopy(),
+                refdomain="py",
+                reftype="obj",
+                reftarget=dotted,
+                refdoc=app.env.docname,
+                refwarn=True,
+            )
+            name.replace_self(link)
+
+
 def setup(app: Any) -> None:
     """Connect to Sphinx."""
+    app.connect("doctree-read", link_names)
     app.connect("missing-reference", by_last_name)

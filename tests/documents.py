@@ -6,6 +6,7 @@ import re
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -34,7 +35,7 @@ def blocks(text: str, *languages: str) -> list[Block]:
     """Return the fenced blocks in some languages."""
     found = list(_FENCE.finditer(text))
     shown: list[str | None] = [None] * len(found)
-    for place, (block, following) in enumerate(zip(found, found[1:], strict=False)):
+    for place, (block, following) in enumerate(pairwise(found)):
         if following["language"] == "text" and following.start() == block.end():
             shown[place] = following["content"]
     return [

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 import typer
-from documents import ROOT, blocks, commands, missing_lines, run_commands, without_blocks
 
+from documents import ROOT, blocks, commands, missing_lines, run_commands, without_blocks
 from hotlever.cli import app
 
 DOCS = ROOT / "docs"
@@ -23,7 +23,7 @@ PAGES = {
     if "_build" not in path.parts
 }
 #: Pages whose examples take minutes.
-SLOW = {"how-to/calibrate", "how-to/design", "how-to/uncertainty"}
+SLOW = {"how-to/calibrate", "how-to/design", "how-to/levers", "how-to/uncertainty"}
 #: Modules whose numbers the theory page states.
 LAWS = ("materials", "calibration", "lever/certificate.py", "fitting/least_squares.py")
 

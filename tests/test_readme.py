@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
+
 from documents import ROOT, blocks, commands, run_commands
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
