@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 
 from hotlever.cache import CACHE_VARIABLE
+from hotlever.calibration.characteristic import Characteristic, characteristic
 from hotlever.cli import main
 from hotlever.lever import Lever
+from hotlever.materials.spieser2017 import published
 from hotlever.probe import MeshOptions, Probe
 
 ROOT = Path(__file__).parents[1]
@@ -35,6 +37,18 @@ def lever() -> Lever:
 def coarse() -> Lever:
     """The reference lever on a coarse mesh: for what does not depend on accuracy."""
     return Lever(Probe.reference(), MeshOptions(refinement=0.4))
+
+
+@pytest.fixture(scope="session")
+def reference(lever: Lever) -> Characteristic:
+    """The characteristic of the reference lever."""
+    return characteristic(lever)
+
+
+@pytest.fixture(scope="session")
+def lever_3(lever: Lever) -> Characteristic:
+    """That of the reference lever with the paper's material of lever 3."""
+    return characteristic(lever.with_material(published("lever 3").material))
 
 
 @pytest.fixture(scope="session")

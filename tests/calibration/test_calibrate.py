@@ -18,7 +18,8 @@ from hotlever.calibration.budget import (
     material_variations,
     refitted,
 )
-from hotlever.calibration.calibrate import TABLE_COLUMNS, calibrate
+from hotlever.calibration.calibrate import calibrate
+from hotlever.calibration.calibration import TABLE_COLUMNS
 from hotlever.calibration.characteristic import characteristic
 from hotlever.calibration.knee import IVCurve
 from hotlever.calibration.power_law import EQ12, read_power_law

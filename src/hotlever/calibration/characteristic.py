@@ -182,7 +182,7 @@ class Characteristic:
         >>> from hotlever.probe import Probe
         >>> model = characteristic(Lever(Probe.reference()), 900.0)
         >>> model.bias([700.0, 800.0], 5600.0).round(2).tolist()
-        [7.73, 7.93]
+        [7.72, 7.93]
         """
         lever = self.lever_voltage(tip_K)
         return lever + series_resistance_ohm / 1000.0 * self.power(tip_K) / lever

@@ -11,6 +11,7 @@ from hotlever.cli.app import app, progress, stdout
 from hotlever.cli.options import ProbeFile, check_output, load_probe
 from hotlever.errors import InputError
 from hotlever.files import write_text
+from hotlever.materials.diffusion import ANNEALING_K, ANNEALING_S
 
 
 @app.command()
@@ -29,10 +30,10 @@ def design(
     ] = 2.0,
     annealing_K: Annotated[
         float, typer.Option("--annealing-K", help="Annealing (K) that the probe's delta is of.")
-    ] = 1423.15,
+    ] = ANNEALING_K,
     annealing_min: Annotated[
         float, typer.Option("--annealing-min", help="Annealing (min) that the delta is of.")
-    ] = 30.0,
+    ] = ANNEALING_S / 60.0,
     air: Annotated[bool, typer.Option(help="Solve in air too, for k.")] = True,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="FILE.csv; standard output if left out.")

@@ -61,7 +61,16 @@ class Fit:
     names : list of str
         The parameters that were varied.
     correlation : ndarray, shape (len(names), len(names))
-        NaN if it could not be estimated.
+        That the standard errors belong to; NaN if it could not be estimated.
+    common_noise_covariance : ndarray, shape (len(names), len(names))
+        What the covariance would be if all weighted data had the same noise: the paper's and
+        lmfit's assumption.
+    data_weights : ndarray, shape (len(observables), n)
+        What the differences of data and model were multiplied by; 0 for data left out.
+    sum_of_squares : float
+        Of the weighted differences.
+    drift : bool
+        Whether zeros could drift.
     observables : tuple of str
         What was fitted.
     inversion_temperature_K, inversion_temperature_stderr_K : float
@@ -85,6 +94,10 @@ class Fit:
     parameters: dict[str, FittedParameter]
     names: list[str]
     correlation: Array
+    common_noise_covariance: Array
+    data_weights: Array
+    sum_of_squares: float
+    drift: bool
     observables: tuple[str, ...]
     inversion_temperature_K: float
     inversion_temperature_stderr_K: float
@@ -115,6 +128,11 @@ class Fit:
         }
         return json.dumps(_without_nan(content), indent=2, ensure_ascii=False) + "\n"
 
+    @property
+    def common_noise_correlation(self) -> Array:
+        """The correlation of `common_noise_covariance`."""
+        return _correlation(self.common_noise_covariance)
+
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the fit file, whole or not at all."""
         write_text(path, self.to_json())
@@ -133,6 +151,7 @@ def fit(
     robust: bool = False,
     weights: Weights = "maximum",
     drift: bool = False,
+    data_weights: Array | None = None,
     medium: str | None = None,
     model: Callable[[Probe], ForwardModel] | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -161,6 +180,8 @@ def fit(
         its measurement error; an observable without errors then takes its scatter about the fit.
     drift : bool
         Let the zeros of I_h and V_r lie on straight lines over the order of the rows.
+    data_weights : ndarray, shape (observables, n), optional
+        `Fit.data_weights` of an earlier fit, in place of `weights`.
     medium : {"vacuum", "air"}, optional
         What the lever was measured in; wins over measurement and probe.
     model : callable, optional
@@ -196,7 +217,7 @@ def fit(
     used: NDArray[np.bool_] = np.any(present, axis=0)
     forward = model(probe) if model else fast_model(probe, progress)
     problem = LeastSquares(
-        forward, start, measurement, used, chosen, varied, weights, drift, progress
+        forward, start, measurement, used, chosen, varied, weights, drift, data_weights, progress
     )
     if isinstance(forward, FastModel):
         problem.start = problem.found_start(forward.space, probe.circuit)
@@ -237,6 +258,10 @@ def fit(
         parameters=parameters,
         names=varied,
         correlation=correlation,
+        common_noise_covariance=problem.common_noise_covariance(result),
+        data_weights=problem.data_weights,
+        sum_of_squares=problem.sum_of_squares(result.params),
+        drift=drift,
         observables=chosen,
         inversion_temperature_K=float(inversion_temperature(material.n_d, material.p)),
         inversion_temperature_stderr_K=_inversion_error(material, varied, covariance),

@@ -70,6 +70,8 @@ class LeastSquares:
         scatter about the fit for one.
     drift : bool
         Whether I_h and V_r have a zero that drifts along the file.
+    data_weights : ndarray, shape (observables, rows of the measurement), or None
+        What differences are multiplied by instead, as an earlier fit found it; 0 leaves out.
     progress : callable or None
         Called with the sweeps solved and how many there usually are.
 
@@ -94,6 +96,7 @@ class LeastSquares:
         varied: list[str],
         weights: Weights,
         drift: bool,
+        data_weights: Array | None,
         progress: Callable[[int, int], None] | None,
     ) -> None:
         self._model, self._varied = model, varied
@@ -108,10 +111,13 @@ class LeastSquares:
             if scale == 0:
                 raise InputError(f"{measurement.path or 'measurement'}: all values of {name} are 0")
         self._largest = self._scale
-        self._errors = weights == "errors"
+        self._errors = weights == "errors" and data_weights is None
         if self._errors:
             self._scale = self._measured_errors(observables)
         self._weights = np.ones(data.shape)
+        if data_weights is not None:
+            self._scale, self._weights = np.ones(data.shape), data_weights[:, used]
+            self._present = self._present & (self._weights > 0)
         self._lines, self._drift = Drift(observables, self._present), drift
         self.size = int(self._present.sum())
         self.evaluations = 0
@@ -255,6 +261,26 @@ class LeastSquares:
         influence = inverse @ jacobian.T * (residual / np.maximum(1.0 - leverage, _LEAST_FREE))
         covariance: Array = influence @ influence.T * np.outer(scale, scale)
         return covariance
+
+    def common_noise_covariance(self, result: Any) -> Array:
+        """Return the covariance if all weighted data had the same noise, as lmfit takes them."""
+        scale = np.array([PARAMETERS[name].scale for name in self._varied])
+        covariance = getattr(result, "covar", None)
+        if covariance is None:
+            return np.full((scale.size, scale.size), np.nan)
+        return np.asarray(covariance * np.outer(scale, scale))
+
+    @property
+    def data_weights(self) -> Array:
+        """What differences are multiplied by, in all rows of the measurement; 0 if left out."""
+        full = np.zeros((len(self._rows), self._used.size))
+        full[:, self._used] = np.where(self._present, self._by, 0.0)
+        return full
+
+    def sum_of_squares(self, parameters: Any) -> float:
+        """Return the sum of squares of the weighted residuals."""
+        residual = self._residual(parameters)
+        return float(residual @ residual)
 
     def residual_rms(self, parameters: Any) -> dict[str, float]:
         """Return the rms of data minus model per column, for every observable with data."""

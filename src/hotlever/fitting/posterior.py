@@ -1,6 +1,6 @@
 """The posterior of a fit's parameters, and the band of tip temperature that follows from it.
 
-Sampled with emcee on the reduced lever. The likelihood takes the fit's own scaled residuals as
+Sampled with emcee on the reduced lever. The likelihood takes the fit's own weighted residuals as
 normal, with one unknown noise scale for each observable. With the prior 1/σ the scales are
 integrated out exactly: a group of n residuals with the sum of squares Q contributes Q^(−n/2).
 The parameters have uniform priors within the bounds of `PARAMETERS`.
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from hotlever import __version__
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting.diagnostics import effective_sample_size, split_rhat
+from hotlever.fitting.drift import Drift
 from hotlever.fitting.fit import Fit
 from hotlever.fitting.nearby import NearbyModel
 from hotlever.lever.equations import OBSERVABLES
@@ -116,8 +117,9 @@ class FitPosterior:
         self.optimum = np.array([getattr(self._material, name) for name in fit.names]) / self.scale
         self._rows = [OBSERVABLES.index(name) for name in fit.observables]
         self._data = np.stack([fit.measurement.observable(name) for name in fit.observables])
-        self._present = np.isfinite(self._data)
-        self._largest = np.nanmax(np.abs(self._data), axis=1, keepdims=True)
+        self._weights = fit.data_weights
+        self._present = np.isfinite(self._data) & (self._weights > 0)
+        self._drift = Drift(fit.observables, self._present) if fit.drift else None
         groups = np.arange(len(self._rows)) if noise == "each" else np.zeros(len(self._rows), int)
         self._group = np.broadcast_to(groups[:, None], self._data.shape)[self._present]
         self._counts = np.bincount(self._group)
@@ -146,7 +148,9 @@ class FitPosterior:
         varied = [list(PARAMETERS).index(name) for name in self._names]
         residual = self._scaled(self._model.predict(self._material)[self._rows] - self._data)
         slopes = self._model.sensitivities()[self._rows][:, :, varied] * self.scale
-        jacobian = (slopes / self._largest[:, :, None])[self._present]
+        jacobian = (slopes * self._weights[:, :, None])[self._present]
+        if self._drift is not None:
+            jacobian = self._drift.removed(jacobian, self._weights)
         prior = np.diag(12.0 / (self.upper - self.lower) ** 2)
         step = np.zeros(len(varied))
         for _ in range(50):
@@ -158,7 +162,9 @@ class FitPosterior:
         return Gaussian(mean, covariance)
 
     def _scaled(self, difference: Array) -> Array:
-        scaled: Array = (difference / self._largest)[self._present]
+        if self._drift is not None:
+            difference = difference - self._drift.line(difference, self._weights)
+        scaled: Array = (difference * self._weights)[self._present]
         return scaled
 
     def _squares(self, residual: Array) -> Array:

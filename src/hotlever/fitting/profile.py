@@ -13,7 +13,7 @@ from hotlever import __version__
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting.fit import Fit, fit
 from hotlever.fitting.models import FastModel
-from hotlever.lever.lever import OBSERVABLE_COLUMNS, Lever
+from hotlever.lever.lever import Lever
 from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.materials import PARAMETERS, Material, parameter
 from hotlever.probe import Probe
@@ -128,9 +128,13 @@ class _Profile:
         model = FastModel(lever, cached_reduction(lever))
         model.confirm(lever.probe.material, self._used_bias())
         self._model = _Confirmed(model)
-        self.at_optimum = self._squares(result)
-        data = sum(self._count(observable) for observable in result.observables)
-        self._variance = self.at_optimum / max(data - len(result.names), 1)
+        self.at_optimum = result.sum_of_squares
+        data = int(np.count_nonzero(result.data_weights))
+        variance = self.at_optimum / max(data - len(result.names), 1)
+        # what the sum of squares knows of the noise, corrected by what the standard error knows
+        place, stderr = result.names.index(name), result.parameters[name].stderr
+        common = result.common_noise_covariance[place, place]
+        self._variance = variance * (1.0 if stderr is None else float(stderr**2 / common))
 
     def delta(self, squares: float) -> float:
         """Return Δχ² of a sum of scaled squares."""
@@ -145,9 +149,11 @@ class _Profile:
             probe,
             observables=self._result.observables,
             fixed={**held, self._name: value},
+            drift=self._result.drift,
+            data_weights=self._result.data_weights,
             model=self._forward,
         )
-        return self._squares(refitted), refitted.probe.material
+        return refitted.sum_of_squares, refitted.probe.material
 
     def _forward(self, probe: Probe) -> _Confirmed:
         return self._model
@@ -156,18 +162,6 @@ class _Profile:
         measurement = self._result.measurement
         data = np.stack([measurement.observable(name) for name in self._result.observables])
         return measurement.bias_V[np.isfinite(data).any(axis=0)]
-
-    def _count(self, observable: str) -> int:
-        return int(np.isfinite(self._result.measurement.observable(observable)).sum())
-
-    def _squares(self, fitted: Fit) -> float:
-        """Return the sum of squares of the scaled residuals of a fit."""
-        total = 0.0
-        for name in fitted.observables:
-            largest = np.nanmax(np.abs(fitted.measurement.observable(name)))
-            rms = fitted.residual_rms[OBSERVABLE_COLUMNS[name]]
-            total += self._count(name) * (rms / largest) ** 2
-        return total
 
 
 def _dataset(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from hotlever.calibration.calibrate import Calibration
+from hotlever.calibration.calibration import Calibration
 from hotlever.report.fit_report import value_with_error
 from hotlever.report.style import (
     BLACK,

@@ -40,10 +40,23 @@ class Page:
         self.blocks.append({"kind": "text", "text": text})
 
     def table(
-        self, columns: Sequence[str], rows: Sequence[Sequence[str]], caption: str = ""
+        self,
+        columns: Sequence[str],
+        rows: Sequence[Sequence[str]],
+        caption: str = "",
+        *,
+        prose: bool = False,
     ) -> None:
-        """Add a table of strings."""
-        self.blocks.append({"kind": "table", "columns": columns, "rows": rows, "caption": caption})
+        """Add a table of strings; one of sentences is set flush left."""
+        self.blocks.append(
+            {
+                "kind": "table",
+                "columns": columns,
+                "rows": rows,
+                "caption": caption,
+                "prose": prose,
+            }
+        )
 
     def figure(self, name: str, made: Figure, caption: str) -> None:
         """Add a figure; `name` is its file name without suffix."""

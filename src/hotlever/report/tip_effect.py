@@ -25,8 +25,6 @@ Array = NDArray[np.float64]
 
 #: Plausible tips of lithography probes: height (µm) and half-angle (degrees).
 SIZES = ((0.5, 15.0), (0.5, 30.0), (0.7, 20.0), (1.0, 15.0), (1.0, 30.0))
-#: The paper's predicted and measured knee (K).
-PREDICTED_KNEE, MEASURED_KNEE = 893.0, 943.0
 BIAS = np.linspace(1.0, 11.0, 25)
 
 

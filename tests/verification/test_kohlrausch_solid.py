@@ -1,0 +1,38 @@
+"""The Kohlrausch relation in three dimensions: the L-shape of `test_kohlrausch`, as a solid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from skfem.element import ElementTetP2
+from test_kohlrausch import GROUND, HIGH_DOPED, SUPPLY
+
+from hotlever.lever.continuation import BranchFollower
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.operators import FiniteElements
+from hotlever.lever.space import LeverSpace
+from hotlever.materials.spieser2017 import published
+from hotlever.probe import Circuit, Layout, Region
+from hotlever.probe.solid import SolidMeshOptions, mesh_solid
+
+OUTLINE = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
+
+
+def highest(voltage, refinement):
+    """Highest temperature at the nodes of a mesh with sizes divided by `refinement`."""
+    layout = Layout((Region("all", "heater", OUTLINE),), (SUPPLY, GROUND), (0.5, 0.5), 0.3)
+    sizes = SolidMeshOptions(heater=0.2, lever=0.2, corner=0.05, refinement=refinement)
+    mesh = mesh_solid(layout, sizes)
+    space = LeverSpace(mesh, FiniteElements(mesh.elements, ElementTetP2(), 4))
+    circuit = Circuit(series_resistance_ohm=0.0)
+    equations = LeverEquations(space, circuit, published("option III").material)
+    return space.highest_temperature(BranchFollower(equations).advance_to(voltage).x)
+
+
+@pytest.mark.parametrize("voltage", [0.5, 1.0])
+def test_highest_temperature_of_a_solid_l_shape(voltage):
+    exact = HIGH_DOPED[voltage]
+    errors = np.abs([highest(voltage, refinement) - exact for refinement in (0.6, 2.0)])
+    # the exact value is given to 0.005 K
+    assert errors[1] < 2e-4 * (exact - 293) + 0.005
+    assert errors[1] < errors[0] / 4
