@@ -25,7 +25,13 @@ PAGES = {
 #: Pages whose examples take minutes.
 SLOW = {"how-to/calibrate", "how-to/design", "how-to/levers", "how-to/uncertainty"}
 #: Modules whose numbers the theory page states.
-LAWS = ("materials", "calibration", "lever/certificate.py", "fitting/least_squares.py")
+LAWS = (
+    "materials",
+    "probe/tip.py",
+    "calibration",
+    "lever/certificate.py",
+    "fitting/least_squares.py",
+)
 
 with_examples = [
     pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else [])
