@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import re
-import shlex
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from documents import ROOT, blocks, commands, run_commands
+
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-
-
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
 
 
 @pytest.fixture
@@ -24,23 +19,18 @@ def beside_examples(tmp_path):
 
 def test_python_example(beside_examples, monkeypatch, capsys):
     monkeypatch.chdir(beside_examples)
-    (example,) = blocks("python")
-    assert len(example.splitlines()) <= 12
-    exec(compile(example, "README.md", "exec"), {})
+    (example,) = blocks(README, "python")
+    assert len(example.content.splitlines()) <= 12
+    exec(compile(example.content, "README.md", "exec"), {})
     printed = capsys.readouterr().out
     assert "knee of the I-V curve: tip at 900 K" in printed
     assert printed.count("±") == 6
 
 
 def test_command_line_example(run, beside_examples):
-    (example,) = blocks("sh")
-    commands = example.strip().splitlines()
-    assert len(commands) <= 10
-    for command in commands:
-        name, *arguments = shlex.split(command)
-        assert name == "hotlever"
-        status, _, err = run(*arguments)
-        assert status == 0, (command, err)
+    (example,) = blocks(README, "sh")
+    assert 0 < len(commands(example.content)) == len(example.content.splitlines()) <= 10
+    run_commands(example.content, run)
     made = {path.name for path in beside_examples.iterdir()}
     assert {"probe.toml", "probe.png", "sweep.csv", "one.nc", "fields", "fit.json"} <= made
 

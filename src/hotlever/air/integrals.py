@@ -22,7 +22,7 @@ _TINY = 1e-150
 
 
 def potential(points: Array, corners: Array) -> Array:
-    """Return ∫ 1/|p − y| dA(y) over polygons.
+    """Return ``∫ 1/|p − y| dA(y)`` over polygons.
 
     Parameters
     ----------

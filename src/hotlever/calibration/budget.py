@@ -80,7 +80,7 @@ class Variation:
 
 
 def geometry_variations(probe: Probe, tolerance: float) -> Iterator[Variation]:
-    """Yield levers with one dimension a little larger, by `_SMALL` of it."""
+    """Yield levers with one dimension a little larger, by ``_SMALL`` of it."""
     for name in probe.shape.description():
         if name in _HARMLESS or tolerance == 0:
             continue

@@ -33,7 +33,7 @@ def compare_levers(fits: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
     Parameters
     ----------
     fits : mapping of str to mapping
-        The contents of fit files (`hotlever.fitting.Fit.to_json`), by the name of the lever.
+        The contents of fit files (`hotlever.fitting.fit.Fit.to_json`), by the name of the lever.
 
     Returns
     -------

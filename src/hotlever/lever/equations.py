@@ -1,6 +1,6 @@
 """The coupled electro-thermal equations of a lever in its circuit.
 
-Heat (paper's first equation, with the sign corrected) and charge:
+Heat (paper's first equation, with the sign corrected) and charge::
 
     −∇·(κ ∇T) = σ |∇V|² − heat lost to air,    ∇·(σ ∇V) = 0,
 
@@ -9,8 +9,8 @@ no current into the reader, and V_l + R_s I_h = V_b. A state is the vector of th
 values, then V_l, then V_b; one more condition, the *pin*, selects a state on the branch: a
 given bias, or a point along the arc. Units are µm, V, mA, mW and K.
 
-The loss to air is linear in θ = ∫κ_air dT on the surface (`hotlever.air`). The air operator fills
-the plate itself with air too; κ is therefore κ_Si − κ_air where there is air.
+The loss to air is linear in θ = ∫κ_air dT on the surface (`hotlever.air.operator`). The air
+operator fills the plate itself with air too; κ is therefore κ_Si − κ_air where there is air.
 """
 
 from __future__ import annotations

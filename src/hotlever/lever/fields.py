@@ -57,7 +57,7 @@ class FieldMap:
 
 
 class FieldMapper:
-    """Draws states of one lever: every triangle of the mesh is cut into `cuts`² smaller ones."""
+    """Draws states of one lever: every triangle of the mesh is cut into ``cuts²`` smaller ones."""
 
     def __init__(self, lever: Lever, cuts: int = 3) -> None:
         self._lever = lever

@@ -29,7 +29,7 @@ from hotlever.probe.probe import Circuit
 from hotlever.threads import one_blas_thread
 
 Array = NDArray[np.float64]
-#: States and inverse Jacobians.
+# states and inverse Jacobians
 Found = tuple[Array, Array]
 
 #: Error left (1 K or 10 mV) on the few points, and at the end.

@@ -2,17 +2,13 @@
 
 An optical phonon decays into two of half its energy (three-phonon process) or into three of
 a third (four-phonon process). With the thermal occupation n(ω) = 1/(exp(hcω/kT) − 1) its
-wavenumber is [1]_
+wavenumber is (Balkanski, Wallis and Haro, Phys. Rev. B 28, 1928 (1983), eq. 3.6)::
 
     ω(T) = ω0 + A·(1 + 2·n2) + B·(1 + 3·n3 + 3·n3²),   n2 = n(ω0/2), n3 = n(ω0/3).
 
 The law is linear in A and B once ω0 in the occupations is given; ω0 itself cancels from
 shifts. For kT ≫ hcω0 the A term grows like T and the B term like T², which is why a line
 fitted below 900 K reads too hot above.
-
-References
-----------
-.. [1] Balkanski, Wallis and Haro, Phys. Rev. B 28, 1928 (1983), eq. 3.6.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Where the silicon line of a spectrum is, how wide and how strong, and how sure we are.
 
-The fit needs no start values. Its model is the line (`lineshape.line`) on a sloping
+The fit needs no start values. Its model is the line (`hotlever.raman.lineshape.line`) on a sloping
 background, and, where the residuals ask for it, a broad band on the low side: disordered
 silicon near 480 cm⁻¹, or a shoulder from warmer surroundings in the laser spot. Left out,
 such a band pulls the centre of a hot, weak line by more than a wavenumber (tens of kelvin).

@@ -9,12 +9,8 @@ the background) plus
     (1 − f²)·D(e) + 2f·X(e),   D = 1/(1 + e²),   X = e/(1 + e²).
 
 D and X are real and imaginary part of one analytic function, so a Gaussian response turns
-both into real and imaginary part of the Faddeeva function w(z) [1]_.
-
-References
-----------
-.. [1] Abramowitz and Stegun, Handbook of Mathematical Functions, 7.1 and 7.4.13;
-   w'(z) = −2z·w(z) + 2i/√π.
+both into real and imaginary part of the Faddeeva function w(z): Abramowitz and
+Stegun, Handbook of Mathematical Functions, 7.1 and 7.4.13, with w'(z) = −2z·w(z) + 2i/√π.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ class PeakOptions:
     ----------
     shape : {"lorentzian", "voigt", "fano"}
         "voigt" adds the spectrometer's Gaussian response, "fano" the asymmetry of heavily
-        doped silicon. A `resolution` given with "fano" convolves the Fano line too.
+        doped silicon. A resolution given with "fano" convolves the Fano line too.
     resolution : float, optional
         FWHM of the spectrometer's response, cm⁻¹. Left out with "voigt", it is fitted.
     band : bool
