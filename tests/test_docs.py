@@ -23,7 +23,7 @@ PAGES = {
     if "_build" not in path.parts
 }
 #: Pages whose examples take minutes.
-SLOW = {"how-to/calibrate", "how-to/design", "how-to/levers", "how-to/uncertainty"}
+SLOW = {"how-to/calibrate", "how-to/design", "how-to/fit", "how-to/levers", "how-to/uncertainty"}
 #: Modules whose numbers the theory page states.
 LAWS = (
     "materials",

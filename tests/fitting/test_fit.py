@@ -300,7 +300,7 @@ def with_errors(measurement, current=None, reader=None, tip=None):
 
 def test_measurement_errors_weigh_the_data(coarse, coarse_fast):
     measurement = twin(coarse, noise=0.003)
-    trusted = with_errors(measurement, current=1e-5, reader=1.0, tip=1e3)
+    trusted = with_errors(measurement, current=1e-3, reader=0.3, tip=600.0)
     result = fit(trusted, coarse.probe, weights="errors", model=coarse_fast)
     alone = fit(measurement, coarse.probe, observables=["current"], model=coarse_fast)
     assert result.residual_rms["current_mA"] == pytest.approx(
