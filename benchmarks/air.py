@@ -131,13 +131,13 @@ def refinement(vacuum, air):
         space = vacuum.space.in_air(replace(operator, **changes))
         return len(operator.sites), Lever(probe, space=space).sweep(bias)
 
-    _, finest = observed(PanelOptions(refinement=2.2, edge=0.25))
+    _, finest = observed(PanelOptions(refinement=2.0))
     choices = {
         "sizes × 2": observed(PanelOptions(refinement=0.5)),
         "default": observed(PanelOptions()),
-        "sizes / 2": observed(PanelOptions(refinement=2.0)),
-        "half the size at edges only": observed(PanelOptions(edge=0.25)),
-        "half the size in the heater only": observed(PanelOptions(heater=0.1)),
+        "sizes / 1.5": observed(PanelOptions(refinement=1.5)),
+        "half the size at edges only": observed(PanelOptions(edge=0.075)),
+        "half the size in the heater only": observed(PanelOptions(heater=0.15)),
         "default, κ_Si in the plate, not κ_Si - κ_air": observed(PanelOptions(), filling=0.0),
     }
     rows = []
@@ -146,7 +146,7 @@ def refinement(vacuum, air):
         current = data.current_mA / finest.current_mA - 1
         heat = data.air_heat_mW / finest.air_heat_mW - 1
         rows.append((name, count, *(f"{np.abs(x).max().item():.1e}" for x in (heat, tip, current))))
-    print("\nPanels: largest relative distance from 2.2 times finer ones, 4 to 10.7 V\n")
+    print("\nPanels: largest relative distance from panels of half the size, 4 to 10.7 V\n")
     table(("", "sites", "heat into air", "rise of T_tip", "I_h"), rows)
 
 

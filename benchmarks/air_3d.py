@@ -13,6 +13,8 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
+from hotlever.air.operator import make_operator
+from hotlever.air.surface import PanelOptions
 from hotlever.lever import Lever
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe
@@ -23,15 +25,18 @@ from problems import BIAS, table
 POINTS = (7.22, 8.268, 10.748)
 
 AIR = Probe.reference().in_medium("air")
+BASE = AIR.circuit.base_temperature_K
 
 #: What is varied, and how.
 STUDY: dict[str, dict] = {
     "default": {},
-    "sizes × 1.5": {"mesh": SolidMeshOptions(refinement=2 / 3)},
-    "sizes / 1.5": {"mesh": SolidMeshOptions(refinement=1.5)},
+    "quadratic elements in the air": {"air_order": 2},
+    "quadratic, sizes × 1.5": {"air_order": 2, "mesh": SolidMeshOptions(refinement=2 / 3)},
+    "quadratic, sizes / 1.5": {"air_order": 2, "mesh": SolidMeshOptions(refinement=1.5)},
+    "edges of the plate × 2": {"mesh": SolidMeshOptions(rim=4.0)},
+    "edges of the plate / 1.5": {"mesh": SolidMeshOptions(rim=4 / 3)},
     "sphere of 45 µm": {"sphere_radius_um": 45.0},
     "sphere of 90 µm": {"sphere_radius_um": 90.0},
-    "cubic elements in the air": {"air_order": 3},
 }
 
 
@@ -59,26 +64,29 @@ def points() -> None:
     table(("bias_V", *columns, "air share", "k"), rows)
 
 
-def operator() -> None:
-    """Print the heat of a lever at one temperature: volume elements, and the fast model."""
+def operator(names: Sequence[str] = tuple(STUDY)) -> None:
+    """Print the energy ∫θq of θ rising linearly from the leg ends, by volumes and by panels.
+
+    Volumes come to the limit from above and panels from below. Heat of a lever at one temperature
+    would not compare them: θ would jump at the leg ends, which have no panels.
+    """
+    length = np.ptp([x for region in AIR.layout().regions for x, _ in region.outline])
     rows = []
-    for name, changes in STUDY.items():
-        lever = SolidLever(AIR, **changes)
+    for name in names:
+        lever = SolidLever(AIR, **STUDY[name])
         assert lever.air is not None
-        coefficients, heat = lever.air.solve(np.ones(lever.surface.size))
-        rows.append(
-            (
-                name,
-                lever.air.size,
-                f"{heat.sum():.3f}",
-                f"{lever.air.at_infinity(coefficients) / heat.sum() - 1:+.1e}",
-            )
-        )
+        theta = lever.air.sites[:, 0] / length
+        coefficients, heat = lever.air.solve(theta)
+        far = f"{lever.air.at_infinity(coefficients) / heat.sum() - 1:+.1e}"
+        rows.append((f"volumes: {name}", lever.air.size, f"{theta @ heat:.3f}", far))
         print(rows[-1], file=sys.stderr, flush=True)
-    fast = Lever(AIR).space.air
-    assert fast is not None
-    rows.append(("boundary elements", len(fast.matrix), f"{fast.matrix.sum():.3f}", ""))
-    table(("variant", "unknowns", "heat over θ (µm)", "at infinity (relative)"), rows)
+    for refinement in (0.5, 1.0, 1.5, 2.0):
+        options = PanelOptions(refinement=refinement)
+        air = make_operator(AIR.layout(), AIR.surroundings, BASE, options)
+        theta = air.sites[:, 0] / length
+        name = f"panels: sizes / {refinement:g}"
+        rows.append((name, len(air.sites), f"{theta @ air.matrix @ theta:.3f}", ""))
+    table(("variant", "unknowns", "energy over θ² (µm)", "heat at infinity (relative)"), rows)
 
 
 def study(names: Sequence[str] = tuple(STUDY)) -> None:
@@ -147,7 +155,6 @@ def sweep() -> None:
     full = lever.dataset(lever.solve(BIAS, store=lever.store()))
     wall, processor = time.perf_counter() - wall, time.process_time() - processor
     fast = Lever(AIR).sweep(BIAS)
-    base = AIR.circuit.base_temperature_K
     rows = [
         (
             f"{bias:.3f}",
@@ -157,7 +164,7 @@ def sweep() -> None:
             f"{fast.current_mA.values[k] / full.current_mA.values[k] - 1:+.1e}",
             f"{fast.air_heat_mW.values[k] / full.air_heat_mW.values[k] - 1:+.1e}",
         )
-        for k, (bias, rise) in enumerate(zip(BIAS, full.tip_K.values - base, strict=True))
+        for k, (bias, rise) in enumerate(zip(BIAS, full.tip_K.values - BASE, strict=True))
     ]
     print("fast less full 3-D\n")
     table(("bias (V)", "T_tip (K)", "T_tip (K)", "% of the rise", "I_h", "air heat"), rows)

@@ -17,7 +17,7 @@ COARSE = SolidMeshOptions(refinement=0.4, grading=0.7)
 def in_air() -> SolidLever:
     """The reference lever in air on a coarse mesh."""
     pytest.importorskip("ngsolve")
-    return SolidLever(Probe.reference().in_medium("air"), COARSE)
+    return SolidLever(Probe.reference().in_medium("air"), COARSE, air_order=2)
 
 
 @pytest.fixture(scope="session")

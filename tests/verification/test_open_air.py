@@ -7,20 +7,10 @@ import pytest
 
 pytest.importorskip("ngsolve")
 
-from netgen.occ import (
-    Axes,
-    Ellipsoid,
-    Glue,
-    OCCGeometry,
-    Pnt,
-    Sphere,
-    WorkPlane,
-    X,
-    Z,
-)
+from netgen.occ import Axes, Ellipsoid, OCCGeometry, Pnt, Sphere, X, Z
 
 from hotlever.lever3d.still_air import OpenAir
-from hotlever.probe.solid import AIR, LEVER_SURFACE, SPHERE, in_a_sphere, with_image
+from hotlever.probe.solid import in_a_sphere
 
 CENTRE, RADIUS = (0.0, 0.0, 0.0), 4.0
 
@@ -43,22 +33,6 @@ def spheroid(size):
     body = Ellipsoid(Axes(CENTRE, Z, X), 1.0, 1.0, 0.5)
     body.maxh = size
     return in_a_sphere(body, CENTRE, RADIUS)
-
-
-def disc(size, rim):
-    """A disc without thickness, in a ball of air cut out by nothing."""
-    face = WorkPlane().Circle(0, 0, 1.0).Face()
-    face.maxh = size
-    for edge in face.edges:
-        edge.maxh = rim
-    ball = Sphere(Pnt(*CENTRE), RADIUS)
-    ball.faces.name = SPHERE
-    inside = Glue([ball, face])
-    for solid in inside.solids:
-        solid.name = AIR
-    for surface in inside.faces:
-        surface.name = surface.name if surface.name == SPHERE else LEVER_SURFACE
-    return with_image(inside, CENTRE, RADIUS)
 
 
 EXACT = {

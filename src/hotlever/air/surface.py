@@ -28,7 +28,7 @@ class PanelOptions:
     Attributes
     ----------
     refinement : float
-        Divides all sizes: 2 halves them.
+        Divides all sizes and their growth: 2 halves them.
     edge : float
         At an edge of the lever, as a share of its thickness.
     heater : float
@@ -40,10 +40,10 @@ class PanelOptions:
     """
 
     refinement: float = 1.0
-    edge: float = 0.5
-    heater: float = 0.2
-    largest: float = 0.08
-    growth: float = 0.6
+    edge: float = 0.15
+    heater: float = 0.3
+    largest: float = 0.03
+    growth: float = 1.2
 
 
 @dataclass(frozen=True)
@@ -137,8 +137,8 @@ class _Sizes:
     def __init__(self, layout: Layout, options: PanelOptions) -> None:
         low, high = lever_box(layout)
         self._heater = _box(layout.heater)
-        self._growth = options.growth
         fine = 1.0 / options.refinement
+        self._growth = fine * options.growth
         self._edge = fine * options.edge * layout.thickness_um
         self._narrow = fine * options.heater * float(np.ptp(self._heater, axis=0).min())
         self._largest = fine * options.largest * float((high - low).max())

@@ -36,7 +36,7 @@ class SolidLever(Lever):
     sphere_radius_um : float
         Radius of the meshed air around the lever. The air reaches to infinity with any radius.
     air_order : int
-        Order of the elements in the air, 2 or more.
+        Order of the elements in the air, 2 or more; on the lever θ is quadratic.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class SolidLever(Lever):
         mesh: SolidMeshOptions | None = None,
         *,
         sphere_radius_um: float = SPHERE_RADIUS,
-        air_order: int = 2,
+        air_order: int = 3,
     ) -> None:
         around = probe.surroundings
         in_air = around.medium == "air"

@@ -45,6 +45,9 @@ class SolidMeshOptions:
         Edge along re-entrant corners, as a share of the heater's narrow side.
     lever : float
         Largest edge elsewhere in the silicon, as a share of the lever's length.
+    rim : float
+        Largest edge along the edges of the silicon, as a share of its thickness: the flux into
+        the air is singular there.
     sphere : float
         Largest edge in the air and in the image ball, as a share of the sphere's radius.
     grading : float
@@ -55,8 +58,9 @@ class SolidMeshOptions:
     heater: float = 0.15
     corner: float = 0.04
     lever: float = 0.05
+    rim: float = 2.0
     sphere: float = 0.3
-    grading: float = 0.4
+    grading: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -169,7 +173,9 @@ def _silicon(layout: Layout, options: SolidMeshOptions) -> Any:
         solids.append(solid)
     silicon = Glue(solids)
     reentrant = layout.reentrant_corners()
+    rim = options.rim * layout.thickness_um / options.refinement
     for edge in silicon.edges:
+        edge.maxh = min(edge.maxh, rim)
         ends = [(vertex.p[0], vertex.p[1]) for vertex in edge.vertices]
         if any(max(math.dist(end, corner) for end in ends) < _ON_LINE for corner in reentrant):
             edge.maxh = options.corner * narrow
