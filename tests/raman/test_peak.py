@@ -96,7 +96,7 @@ def _pulls(instrument, options, count, seed):
 
 
 def test_standard_errors_are_honest_at_the_papers_counts_with_spikes_and_band():
-    """The issue's target, on its 1 000 spectra: width of the pulls 1 within 10 %, no failure."""
+    """On 1 000 spectra: width of the pulls 1 within 10 %, no failure."""
     pulls = _pulls(Instrument(), PeakOptions(), 1000, seed=42)
     width = pulls.std(axis=0)
     assert np.all(np.abs(width - 1.0) < 0.1), width
