@@ -9,7 +9,9 @@ import sys
 
 import numpy as np
 
+from hotlever.errors import ComputationError
 from hotlever.fitting import Measurement, fit, read_measurement
+from hotlever.fitting.models import fast_model
 from hotlever.lever import Lever
 from hotlever.lever.reduced import BOX, material_in_box
 from hotlever.materials import PARAMETERS
@@ -79,7 +81,15 @@ def coverage(probe, twins, proportional):
     table(("", "mean pull", "spread", "in the 68 % interval", "in the 95 % interval"), rows)
 
 
-def starts(count):
+class FromThere:
+    """A fast model that leaves the start where the probe's material puts it."""
+
+    def __init__(self, probe):
+        model = fast_model(probe)
+        self.predict, self.confirm = model.predict, model.confirm
+
+
+def starts(count, model=None, name="with the start found from the data"):
     """Print how far from each other fits from random materials end."""
     data, rng = read_measurement("examples/lever-a.csv"), np.random.default_rng(2)
     probe = Probe.reference()
@@ -88,7 +98,11 @@ def starts(count):
     for _ in range(count):
         material = material_in_box(probe.material, rng.random(len(BOX)))
         material = material.with_(c_kappa=rng.uniform(0.4, 1.0))
-        found = fit(data, probe.model_copy(update={"material": material}))
+        try:
+            found = fit(data, probe.model_copy(update={"material": material}), model=model)
+        except ComputationError:
+            apart.append(np.inf)
+            continue
         apart.append(
             max(
                 abs(found.parameters[name].value - parameter.value) / parameter.stderr
@@ -97,8 +111,8 @@ def starts(count):
         )
     apart = np.array(apart)
     print(
-        f"\n{count} random starting points: {int((apart < 0.05).sum())} end at the same optimum; "
-        f"the largest distance of a parameter is {apart.max():.1e} standard errors."
+        f"\n{count} random starting points, {name}: {int((apart < 0.05).sum())} end at the same "
+        f"optimum; the largest distance of a parameter is {apart.max():.1e} standard errors."
     )
 
 
@@ -108,3 +122,4 @@ if __name__ == "__main__":
     for each in (True, False):
         coverage(Probe.reference(), TWINS, each)
     starts(STARTS)
+    starts(STARTS, FromThere, "Levenberg-Marquardt straight from there")
