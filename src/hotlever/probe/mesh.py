@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from skfem import MeshTri
+from skfem import MeshTet, MeshTri
 
 from hotlever.errors import ComputationError
 from hotlever.probe.layout import Layout, Point, Terminal
@@ -86,7 +86,7 @@ def mesh_layout(layout: Layout, options: MeshOptions | None = None) -> ProbeMesh
     options = options or MeshOptions()
     points, triangles, region = _netgen(layout, options)
     mesh = MeshTri(points.T.copy(), triangles.T.copy())
-    edges = {terminal.name: _facets_on(mesh, terminal, layout) for terminal in layout.terminals}
+    edges = {terminal.name: facets_on(mesh, terminal) for terminal in layout.terminals}
     return ProbeMesh(layout, mesh, region, edges)
 
 
@@ -132,16 +132,21 @@ def _netgen(
     return points, triangles, region
 
 
-def _facets_on(mesh: MeshTri, terminal: Terminal, layout: Layout) -> NDArray[np.intp]:
-    """Boundary facets with both ends on the terminal's line segment."""
+def facets_on(mesh: MeshTri | MeshTet, terminal: Terminal) -> NDArray[np.intp]:
+    """Return the boundary facets with all corners on the terminal's line, or above or below it.
+
+    Raises
+    ------
+    ComputationError
+        If there are none.
+    """
     facets = mesh.boundary_facets()
-    ends = mesh.p[:, mesh.facets[:, facets]]
-    on = _on_segment(ends[:, 0], terminal.start, terminal.end) & _on_segment(
-        ends[:, 1], terminal.start, terminal.end
-    )
+    corners = mesh.p[:2, mesh.facets[:, facets].ravel()]
+    on = _on_segment(corners, terminal.start, terminal.end).reshape(-1, facets.size).all(axis=0)
     if not on.any():
-        raise ComputationError(f"terminal '{terminal.name}' touches no edge of the lever")
-    return facets[on]
+        kind = "edge" if mesh.dim() == 2 else "face"
+        raise ComputationError(f"terminal '{terminal.name}' touches no {kind} of the lever")
+    return np.asarray(facets[on], dtype=np.intp)
 
 
 def _on_segment(points: NDArray[np.float64], start: Point, end: Point) -> NDArray[np.bool_]:

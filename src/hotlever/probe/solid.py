@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from skfem import MeshTet
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.probe.layout import Layout, Terminal
+from hotlever.probe.layout import Layout
+from hotlever.probe.mesh import facets_on
 
 _ON_LINE = 1e-6  # µm
 #: Largest edge on the sphere, as a share of its radius: with longer ones Netgen fails to pair
@@ -138,7 +139,7 @@ def mesh_solid(
         largest = options.sphere * sphere_radius_um / options.refinement
     try:
         mesh = OCCGeometry(shape).GenerateMesh(maxh=largest, grading=options.grading)
-    except Exception as error:
+    except Exception as error:  # Netgen's own type is not exported
         raise ComputationError(f"Netgen could not mesh the lever: {error}") from error
     return _take_out_silicon(mesh, layout, centre, sphere_radius_um)
 
@@ -231,20 +232,5 @@ def _take_out_silicon(
     silicon = MeshTet(
         np.ascontiguousarray(points.T), np.ascontiguousarray(numbers.reshape(tetrahedra.shape).T)
     )
-    facets = {terminal.name: _facets_on(silicon, terminal) for terminal in layout.terminals}
+    facets = {terminal.name: facets_on(silicon, terminal) for terminal in layout.terminals}
     return SolidMesh(layout, silicon, region[region >= 0], facets, mesh, vertices, centre, radius)
-
-
-def _facets_on(mesh: MeshTet, terminal: Terminal) -> NDArray[np.intp]:
-    """Boundary facets with all corners over the terminal's line."""
-    facets = mesh.boundary_facets()
-    corners = mesh.p[:2][:, mesh.facets[:, facets]]
-    a, b = np.array(terminal.start), np.array(terminal.end)
-    length = np.linalg.norm(b - a)
-    offset = corners - a[:, None, None]
-    along = np.tensordot((b - a) / length, offset, axes=1)
-    across = np.tensordot(np.array([a[1] - b[1], b[0] - a[0]]) / length, offset, axes=1)
-    on = (np.abs(across) < _ON_LINE) & (along > -_ON_LINE) & (along < length + _ON_LINE)
-    if not on.all(axis=0).any():
-        raise ComputationError(f"terminal '{terminal.name}' touches no face of the lever")
-    return facets[on.all(axis=0)]
