@@ -249,7 +249,7 @@ class LeastSquares:
         A = JᵀJ and V = r² / (1 − h)².
         """
         scale = np.array([PARAMETERS[name].scale for name in self._varied])
-        residual, jacobian = self._residual(result.params), self._jacobian(result.params)
+        residual, jacobian = self._residual(result.params), self._slopes(result.params)
         unknown = np.full((scale.size, scale.size), np.nan)
         if self.size <= scale.size:
             return unknown
@@ -302,7 +302,7 @@ class LeastSquares:
             return self._lines.lines_in_words(self._lines.line(difference, self._by))
         if self.size <= len(self._varied) + 2 * len(self._rows):
             return []
-        residual, jacobian = -self._residual(parameters), self._jacobian(parameters)
+        residual, jacobian = -self._residual(parameters), self._slopes(parameters)
         noticed = self._lines.noticed(residual, jacobian, self._by)
         return [f"{text}; --drift would take that out" for text in noticed]
 
@@ -360,6 +360,10 @@ class LeastSquares:
     def _jacobian(self, parameters: Any) -> Array:
         # Levenberg-Marquardt asks for this once per step, at parameters it has just accepted
         self.steps += 1
+        return self._slopes(parameters)
+
+    def _slopes(self, parameters: Any) -> Array:
+        """Return the derivatives of the residuals by the scaled parameters."""
         _, sensitivities = self._predict(self.material(parameters))
         columns = [list(PARAMETERS).index(name) for name in self._varied]
         scale = np.array([PARAMETERS[name].scale for name in self._varied])
