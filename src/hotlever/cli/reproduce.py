@@ -16,7 +16,10 @@ def reproduce(
         Path, typer.Option("-o", "--output", help="Folder for the page and its figures.")
     ] = Path("reproduce"),
     quick: Annotated[
-        bool, typer.Option("--quick", help="Leave out the study of the mesh.")
+        bool,
+        typer.Option(
+            "--quick", help="Leave out what takes longest: k by geometry, the tip, the mesh."
+        ),
     ] = False,
 ) -> None:
     """Compute the paper's tables and figures and put them on one page."""
