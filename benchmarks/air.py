@@ -21,9 +21,9 @@ from hotlever.air.surface import PanelOptions
 from hotlever.air.surroundings import Surroundings
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.lever import Lever
-from hotlever.lever.reduced import BOX, material_in_box
 from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.lever.reduced_lever import ReducedLever
+from hotlever.lever.reduction import BOX, material_in_box
 from hotlever.probe import Probe
 from problems import BIAS, table
 

@@ -11,6 +11,7 @@ from hotlever.calibration.characteristic import characteristic
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.power_law_fit import PowerLawFit, fit_power_law
 from hotlever.lever import Lever
+from hotlever.materials.spieser2017 import RAMP
 from hotlever.probe import Probe
 from hotlever.report.fit_report import value_with_error
 
@@ -20,7 +21,7 @@ SPLIT = 3.3
 def main() -> None:
     lever = Lever(Probe.reference())
     model = characteristic(lever)
-    sweep = lever.sweep(np.linspace(1.0, 11.0, 25))
+    sweep = lever.sweep(RAMP)
     even = np.linspace(0.05, 4.0, 80)
     knee = model.knee.power_mW if model.knee else float("nan")
     ramp = (sweep.power_mW.values, sweep.tip_K.values)

@@ -13,11 +13,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from hotlever.materials.spieser2017 import RAMP
 from hotlever.probe import Probe, ProbeMesh
 
-BIAS = np.linspace(1.0, 11.0, 25)
+BIAS = RAMP
 PEER = Path(__file__).parent / "fenics" / "peer.py"
 DEBIAN_PYTHON = "/usr/bin/python3"
 

@@ -22,9 +22,9 @@ from hotlever.lever import Lever
 from hotlever.lever.certificate import estimated_error
 from hotlever.lever.continuation import AT_BIAS
 from hotlever.lever.newton import NewtonOptions, newton
-from hotlever.lever.reduced import BOX, material_in_box
 from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.lever.reduced_lever import ReducedLever
+from hotlever.lever.reduction import BOX, material_in_box
 from hotlever.probe import Probe
 from problems import BIAS, peer_problem, solve_with_peer, table
 

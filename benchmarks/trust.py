@@ -13,7 +13,7 @@ from hotlever.errors import ComputationError
 from hotlever.fitting import Measurement, fit, read_measurement
 from hotlever.fitting.models import fast_model
 from hotlever.lever import Lever
-from hotlever.lever.reduced import BOX, material_in_box
+from hotlever.lever.reduction import BOX, material_in_box
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from problems import BIAS, table

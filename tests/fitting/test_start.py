@@ -10,8 +10,8 @@ from hotlever.fitting import fit
 from hotlever.fitting.models import FastModel
 from hotlever.fitting.start import QuickPrediction, starting_material
 from hotlever.lever import Lever
-from hotlever.lever.reduced import BOX, material_in_box
 from hotlever.lever.reduced_cache import cached_reduction
+from hotlever.lever.reduction import BOX, material_in_box
 from hotlever.materials import PARAMETERS
 
 BIAS = np.linspace(1.0, 11.0, 13)

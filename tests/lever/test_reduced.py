@@ -14,8 +14,9 @@ from hotlever.errors import ComputationError
 from hotlever.lever import Lever
 from hotlever.lever.continuation import BranchFollower
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.reduced import BOX, ReducedSpace, material_in_box
+from hotlever.lever.reduced import ReducedSpace
 from hotlever.lever.reduced_cache import cached_reduction
+from hotlever.lever.reduction import BOX, material_in_box
 from hotlever.probe import MeshOptions, Probe
 
 BIAS = np.linspace(1.0, 11.0, 13)

@@ -8,9 +8,9 @@ import pytest
 from hotlever.fitting import fit
 from hotlever.fitting.measurement import Measurement
 from hotlever.fitting.models import FastModel
-from hotlever.lever.reduced import BOX, material_in_box
 from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.lever.reduced_lever import ReducedLever
+from hotlever.lever.reduction import BOX, material_in_box
 
 BIAS = np.linspace(1.0, 11.0, 11)
 

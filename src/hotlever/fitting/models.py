@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from hotlever.lever.certificate import estimated_error, relative_to_tolerance
 from hotlever.lever.lever import Lever, checked_bias
-from hotlever.lever.reduced import ReducedSpace, neighbourhood, place_in_box
+from hotlever.lever.reduced import ReducedSpace
 from hotlever.lever.reduced_cache import cached_reduction
 from hotlever.lever.reduced_lever import Linearised, ReducedLever, ReducedStates
+from hotlever.lever.reduction import neighbourhood, place_in_box
 from hotlever.materials import Material
 from hotlever.probe import Probe
 from hotlever.threads import one_blas_thread

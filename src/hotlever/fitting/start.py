@@ -14,7 +14,8 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from hotlever.lever.equations import OBSERVABLES
-from hotlever.lever.reduced import BOX, ReducedSpace, material_in_box, place_in_box
+from hotlever.lever.reduced import ReducedSpace
+from hotlever.lever.reduction import BOX, material_in_box, place_in_box
 from hotlever.materials import Material
 from hotlever.probe.probe import Circuit
 

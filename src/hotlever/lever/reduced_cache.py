@@ -14,7 +14,8 @@ import numpy as np
 from hotlever import __version__
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.lever.lever import Lever
-from hotlever.lever.reduced import ReducedSpace, ReductionOptions, reduce
+from hotlever.lever.reduced import ReducedSpace
+from hotlever.lever.reduction import ReductionOptions, reduce
 
 
 def cached_reduction(

@@ -17,13 +17,8 @@ from hotlever.errors import NewtonError
 from hotlever.lever.continuation import MELTING_POINT, BranchFollower
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import checked_bias
-from hotlever.lever.reduced import (
-    ReducedSpace,
-    Samples,
-    StackedJacobian,
-    StackedSpace,
-    place_in_box,
-)
+from hotlever.lever.reduced import ReducedSpace, Samples, StackedJacobian, StackedSpace
+from hotlever.lever.reduction import place_in_box
 from hotlever.materials import PARAMETERS, Material
 from hotlever.probe.probe import Circuit
 from hotlever.threads import one_blas_thread
@@ -123,7 +118,8 @@ class ReducedLever:
         bias : array_like, shape (n,)
             Biases (V) in any order; repeated ones are solved once.
         near : Linearised, optional
-            States at the same biases to start from; without them the ramp is followed.
+            States at the same biases to start from; without them, or where they lead nowhere, the
+            atlas of the space gives a guess, and if that fails the ramp is followed.
         rough : bool
             Stay on the few points.
 

@@ -10,12 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from hotlever.errors import unknown_name
 from hotlever.materials.material import Material
 
 DOI = "10.1063/1.4981883"
 #: Doping concentration of the wafer (cm⁻³), to which the "n_d fixed" rows are held.
 NOMINAL_DOPING = 3.3e17
+#: The ramp of the bias (V).
+RAMP = np.linspace(1.0, 11.0, 25)
 
 
 @dataclass(frozen=True)

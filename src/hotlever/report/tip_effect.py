@@ -19,13 +19,13 @@ from scipy.interpolate import PchipInterpolator
 from hotlever.fitting import fit
 from hotlever.fitting.measurement import Measurement
 from hotlever.lever import Lever
+from hotlever.materials.spieser2017 import RAMP
 from hotlever.probe import Probe, Tip
 
 Array = NDArray[np.float64]
 
 #: Plausible tips of lithography probes: height (µm) and half-angle (degrees).
 SIZES = ((0.5, 15.0), (0.5, 30.0), (0.7, 20.0), (1.0, 15.0), (1.0, 30.0))
-BIAS = np.linspace(1.0, 11.0, 25)
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def tip_effect(probe: Probe, tip: Tip) -> TipEffect:
     tip : Tip
     """
     bare, tipped = Lever(probe), Lever(probe.model_copy(update={"tip": tip}))
-    without, with_tip = bare.sweep(BIAS), tipped.sweep(BIAS)
+    without, with_tip = bare.sweep(RAMP), tipped.sweep(RAMP)
     knee, knee_without = tipped.knee(), bare.knee()
     fitted = fit(_as_measured(with_tip), probe)
     return TipEffect(

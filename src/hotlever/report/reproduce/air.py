@@ -17,6 +17,7 @@ from hotlever.lever import Lever
 from hotlever.lever.air_fields import AirFields
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.silicon import thermal_conductivity
+from hotlever.materials.spieser2017 import RAMP
 from hotlever.probe import Probe
 from hotlever.raman.published import KNEE_MEASURED, KNEE_PREDICTED
 from hotlever.report.air_loss_figure import air_loss_figure
@@ -26,7 +27,7 @@ from hotlever.report.reproduce.air_figures import (
     iv_in_both_media,
     scale_factor_figure,
 )
-from hotlever.report.reproduce.study import BIAS, Study
+from hotlever.report.reproduce.study import Study
 from hotlever.report.tip_effect import tip_effects
 
 Array = NDArray[np.float64]
@@ -101,7 +102,7 @@ def characteristics_section(study: Study) -> None:
     seconds = {}
     for name, lever in (("vacuum", study.lever), ("air", study.air)):
         began = time.perf_counter()
-        lever.solve(BIAS)
+        lever.solve(RAMP)
         seconds[name] = time.perf_counter() - began
     ratio = seconds["air"] / seconds["vacuum"]
     study.claim(
@@ -233,7 +234,7 @@ def _conductivity_ratio(tip_K: float) -> float:
 def map_section(study: Study) -> None:
     """The flux into the air on the lever, and by region."""
     study.page.heading("Where the heat goes")
-    ramp = study.air.solve(BIAS)
+    ramp = study.air.solve(RAMP)
     fields = AirFields(study.air)
     shares = fields.shares(ramp)
     hottest = ramp.states[-1]

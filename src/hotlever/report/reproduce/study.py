@@ -10,10 +10,8 @@ import xarray as xr
 
 from hotlever.calibration.characteristic import Characteristic, characteristic
 from hotlever.lever import Lever
+from hotlever.materials.spieser2017 import RAMP
 from hotlever.report.page import Page
-
-#: The paper's ramp: 1 to 11 V in 25 steps.
-BIAS = np.linspace(1.0, 11.0, 25)
 
 
 @dataclass(frozen=True)
@@ -83,12 +81,12 @@ class Study:
     @cached_property
     def ramp(self) -> xr.Dataset:
         """The paper's 25 points in vacuum."""
-        return self.lever.sweep(BIAS)
+        return self.lever.sweep(RAMP)
 
     @cached_property
     def curve(self) -> xr.Dataset:
         """The same with many points."""
-        return self.lever.sweep(np.linspace(0.1, BIAS[-1], 110))
+        return self.lever.sweep(np.linspace(0.1, RAMP[-1], 110))
 
     @cached_property
     def knee(self) -> xr.Dataset:
@@ -103,12 +101,12 @@ class Study:
     @cached_property
     def air_ramp(self) -> xr.Dataset:
         """The paper's 25 points in air."""
-        return self.air.sweep(BIAS)
+        return self.air.sweep(RAMP)
 
     @cached_property
     def air_curve(self) -> xr.Dataset:
         """The same with many points."""
-        return self.air.sweep(np.linspace(0.1, BIAS[-1], 110))
+        return self.air.sweep(np.linspace(0.1, RAMP[-1], 110))
 
     @cached_property
     def characteristic(self) -> Characteristic:

@@ -13,7 +13,7 @@ from hotlever.lever.fields import FieldMapper, heater_profile
 from hotlever.lever.lever import OBSERVABLE_COLUMNS
 from hotlever.materials import PARAMETERS
 from hotlever.materials.silicon import inversion_temperature
-from hotlever.materials.spieser2017 import OPERATING_POINTS, PUBLISHED
+from hotlever.materials.spieser2017 import OPERATING_POINTS, PUBLISHED, RAMP
 from hotlever.probe import MeshOptions
 from hotlever.report.figures import (
     doping_profile,
@@ -25,7 +25,7 @@ from hotlever.report.figures import (
     temperature_power,
 )
 from hotlever.report.fit_report import value_with_error
-from hotlever.report.reproduce.study import BIAS, Study
+from hotlever.report.reproduce.study import Study
 
 #: Headings of the six parameters, in units of their scale.
 PARAMETER_COLUMNS = (
@@ -367,7 +367,7 @@ def mesh_section(study: Study) -> None:
     """How far the default mesh is from a much finer one."""
     study.page.heading("Mesh")
     fine = Lever(study.lever.probe, MeshOptions(refinement=3.0))
-    best = fine.sweep(BIAS)
+    best = fine.sweep(RAMP)
 
     def row(name: str, lever: Lever, ours: xr.Dataset) -> tuple[str, ...]:
         differences: dict[str, xr.DataArray] = {
@@ -387,7 +387,7 @@ def mesh_section(study: Study) -> None:
         ("mesh", "triangles", "I_h (relative)", "V_r (relative)", "T_tip (K)"),
         [
             row("default", study.lever, study.ramp),
-            row("sizes / 2", finer, finer.sweep(BIAS)),
+            row("sizes / 2", finer, finer.sweep(RAMP)),
         ],
         f"Largest difference over 1 to 11 V from a mesh of {fine.space.mesh.elements.nelements} "
         "triangles (sizes / 3).",
