@@ -12,20 +12,23 @@ import sys
 import tempfile
 import time
 from dataclasses import replace
+from functools import partial
 from statistics import median
 
 import numpy as np
 
-from hotlever.air.operator import make_operator
+from hotlever.air.operator import PanelledAir
 from hotlever.air.surface import PanelOptions
-from hotlever.air.surroundings import Surroundings
 from hotlever.cache import CACHE_VARIABLE
+from hotlever.fitting.models import reduced_model
 from hotlever.lever import Lever
-from hotlever.lever.reduced_cache import cached_reduction
-from hotlever.lever.reduced_lever import ReducedLever
-from hotlever.lever.reduction import BOX, material_in_box
+from hotlever.lever.atlas import BOX, material_in_box
+from hotlever.lever.reduction import cached_reduction
 from hotlever.probe import Probe
-from problems import BIAS, table
+from hotlever.probe.surroundings import Surroundings
+from hotlever.spieser2017 import BASE_TEMPERATURE_K, K_IN_AIR
+from hotlever.studies.air_scaling import HOT, error_of_one_factor, find_scale_factor
+from problems import BIAS, processor_seconds, table
 
 RUNS = 7
 PLACES = {
@@ -42,7 +45,7 @@ def build(place: str) -> None:
     layout = Probe.reference().layout()
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     began, began_cpu = time.perf_counter(), time.process_time()
-    operator = make_operator(layout, PLACES[place], 293.0, PanelOptions())
+    operator = PanelledAir(layout, PLACES[place], BASE_TEMPERATURE_K, PanelOptions()).operator()
     seconds, cpu = time.perf_counter() - began, time.process_time() - began_cpu
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     memory = (f"{value / 2**20:.2f}" for value in (peak, before))
@@ -59,54 +62,42 @@ def building():
     table(("", "sites", "seconds", "CPU seconds", "peak GB", "of which imports"), rows)
 
 
-def alternating(actions):
-    """Median CPU seconds of some actions (one thread), in turns: other processes do not count."""
-    times = {name: [] for name in actions}
-    for _ in range(RUNS):
-        for name, action in actions.items():
-            began = time.process_time()
-            action()
-            times[name].append(time.process_time() - began)
-    return {name: median(values) for name, values in times.items()}
-
-
 def speed(vacuum, air):
-    spaces = {"vacuum": cached_reduction(vacuum), "air": cached_reduction(air)}
-    material, circuit = vacuum.probe.material, vacuum.probe.circuit
-    reduced = {name: ReducedLever(space, circuit) for name, space in spaces.items()}
-
-    def with_slopes(name):
-        reduced[name].linearise(reduced[name].solve(material, BIAS))
-
+    """Print the times of sweeps; return the reduced model in air."""
+    levers = {"vacuum": vacuum, "air": air}
+    models = {
+        name: reduced_model(lever, cached_reduction(lever), BIAS) for name, lever in levers.items()
+    }
+    material = vacuum.probe.material
     kinds = {
-        "full lever": lambda lever, name: lever.solve(BIAS),
-        "full, with sensitivities": lambda lever, name: lever.sweep(BIAS, sensitivities=True),
-        "reduced lever": lambda lever, name: reduced[name].solve(material, BIAS),
-        "reduced, with sensitivities": lambda lever, name: with_slopes(name),
+        # made anew each time: a lever keeps its branch
+        "full lever": lambda name: levers[name].with_material(material).sweep(BIAS),
+        "full, with sensitivities": lambda name: (
+            levers[name].with_material(material).sweep(BIAS, sensitivities=True)
+        ),
+        "reduced, with sensitivities": lambda name: models[name].predict(material),
     }
     rows = []
     for kind, action in kinds.items():
-        found = alternating(
-            {
-                "vacuum": lambda action=action: action(vacuum, "vacuum"),
-                "air": lambda action=action: action(air, "air"),
-            }
-        )
-        ratio = found["air"] / found["vacuum"]
-        rows.append((kind, *(f"{found[name]:.3f}" for name in found), f"{ratio:.2f}"))
+        times = {name: [] for name in levers}
+        for _ in range(RUNS):  # in turns, so that a slow spell of the machine meets both
+            for name in levers:
+                times[name].append(processor_seconds(partial(action, name)))
+        in_vacuum, in_air = (median(found) for found in times.values())
+        rows.append((kind, f"{in_vacuum:.3f}", f"{in_air:.3f}", f"{in_air / in_vacuum:.2f}"))
     print("\n25-point sweep, operator at hand: CPU seconds, median (air ≤ 2 × vacuum)\n")
     table(("", "vacuum", "air", "ratio"), rows)
-    return reduced["air"]
+    return models["air"]
 
 
-def accuracy(air, reduced, count=8):
+def accuracy(air, model, count=8):
     rng = np.random.default_rng(5)
     rows = []
     for _ in range(count):
         material = material_in_box(air.probe.material, rng.random(len(BOX)))
         material = material.with_(c_kappa=rng.uniform(0.6, 0.76))
         full = air.with_material(material).sweep(BIAS)
-        current, reader, tip = reduced.solve(material, BIAS).observables
+        current, reader, tip = model.predict(material).values
         rows.append(
             (
                 np.abs(current / full.current_mA.values - 1).max(),
@@ -127,7 +118,9 @@ def refinement(vacuum, air):
     bias = [4.0, 8.268, 10.748]
 
     def observed(options, **changes):
-        operator = make_operator(probe.layout(), probe.surroundings, 293.0, options)
+        operator = PanelledAir(
+            probe.layout(), probe.surroundings, BASE_TEMPERATURE_K, options
+        ).operator()
         space = vacuum.space.in_air(replace(operator, **changes))
         return len(operator.sites), Lever(probe, space=space).sweep(bias)
 
@@ -142,7 +135,7 @@ def refinement(vacuum, air):
     }
     rows = []
     for name, (count, data) in choices.items():
-        tip = (data.tip_K - finest.tip_K) / (finest.tip_K - 293.0)
+        tip = (data.tip_K - finest.tip_K) / (finest.tip_K - BASE_TEMPERATURE_K)
         current = data.current_mA / finest.current_mA - 1
         heat = data.air_heat_mW / finest.air_heat_mW - 1
         rows.append((name, count, *(f"{np.abs(x).max().item():.1e}" for x in (heat, tip, current))))
@@ -167,8 +160,8 @@ def surroundings(vacuum):
     }
     rows = []
     for name, values in places.items():
-        probe = vacuum.probe.with_values({"medium": "air", **values})
-        data = Lever(probe, space=vacuum.space).sweep([8.268])
+        probe = vacuum.probe.with_(**{"medium": "air", **values})
+        data = vacuum.with_probe(probe).sweep([8.268])
         share = (data.air_heat_mW / data.power_mW).item()
         rows.append((name, f"{data.tip_K.item():.1f}", f"{100 * share:.1f} %"))
     rows.append(("vacuum", f"{vacuum.sweep([8.268]).tip_K.item():.1f}", "0 %"))
@@ -178,35 +171,21 @@ def surroundings(vacuum):
 
 def scale_factor(vacuum, air):
     """P in air over P in vacuum at the same tip temperature (the paper: 1.29)."""
-    bias = np.linspace(1.0, 11.0, 101)
-    in_vacuum, in_air = vacuum.sweep(bias), air.sweep(bias)
     tips = np.array([330.0, 400.0, 500.0, 600.0, 700.0, 800.0, 900.0, 1006.0])
-
-    def power(sweep):
-        return np.interp(tips, sweep.tip_K.values, sweep.power_mW.values)
-
-    share = np.interp(tips, in_air.tip_K.values, (in_air.air_heat_mW / in_air.power_mW).values)
-    k = power(in_air) / power(in_vacuum)
+    in_vacuum, in_air = vacuum.branch(), air.branch()
+    sweep = air.sweep(in_air.bias(tips, air.circuit))
+    k = in_air.power(tips) / in_vacuum.power(tips)
+    share = (sweep.air_heat_mW / sweep.power_mW).values
     print("\nPower in air over power in vacuum at the same tip temperature\n")
     table(
         ("T_tip (K)", "k", "air's share of the power"),
         [(f"{t:.0f}", f"{a:.3f}", f"{b:.3f}") for t, a, b in zip(tips, k, share, strict=True)],
     )
-    trials = np.linspace(1.1, 1.5, 401)
-    off = [
-        np.abs(
-            np.interp(
-                in_air.power_mW.values / trial, in_vacuum.power_mW.values, in_vacuum.tip_K.values
-            )
-            - in_air.tip_K.values
-        ).max()
-        for trial in trials
-    ]
-    best = int(np.argmin(off))
-    at_paper = off[int(np.argmin(np.abs(trials - 1.29)))]
+    factor = find_scale_factor(in_vacuum, in_air)
+    published = error_of_one_factor(in_vacuum, in_air, K_IN_AIR)
     print(
-        f"\nbest single k: {trials[best]:.3f}, which leaves {off[best]:.0f} K; "
-        f"1.29 leaves {at_paper:.0f} K (1 to 11 V)"
+        f"\nbest single k: {factor.best_k.item():.3f}, which leaves "
+        f"{factor.best_error_K.item():.0f} K; {K_IN_AIR} leaves {published:.0f} K (to {HOT:g} K)"
     )
 
 
@@ -219,8 +198,7 @@ def main():
         os.environ.setdefault(CACHE_VARIABLE, folder)
         vacuum = Lever(Probe.reference())
         air = vacuum.in_medium("air")
-        reduced = speed(vacuum, air)
-        accuracy(air, reduced)
+        accuracy(air, speed(vacuum, air))
         refinement(vacuum, air)
         surroundings(vacuum)
         scale_factor(vacuum, air)

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
-from hotlever.air.operator import make_operator
+from hotlever.air.operator import PanelledAir
 from hotlever.air.surface import PanelOptions
 from hotlever.lever import Lever
 from hotlever.lever3d import SolidLever
@@ -73,16 +73,15 @@ def operator(names: Sequence[str] = tuple(STUDY)) -> None:
     length = np.ptp([x for region in AIR.layout().regions for x, _ in region.outline])
     rows = []
     for name in names:
-        lever = SolidLever(AIR, **STUDY[name])
-        assert lever.air is not None
-        theta = lever.air.sites[:, 0] / length
-        coefficients, heat = lever.air.solve(theta)
-        far = f"{lever.air.at_infinity(coefficients) / heat.sum() - 1:+.1e}"
-        rows.append((f"volumes: {name}", lever.air.size, f"{theta @ heat:.3f}", far))
+        air = SolidLever(AIR, **STUDY[name]).space.air.operator
+        theta = air.sites[:, 0] / length
+        coefficients, heat = air.solve(theta)
+        far = f"{air.at_infinity(coefficients) / heat.sum() - 1:+.1e}"
+        rows.append((f"volumes: {name}", air.size, f"{theta @ heat:.3f}", far))
         print(rows[-1], file=sys.stderr, flush=True)
     for refinement in (0.5, 1.0, 1.5, 2.0):
         options = PanelOptions(refinement=refinement)
-        air = make_operator(AIR.layout(), AIR.surroundings, BASE, options)
+        air = PanelledAir(AIR.layout(), AIR.surroundings, BASE, options).operator()
         theta = air.sites[:, 0] / length
         name = f"panels: sizes / {refinement:g}"
         rows.append((name, len(air.sites), f"{theta @ air.matrix @ theta:.3f}", ""))
@@ -96,7 +95,6 @@ def study(names: Sequence[str] = tuple(STUDY)) -> None:
     for name in names:
         began = time.perf_counter()
         lever = SolidLever(probe, **STUDY[name])
-        assert lever.air is not None
         sweep = lever.sweep(POINTS[:1])
         seconds = time.perf_counter() - began
         balance = (sweep.end_heat_mW + sweep.air_heat_mW) / sweep.power_mW - 1
@@ -104,7 +102,7 @@ def study(names: Sequence[str] = tuple(STUDY)) -> None:
             (
                 name,
                 lever.space.mesh.elements.nelements,
-                lever.air.size,
+                lever.space.air.operator.size,
                 f"{sweep.tip_K.item():.3f}",
                 f"{sweep.current_mA.item():.6f}",
                 f"{sweep.air_heat_mW.item():.6f}",
@@ -152,7 +150,7 @@ def sweep() -> None:
     """Print the fast model against the full 3-D sweep of 25 biases, and its time."""
     lever = SolidLever(AIR)
     wall, processor = time.perf_counter(), time.process_time()
-    full = lever.dataset(lever.solve(BIAS, store=lever.store()))
+    full = lever.sweep(BIAS)
     wall, processor = time.perf_counter() - wall, time.process_time() - processor
     fast = Lever(AIR).sweep(BIAS)
     rows = [

@@ -18,18 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hotlever.calibration.budget import MATERIAL_SCATTER
-from hotlever.calibration.characteristic import Characteristic, characteristic
 from hotlever.calibration.knee import IVCurve, find_knee
 from hotlever.calibration.power_law import EQ12
-from hotlever.calibration.synthetic import current_at, measured_curve
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import HotleverError
 from hotlever.fitting import Measurement, fit
-from hotlever.lever import Lever
+from hotlever.lever import Branch, Lever
 from hotlever.materials import Material
 from hotlever.materials.silicon import inversion_temperature
-from hotlever.materials.spieser2017 import published
-from hotlever.probe import MeshOptions, Probe
+from hotlever.probe import Circuit, MeshOptions, Probe
+from hotlever.spieser2017 import BASE_TEMPERATURE_K as BASE
+from hotlever.spieser2017 import published
+from synthetic_curves import current_at, measured_curve
 
 Array = NDArray[np.float64]
 Temperatures = Callable[[Array], Array]
@@ -38,7 +38,7 @@ MEDIA = ("vacuum", "air")
 DIMENSIONS = 0.03
 HIGHEST_BIAS = {"vacuum": 11.0, "air": 13.0}
 MESH = MeshOptions(refinement=0.7)
-BASE = 293.0
+CIRCUIT = Circuit()
 
 
 def twin(rng: np.random.Generator) -> Probe:
@@ -60,20 +60,20 @@ def twin(rng: np.random.Generator) -> Probe:
         name: getattr(reference.material, name) * float(np.exp(change))
         for name, change in zip(names, deviations, strict=True)
     }
-    return reference.with_values(shape | material)
+    return reference.with_(**shape | material)
 
 
-def models_of(probe: Probe) -> dict[str, Characteristic]:
+def models_of(probe: Probe) -> dict[str, Branch]:
     lever = Lever(probe.in_medium("vacuum"), MESH)
-    return {medium: characteristic(lever.in_medium(medium)) for medium in MEDIA}
+    return {medium: lever.in_medium(medium).branch() for medium in MEDIA}
 
 
 def full_measurement(
-    probe: Probe, known: Characteristic, medium: str, rng: np.random.Generator
+    probe: Probe, known: Branch, medium: str, rng: np.random.Generator
 ) -> Measurement:
     """Measure current, reader voltage and tip temperature at 25 biases."""
     bias = np.linspace(1.0, HIGHEST_BIAS[medium], 25)
-    bias = bias[np.isfinite(current_at(known, bias, 5600.0))]
+    bias = bias[np.isfinite(current_at(known, bias, CIRCUIT))]
     sweep = Lever(probe.in_medium(medium), MESH).sweep(bias)
     error = 5.0 + 0.02 * (sweep.tip_K.values - BASE)  # the paper's calibration error
     tip = sweep.tip_K.values + 0.5 * error * rng.standard_normal(bias.size)
@@ -86,10 +86,10 @@ def full_measurement(
     )
 
 
-def fitted(measurement: Measurement, medium: str) -> tuple[dict[str, Characteristic], float]:
+def fitted(measurement: Measurement, medium: str) -> tuple[dict[str, Branch], float]:
     """Fit the reference shape; return the fitted models and the power of the measured knee."""
     models = models_of(fit(measurement, Probe.reference(), medium=medium).probe)
-    curve = IVCurve.of(measurement.bias_V, measurement.current_mA, 5600.0)
+    curve = IVCurve.of(measurement.bias_V, measurement.current_mA, CIRCUIT)
     return models, find_knee(curve, models[medium]).power_mW
 
 
@@ -102,10 +102,10 @@ def bare_rule(knee_mW: float, material: Material) -> Temperatures:
 def routes(
     curve: IVCurve,
     medium: str,
-    own: dict[str, Characteristic],
-    reference: dict[str, Characteristic],
+    own: dict[str, Branch],
+    reference: dict[str, Branch],
     probe: Probe,
-    fits: dict[str, tuple[dict[str, Characteristic], float]],
+    fits: dict[str, tuple[dict[str, Branch], float]],
 ) -> dict[str, Temperatures]:
     knee = find_knee(curve, reference[medium]).power_mW
     nominal = Probe.reference().material

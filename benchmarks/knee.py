@@ -9,19 +9,18 @@ Run: python benchmarks/knee.py [TRIALS]
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 
 import numpy as np
 from scipy.interpolate import make_smoothing_spline
 
-from hotlever.calibration.characteristic import Characteristic, characteristic
 from hotlever.calibration.knee import IVCurve, find_knee
-from hotlever.calibration.knee_reasons import knee_reasons
-from hotlever.calibration.synthetic import measured_curve
-from hotlever.lever import Lever
-from hotlever.materials.spieser2017 import published
+from hotlever.lever import Branch, Lever
 from hotlever.probe import Probe
+from hotlever.spieser2017 import published
+from hotlever.studies.knee_reasons import reasons_of_the_knee, steps_to_the_knee
+from problems import processor_time
+from synthetic_curves import measured_curve
 
 #: Power of the knee (mW) and its standard error; NaN where a way states none.
 Found = tuple[float, float]
@@ -68,7 +67,7 @@ def smoothing_spline(curve: IVCurve) -> Found:
     return float(grid[np.argmax(spline(grid))]), NONE
 
 
-def ours(like: Characteristic | None) -> Callable[[IVCurve], Found]:
+def ours(like: Branch | None) -> Callable[[IVCurve], Found]:
     def find(curve: IVCurve) -> Found:
         knee = find_knee(curve, like)
         return knee.power_mW, knee.power_mW_stderr
@@ -84,14 +83,12 @@ def levers() -> dict[str, Lever]:
         "lever 3": reference.with_material(published("lever 3").material),
         "lever 4": reference.with_material(published("lever 4").material),
         "lightly doped": reference.with_material(material.with_(n_d=2e17, delta=0.45)),
-        "wide and thin": Lever(
-            reference.probe.with_values({"heater_width_um": 1.9, "thickness_um": 0.35})
-        ),
+        "wide and thin": Lever(reference.probe.with_(heater_width_um=1.9, thickness_um=0.35)),
     }
 
 
 def main(trials: int) -> None:
-    known = {name: characteristic(lever) for name, lever in levers().items()}
+    known = {name: lever.branch() for name, lever in levers().items()}
     print(
         f"{'lever':<14}{'way':<28}{'found':>6}{'bias %':>8}{'rms %':>7}{'95 % %':>7}"
         f"{'68 %':>6}{'95 %':>6}{'ms':>6}"
@@ -109,9 +106,9 @@ def main(trials: int) -> None:
         curves = [measured_curve(lever, np.random.default_rng(seed)) for seed in range(trials)]
         true = lever.knee.power_mW if lever.knee else NONE
         for way, find in ways.items():
-            began = time.perf_counter()
+            began = processor_time()
             found = np.array([find(curve) for curve in curves])
-            milliseconds = (time.perf_counter() - began) / trials * 1000
+            milliseconds = (processor_time() - began) / trials * 1000
             error = 100 * (found[:, 0] / true - 1)
             pull = np.abs(found[:, 0] - true) / found[:, 1]
             here = np.isfinite(error)
@@ -128,12 +125,13 @@ def main(trials: int) -> None:
 
 
 def print_reasons() -> None:
-    reasons = knee_reasons(Lever(Probe.reference()))
+    reasons = reasons_of_the_knee(Lever(Probe.reference()))
     print("\nreference lever, tip temperature (K) where V_l and R_l are highest")
-    for name, knee in reasons.knee_K.items():
-        print(f"  {name:<22}{knee:>8.1f}{reasons.resistance_K[name]:>8.1f}")
-    print(f"from the inversion temperature of {reasons.inversion_K:.1f} K to the knee:")
-    for reason, kelvins in reasons.steps():
+    for name in reasons.lever.values:
+        one = reasons.sel(lever=name)
+        print(f"  {name:<22}{one.knee_K.item():>8.1f}{one.resistance_K.item():>8.1f}")
+    print(f"from the inversion temperature of {reasons.attrs['inversion_K']:.1f} K to the knee:")
+    for reason, kelvins in steps_to_the_knee(reasons):
         print(f"  {kelvins:>+6.1f} K  {reason}")
 
 

@@ -23,10 +23,10 @@ from statistics import median
 import numpy as np
 
 from hotlever.fitting.batch import fit_many
-from hotlever.fitting.models import fast_model
-from hotlever.materials.spieser2017 import PUBLISHED
+from hotlever.fitting.models import forward_model
 from hotlever.probe import Probe
-from problems import BIAS, table
+from hotlever.spieser2017 import PUBLISHED
+from problems import BIAS, processor_time, table
 
 #: Relative scatter of the parameters between levers, about that of the paper's Table II.
 SCATTER = {"c_kappa": 0.01, "delta": 0.05, "n_d": 0.1, "p": 0.02, "a0": 0.03, "a1": 0.03}
@@ -37,15 +37,15 @@ NOISE = np.array([2e-3, 2e-3, 5e-3])
 def write_levers(folder: Path, count: int, seed: int = 0) -> list[Path]:
     """Write measurement files of levers that differ, and are measured with noise."""
     rng = np.random.default_rng(seed)
-    probe = Probe.reference()
-    material, model = PUBLISHED["option III"].material, fast_model(probe)
+    material = PUBLISHED["option III"].material
+    model = forward_model(Probe.reference(), BIAS, reduce=True)
     paths = []
     for number in range(count):
         changed = {
             name: getattr(material, name) * (1 + share * rng.normal())
             for name, share in SCATTER.items()
         }
-        values, _ = model.predict(material.with_(**changed), BIAS)
+        values = model.predict(material.with_(**changed)).values
         values += NOISE[:, None] * values.max(axis=1, keepdims=True) * rng.normal(size=values.shape)
         rows = [",".join(f"{cell:.6g}" for cell in row) for row in np.vstack([BIAS, values]).T]
         text = ["# R_s (kOhm): 5.6", "V_b (V),I_h (mA),V_r (V),T_tip (K)", *rows]
@@ -63,11 +63,6 @@ def seconds(paths: list[Path], processes: int) -> tuple[float, float]:
     if batch.failures:
         sys.exit(f"{len(batch.failures)} levers failed: {next(iter(batch.failures.values()))}")
     return elapsed
-
-
-def processor_time() -> float:
-    """Return the processor time (s) of this process and of those that it started and that ended."""
-    return sum(os.times()[:4])
 
 
 def main() -> None:

@@ -10,12 +10,12 @@ import time
 
 from hotlever.fitting import fit, read_measurement
 from hotlever.fitting.posterior import predictive_band, sample_posterior
-from problems import table
+from problems import EXAMPLE, table
 
 
 def main():
     samples = int(sys.argv[1]) if len(sys.argv) > 1 else 10_000
-    result = fit(read_measurement("examples/lever-a.csv"))
+    result = fit(read_measurement(EXAMPLE))
     began = time.perf_counter()
     posterior = sample_posterior(result, samples=samples, processes=2)
     sampled = time.perf_counter()

@@ -7,20 +7,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from hotlever.calibration.characteristic import characteristic
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.power_law_fit import PowerLawFit, fit_power_law
 from hotlever.lever import Lever
-from hotlever.materials.spieser2017 import RAMP
 from hotlever.probe import Probe
-from hotlever.report.fit_report import value_with_error
+from hotlever.spieser2017 import RAMP
+from hotlever.text import value_with_error
 
 SPLIT = 3.3
 
 
 def main() -> None:
     lever = Lever(Probe.reference())
-    model = characteristic(lever)
+    model = lever.branch()
     sweep = lever.sweep(RAMP)
     even = np.linspace(0.05, 4.0, 80)
     knee = model.knee.power_mW if model.knee else float("nan")
@@ -57,9 +56,9 @@ def main() -> None:
     for tip in (500.0, 800.0, 1100.0):
         law = fits["the same, continuous"].law
         power = float(law.power(tip))
-        bias = float(model.bias(model.tip_temperature(power), 5600.0))
+        bias = float(model.bias(model.tip_temperature(power), lever.circuit))
         print(f"for {tip:.0f} K: {power:.3f} mW by the continuous law, bias {bias:.3f} V with "
-              f"5.6 kOhm; by the model {float(model.bias(tip, 5600.0)):.3f} V")  # fmt: skip
+              f"5.6 kOhm; by the model {float(model.bias(tip, lever.circuit)):.3f} V")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What the benchmarks share: our problems as files for the FEniCS peer, and tables."""
+"""What the benchmarks share: our problems as files for the FEniCS peer, times, and tables."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from statistics import median
 from typing import Any
 
-from hotlever.materials.spieser2017 import RAMP
+from hotlever.cache import CACHE_VARIABLE
 from hotlever.probe import Probe, ProbeMesh
+from hotlever.spieser2017 import RAMP
 
 BIAS = RAMP
+EXAMPLE = Path(__file__).parents[1] / "examples" / "lever-a.csv"
 PEER = Path(__file__).parent / "fenics" / "peer.py"
 DEBIAN_PYTHON = "/usr/bin/python3"
 
@@ -25,7 +28,7 @@ def peer_problem(
     probe: Probe, mesh: ProbeMesh, *, degree: int, quadrature: int, bias: Sequence[float]
 ) -> dict[str, Any]:
     """Return a mesh, material and circuit as the peer reads them."""
-    layout, triangles = mesh.layout, mesh.triangles
+    layout, triangles = mesh.layout, mesh.elements
     regions: dict[str, dict[str, Any]] = {}
     for index, region in enumerate(layout.regions):
         regions[str(index)] = {"name": region.name, "doping": "high"}
@@ -123,6 +126,36 @@ def check_peer() -> None:
     )
     if not found:
         sys.exit("legacy FEniCS is not installed: run benchmarks/fenics/install.sh (Debian)")
+
+
+def processor_time() -> float:
+    """Return the processor time (s) of this process and of those that it started and that ended.
+
+    Other work on the machine lengthens it much less than the time on the clock.
+    """
+    return sum(os.times()[:4])
+
+
+def processor_seconds(action: Callable[[], object], runs: int = 1) -> float:
+    """Return the median processor time (s) of some runs of an action."""
+    times = []
+    for _ in range(runs):
+        began = processor_time()
+        action()
+        times.append(processor_time() - began)
+    return median(times)
+
+
+def fit_command(cache: str | Path) -> None:
+    """Run the whole command ``hotlever fit`` on the example, with its cache in a folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        fit = [sys.executable, "-c", "from hotlever.cli import main; main()", "fit"]
+        subprocess.run(
+            [*fit, str(EXAMPLE), "-o", str(Path(folder, "fit.json"))],
+            check=True,
+            env=os.environ | {CACHE_VARIABLE: str(cache)},
+            capture_output=True,
+        )
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:

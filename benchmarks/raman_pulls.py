@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import lmfit
 import numpy as np
 
+import synthetic_spectra as synthetic
 from hotlever.errors import InputError
-from hotlever.raman import PeakOptions, fit_peak, synthetic
-from hotlever.raman.synthetic import Instrument
+from hotlever.raman import PeakOptions, fit_peak
+from synthetic_spectra import Instrument
 
 
 @dataclass(frozen=True)

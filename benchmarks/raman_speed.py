@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hotlever.raman import PeakOptions, fit_peak, read_spectrum, synthetic
+import synthetic_spectra as synthetic
+from hotlever.raman import PeakOptions, fit_peak, read_spectrum
 
 TARGET = 10.0
 

@@ -16,47 +16,40 @@ import numpy as np
 from hotlever.lever import Lever
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe, Tip
-from hotlever.raman.published import KNEE_MEASURED, KNEE_PREDICTED
-from hotlever.report.tip_effect import SIZES, tip_effects
+from hotlever.spieser2017 import KNEE_MEASURED_K, KNEE_PREDICTED_K
+from hotlever.studies.tip_effect import SIZES, tip_effects
 from problems import table
+
+#: What is printed of each tip: heading and format.
+FITTED = {
+    "height_um": ("height (µm)", "g"),
+    "half_angle_deg": ("half-angle (°)", "g"),
+    "knee_K": ("knee (K)", ".1f"),
+    "knee_V": ("V_l at the knee (V)", ".3f"),
+    "moved_K": ("knee moved by (K)", "+.1f"),
+    "at_power_K": ("T at equal power (K)", "+.1f"),
+    "fitted_knee_K": ("knee of tipless fit (K)", ".1f"),
+    "missed_K": ("missed (K)", "+.1f"),
+}
 
 
 def fitted() -> None:
     """Print what the tip does to knee and T(P), and what a tipless fit makes of it."""
     for medium in ("vacuum", "air"):
         effects = tip_effects(Probe.reference().in_medium(medium))
-        print(f"\nin {medium}\n")
+        without_K, without_V = effects.attrs["without_K"], effects.attrs["without_V"]
+        print(f"\nin {medium}; without a tip the knee is at {without_K:.1f} K, {without_V:.3f} V\n")
         table(
-            (
-                "height (µm)",
-                "half-angle (°)",
-                "base radius (µm)",
-                "knee without (K)",
-                "knee with (K)",
-                "V_l at the knee (V)",
-                "T at equal power (K)",
-                "knee of tipless fit (K)",
-                "missed (K)",
-            ),
+            [heading for heading, _ in FITTED.values()],
             [
-                (
-                    effect.tip.height_um,
-                    effect.tip.half_angle_deg,
-                    f"{effect.tip.base_radius_um:.3f}",
-                    f"{effect.knee_without_K:.1f}",
-                    f"{effect.knee_K:.1f}",
-                    f"{effect.knee_without_V:.3f} → {effect.knee_V:.3f}",
-                    f"{effect.at_power_K:+.1f}",
-                    f"{effect.fitted_knee_K:.1f}",
-                    f"{effect.missed_K:+.1f}",
-                )
-                for effect in effects
+                [format(effects[name].values[row], form) for name, (_, form) in FITTED.items()]
+                for row in range(effects.sizes["tip"])
             ],
         )
-        largest = max(effects, key=lambda effect: abs(effect.missed_K))
+        largest = max(effects.missed_K.values, key=abs)
         print(
-            f"\nlargest miss {largest.missed_K:+.1f} K; the paper's knee was missed by "
-            f"{KNEE_MEASURED - KNEE_PREDICTED:+.0f} K"
+            f"\nlargest miss {largest:+.1f} K; the paper's knee was missed by "
+            f"{KNEE_MEASURED_K - KNEE_PREDICTED_K:+.0f} K"
         )
 
 
@@ -90,16 +83,16 @@ def air() -> None:
     rows = []
     for tip in (None, Tip(height_um=0.7, half_angle_deg=20), Tip(height_um=1, half_angle_deg=30)):
         lever = SolidLever(probe.model_copy(update={"tip": tip}))
-        ramp = lever.solve(bias)
-        sweep = lever.dataset(ramp)
+        states = lever.solve(bias)
+        sweep = lever.dataset(states)
         name = "none" if tip is None else f"{tip.height_um:g} µm, {tip.half_angle_deg:g}°"
-        for row, state in enumerate(ramp.states):
+        for row, state in enumerate(states):
             rows.append(
                 (
                     name,
-                    f"{state.bias:g}",
+                    f"{state.bias_V:g}",
                     f"{sweep.tip_K.values[row]:.2f}",
-                    "" if tip is None else f"{lever.apex_temperature(state.x):.2f}",
+                    "" if tip is None else f"{lever.apex_temperature(state):.2f}",
                     f"{sweep.power_mW.values[row]:.4f}",
                     f"{sweep.air_heat_mW.values[row] / sweep.power_mW.values[row]:.4f}",
                 )

@@ -9,11 +9,13 @@ from pathlib import Path
 import pytest
 
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.calibration.characteristic import Characteristic, characteristic
 from hotlever.cli import main
-from hotlever.lever import Lever
-from hotlever.materials.spieser2017 import published
-from hotlever.probe import MeshOptions, Probe
+from hotlever.lever import Branch, Lever
+from hotlever.lever.lever import COARSE
+from hotlever.lever.reduced import ReducedLever
+from hotlever.lever.reduction import cached_reduction
+from hotlever.probe import Probe
+from hotlever.spieser2017 import published
 
 ROOT = Path(__file__).parents[1]
 
@@ -36,28 +38,52 @@ def lever() -> Lever:
 @pytest.fixture(scope="session")
 def coarse() -> Lever:
     """The reference lever on a coarse mesh: for what does not depend on accuracy."""
-    return Lever(Probe.reference(), MeshOptions(refinement=0.4))
+    return Lever(Probe.reference(), COARSE)
 
 
 @pytest.fixture(scope="session")
-def reference(lever: Lever) -> Characteristic:
-    """The characteristic of the reference lever."""
-    return characteristic(lever)
+def in_air(coarse: Lever) -> Lever:
+    """The coarse lever in still air."""
+    return coarse.in_medium("air")
 
 
 @pytest.fixture(scope="session")
-def lever_3(lever: Lever) -> Characteristic:
-    """That of the reference lever with the paper's material of lever 3."""
-    return characteristic(lever.with_material(published("lever 3").material))
+def reduced(coarse: Lever) -> ReducedLever:
+    """The coarse lever, reduced."""
+    return cached_reduction(coarse)
 
 
 @pytest.fixture(scope="session")
-def shared() -> Path:
-    """The folder of shared data; tests that need it are skipped where it is not there."""
-    folder = Path(os.environ.get("HOTLEVER_SHARED", ROOT.parent / "shared"))
-    if not folder.is_dir():
-        pytest.skip(f"the shared data are not there ({folder})")
-    return folder
+def reduced_in_air(in_air: Lever) -> ReducedLever:
+    """The coarse lever in air, reduced."""
+    return cached_reduction(in_air)
+
+
+@pytest.fixture(scope="session")
+def reference(lever: Lever) -> Branch:
+    """The reference lever as one curve."""
+    return lever.branch()
+
+
+@pytest.fixture(scope="session")
+def lever_3(lever: Lever) -> Branch:
+    """The same with the paper's material of lever 3."""
+    return lever.with_material(published("lever 3").material).branch()
+
+
+@pytest.fixture(scope="session")
+def shared() -> Callable[..., list[Path]]:
+    """Give files of the shared data; a test is skipped where one of these very files is missing."""
+    top = Path(os.environ.get("HOTLEVER_SHARED", ROOT.parent / "shared"))
+
+    def find(folder: str, *names: str) -> list[Path]:
+        paths = [top / folder / name for name in names]
+        missing = [path for path in paths if not path.is_file()]
+        if missing:
+            pytest.skip(f"the shared data are not there ({missing[0]})")
+        return paths
+
+    return find
 
 
 @pytest.fixture

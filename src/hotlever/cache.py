@@ -1,16 +1,19 @@
 """Computed arrays kept on disk, so that a geometry is worked out once.
 
-A file holds the arrays of one result under a name made of everything they depend on. Files are
-written whole, so two processes may write the same one; a damaged file is made anew.
+A file holds the arrays of one result under a name made of everything they depend on, the code
+included. Files are written whole, so two processes may write the same one; a damaged file is made
+anew. Those that were not used for longest go when all together become too large.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import os
-import zipfile
+import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,11 +21,16 @@ import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
-from hotlever.errors import InputError
-from hotlever.files import output_folder, whole_file
+from hotlever import __version__
+from hotlever.errors import HotleverError, InputError
+from hotlever.files import Outputs, output_folder, whole_file
 
 #: Environment variable that moves the cache; empty switches it off.
 CACHE_VARIABLE = "HOTLEVER_CACHE"
+#: Environment variable with the largest size of the cache (GB), and the size without it.
+SIZE_VARIABLE, _SIZE_GB = "HOTLEVER_CACHE_GB", 2.0
+#: Packages whose code makes what is kept.
+_MAKERS = ("materials", "probe", "air", "lever", "lever3d")
 
 Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
@@ -37,19 +45,14 @@ def cache_folder() -> Path | None:
 
 
 def cache_file(kind: str, facts: Mapping[str, Any]) -> Path | None:
-    """Return the file of a result of some kind; None if the cache is switched off.
+    """Return the file of a result, in the folder of its kind; None if the cache is switched off.
 
-    Parameters
-    ----------
-    kind : str
-        Names the folder.
-    facts : mapping
-        Everything that the result depends on: what JSON knows, and arrays.
+    The facts are everything that it depends on, but the code: what JSON knows, and arrays.
     """
     top = cache_folder()
     if top is None:
         return None
-    content = hashlib.sha256()
+    content = hashlib.sha256(_code())
     for name in sorted(facts):
         fact = facts[name]
         content.update(name.encode())
@@ -60,30 +63,85 @@ def cache_file(kind: str, facts: Mapping[str, Any]) -> Path | None:
     return top / kind / f"{content.hexdigest()[:32]}.npz"
 
 
-def stored(path: Path | None, make: Callable[[Arrays], T]) -> T | None:
-    """Make something of a stored file's arrays.
+@functools.cache
+def _code() -> bytes:
+    """Return a digest of the code that makes what is kept."""
+    content = hashlib.sha256(__version__.encode())
+    for name in _MAKERS:
+        for file in sorted(Path(__file__).with_name(name).glob("*.py")):
+            content.update(file.read_bytes())
+    return content.digest()
 
-    None if there is no file, or if it is damaged or `make` raises KeyError or ValueError for its
-    content; it is then removed.
+
+def stored(path: Path | None, make: Callable[[Arrays], T]) -> T | None:
+    """Make something of a stored file's arrays; None if there is no file.
+
+    None, too, if it is damaged or `make` raises for its content; it is then removed.
     """
-    if path is None or not path.is_file():
+    if path is None:
         return None
     try:
         # opened here: np.load leaves a file it cannot read open
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-            return make(dict(arrays))
-    except (OSError, ValueError, KeyError, IndexError, zipfile.BadZipFile, EOFError):
-        path.unlink(missing_ok=True)
+            made = make(dict(arrays))
+    except (FileNotFoundError, PermissionError):
         return None
+    except Exception:
+        # zip, zlib, struct, tokenize: what a damaged file raises has no end
+        with suppress(OSError):
+            path.unlink()
+        return None
+    with suppress(OSError):
+        os.utime(path)
+    return made
 
 
 def store_arrays(path: Path | None, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write a file; a cache that cannot be written is no reason to stop."""
+    """Write a file; a cache that cannot be written is no reason to stop.
+
+    Raises
+    ------
+    InputError
+        As `largest_size`.
+    """
     if path is None:
         return
-    try:
+    most = largest_size()
+    # whatever else is being written, this file is not part of it
+    with suppress(HotleverError, OSError), Outputs().together():
         output_folder(path.parent)
         with whole_file(path) as temporary:
             np.savez(temporary, **dict[str, Any](arrays))
-    except (InputError, OSError):
-        return
+    size = 0
+    for status, file in sorted(kept_files(path.parents[1]), key=lambda one: -one[0].st_mtime):
+        size += status.st_size
+        if size > most:
+            with suppress(OSError):
+                file.unlink()
+
+
+def largest_size() -> float:
+    """Return how large the cache may be (bytes).
+
+    Raises
+    ------
+    InputError
+        If the environment gives no number of 0 or more.
+    """
+    text = os.environ.get(SIZE_VARIABLE) or str(_SIZE_GB)
+    with suppress(ValueError):
+        if float(text) >= 0:
+            return 1e9 * float(text)
+    raise InputError(f"{SIZE_VARIABLE} = {text}: expected a number of gigabytes, 0 or more")
+
+
+def kept_files(top: Path) -> list[tuple[os.stat_result, Path]]:
+    """Return the files of a cache folder, and their sizes and times."""
+    found = []
+    with suppress(OSError):
+        for path in top.glob("*/*.npz"):
+            # a folder that the user chose may hold other files too
+            if re.fullmatch(r"[0-9a-f]{32}|\.hotlever-\w+", path.stem):
+                with suppress(OSError):
+                    found.append((path.stat(), path))
+    return found

@@ -1,60 +1,187 @@
-"""Work spread over processes through a Dask scheduler: local ones, or a cluster's.
-
-Local processes are started by spawn, with one BLAS thread each, and are started again when they
-die; what they were doing is done again. A script that asks for them needs
-``if __name__ == "__main__"``.
-"""
+"""Work spread over processes by Dask: local ones, or those of a cluster's scheduler."""
 
 from __future__ import annotations
 
 import logging
+import os
 import signal
+import subprocess
+import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from itertools import islice
 from typing import Any, TypeVar
 
 import dask
 import numpy as np
-from distributed import CancelledError, Client, KilledWorker, LocalCluster, as_completed
+from distributed import CancelledError, Client, KilledWorker, LocalCluster, Security, wait
 from distributed.diagnostics.plugin import WorkerPlugin
 
 from hotlever import __version__
+from hotlever.cache import CACHE_VARIABLE, cache_folder
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.threads import single_threaded_children
 
 T = TypeVar("T")
+#: Number and arguments.
+Task = tuple[int, tuple[Any, ...]]
+#: Applies a function to each of many arguments; gives number and result of each as it is done.
+Run = Callable[[Callable[..., Any], list[tuple[Any, ...]]], Iterator[tuple[int, Any]]]
 
 #: Tasks at the scheduler for each worker: one at work, one to go on with. The others wait here.
 _AHEAD = 2
-#: How long a scheduler, and then its first worker, may take to answer.
+#: Seconds that a scheduler, and then its first worker, may take to answer.
 _PATIENCE_S = 10
+#: Seconds for which a scheduler may be without workers while there is work.
+_WITHOUT_WORKERS_S = 30
+#: Seconds that a scheduler may take to say who its workers are.
+_ANSWER_S = 30
+#: Seconds after which a local worker that gives no sign of life is started again.
+_SILENT_S = 20
+#: Seconds between two looks at the workers.
+_LOOK_S = 5.0
 #: Those that Dask gives levels of their own.
 _LOGGERS = ("distributed", "distributed.client")
+_KILLED = ComputationError("every process that tried it died; too little memory?")
+_LOST = "the scheduler is lost; what was done until then is written"
 
 
-class _Quiet(WorkerPlugin):
+def run_all(
+    client: Client, function: Callable[..., T], tasks: Iterable[tuple[Any, ...]]
+) -> Iterator[tuple[int, T | HotleverError]]:
+    """Apply a function to each of many arguments; give number and result as each is done.
+
+    Only a few tasks for each worker are sent ahead. A task whose worker dies goes to another one.
+    If that dies as well the task is tried again alone, since another one may have been the cause;
+    if its workers still die it gives an error, as one that raises does.
+
+    Raises
+    ------
+    ComputationError
+        If the workers are lost.
+    """
+    waiting: Iterator[Task] = enumerate(tasks)
+    suspects: list[Task] = []
+    running: dict[Any, Task] = {}
+    last_seen, alone = time.monotonic(), False
+    while True:
+        if threads := _threads(client):
+            last_seen = time.monotonic()
+        elif running and time.monotonic() > last_seen + _WITHOUT_WORKERS_S:
+            raise ComputationError(
+                "the scheduler has no workers left; what was done until then is written"
+            )
+        ahead = 1 if alone else max(1, _AHEAD * threads)
+        for task in islice(waiting, max(0, ahead - len(running))):
+            running[client.submit(guarded, function, task[1], pure=False)] = task
+        if not running:
+            if alone or not suspects:
+                return
+            waiting, alone = iter(suspects), True
+            continue
+        with client.as_current(), suppress(TimeoutError, CancelledError):
+            wait(list(running), _LOOK_S, return_when="FIRST_COMPLETED")
+        for future in [future for future in running if future.done()]:
+            task, result = running.pop(future), _result(future)
+            if result is _KILLED and not alone:
+                suspects.append(task)
+            else:
+                yield task[0], result
+
+
+@contextmanager
+def local_processes(processes: int) -> Iterator[Run]:
+    """Start local processes that do tasks, and raise what these raise; one would be this one.
+
+    Raises
+    ------
+    ComputationError
+        If they cannot be started, or die again and again.
+    """
+    if processes == 1:
+        yield lambda function, tasks: ((n, function(*task)) for n, task in enumerate(tasks))
+        return
+    with local_client(processes) as client:
+        yield lambda function, tasks: map(_raised, run_all(client, function, tasks))
+
+
+def _raised(done: tuple[int, Any]) -> tuple[int, Any]:
+    if isinstance(done[1], HotleverError):
+        raise done[1]
+    return done
+
+
+def _threads(client: Client) -> int:
+    """Return how many tasks the workers can do at a time."""
+    try:
+        if client.status != "running":
+            raise ConnectionError
+        found = client.sync(client.scheduler.ncores, callback_timeout=_ANSWER_S)
+    except (OSError, TimeoutError) as error:
+        raise ComputationError(_LOST) from error
+    return sum(found.values())
+
+
+def _result(future: Any) -> Any:
+    try:
+        return future.result()
+    except CancelledError as error:
+        raise ComputationError(_LOST) from error
+    except KilledWorker:
+        return _KILLED
+    except Exception as error:
+        return ComputationError(f"{type(error).__name__}: {error}")
+
+
+def guarded(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """Call a function in a worker; an error is returned, as one that can be sent.
+
+    What some carry along is large, or cannot be sent.
+    """
+    try:
+        return function(*arguments)
+    except InputError as error:
+        return InputError(str(error))
+    except HotleverError as error:
+        return ComputationError(str(error))
+    except Exception as error:
+        return ComputationError(f"{type(error).__name__}: {error}")
+
+
+# --- on this machine ----------------------------------------------------------------------------
+
+
+class _LocalWorker(WorkerPlugin):
     """What a local worker does when it starts, and when it starts again."""
 
     def setup(self, worker: Any) -> None:
         _silence()
-        # Ctrl-C reaches all processes of a terminal; the one that started the workers ends them
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
         # freeing a large block once teaches glibc to keep the memory of intermediate arrays
         np.empty(2_000_000)
 
 
 @contextmanager
 def local_client(processes: int) -> Iterator[Client]:
-    """Start local worker processes; they end with the block.
+    """Start local worker processes with one BLAS thread each; they end with the block.
+
+    They are started by spawn: a script that calls this needs ``if __name__ == "__main__"``. Their
+    ports ask for credentials that are made for each block and never leave the memory of its
+    processes. One that dies or is stopped is started again, and what it was doing is done again.
 
     Raises
     ------
     ComputationError
         If they cannot be started.
     """
-    settings = {
+    settings: dict[str, Any] = {
         "distributed.worker.multiprocessing-method": "spawn",
+        # nothing but the encrypted connections answers
+        "distributed.scheduler.http.routes": [],
+        "distributed.worker.http.routes": [],
+        "distributed.scheduler.allowed-failures": 1,
+        "distributed.scheduler.worker-ttl": f"{_SILENT_S}s",
         # the default hands every freed array back to the system, to ask for it again
         "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
         # Dask watches its workers many times a second, at the cost of their work
@@ -62,29 +189,72 @@ def local_client(processes: int) -> Iterator[Client]:
         "distributed.admin.tick.interval": "1s",
         "distributed.admin.system-monitor.interval": "5s",
     }
+    security = Security.temporary()
     with (
-        dask.config.set(settings),
         single_threaded_children(),
-        tempfile.TemporaryDirectory(prefix="hotlever-", ignore_cleanup_errors=True) as folder,
+        _folder_of_this_process() as folder,
+        dask.config.set({**settings, "temporary-directory": folder}),
+        _shared_cache(folder),
     ):
         try:
-            cluster = LocalCluster(
-                n_workers=processes,
-                threads_per_worker=1,
-                # None would mean the usual port, with a warning where that is taken
-                dashboard_address="127.0.0.1:0",
-                scheduler_kwargs={"dashboard": False},
-                silence_logs=logging.CRITICAL,
-                local_directory=folder,
-            )
+            with _without_interrupts():
+                cluster = LocalCluster(
+                    n_workers=processes,
+                    threads_per_worker=1,
+                    security=security,
+                    # None would mean the usual port, with a warning where that is taken
+                    dashboard_address="127.0.0.1:0",
+                    scheduler_kwargs={"dashboard": False},
+                    silence_logs=logging.CRITICAL,
+                )
         except (RuntimeError, OSError) as error:
             raise ComputationError(
                 "the worker processes could not be started; is there enough memory, and does a "
                 'script that starts them have `if __name__ == "__main__"`?'
             ) from error
-        with cluster, Client(cluster, set_as_default=False) as client:
-            client.register_plugin(_Quiet())
+        with cluster, Client(cluster, security=security, set_as_default=False) as client:
+            client.register_plugin(_LocalWorker())
             yield client
+
+
+@contextmanager
+def _folder_of_this_process() -> Iterator[str]:
+    """Make a temporary folder that is removed even if this process is killed."""
+    folder = tempfile.mkdtemp(prefix="hotlever-")
+    # our end of its standard input closes however we end
+    remover = "import shutil, sys; sys.stdin.read(); shutil.rmtree(sys.argv[1], True)"
+    command = [sys.executable, "-I", "-S", "-c", remover, folder]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True):
+        yield folder
+
+
+@contextmanager
+def _shared_cache(folder: str) -> Iterator[None]:
+    """Let workers find reduced levers on disk, even if the user's cache is switched off."""
+    if cache_folder() is not None:
+        yield
+        return
+    os.environ[CACHE_VARIABLE] = folder
+    try:
+        yield
+    finally:
+        os.environ[CACHE_VARIABLE] = ""
+
+
+@contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Start threads and processes that Ctrl-C, which reaches all of a terminal, leaves to us."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+# --- on a cluster ---------------------------------------------------------------------------------
 
 
 @contextmanager
@@ -141,63 +311,3 @@ def _version() -> str:
     from hotlever import __version__ as version
 
     return version
-
-
-def run_all(
-    client: Client, function: Callable[..., T], tasks: Iterable[tuple[Any, ...]]
-) -> Iterator[tuple[int, T | HotleverError]]:
-    """Apply a function to each of many arguments; give number and result as each is done.
-
-    Only a few tasks for each worker are sent ahead. A task whose worker dies goes to another one;
-    a task that kills several workers gives an error, as one that raises does.
-
-    Raises
-    ------
-    ComputationError
-        If the scheduler is lost.
-    """
-    waiting = enumerate(tasks)
-    running: dict[Any, int] = {}
-    done = as_completed(loop=client.loop)
-    exhausted = False
-    while True:
-        try:
-            threads = sum(client.nthreads().values())
-        except (OSError, TimeoutError) as error:
-            raise ComputationError(
-                "the scheduler is lost; what was done until then is written"
-            ) from error
-        while not exhausted and len(running) < max(1, _AHEAD * threads):
-            number, arguments = next(waiting, (-1, ()))
-            if number < 0:
-                exhausted = True
-                break
-            future = client.submit(_guarded, function, arguments, pure=False)
-            running[future] = number
-            done.add(future)
-        if not running:
-            return
-        future = next(done)
-        number = running.pop(future)
-        try:
-            yield number, future.result()
-        except CancelledError as error:
-            raise ComputationError(
-                "the scheduler is lost; what was done until then is written"
-            ) from error
-        except KilledWorker:
-            yield number, ComputationError("every process that tried it died; too little memory?")
-        except Exception as error:
-            yield number, ComputationError(f"{type(error).__name__}: {error}")
-
-
-def _guarded(function: Callable[..., T], arguments: tuple[Any, ...]) -> T | HotleverError:
-    """Call a function, in a worker; errors made for users come back as plain ones.
-
-    What some carry along is large, or cannot be sent.
-    """
-    try:
-        return function(*arguments)
-    except HotleverError as error:
-        kind = InputError if isinstance(error, InputError) else ComputationError
-        return kind(str(error))

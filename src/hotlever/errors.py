@@ -6,6 +6,9 @@ import difflib
 from collections.abc import Iterable
 from typing import Any
 
+#: Characters that an error quotes of what was found.
+_QUOTED = 40
+
 
 class HotleverError(Exception):
     """Base of every error raised on purpose; its text is one line for a user."""
@@ -22,12 +25,7 @@ class InputError(HotleverError):
 class ComputationError(HotleverError):
     """A computation could not be finished.
 
-    Parameters
-    ----------
-    message : str
-        One line for the user.
-    partial : optional
-        What was reached before the failure, of the type the call would have returned.
+    ``partial`` is what was reached before, of the type the call would have returned.
     """
 
     def __init__(self, message: str, partial: Any = None) -> None:
@@ -42,17 +40,27 @@ class NewtonError(ComputationError):
 class BranchEndError(ComputationError):
     """The branch that a slow bias ramp follows ends before the last bias asked for.
 
-    Attributes
-    ----------
-    bias_reached : float
-        Bias (V) at which the branch ends.
-    partial : xarray.Dataset or list
-        The states up to there.
+    It ends at ``bias_reached`` (V); ``partial`` holds the states up to there.
     """
 
     def __init__(self, message: str, bias_reached: float, partial: Any = None) -> None:
         super().__init__(message, partial)
         self.bias_reached = bias_reached
+
+
+def shown(found: object) -> str:
+    """Return what was found as an error quotes it: the beginning of what is long.
+
+    Examples
+    --------
+    >>> shown("a" * 80)
+    "'aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa…"
+    """
+    try:
+        text = repr(found)
+    except (ValueError, RecursionError):
+        return f"a very long {type(found).__name__}"
+    return text if len(text) <= _QUOTED else f"{text[: _QUOTED - 2]}…"
 
 
 def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") -> InputError:
@@ -64,9 +72,9 @@ def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") 
     "unknown parameter 'c_kapa': did you mean 'c_kappa'? (expected one of: c_kappa, delta)"
     """
     known = list(choices)
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(name[:_QUOTED], known, n=1, cutoff=0.5)
     hint = f"did you mean '{near[0]}'? " if near else ""
     prefix = f"{where}: " if where else ""
     return InputError(
-        f"{prefix}unknown {kind} '{name}': {hint}(expected one of: {', '.join(known)})"
+        f"{prefix}unknown {kind} {shown(name)}: {hint}(expected one of: {', '.join(known)})"
     )

@@ -1,12 +1,13 @@
-"""Immutable, checked records: the base of everything a probe file holds."""
+"""Immutable, checked records: the base of what files hold."""
 
 from __future__ import annotations
 
+import inspect
 from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from hotlever.errors import InputError, unknown_name
+from hotlever.errors import InputError, shown, unknown_name
 
 
 class Record(BaseModel):
@@ -18,7 +19,17 @@ class Record(BaseModel):
         From `of` and `with_`, on a missing, misspelt or impossible value.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    # strict: a number in quotes, or true, is no number
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Say in the help what each value is, as in the comments of a probe file."""
+        values = "\n".join(f"{name}\n    {text}" for name, text in cls.description().items())
+        if values:
+            cls.__doc__ = (
+                f"{inspect.cleandoc(cls.__doc__ or '')}\n\nAttributes\n----------\n{values}\n"
+            )
 
     @classmethod
     def of(cls, values: dict[str, Any], where: str) -> Self:
@@ -27,6 +38,12 @@ class Record(BaseModel):
             return cls.model_validate(values)
         except ValidationError as error:
             raise explained(error, cls, where) from None
+
+    @classmethod
+    def description(cls) -> dict[str, str]:
+        """Return what each value is, by key, for the comments of a probe file."""
+        fields = cls.model_fields.items()
+        return {name: field.description for name, field in fields if field.description}
 
     def with_(self, **changes: Any) -> Self:
         """Return a copy with some values changed, checked again."""
@@ -48,4 +65,6 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
     message = first["msg"].removeprefix("Value error, ")
     if not key:
         return InputError(f"{where}: {message}")
-    return InputError(f"{where}: {key} = {first['input']!r}: {message[0].lower()}{message[1:]}")
+    return InputError(
+        f"{where}: {key} = {shown(first['input'])}: {message[0].lower()}{message[1:]}"
+    )

@@ -7,10 +7,10 @@ import pytest
 
 from hotlever.air.operator import air_operator
 from hotlever.air.surface import PanelOptions
-from hotlever.air.surroundings import Surroundings
 from hotlever.errors import InputError
 from hotlever.materials.air import temperature_jump_length
 from hotlever.probe import Probe
+from hotlever.probe.surroundings import Surroundings
 
 LAYOUT = Probe.reference().layout()
 #: For what does not depend on accuracy.
@@ -69,7 +69,7 @@ def test_the_chip_takes_up_heat_and_is_large_enough(monkeypatch):
 
     with_chip = heated_at_the_front(True)
     assert with_chip > 1.15 * heated_at_the_front(False)
-    monkeypatch.setattr("hotlever.air.chip.REACH", 32.0)
+    monkeypatch.setattr("hotlever.air.surface.REACH", 32.0)
     assert heated_at_the_front(True) == pytest.approx(with_chip, rel=1e-3)
 
 
@@ -106,7 +106,7 @@ def test_operators_are_kept_and_damaged_files_replaced(tmp_path, monkeypatch):
     first = air_operator(LAYOUT, options=COARSE)
     (file,) = (tmp_path / "air").iterdir()
     calls = []
-    monkeypatch.setattr("hotlever.air.operator.single_layer", lambda *_: calls.append(1))
+    monkeypatch.setattr("hotlever.air.operator.single_layer_matrix", lambda *_: calls.append(1))
     assert np.array_equal(air_operator(LAYOUT, options=COARSE).matrix, first.matrix)
     assert not calls
     monkeypatch.undo()
@@ -117,7 +117,7 @@ def test_operators_are_kept_and_damaged_files_replaced(tmp_path, monkeypatch):
 
 
 def test_probe_files_hold_surroundings(tmp_path):
-    probe = Probe.reference().with_values({"surface_gap_um": 8.0, "chip": True})
+    probe = Probe.reference().with_(surface_gap_um=8.0, chip=True)
     probe.to_file(tmp_path / "probe.toml")
     assert Probe.from_file(tmp_path / "probe.toml") == probe
     text = Probe.reference().to_toml()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,26 +13,23 @@ import pytest
 
 from hotlever.calibration.budget import (
     Tolerances,
-    combined,
     fit_variations,
     geometry_variations,
     material_variations,
     refitted,
 )
-from hotlever.calibration.calibrate import calibrate
-from hotlever.calibration.calibration import TABLE_COLUMNS
-from hotlever.calibration.characteristic import characteristic
+from hotlever.calibration.calibration import TABLE_COLUMNS, read_calibration
 from hotlever.calibration.knee import IVCurve
 from hotlever.calibration.power_law import EQ12, read_power_law
-from hotlever.calibration.synthetic import measured_curve
+from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import InputError
-from hotlever.fitting import fit, read_measurement
-from hotlever.fitting.fit_file import FitFile, read_fit
-from hotlever.fitting.measurement import Measurement
+from hotlever.fitting import Measurement, fit, read_fit
 from hotlever.lever import Lever
-from hotlever.materials.spieser2017 import published
-from hotlever.probe import MeshOptions, Probe
+from hotlever.lever.lever import COARSE
+from hotlever.probe import Circuit, Probe
+from hotlever.spieser2017 import published
+from synthetic_curves import measured_curve
 
 #: Leave out what needs other levers to be solved.
 FEW = Tolerances(geometry=0.0, material=0.0)
@@ -58,7 +56,7 @@ def example():
 def shared_fit(tmp_path_factory, example):
     """A fit file of an example measurement."""
     path = tmp_path_factory.mktemp("fit") / "fit.json"
-    fit(read_measurement(example)).write(path)
+    fit(example).write(path)
     return path
 
 
@@ -73,27 +71,33 @@ def test_the_table_gives_the_true_temperature(calibrated, reference):
 
 def test_the_bias_for_a_temperature_is_that_of_the_lever(calibrated, lever, reference):
     wanted = np.array([400.0, 700.0, 1000.0])
-    exact = reference.bias(wanted, 5600.0)
+    exact = reference.bias(wanted, lever.circuit)
     np.testing.assert_allclose(lever.sweep(exact).tip_K, wanted, atol=0.05)
     np.testing.assert_allclose(calibrated.bias_for(wanted), exact, atol=0.1)
+    other = Circuit(series_resistance_ohm=3000.0)
     np.testing.assert_allclose(
-        calibrated.bias_for(wanted, 3000.0), reference.bias(wanted, 3000.0), atol=0.1
+        calibrated.bias_for(wanted, other), reference.bias(wanted, other), atol=0.1
+    )
+    power = calibrated.table.power_mW.values[[20, 80]]
+    np.testing.assert_allclose(
+        calibrated.tip_temperature(power), calibrated.table.tip_K.values[[20, 80]]
     )
     assert np.isnan(calibrated.bias_for([294.0, 1500.0])).all()
 
 
 def test_k_is_the_power_of_the_knee_over_the_threshold(calibrated, reference):
     assert calibrated.k == pytest.approx(1.0, abs=0.015)
-    assert calibrated.k == calibrated.knee_mW / calibrated.power_law.threshold_mW
+    assert calibrated.k == calibrated.knee.power_mW / calibrated.power_law.threshold_mW
     assert calibrated.power_law.threshold_mW == pytest.approx(reference.knee.power_mW, rel=1e-3)
     assert calibrated.knee_tip_K == pytest.approx(reference.knee.tip_K, abs=1.0)
 
 
 def test_the_budget_adds_up_and_every_source_counts(calibrated):
-    assert set(calibrated.budget) == {"k", "electronics", "geometry", "material"}
-    np.testing.assert_allclose(calibrated.table.tip_stderr_K, combined(calibrated.budget))
-    for source, error in calibrated.budget.items():
-        assert np.nanmax(error) > 0.3, source
+    budget = calibrated.table.budget_K
+    assert set(budget.source.values) == {"k", "electronics", "geometry", "material"}
+    together = np.sqrt((budget**2).sum("source"))
+    np.testing.assert_allclose(calibrated.table.tip_stderr_K, together)
+    assert (budget.max("bias") > 0.3).all()
     assert calibrated.tip_temperature_uncertainty_K == np.nanmax(calibrated.table.tip_stderr_K)
 
 
@@ -102,9 +106,11 @@ def test_another_lever_is_within_a_few_stated_errors(calibrated, lever_3):
     law = calibrated.power_law
     with_law = calibrate(measurement_of(curve), law=law, tolerances=FEW)
     error = np.abs(with_law.table.tip_K - lever_3.tip_temperature(with_law.table.power_mW))
-    stated = np.hypot(with_law.table.tip_stderr_K, calibrated.budget["material"].max())
+    stated = np.hypot(
+        with_law.table.tip_stderr_K, calibrated.table.budget_K.sel(source="material").max()
+    )
     assert np.nanmax(error / stated) < 2.0
-    assert np.nanmax(with_law.budget["power law"]) < 40.0
+    assert with_law.table.budget_K.sel(source="power law").max() < 40.0
     assert with_law.route == "power law"
     assert with_law.power_law == law
 
@@ -128,11 +134,12 @@ def test_a_knee_outside_is_estimated_with_a_larger_error(reference, calibrated):
     estimated = calibrate(
         measurement_of(curve), law=calibrated.power_law, tolerances=Tolerances(geometry=0.0)
     )
-    assert estimated.knee is None
+    assert not estimated.knee.measured
     assert any("estimated from the points below it" in note for note in estimated.notes)
-    assert estimated.knee_stderr_mW > 2 * calibrated.knee_stderr_mW
-    assert abs(estimated.knee_mW - reference.knee.power_mW) < 3 * estimated.knee_stderr_mW
-    content = json.loads(estimated.to_json())
+    found, stderr = estimated.knee.power_mW, estimated.knee.power_mW_stderr
+    assert stderr > 2 * calibrated.knee.power_mW_stderr
+    assert abs(found - reference.knee.power_mW) < 3 * stderr
+    content = estimated.content()
     assert content["knee"]["lever_V"] is None
     assert content["knee"]["measured"] is False
 
@@ -169,7 +176,7 @@ def test_a_measured_knee_takes_the_place_of_the_model_s(reference):
     np.testing.assert_allclose(curve.at(power, measured), reference.tip_temperature(power))
 
 
-def test_variations_are_of_the_size_asked_for():
+def test_variations_are_of_the_size_asked_for(shared_fit):
     probe = Probe.reference()
     names = [variation.name for variation in geometry_variations(probe, 0.05)]
     assert "heater_width_um" in names
@@ -178,15 +185,19 @@ def test_variations_are_of_the_size_asked_for():
     materials = [variation.probe.material for variation in material_variations(probe)]
     mean = np.mean([np.log(material.n_d) for material in materials])
     assert mean == pytest.approx(np.log(probe.material.n_d))
-    stderr = {"c_kappa": 0.005, "p": 0.05}
-    fit = FitFile(probe, list(stderr), np.diag(np.square(list(stderr.values()))), (), "", "", "f")
-    moved = np.array(
-        [
-            [getattr(variation.probe.material, name) for name in stderr]
-            for variation in fit_variations(fit)
-        ]
-    ) - [probe.material.c_kappa, probe.material.p]
-    np.testing.assert_allclose(np.sqrt((moved**2).sum(axis=0)), list(stderr.values()), rtol=0.02)
+    fit = read_fit(shared_fit)
+    origin = np.array([getattr(fit.probe.material, name) for name in fit.names])
+    moved = (
+        np.array(
+            [
+                [getattr(variation.probe.material, name) for name in fit.names]
+                for variation in fit_variations(fit)
+            ]
+        )
+        - origin
+    )
+    spread = np.sqrt(np.diag(fit.covariance))
+    np.testing.assert_allclose(np.sqrt((moved**2).sum(axis=0)), spread, rtol=0.1)
     with pytest.raises(InputError, match="expected a relative error"):
         Tolerances(geometry=5.0)
 
@@ -194,35 +205,77 @@ def test_variations_are_of_the_size_asked_for():
 def test_errors_of_dimensions_are_made_up_for_by_a_fit(shared_fit):
     """A refitted lever of another heater length shows the data the first one does."""
     fit = read_fit(shared_fit)
-    mesh = MeshOptions(refinement=0.3)
-    data = fit.measurement()
-    changed = fit.probe.with_values({"heater_length_um": 4.08})
-    again = refitted(fit, data, changed, mesh)
+    changed = fit.probe.with_(heater_length_um=4.08)
+    again = refitted(fit, changed)
     assert again.material != fit.probe.material
     before, wrong, after = (
-        Lever(probe, mesh).sweep([6.0, 8.0, 10.0]).tip_K.values
+        Lever(probe, COARSE).sweep([6.0, 8.0, 10.0]).tip_K.values
         for probe in (fit.probe, changed, again)
     )
     assert np.abs(wrong - before).max() > 5.0
     assert np.abs(after - before).max() < 1.0
 
 
-def test_a_fit_file_is_read_back(tmp_path, shared_fit):
-    fit = read_fit(shared_fit)
-    content = json.loads(shared_fit.read_text())
-    assert fit.observables == ("current", "reader", "tip")
-    assert fit.probe.material.c_kappa == content["parameters"]["c_kappa"]["value"]
-    errors = [content["parameters"][name]["stderr"] for name in fit.names]
-    np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), errors)
-    assert fit.measurement() is not None
-    content["correlation"]["matrix"] = [[1.0]]
-    bad = tmp_path / "bad.json"
-    bad.write_text(json.dumps(content))
-    with pytest.raises(InputError, match="do not belong together"):
-        read_fit(bad)
-    bad.write_text("{}")
-    with pytest.raises(InputError, match="not a fit file: probe is missing"):
-        read_fit(bad)
+def test_a_calibration_file_is_read_back_whole(calibrated, tmp_path):
+    path = tmp_path / "cal.json"
+    calibrated.write(path)
+    again = read_calibration(path)
+    assert again.content() == calibrated.content()
+    np.testing.assert_array_equal(
+        again.bias_for([500.0, 900.0]), calibrated.bias_for([500.0, 900.0])
+    )
+    assert repr(again) == repr(calibrated)
+
+
+def test_a_fit_as_object_or_file_and_data_as_object_or_file_are_one(shared_fit, example):
+    by_path = calibrate(example, fit=shared_fit, tolerances=FEW)
+    one = read_fit(shared_fit)
+    by_object = calibrate(one.measurement, fit=one, tolerances=FEW)
+    np.testing.assert_allclose(by_path.table.tip_K, by_object.table.tip_K)
+
+
+def damaged(content, *keys, value=None):
+    """A copy with one entry, found by its keys, replaced; or left out without a value."""
+    content = json.loads(json.dumps(content))
+    part = content
+    for key in keys[:-1]:
+        part = part[key]
+    if value is None:
+        del part[keys[-1]]
+    else:
+        part[keys[-1]] = value
+    return content
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "message"),
+    [
+        (("probe",), None, "not a calibration file: probe is missing"),
+        (("data",), 3, "data = 3"),
+        (("data", "columns"), {"I_h": [1.0]}, "columns: V_b is missing"),
+        (("data", "columns", "I_h"), [1.0, 2.0], "I_h: expected numbers in 40 places"),
+        (("knee",), "none", "knee = 'none'"),
+        (("table",), [], "expected rows of rising bias"),
+        (("table", 5, "tip_K"), "hot", "tip_K = 'hot'"),
+        (("budget_K", "k"), [1.0], "budget_K: k: expected numbers in 101 places"),
+        (("power_law", "exponents"), 2.0, "did you mean 'exponent'"),
+        (("k",), 10**400, "expected a finite number"),
+        (("notes",), {}, "notes = {}"),
+    ],
+)
+def test_damaged_calibration_files_get_one_line(calibrated, tmp_path, keys, value, message):
+    path = tmp_path / "bad.json"
+    path.write_text(json.dumps(damaged(calibrated.content(), *keys, value=value)))
+    with pytest.raises(InputError, match=re.escape(message)) as no:
+        read_calibration(path)
+    assert "\n" not in str(no.value)
+
+
+def test_what_is_no_json_is_no_calibration(tmp_path):
+    for text in ("", "[", "[" * 5000, '{"k": NaN}', "3"):
+        (tmp_path / "bad.json").write_text(text)
+        with pytest.raises(InputError, match=r"bad\.json"):
+            read_calibration(tmp_path / "bad.json")
 
 
 def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
@@ -267,7 +320,7 @@ def test_a_file_without_current_is_refused(run, tmp_path):
 
 def test_air_calibration_uses_the_model_in_air(lever, reference):
     """A lever in air calibrated with the air model, and by the rule of a constant k."""
-    air = characteristic(lever.in_medium("air"), 1050.0, step_K=50.0)
+    air = lever.in_medium("air").branch()
     curve = measurement_of(measured_curve(air, np.random.default_rng(5), to_V=12.0))
     with_model = calibrate(curve, medium="air", tolerances=FEW)
     assert with_model.k == pytest.approx(air.knee.power_mW / reference.knee.power_mW, rel=0.015)
@@ -276,10 +329,6 @@ def test_air_calibration_uses_the_model_in_air(lever, reference):
 
 
 def test_published_materials_are_what_a_material_may_be():
-    scatter = {
-        variation.name: variation.probe.material
-        for variation in material_variations(
-            Probe.reference().with_values(published("lever 3").material.model_dump())
-        )
-    }
+    probe = Probe.reference().with_(**published("lever 3").material.model_dump())
+    scatter = {variation.name: variation.probe for variation in material_variations(probe)}
     assert set(scatter) == {"lever 1", "lever 2", "lever 3", "lever 4"}

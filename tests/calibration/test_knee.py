@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from hotlever.calibration.knee import IVCurve, KneeOutsideError, find_knee, scale_to
-from hotlever.calibration.knee_reasons import knee_reasons
 from hotlever.calibration.smoothing import SmoothCurve
-from hotlever.calibration.synthetic import current_at, measured_curve
-from hotlever.errors import ComputationError, InputError
+from hotlever.errors import InputError
+from hotlever.probe import Circuit
+from synthetic_curves import current_at, measured_curve
 
-SERIES_OHM = 5600.0
+CIRCUIT = Circuit()
 
 
 def test_without_noise_the_knee_is_found(reference, lever_3):
     bias = np.linspace(1, 11, 400)
-    curve = IVCurve.of(bias, current_at(reference, bias, SERIES_OHM), SERIES_OHM)
+    curve = IVCurve.of(bias, current_at(reference, bias, CIRCUIT), CIRCUIT)
     for like in (None, reference, lever_3):
         knee = find_knee(curve, like)
         assert knee.power_mW == pytest.approx(reference.knee.power_mW, rel=1e-3)
@@ -92,11 +92,11 @@ def test_the_scale_of_a_cold_curve_of_the_same_lever_is_one(reference):
 def test_a_scaled_lever_gives_its_scale(reference):
     """A lever of 1.3 times the heat conductance and 0.9 times the resistance."""
     bias = np.linspace(1, 10, 60)
-    current = current_at(reference, bias, SERIES_OHM)
-    lever = bias - SERIES_OHM / 1000 * current
+    current = current_at(reference, bias, CIRCUIT)
+    lever = CIRCUIT.lever_voltage(bias, current)
     power, resistance = 1.3 * lever * current, 0.9 * lever / current
     lever, current = np.sqrt(power * resistance), np.sqrt(power / resistance)
-    scaled = IVCurve.of(lever + SERIES_OHM / 1000 * current, current, SERIES_OHM)
+    scaled = IVCurve.of(CIRCUIT.bias(lever, current), current, CIRCUIT)
     scale = scale_to(scaled, reference)
     assert (scale.power, scale.resistance) == pytest.approx((1.3, 0.9), rel=6e-3)
     knee = scale.applied(reference.knee)
@@ -105,32 +105,20 @@ def test_a_scaled_lever_gives_its_scale(reference):
 
 def test_curves_that_cannot_tell_are_refused(reference):
     bias = np.linspace(1, 11, 40)
-    current = current_at(reference, bias, SERIES_OHM)
+    current = current_at(reference, bias, CIRCUIT)
     with pytest.raises(InputError, match="without a series resistance"):
-        find_knee(IVCurve.of(bias - 5.6 * current, current, 0.0))
+        find_knee(IVCurve.of(bias - 5.6 * current, current, Circuit(series_resistance_ohm=0)))
     with pytest.raises(InputError, match="expected at least 6"):
-        IVCurve.of(bias[:5], current[:5], SERIES_OHM)
+        IVCurve.of(bias[:5], current[:5], CIRCUIT)
     with pytest.raises(InputError, match="series resistance of 56000 ohm, expected positive"):
-        IVCurve.of(bias, current, 56000.0)
+        IVCurve.of(bias, current, Circuit(series_resistance_ohm=56000))
     sparse = np.array([1.0, 3.0, 5.0, 7.0, 8.0, 8.5, 9.5, 11.0])
-    few = IVCurve.of(sparse, current_at(reference, sparse, SERIES_OHM), SERIES_OHM)
+    few = IVCurve.of(sparse, current_at(reference, sparse, CIRCUIT), CIRCUIT)
     with pytest.raises(InputError, match="on either side"):
         find_knee(few)
     cold = np.linspace(0.5, 1.0, 10)
     with pytest.raises(InputError, match="too cold to tell"):
-        scale_to(IVCurve.of(cold, current_at(reference, cold, SERIES_OHM), SERIES_OHM), reference)
-
-
-def test_reasons_for_the_knee_add_up(coarse):
-    reasons = knee_reasons(coarse)
-    steps = dict(reasons.steps())
-    assert reasons.inversion_K + sum(steps.values()) == pytest.approx(reasons.knee_K["as it is"])
-    assert all(kelvins > 0 for kelvins in steps.values())
-    # the paper: approximately 15 K
-    assert steps["the legs have a resistance"] == pytest.approx(15, abs=3)
-    cold = coarse.with_material(coarse.probe.material.with_(n_d=5e18))
-    with pytest.raises(ComputationError, match=r"as it is.*no knee"):
-        knee_reasons(cold)
+        scale_to(IVCurve.of(cold, current_at(reference, cold, CIRCUIT), CIRCUIT), reference)
 
 
 def test_a_smooth_curve_covers_the_truth():

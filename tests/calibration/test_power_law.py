@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hotlever.calibration.power_law import EQ12, PowerLaw, read_power_law
+from hotlever.calibration.power_law import EQ12, read_power_law
 from hotlever.calibration.power_law_fit import fit_power_law
 from hotlever.errors import InputError
 
@@ -35,7 +35,7 @@ def test_the_inverse_returns_the_power(power):
 
 def test_temperatures_inside_the_jump_belong_to_the_threshold():
     assert EQ12.power(919.0) == 2.95
-    overlapping = PowerLaw(103.0, 11.2, 3.1, 200.0, 2.95)
+    overlapping = EQ12.with_(hot_K_per_mW=200.0)
     assert overlapping.jump_K < 0
     assert overlapping.power(900.0) < 2.95
 
@@ -54,7 +54,7 @@ def test_the_continuous_variant_keeps_the_coefficients_and_does_not_jump():
         meeting.tip_temperature(POWER)[apart], EQ12.tip_temperature(POWER)[apart]
     )
     with pytest.raises(InputError, match="do not meet"):
-        PowerLaw(103.0, 11.2, 3.1, 90.0, 2.95).meeting()
+        EQ12.with_(hot_K_per_mW=90.0).meeting()
 
 
 def test_a_scaled_law_needs_that_much_more_power():
@@ -133,7 +133,8 @@ def test_power_law_files(tmp_path):
     ("content", "message"),
     [
         ("{", "not valid JSON"),
-        ("[1]", "found no power law"),
+        ("[1]", "expected an object"),
+        ('{"power_law": 3}', "found no power law"),
         ('{"linear_K_per_mW": 1}', "nonlinear_K is missing"),
         ('{"linear_K_per_mw": 1}', "did you mean 'linear_K_per_mW'"),
         (json.dumps({**EQ12.values(), "exponent": -1}), "exponent = -1, expected a positive"),

@@ -10,15 +10,12 @@ from test_fit import TRUTH, twin
 
 from hotlever.fitting import fit
 from hotlever.fitting.drift import Drift
-from hotlever.fitting.models import FastModel
-from hotlever.lever import Lever
-from hotlever.lever.reduced_cache import cached_reduction
+from hotlever.fitting.models import reduced_model
 
 
 @pytest.fixture(scope="module")
-def model(coarse):
-    space = cached_reduction(coarse)
-    return lambda probe: FastModel(Lever(probe, space=coarse.space), space)
+def model(coarse, reduced):
+    return lambda probe, bias: reduced_model(coarse.with_probe(probe), reduced, bias)
 
 
 @pytest.fixture(scope="module")

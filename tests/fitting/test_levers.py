@@ -8,7 +8,7 @@ import pytest
 from hotlever.errors import InputError
 from hotlever.fitting.levers import INVERSION, compare_levers, levers_csv, statements
 from hotlever.materials import PARAMETERS
-from hotlever.materials.spieser2017 import PUBLISHED
+from hotlever.spieser2017 import PUBLISHED
 
 
 def content(values: dict[str, float], stderr: dict[str, float | None], inversion=830.0):

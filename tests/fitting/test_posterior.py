@@ -8,11 +8,9 @@ import pytest
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting import Measurement, fit
 from hotlever.fitting.diagnostics import effective_sample_size, split_rhat
-from hotlever.fitting.models import FastModel
-from hotlever.fitting.nearby import NearbyModel
-from hotlever.fitting.posterior import Gaussian, predictive_band, sample, sample_posterior
-from hotlever.lever import Lever
-from hotlever.lever.reduced_cache import cached_reduction
+from hotlever.fitting.ensembles import Gaussian, sample
+from hotlever.fitting.posterior import predictive_band, sample_posterior
+from hotlever.fitting.rough import RoughModel
 
 BIAS = np.linspace(2, 11, 10)
 HELD = {"n_d": None, "a0": None, "a1": None}
@@ -40,40 +38,26 @@ class Nowhere:
 ROUGH = Gaussian(np.array([4.5, 2.5]), np.diag([2.0, 3.0]))
 
 
-def measurement(lever: Lever, noise: float) -> Measurement:
-    """Data with equal noise on every scaled residual, as the fit's errors assume."""
-    sweep = lever.sweep(BIAS)
+@pytest.fixture(scope="module")
+def fitted(lever):
+    """A fit of data with equal noise on every scaled residual, as its errors assume."""
+    exact = Measurement.of_sweep(lever.sweep(BIAS))
     rng = np.random.default_rng(3)
-    data = [
-        column.values + noise * column.values.max() * rng.normal(size=BIAS.size)
-        for column in (sweep.current_mA, sweep.reader_V, sweep.tip_K)
-    ]
-    return Measurement(BIAS, *data, np.full(BIAS.size, np.nan))
+    noisy = {
+        name: values + 2e-3 * values.max() * rng.normal(size=BIAS.size)
+        for name, values in vars(exact).items()
+        if name in ("current_mA", "reader_V", "tip_K")
+    }
+    return fit(Measurement(**{**vars(exact), **noisy}), fixed=HELD)
 
 
 @pytest.fixture(scope="module")
-def fitted(coarse):
-    return fit(
-        measurement(coarse, 2e-3),
-        fixed=HELD,
-        model=lambda probe: FastModel(Lever(probe, space=coarse.space), cached_reduction(coarse)),
-    )
-
-
-@pytest.fixture(scope="module")
-def fitted_lever(coarse, fitted):
-    return Lever(fitted.probe, space=coarse.space)
-
-
-@pytest.fixture(scope="module")
-def posterior(fitted, fitted_lever):
-    return sample_posterior(
-        fitted, samples=640, walkers=8, processes=1, noise="common", lever=fitted_lever
-    )
+def posterior(fitted):
+    return sample_posterior(fitted, samples=640, walkers=8, processes=1, noise="common")
 
 
 def test_a_known_normal_density_is_found():
-    chains = sample(Normal(), ROUGH, samples=20_000, walkers=20, seed=1)
+    chains = sample(Normal().log_probability, ROUGH, samples=20_000, walkers=20, seed=1)
     points = chains.points.reshape(-1, 2)
     assert points.mean(axis=0) == pytest.approx(Normal.mean, abs=0.15)
     np.testing.assert_allclose(np.cov(points.T), Normal.covariance, rtol=0.12)
@@ -84,20 +68,23 @@ def test_a_known_normal_density_is_found():
 
 def test_the_number_of_processes_does_not_change_the_samples():
     one, two = (
-        sample(Normal(), ROUGH, samples=400, walkers=8, seed=2, processes=processes)
+        sample(Normal().log_probability, ROUGH, samples=400, walkers=8, seed=2, processes=processes)
         for processes in (1, 2)
     )
     np.testing.assert_array_equal(one.points, two.points)
 
 
 def test_another_seed_gives_other_samples():
-    one, two = (sample(Normal(), ROUGH, samples=100, walkers=8, seed=seed) for seed in (1, 2))
+    one, two = (
+        sample(Normal().log_probability, ROUGH, samples=100, walkers=8, seed=seed)
+        for seed in (1, 2)
+    )
     assert not np.array_equal(one.points, two.points)
 
 
 def test_a_density_without_a_place_to_start_is_reported():
     with pytest.raises(ComputationError, match="only 0 of 400 starting points"):
-        sample(Nowhere(), ROUGH, samples=10, walkers=8)
+        sample(Nowhere().log_probability, ROUGH, samples=10, walkers=8)
 
 
 @pytest.mark.parametrize(
@@ -110,7 +97,7 @@ def test_a_density_without_a_place_to_start_is_reported():
 )
 def test_impossible_numbers_are_refused(options, message):
     with pytest.raises(InputError, match=message):
-        sample(Normal(), ROUGH, **{"samples": 10, "walkers": 8, **options})
+        sample(Normal().log_probability, ROUGH, **{"samples": 10, "walkers": 8, **options})
 
 
 def test_rhat_sees_chains_that_differ_in_place_or_in_width():
@@ -132,25 +119,25 @@ def test_effective_sample_size_of_an_autoregressive_chain():
     assert effective_sample_size(rng.normal(size=(8, 5000))) == pytest.approx(40_000, rel=0.1)
 
 
-def test_nearby_predictions_are_those_of_the_full_lever(coarse):
-    model = NearbyModel(coarse, cached_reduction(coarse), BIAS)
+def test_the_rough_model_predicts_nearby_what_the_full_lever_does(coarse, reduced):
+    model = RoughModel(coarse, reduced, BIAS)
     there = coarse.probe.material.with_(c_kappa=0.70, p=2.70)
     exact = coarse.with_material(there).sweep(BIAS)
     current, reader, tip = model.predict(there)
-    np.testing.assert_allclose(current, exact.current_mA, rtol=1e-4)
-    np.testing.assert_allclose(reader, exact.reader_V, rtol=1e-4)
-    np.testing.assert_allclose(tip, exact.tip_K, atol=0.1)
+    np.testing.assert_allclose(current, exact.current_mA, rtol=2e-4)
+    np.testing.assert_allclose(reader, exact.reader_V, rtol=2e-4)
+    np.testing.assert_allclose(tip, exact.tip_K, atol=0.2)
 
 
-def test_nearby_model_is_exact_at_its_own_material_in_any_order_of_bias(coarse):
+def test_the_rough_model_is_exact_at_its_own_material_in_any_order_of_bias(coarse, reduced):
     bias = np.array([9.0, 3.0, 9.0, 0.0])
-    model = NearbyModel(coarse, cached_reduction(coarse), bias)
+    model = RoughModel(coarse, reduced, bias)
     exact = coarse.sweep(bias)
-    np.testing.assert_allclose(model.predict(coarse.probe.material)[2], exact.tip_K, atol=1e-4)
+    np.testing.assert_allclose(model.predict(coarse.probe.material)[2], exact.tip_K, atol=0.02)
 
 
-def test_far_away_the_ramp_takes_over(coarse):
-    model = NearbyModel(coarse, cached_reduction(coarse), BIAS)
+def test_the_rough_model_serves_far_away_too(coarse, reduced):
+    model = RoughModel(coarse, reduced, BIAS)
     there = coarse.probe.material.with_(c_kappa=1.0, n_d=6e17, p=2.8)
     exact = coarse.with_material(there).sweep(BIAS)
     np.testing.assert_allclose(model.predict(there)[2], exact.tip_K, atol=5.0)
@@ -174,18 +161,18 @@ def test_posterior_says_how_far_to_trust_it(fitted, posterior):
         assert {"units", "long_name"} <= set(variable.attrs)
 
 
-def test_an_unknown_noise_is_refused(fitted, fitted_lever):
+def test_an_unknown_noise_is_refused(fitted):
     with pytest.raises(InputError, match="noise = 'none', expected 'each' or 'common'"):
-        sample_posterior(fitted, noise="none", lever=fitted_lever)
+        sample_posterior(fitted, noise="none")
 
 
-def test_band_holds_the_fit_and_rises_with_power(fitted, fitted_lever, posterior):
-    band = predictive_band(fitted, posterior, bias=BIAS, samples=40, lever=fitted_lever)
+def test_band_holds_the_fit_and_rises_with_power(fitted, lever, posterior):
+    band = predictive_band(fitted, posterior, bias=BIAS, samples=40)
     low, _, middle, _, high = band.tip_K.values
-    best = fitted_lever.sweep(BIAS).tip_K.values
+    best = lever.with_material(fitted.probe.material).sweep(BIAS).tip_K.values
     assert (low < best).all()
     assert (best < high).all()
     assert (np.diff(middle) > 0).all()
     assert (np.diff(band.tip_at_power_K.values) > 0).all()
-    for name in ("tip_K", "tip_at_power_K", "bias_V", "power_mW", "quantile"):
+    for name in ("tip_K", "tip_at_power_K", "bias", "power_mW", "quantile"):
         assert {"units", "long_name"} <= set(band[name].attrs)

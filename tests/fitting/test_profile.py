@@ -8,16 +8,15 @@ from scipy.stats import chi2
 
 from hotlever.errors import InputError
 from hotlever.fitting import Measurement, fit
-from hotlever.fitting.models import FastModel
+from hotlever.fitting.models import full_model
 from hotlever.fitting.profile import profile_likelihood
 from hotlever.lever import Lever
-from hotlever.lever.reduced_cache import cached_reduction
 
 BIAS = np.linspace(2, 11, 10)
 
 
-def fitted(coarse: Lever, bias, fixed, observables=None):
-    sweep = coarse.sweep(bias)
+def fitted(lever: Lever, bias, fixed, observables=None):
+    sweep = lever.sweep(bias)
     rng = np.random.default_rng(7)
     data = [
         column.values + 2e-3 * column.values.max() * rng.normal(size=bias.size)
@@ -27,18 +26,17 @@ def fitted(coarse: Lever, bias, fixed, observables=None):
         Measurement(bias, *data, np.full(bias.size, np.nan)),
         fixed=fixed,
         observables=observables,
-        model=lambda probe: FastModel(Lever(probe, space=coarse.space), cached_reduction(coarse)),
+        model=lambda probe, bias: full_model(lever.with_probe(probe), bias),
     )
 
 
 @pytest.fixture(scope="module")
-def determined(coarse):
-    return fitted(coarse, BIAS, {"n_d": None, "a0": None, "a1": None})
+def determined(lever):
+    return fitted(lever, BIAS, {"n_d": None, "a0": None, "a1": None})
 
 
-def test_a_well_determined_parameter_has_its_parabola(coarse, determined):
-    lever = Lever(determined.probe, space=coarse.space)
-    profile = profile_likelihood(determined, "c_kappa", points=7, lever=lever)
+def test_a_well_determined_parameter_has_its_parabola(determined):
+    profile = profile_likelihood(determined, "c_kappa", points=7)
     np.testing.assert_allclose(profile.delta_chi_square, profile.parabola, atol=0.3)
     known = determined.parameters["c_kappa"]
     for level in (0.68, 0.95):
@@ -50,16 +48,15 @@ def test_a_well_determined_parameter_has_its_parabola(coarse, determined):
     assert profile.refitted.sel(parameter="p").shape == profile.value.shape
 
 
-def test_a_parameter_the_data_leave_open_is_said_to_be_open(coarse):
+def test_a_parameter_the_data_leave_open_is_said_to_be_open(lever):
     """Cold currents do not know how the resistivity rises with temperature."""
     result = fitted(
-        coarse,
+        lever,
         np.linspace(0.5, 2.5, 6),
         {"delta": None, "n_d": None, "a0": None, "p": None},
         ["current"],
     )
-    lever = Lever(result.probe, space=coarse.space)
-    profile = profile_likelihood(result, "a1", points=5, lever=lever)
+    profile = profile_likelihood(result, "a1", points=5)
     assert np.isnan(profile.interval.sel(level=0.95, side="lower"))
     assert "a1: the 95 % interval is open on the lower side" in profile.attrs["notes"]
     assert "the data do not exclude values down to its bound 0" in profile.attrs["notes"]
@@ -73,7 +70,6 @@ def test_a_parameter_the_data_leave_open_is_said_to_be_open(coarse):
         ("p", 6, "points = 6, expected an odd number of 5 or more"),
     ],
 )
-def test_impossible_requests_are_refused(coarse, determined, name, points, message):
-    lever = Lever(determined.probe, space=coarse.space)
+def test_impossible_requests_are_refused(determined, name, points, message):
     with pytest.raises(InputError, match=message):
-        profile_likelihood(determined, name, points=points, lever=lever)
+        profile_likelihood(determined, name, points=points)

@@ -9,16 +9,14 @@ import pytest
 import xarray as xr
 
 from hotlever.fitting import Measurement, fit
-from hotlever.fitting.models import FastModel
+from hotlever.fitting.models import reduced_model
 from hotlever.fitting.uncertainty import Uncertainty
-from hotlever.lever import Lever
-from hotlever.lever.reduced_cache import cached_reduction
 
 BIAS = np.linspace(2, 11, 8)
 
 
 @pytest.fixture(scope="module")
-def fitted(coarse):
+def fitted(coarse, reduced):
     sweep = coarse.sweep(BIAS)
     rng = np.random.default_rng(5)
     data = [
@@ -28,7 +26,7 @@ def fitted(coarse):
     return fit(
         Measurement(BIAS, *data, np.full(BIAS.size, np.nan)),
         fixed={"delta": None, "n_d": None, "a0": None, "a1": None},
-        model=lambda probe: FastModel(Lever(probe, space=coarse.space), cached_reduction(coarse)),
+        model=lambda probe, bias: reduced_model(coarse.with_probe(probe), reduced, bias),
     )
 
 
@@ -51,7 +49,7 @@ def drawn(fitted, shift=0.0, widen=1.0, rhat=1.0, effective=2000.0, **others) ->
             "acceptance_fraction": ((), 0.5),
         },
         coords={"quantity": list(draws)},
-        attrs={"seed": 0, "noise": "common"},
+        attrs={"seed": 0, "noise": "common", "reduced_error_K": 0.0},
     )
 
 
@@ -93,12 +91,8 @@ def test_fit_file_keeps_its_keys_and_gains_the_numbers(fitted):
     quantile = [2.5, 16.0, 50.0, 84.0, 97.5]
     tip = 300 + np.array([-4, -2, 0, 2, 4.0])[:, None] * np.array([0.1, 1.0, 0.5])
     band = xr.Dataset(
-        {"tip_K": (("quantile", "bias"), tip), "tip_at_power_K": (("quantile", "power"), tip)},
-        coords={
-            "quantile": quantile,
-            "bias_V": ("bias", [1.0, 2.0, 3.0]),
-            "power_mW": ("power", [0.1, 0.2, 0.3]),
-        },
+        {"tip_K": (("quantile", "bias"), tip), "tip_at_power_K": (("quantile", "power_mW"), tip)},
+        coords={"quantile": quantile, "bias": [1.0, 2.0, 3.0], "power_mW": [0.1, 0.2, 0.3]},
     )
     profile = xr.Dataset(
         {
@@ -106,7 +100,7 @@ def test_fit_file_keeps_its_keys_and_gains_the_numbers(fitted):
             "interval": (("level", "side"), [[0.6, 0.7], [0.5, np.nan]]),
         },
         coords={"value": ("point", [0.5, 0.65, 0.8]), "level": [0.68, 0.95]},
-        attrs={"parameter": "c_kappa", "notes": "c_kappa: the 95 % interval is open"},
+        attrs={"quantity": "c_kappa", "notes": "c_kappa: the 95 % interval is open"},
     )
     found = Uncertainty(fitted, posterior, band, {"c_kappa": profile})
     content = json.loads(found.to_json())

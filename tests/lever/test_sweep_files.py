@@ -61,29 +61,27 @@ def test_what_is_no_sweep_is_refused(tmp_path):
 
 
 def test_vtu_holds_the_fields(coarse, tmp_path):
-    state = coarse.solve([8.3]).states[0]
-    fields = FieldMapper(coarse).map(state.x)
+    (state,) = coarse.solve([8.3])
+    fields = FieldMapper(coarse).map(state)
     write_vtu(fields, tmp_path / "a.vtu")
     mesh = meshio.read(tmp_path / "a.vtu")
-    seen = coarse.equations.observe(state.x)
-    assert mesh.point_data["temperature_K"].max() == pytest.approx(seen["max_K"], abs=1.0)
-    assert mesh.point_data["potential_V"].max() == pytest.approx(seen["lever_V"])
+    seen = coarse.dataset([state]).isel(bias=0)
+    assert mesh.point_data["temperature_K"].max() == pytest.approx(seen.max_K.item(), abs=1.0)
+    assert mesh.point_data["potential_V"].max() == pytest.approx(state.lever_V)
     # the current through the middle of the centre leg: density times cross-section
     centre = mesh.points[mesh.cells_dict["triangle"]].mean(axis=1)
     leg = (np.abs(centre[:, 0] - 20) < 4) & (np.abs(centre[:, 1]) < 3.2)
     density = mesh.cell_data["current_density_mA_um2"][0][leg, 0]
-    np.testing.assert_allclose(density * 6.44 * 0.4, seen["current_mA"], rtol=0.01)
+    np.testing.assert_allclose(density * 6.44 * 0.4, state.current_mA, rtol=0.01)
 
 
 def test_heater_profile_spans_the_heater(coarse):
-    state = coarse.solve([8.3]).states[0]
-    profile = heater_profile(coarse, state.x, count=41)
+    (state,) = coarse.solve([8.3])
+    profile = heater_profile(state, count=41)
     material = coarse.probe.material
     assert profile.position.values[[0, -1]] == pytest.approx([-2, 2])
     middle = profile.isel(position=20)
-    assert middle.temperature.item() == pytest.approx(
-        coarse.equations.space.tip_temperature(state.x)
-    )
+    assert middle.temperature.item() == pytest.approx(state.tip_K)
     assert middle.doping.item() == pytest.approx(material.n_d, rel=0.02)
     assert middle.inversion_temperature.item() == pytest.approx(
         inversion_temperature(material.n_d, material.p), abs=1.5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import xarray as xr
 
-from hotlever.lever.lever import Ramp
+from hotlever.lever import State
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe
 from hotlever.probe.solid import SolidMeshOptions
@@ -21,12 +21,13 @@ def in_air() -> SolidLever:
 
 
 @pytest.fixture(scope="session")
-def ramp(in_air: SolidLever) -> Ramp:
+def state(in_air: SolidLever) -> State:
     """Its state at 5 V."""
-    return in_air.solve([5.0])
+    (state,) = in_air.solve([5.0])
+    return state
 
 
 @pytest.fixture(scope="session")
-def sweep(in_air: SolidLever, ramp: Ramp) -> xr.Dataset:
-    """What is measured in that state, with sensitivities."""
-    return in_air.dataset(ramp, sensitivities=True)
+def sweep(in_air: SolidLever, state: State) -> xr.Dataset:
+    """What is measured in that state."""
+    return in_air.dataset([state])

@@ -9,11 +9,19 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.lever.continuation import AT_BIAS, BranchFollower
-from hotlever.lever.state_store import StateStore
+from hotlever.figures import temperature_slices as draw
+from hotlever.lever.space import TIP
 from hotlever.lever3d import SolidLever
-from hotlever.lever3d.fields import heat_by_region, temperature_at, write_solid_vtu
+from hotlever.lever3d.fields import (
+    heat_by_region,
+    temperature_at,
+    temperature_slices,
+    write_solid_vtu,
+)
 from hotlever.probe import Probe
+from hotlever.probe.solid import SolidMeshOptions
+
+COARSE = SolidMeshOptions(refinement=0.4, grading=0.7)
 
 
 def test_without_air_it_is_the_flat_lever(lever):
@@ -34,14 +42,15 @@ def test_heat_goes_to_the_leg_ends_and_the_air_and_charge_to_ground(sweep):
     np.testing.assert_allclose(sweep.ground_current_mA, sweep.current_mA, rtol=1e-7)
 
 
-def test_all_heat_that_leaves_the_surface_arrives_at_infinity(in_air, ramp, sweep):
-    coefficients, heat = in_air.in_the_air(ramp.states[0].x)
+def test_all_heat_that_leaves_the_surface_arrives_at_infinity(in_air, state, sweep):
+    coefficients, heat = in_air.in_the_air(state)
     assert heat.sum() == pytest.approx(sweep.air_heat_mW.item())
-    assert in_air.air.at_infinity(coefficients) == pytest.approx(heat.sum(), rel=1e-3)
+    far = in_air.space.air.operator.at_infinity(coefficients)
+    assert far == pytest.approx(heat.sum(), rel=1e-3)
 
 
-def test_the_regions_give_all_the_heat_and_the_bridge_the_most(in_air, ramp, sweep):
-    shares = heat_by_region(in_air, ramp.states[0].x)
+def test_the_regions_give_all_the_heat_and_the_bridge_the_most(state, sweep):
+    shares = heat_by_region(state)
     assert sum(shares.values()) == pytest.approx(sweep.air_heat_mW.item())
     assert max(shares, key=shares.__getitem__) == "bridge"
 
@@ -51,43 +60,53 @@ def test_air_cools(sweep, lever):
     assert 293 + 5 < sweep.tip_K.item() < vacuum.tip_K.item() - 5
 
 
-def test_solves_with_the_jacobian_undo_small_changes(in_air, ramp):
-    """J⁻¹ (F(x + h d) − F(x)) / h − d shrinks like h."""
-    x = ramp.states[0].x
-    pinned = in_air.equations.pinned(AT_BIAS, 5.0)
-    direction = np.random.default_rng(3).normal(size=x.size) * in_air.equations.scale
-    solver = pinned.factorised(x)
-    start = pinned.residual(x)
-    rest = [
-        np.abs(solver.solve((pinned.residual(x + h * direction) - start) / h) - direction).max()
-        for h in (0.2, 0.1, 0.05)
-    ]
+def test_solves_with_the_jacobian_undo_small_changes(in_air, state):
+    """J⁻¹ (F(x + h d) − F(x)) / h − d shrinks like h; it is tests/lever's Taylor test in air."""
+    equations, x = in_air.equations, state.x
+    direction = np.random.default_rng(3).normal(size=x.shape) * equations.scale
+    factors, start = equations.factorised(x), equations.balance(x)
+    rest = []
+    for h in (0.2, 0.1, 0.05):
+        moved = (equations.balance(x + h * direction) - start) / h
+        moved[-1] = TIP.of(in_air.space, direction)
+        rest.append(np.abs(factors.solve(moved, np.array([0])) - direction).max())
     orders = np.log2(np.array(rest[:-1]) / rest[1:])
     np.testing.assert_allclose(orders, 1.0, atol=0.1)
 
 
-def test_the_linear_solver_needs_few_iterations(in_air, ramp, monkeypatch):
-    equations, x = in_air.equations, ramp.states[0].x
-    solver = equations.pinned(AT_BIAS, 5.0).factorised(x)
-    right_hand_side = np.random.default_rng(1).normal(size=x.size)
-    applied = []
+def test_the_linear_solver_needs_few_iterations(in_air, state, monkeypatch):
+    equations, x = in_air.equations, state.x
+    air, applied = in_air.space.air.operator, []
+    factors = equations.factorised(x)
+    wanted = np.random.default_rng(1).normal(size=x.shape) * equations.scale
+    right = equations.balance_change(x, wanted)
+    right[-1] = TIP.of(in_air.space, wanted)
     monkeypatch.setattr(
-        in_air.air, "solve", lambda theta, solve=in_air.air.solve: applied.append(0) or solve(theta)
+        air, "solve", lambda theta, solve=air.solve: applied.append(0) or solve(theta)
     )
-    solution = solver.solve(right_hand_side)
+    found = factors.solve(right, np.array([0]))
     assert len(applied) < 20
-    matrix = equations.jacobian(x).completed(equations.series_kohm, *AT_BIAS)
-    rest = matrix @ solution - right_hand_side
-    assert np.abs(rest).max() < 1e-6 * np.abs(right_hand_side).max()
+    assert np.abs((found - wanted) / equations.scale).max() < 1e-4
 
 
-def test_sensitivities_are_those_of_a_changed_material(in_air, ramp, sweep):
-    material, step = in_air.probe.material, 1e-3
-    changed = in_air.with_material(material.with_(c_kappa=material.c_kappa * (1 + step)))
-    moved = changed.dataset(changed.polish([state.x for state in ramp.states]))
-    slope = sweep.sensitivity.sel(observable="tip", parameter="c_kappa").item()
-    change = (moved.tip_K - sweep.tip_K).item() / (step * material.c_kappa)
-    assert slope == pytest.approx(change, rel=0.01)
+def test_another_material_is_solved_as_by_a_lever_made_of_it(in_air, state):
+    """The same lever otherwise is a solid lever still, with the same mesh and air."""
+    other = in_air.with_material(in_air.probe.material.with_(c_kappa=0.6))
+    assert type(other) is SolidLever
+    assert other.space is in_air.space
+    (warmer,) = other.solve([5.0])
+    assert warmer.tip_K > state.tip_K + 3.0
+
+
+def test_in_another_medium_it_is_meshed_anew_and_solved():
+    vacuum = SolidLever(Probe.reference(), COARSE, air_order=2)
+    (warm,) = vacuum.solve([3.0])  # and what it then knows of its flat lever does not come along
+    air = vacuum.in_medium("air")
+    assert type(air) is SolidLever
+    assert air.medium == "air"
+    (cold,) = air.solve([3.0])
+    assert 293.0 < cold.tip_K < warm.tip_K
+    assert air.in_medium("vacuum").space.air is None
 
 
 def test_the_sphere_must_hold_the_lever():
@@ -102,48 +121,58 @@ def test_without_ngsolve_the_error_says_what_to_install(monkeypatch):
 
 
 def test_only_free_space_is_known():
-    probe = Probe.reference().in_medium("air").with_values({"surface_gap_um": 1.0})
+    probe = Probe.reference().in_medium("air").with_(surface_gap_um=1.0)
     with pytest.raises(InputError, match=r"\[surroundings\]: .* knows free space only"):
         SolidLever(probe)
 
 
-def test_a_sweep_goes_on_from_the_states_in_the_store(coarse, monkeypatch):
-    bias = [2.0, 4.0, 6.0]
-    store = StateStore({"name": "goes on"})
-    whole = coarse.solve(bias)
-    coarse.solve(bias[:2], store=store)
-    advanced = []
+def test_a_sweep_goes_on_from_the_states_in_the_cache(monkeypatch):
+    bias = [2.0, 3.0, 4.0]
+    solid = SolidLever(Probe.reference(), COARSE)
+    solid.solve(bias[:2])
+    solved = []
     monkeypatch.setattr(
-        BranchFollower,
-        "advance_to",
-        lambda self, value, advance=BranchFollower.advance_to: (
-            advanced.append(value) or advance(self, value)
+        SolidLever,
+        "polished",
+        lambda self, guess, value, polished=SolidLever.polished: (
+            solved.append(value) or polished(self, guess, value)
         ),
     )
-    resumed = coarse.solve(bias, store=store)
-    assert advanced == bias[2:]
-    for one, other in zip(resumed.states, whole.states, strict=True):
-        np.testing.assert_allclose(one.x, other.x, rtol=1e-6, atol=1e-6)
+    resumed = SolidLever(Probe.reference(), COARSE).sweep(bias)
+    assert solved == bias[2:]
+    assert resumed.bias_V.values.tolist() == pytest.approx(bias)
 
 
-def test_the_temperature_is_continuous_from_silicon_to_air_and_cold_far_away(in_air, ramp):
-    x = ramp.states[0].x
+def test_the_temperature_is_continuous_from_silicon_to_air_and_cold_far_away(in_air, state):
     across, along = in_air.solid.layout.tip[1], in_air.solid.layout.tip[0]
     heights = np.array([0.0, 0.21, 1.0, 10.0, 45.0, 70.0])
     points = np.column_stack([np.full(6, along), np.full(6, across), heights])
-    T = temperature_at(in_air, x, points)
-    assert T[0] == pytest.approx(in_air.space.tip_temperature(x), abs=0.5)
+    T = temperature_at(state, points)
+    assert T[0] == pytest.approx(state.tip_K, abs=0.5)
     assert T[1] == pytest.approx(T[0], abs=1.0)
     assert (np.diff(T[:5]) < 0).all()
     assert T[4] < T[3] - 10
     assert np.isnan(T[5])
 
 
-def test_the_file_of_a_state_holds_lever_and_air(in_air, ramp, tmp_path):
-    write_solid_vtu(in_air, ramp.states[0].x, tmp_path / "state.vtu")
+def test_slices_through_the_tip_are_drawn(state):
+    slices = temperature_slices(state)
+    assert slices.temperature.dims == ("slice", "z", "place")
+    assert slices.temperature.max().item() == pytest.approx(state.tip_K, abs=2.0)
+    made = draw(slices)
+    titles = [axes.get_title(loc="center") for axes in made.axes[:4]]
+    assert titles == slices.slice.values.tolist()
+
+
+def test_a_flat_lever_s_state_is_refused(lever):
+    with pytest.raises(InputError, match="expected one of a SolidLever"):
+        heat_by_region(lever.solve([1.0])[0])
+
+
+def test_the_file_of_a_state_holds_lever_and_air(in_air, state, tmp_path):
+    write_solid_vtu(state, tmp_path / "state.vtu")
     mesh = meshio.read(tmp_path / "state.vtu")
     region = mesh.cell_data["region"][0]
     assert set(region) == {-1, *range(7)}
-    assert mesh.point_data["temperature_K"].max() == pytest.approx(
-        in_air.space.highest_temperature(ramp.states[0].x), abs=2.0
-    )
+    hottest = in_air.dataset([state]).max_K.item()
+    assert mesh.point_data["temperature_K"].max() == pytest.approx(hottest, abs=2.0)

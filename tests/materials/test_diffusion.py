@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.materials.diffusion import (
-    ANNEALING_K,
-    ANNEALING_S,
+from hotlever.materials.doping import (
     diffusion_length,
     phosphorus_diffusivity,
 )
-from hotlever.materials.spieser2017 import published
+from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S, published
 
 
 def test_the_slope_of_the_diffusivity_is_exact():

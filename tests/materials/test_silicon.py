@@ -10,13 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from hotlever.materials.law import limited_temperature
+from hotlever.materials.laws import limited_temperature
 from hotlever.materials.silicon import (
     band_gap,
+    carrier_density,
     conductivity_high_doped,
     conductivity_low_doped,
-    electron_density,
-    hole_density,
     impurity_mobility,
     intrinsic_density,
     inversion_temperature,
@@ -34,8 +33,7 @@ LAWS = [
     (thermal_conductivity, {"c_kappa": 0.686}),
     (band_gap, {"n": 5.75e17}),
     (intrinsic_density, {"n": 5.75e17}),
-    (electron_density, {"n": 5.75e17}),
-    (hole_density, {"n": 5.75e17}),
+    (carrier_density, {"n": 5.75e17}),
     (phonon_mobility, {"p": 2.65}),
     (mobility, {"n": 5.75e17, "p": 2.65}),
     (conductivity_low_doped, {"n": 5.75e17, "p": 2.65}),
@@ -44,7 +42,7 @@ LAWS = [
 CARRIERS = [
     (law, {**arguments, "carrier": "hole"})
     for law, arguments in LAWS
-    if law in (phonon_mobility, mobility)
+    if law in (carrier_density, phonon_mobility, mobility)
 ]
 
 
@@ -107,8 +105,8 @@ def test_intrinsic_density_golden_value():
 
 def test_carriers_satisfy_neutrality_and_mass_action():
     T = TEMPERATURES[:, None]
-    electrons, _ = electron_density(T, DOPING)
-    holes, _ = hole_density(T, DOPING)
+    electrons, _ = carrier_density(T, DOPING, "electron")
+    holes, _ = carrier_density(T, DOPING, "hole")
     n_i, _ = intrinsic_density(T, DOPING)
     np.testing.assert_allclose(electrons * holes, n_i**2, rtol=1e-12)
     np.testing.assert_allclose(

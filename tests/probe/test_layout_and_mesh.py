@@ -24,7 +24,7 @@ def polygon_area(outline):
 def test_mesh_tiles_every_region(name):
     layout = PROBES[name].layout()
     mesh = mesh_layout(layout)
-    corners = mesh.triangles.p[:, mesh.triangles.t]
+    corners = mesh.elements.p[:, mesh.elements.t]
     (ax, ay), (bx, by) = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     areas = np.abs(ax * by - ay * bx) / 2
     for index, region in enumerate(layout.regions):
@@ -36,8 +36,8 @@ def test_terminals_have_edges_of_their_full_length(name):
     layout = PROBES[name].layout()
     mesh = mesh_layout(layout)
     for terminal in layout.terminals:
-        a, b = mesh.triangles.p[
-            :, mesh.triangles.facets[:, mesh.terminal_facets[terminal.name]]
+        a, b = mesh.elements.p[
+            :, mesh.elements.facets[:, mesh.terminal_facets[terminal.name]]
         ].T.swapaxes(0, 1)
         length = np.linalg.norm(a - b, axis=1).sum()
         assert length == pytest.approx(math.dist(terminal.start, terminal.end))
@@ -60,7 +60,7 @@ def test_reentrant_corners_of_the_reference_probe():
 def test_mesh_is_graded_to_heater_and_corners():
     layout = Probe.reference().layout()
     mesh = mesh_layout(layout)
-    p, facets = mesh.triangles.p, mesh.triangles.facets
+    p, facets = mesh.elements.p, mesh.elements.facets
     length = np.linalg.norm(p[:, facets[0]] - p[:, facets[1]], axis=0)
     middle = p[:, facets].mean(axis=1)
     for corner in layout.reentrant_corners():
@@ -73,17 +73,17 @@ def test_mesh_is_graded_to_heater_and_corners():
 def test_refinement_divides_the_sizes():
     layout = Probe.reference().layout()
     coarse, fine = (
-        mesh_layout(layout, MeshOptions(refinement=r)).triangles.nelements for r in (1.0, 2.0)
+        mesh_layout(layout, MeshOptions(refinement=r)).elements.nelements for r in (1.0, 2.0)
     )
     assert fine > 1.8 * coarse
 
 
 def test_the_tip_lies_in_the_heater_and_outside_points_are_refused(coarse):
-    nodes, weights = coarse.space.operators.point_weights(coarse.space.mesh.layout.tip)
-    x = coarse.space.operators.nodes
+    nodes, weights = coarse.space.elements.point_weights(coarse.space.mesh.layout.tip)
+    x = coarse.space.elements.nodes
     np.testing.assert_allclose(x[:, nodes] @ weights, (48.58, 0.0), atol=1e-9)
     with pytest.raises(InputError, match="outside the lever"):
-        coarse.space.operators.point_weights((0.0, 100.0))
+        coarse.space.elements.point_weights((0.0, 100.0))
 
 
 @settings(max_examples=15, deadline=None)
@@ -97,17 +97,15 @@ def test_the_tip_lies_in_the_heater_and_outside_points_are_refused(coarse):
     st.floats(0.4, 3),
 )
 def test_any_sensible_three_leg_lever_meshes(length, centre, outer, gap, bridge, heater, width):
-    probe = Probe.reference().with_values(
-        {
-            "length_um": length,
-            "centre_leg_width_um": centre,
-            "outer_leg_width_um": outer,
-            "gap_um": gap,
-            "bridge_width_um": bridge,
-            "heater_length_um": heater,
-            "heater_width_um": width,
-            "reader_length_um": 3.0,
-        }
+    probe = Probe.reference().with_(
+        length_um=length,
+        centre_leg_width_um=centre,
+        outer_leg_width_um=outer,
+        gap_um=gap,
+        bridge_width_um=bridge,
+        heater_length_um=heater,
+        heater_width_um=width,
+        reader_length_um=3.0,
     )
     mesh = mesh_layout(probe.layout())
-    assert 100 < mesh.triangles.nelements < 6000
+    assert 100 < mesh.elements.nelements < 6000

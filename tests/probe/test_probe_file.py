@@ -5,6 +5,8 @@ from __future__ import annotations
 import tomllib
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from hotlever.errors import InputError
 from hotlever.probe import Probe, ThreeLeg
@@ -72,7 +74,11 @@ def test_left_out_sections_take_the_reference_values(tmp_path):
             r"probe.toml: \[probe\]: unknown key 'gapp_um': did you mean 'gap_um'",
         ),
         ("gap_um = 3.2", "", r"\[probe\]: gap_um is missing"),
-        ("gap_um = 3.2", "gap_um = -1", r"\[probe\]: gap_um = -1: input should be greater than 0"),
+        (
+            "gap_um = 3.2",
+            "gap_um = -1",
+            r"\[probe\]: gap_um = -1: input should be greater than or equal to 0.05",
+        ),
         ("gap_um = 3.2", 'gap_um = "a"', r"gap_um = 'a': input should be a valid number"),
         ('"three-leg"', '"three-legs"', r"unknown shape 'three-legs': did you mean 'three-leg'"),
         ("[circuit]", "[circus]", r"unknown section 'circus': did you mean 'circuit'"),
@@ -105,11 +111,50 @@ def test_missing_file_is_one_line(tmp_path):
 
 
 def test_with_values_reaches_every_section_and_answers_a_typo():
-    probe = Probe.reference().with_values(
-        {"a0": 1e-3, "series_resistance_ohm": 0, "gap_um": 4.0, "reader_centre_um": 30.0}
+    probe = Probe.reference().with_(
+        a0=1e-3, series_resistance_ohm=0, gap_um=4.0, reader_centre_um=30.0
     )
     assert isinstance(probe.shape, ThreeLeg)
     assert (probe.material.a0, probe.circuit.series_resistance_ohm) == (1e-3, 0)
     assert (probe.shape.gap_um, probe.shape.reader_centre_um) == (4.0, 30.0)
     with pytest.raises(InputError, match="did you mean 'c_kappa'"):
-        probe.with_values({"ckappa": 1})
+        probe.with_(ckappa=1)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a = " + "[\n" * 5000, "not valid TOML: nested too deeply"),
+        (".".join("a" * 50_000) + " = 1", "line 1: 100003 characters, expected at most 1000"),
+        ("probe = " + "9" * 900, r"\[probe\] must be a section, found 9999.*…"),
+        (CONTRACT.replace("gap_um", "length_um"), "not valid TOML: .*overwrite"),
+        (CONTRACT.replace("[probe]", "[[probe]]"), r"\[probe\] must be a section, found \["),
+        ("#" * 999 + "\n" + "#\n" * 1_000_000, "larger than the 1 MB"),
+        ('"\\ud800" = 1', "not valid TOML"),
+    ],
+)
+def test_files_made_to_break_a_reader_are_one_short_line(tmp_path, text, message):
+    with pytest.raises(InputError, match=message) as caught:
+        read(tmp_path, text)
+    assert len(str(caught.value)) < 300
+
+
+@given(st.data())
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_whatever_is_changed_in_a_file_it_is_a_probe_or_one_line_says_why(tmp_path, data):
+    text = Probe.reference().to_toml()
+    for _ in range(data.draw(st.integers(1, 3))):
+        start = data.draw(st.integers(0, len(text)))
+        stop = start + data.draw(st.integers(0, 12))
+        wild = st.text(max_size=8) | st.sampled_from(["=", "[", "1e400", "nan", '"""', "{"])
+        text = text[:start] + data.draw(wild) + text[stop:]
+    path = tmp_path / "probe.toml"
+    path.write_bytes(text.encode("utf-8", "surrogatepass"))
+
+    def said() -> str:
+        try:
+            return str(Probe.from_file(path).shape.shape)
+        except InputError as error:
+            return str(error)
+
+    assert 0 < len(said()) < 500

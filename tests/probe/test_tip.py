@@ -42,7 +42,10 @@ def test_the_example_in_the_comments_is_a_valid_section(tmp_path):
     ("section", "message"),
     [
         ({"heigth_um": 0.7}, r"\[tip\]: unknown key 'heigth_um': did you mean 'height_um'"),
-        ({"height_um": -1}, r"\[tip\]: height_um = -1: input should be greater than 0"),
+        (
+            {"height_um": -1},
+            r"\[tip\]: height_um = -1: input should be greater than or equal to 0.01",
+        ),
         ({"half_angle_deg": 20}, r"\[tip\]: height_um is missing"),
         (
             {"height_um": 3.0, "half_angle_deg": 30},
@@ -64,12 +67,12 @@ def test_the_thickening_ends_at_the_base_and_is_highest_at_the_axis():
 
 
 def test_a_flat_cone_counts_in_full():
-    flat = Tip(height_um=0.01, half_angle_deg=80, apex_radius_um=1e-6)
+    flat = Tip(height_um=0.01, half_angle_deg=80, apex_radius_um=1e-4)
     volume = np.pi * flat.base_radius_um**2 * flat.height_um / 3
     radius = np.linspace(0, flat.base_radius_um, 2001)
     thickening = flat.thickening_um(radius)
     assert np.trapezoid(2 * np.pi * radius * thickening, radius) == pytest.approx(volume, rel=0.3)
-    steep = Tip(height_um=50.0, half_angle_deg=1, apex_radius_um=1e-6)
+    steep = Tip(height_um=50.0, half_angle_deg=1, apex_radius_um=1e-4)
     assert steep.thickening_um(0.0) == pytest.approx(steep.base_radius_um / 1.84, rel=0.02)
 
 

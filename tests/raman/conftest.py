@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hotlever.raman import synthetic
+import synthetic_spectra as synthetic
 
 REPO = Path(__file__).parents[2]
 
 
 @pytest.fixture
-def real_spectra(shared: Path) -> Path:
-    return shared / "data" / "raman"
+def real_spectra(shared: Callable[..., list[Path]]) -> list[Path]:
+    return shared(
+        "data/raman",
+        "FMNT-M_BW532__Sil10_iR532_Probe_100_60000msx2.txt",
+        "FMNT-M_Ho785__Sil10_iR785_OP01_6000msx4.txt",
+        "labram_spectrum_wn.txt",
+    )
 
 
 @pytest.fixture
-def hot_plate_files(shared: Path) -> Path:
-    return shared / "data" / "virtual-lab" / "raman-hot-plate"
+def hot_plate_files(shared: Callable[..., list[Path]]) -> list[Path]:
+    names = (f"si100_{number:02d}.txt" for number in range(25))
+    return shared("data/virtual-lab/raman-hot-plate", *names)
 
 
 @pytest.fixture
-def tip_files(shared: Path) -> Path:
-    return shared / "data" / "virtual-lab" / "raman-tip"
+def tip_files(shared: Callable[..., list[Path]]) -> list[Path]:
+    names = (f"tip_{number:02d}.txt" for number in range(12))
+    return shared("data/virtual-lab/raman-tip", *names)
 
 
 @pytest.fixture

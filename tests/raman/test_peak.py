@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import synthetic_spectra as synthetic
 from hotlever.errors import InputError
-from hotlever.raman import lineshape, noise, synthetic
+from hotlever.raman import lineshape, noise
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.peak import NoSiliconLine, PeakOptions
-from hotlever.raman.synthetic import Instrument
+from synthetic_spectra import Instrument
 
 X = np.arange(440.0, 600.0, 0.527)
 

@@ -5,21 +5,32 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
+import xarray as xr
 
+import synthetic_spectra as synthetic
 from hotlever.cli.raman import spread_option
 from hotlever.errors import InputError
+from hotlever.figures import raman as figures
 from hotlever.fitting.measurement import read_measurement
-from hotlever.raman import figures, synthetic
-from hotlever.raman.calibration import published
-from hotlever.raman.check import paper_check
-from hotlever.raman.join import join, read_bias_log
-from hotlever.raman.series import COLUMNS, Row, measure, read_lines
-from hotlever.raman.spectrum import read_spectra
+from hotlever.raman.bias_log import join, read_bias_log
+from hotlever.raman.calibration import published_raman_calibration
+from hotlever.raman.series import (
+    COLUMNS,
+    QUANTITIES,
+    calibrate_from,
+    measure,
+    read_lines,
+    to_csv,
+)
+from hotlever.raman.spectrum import Spectrum, read_spectra
 from hotlever.raman.thermometer import Thermometer
+from hotlever.studies.raman_check import conclusion, paper_check
 
 HEADER = (
     "file,center_cm-1,center_stderr_cm-1,fwhm_cm-1,shift_cm-1,temperature_K,"
@@ -88,6 +99,28 @@ def test_published_laws_with_a_reference(run, examples):
         assert float(row["temperature_K"]) == pytest.approx(expected, abs=0.05)
 
 
+def test_a_table_of_spectra_is_a_dataset_with_units_and_what_the_csv_holds(
+    run, examples, hot_plate
+):
+    found, _ = calibrate_from(read_spectra([hot_plate]))
+    x = np.arange(440.0, 600.0, 0.5)
+    noise = np.random.default_rng(0).poisson(100.0, x.size).astype(float)
+    lines = measure([*read_spectra([examples / "tip"]), Spectrum(x, noise, "none.txt")])
+    made = read_lines(lines, Thermometer(found))
+    assert made.sizes == {"spectrum": 5}
+    assert {name: made[name].attrs["units"] for name in QUANTITIES} == {
+        name: "K" if name.endswith("_K") else "cm-1" for name in QUANTITIES
+    }
+    rows = table(to_csv(made))
+    for name, (digits, _, _) in QUANTITIES.items():
+        cells = [float(row[name.replace("_per_cm", "_cm-1")] or "nan") for row in rows]
+        np.testing.assert_allclose(cells, made[name], atol=0.51 * 10.0**-digits)
+    assert [row["file"] for row in rows] == made.file.values.tolist()
+    assert [row["flags"] for row in rows] == made.flags.values.tolist()
+    assert made.flags.values[-1] == "no-line"
+    assert np.isnan(made.temperature_K.values[-1])
+
+
 def test_single_spectrum_and_lineless_spectrum(run, tmp_path):
     x = np.arange(440.0, 600.0, 0.5)
     noise = np.random.default_rng(0).poisson(100.0, x.size)
@@ -107,6 +140,22 @@ def test_single_spectrum_and_lineless_spectrum(run, tmp_path):
     status, _, _ = run("raman", tmp_path / "b_si.txt", "--plot", tmp_path / "one.svg")
     assert status == 0
     assert "cm⁻¹" in (tmp_path / "one.svg").read_text()
+
+
+def test_spectra_come_through_a_pipe_and_a_pipe_in_a_folder_is_passed_over(run, examples, tmp_path):
+    pipe = tmp_path / "folder" / "pipe.txt"
+    pipe.parent.mkdir()
+    os.mkfifo(pipe)
+    source = examples / "tip" / "tip_00.txt"
+    writer = Thread(target=lambda: pipe.write_bytes(source.read_bytes()))
+    writer.start()
+    _, piped, _ = run("raman", pipe)
+    writer.join()
+    (tmp_path / "folder" / "tip_00.txt").write_bytes(source.read_bytes())
+    status, out, err = run("raman", tmp_path / "folder")
+    assert status == 0
+    assert "pipe.txt: is a pipe or a device" in err
+    assert out == piped.replace("pipe.txt", "tip_00.txt")
 
 
 def test_equal_names_in_two_folders_are_told_apart(run, examples, tmp_path):
@@ -144,6 +193,27 @@ BAD = {
         "--reference needs --calibration",
     ),
     "laser without resistance": (["raman", "tip", "--laser-power", "1"], "belong together"),
+    "laser": (
+        ["raman", "tip", "--laser-power", "1e300", "--thermal-resistance", "1"],
+        "laser power: found 1e+300, expected 0 to 1000 mW",
+    ),
+    "thermal resistance": (
+        ["raman", "tip", "--laser-power", "1", "--thermal-resistance", "nan"],
+        "thermal resistance: found nan, expected 0 to 100000 K/mW",
+    ),
+    "stress": (
+        ["raman", "tip", "--stress", "1e300", "--calibrate-from", "plate"],
+        "stress: found 1e+300, expected 0 to 10000 MPa",
+    ),
+    "stress without calibration": (["raman", "tip", "--stress", "5"], "--stress needs --calib"),
+    "device": (["raman", "/dev/zero"], "/dev/zero: is a device, expected a file"),
+    "device as calibration": (["raman", "tip", "--calibration", "/dev/zero"], "is a device"),
+    "device as table": (
+        ["raman", "tip", "--calibrate-from", "plate", "--temperatures", "/dev/zero"],
+        "is a device",
+    ),
+    "device as log": (["join", "/dev/zero", "tip", "--calibrate-from", "plate"], "is a device"),
+    "long name": (["raman", "x" * 5000], "no such file or folder"),
     "table without series": (["raman", "tip", "--temperatures", "t.csv"], "--calibrate-from"),
     "nothing to save": (["raman", "tip", "--save-calibration", "c.json"], "no calibration"),
     "no temperatures": (
@@ -151,7 +221,7 @@ BAD = {
         "no temperature in its header or name",
     ),
     "figure format": (["raman", "tip", "--plot", "f.doc"], "unknown figure type '.doc'"),
-    "output folder": (["raman", "tip", "-o", "none/t.csv"], "cannot be written"),
+    "output folder": (["raman", "tip", "-o", "none/t.csv"], "the folder none does not exist"),
     "output is a folder": (["raman", "tip", "-o", "empty"], "is a folder"),
     "no spectra": (["raman"], "FILE_OR_DIR"),
     "unknown option": (["raman", "tip", "--lawn", "linear"], "--law"),
@@ -204,8 +274,17 @@ def test_command_line_of_several_files():
 # --- join ----------------------------------------------------------------------------------
 
 
-def row(name, temperature=500.0, error=3.0):
-    return Row(name, 515.0, 0.05, 5.0, -5.0, temperature, error, ())
+def read(*spectra):
+    """A table of spectra, each a name or (name, temperature, error)."""
+    rows = [(one, 500.0, 3.0) if isinstance(one, str) else one for one in spectra]
+    names, temperatures, errors = zip(*rows, strict=True)
+    return xr.Dataset(
+        {
+            "file": ("spectrum", np.array(names)),
+            "temperature_K": ("spectrum", np.array(temperatures)),
+            "temperature_error_K": ("spectrum", np.array(errors)),
+        }
+    )
 
 
 def test_join_gives_the_measurement_file_by_file_column(run, examples, tmp_path):
@@ -230,7 +309,7 @@ def test_join_gives_the_measurement_file_by_file_column(run, examples, tmp_path)
 def test_join_by_bias_in_the_name_leaves_other_rows_empty(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("# medium: vacuum\nV_b (V),I_h (mA)\n1.0000,0.14\n5.2500,0.80\n11.0000,1.46\n")
-    found = [row("tip_11V.txt", 1200.4, 9.04), row("tip_5.25V.txt")]
+    found = read(("tip_11V.txt", 1200.4, 9.04), "tip_5.25V.txt")
     assert join(read_bias_log(log), found).splitlines() == [
         "# medium: vacuum",
         "V_b (V),I_h (mA),T_tip (K),dT_tip (K)",
@@ -243,7 +322,7 @@ def test_join_by_bias_in_the_name_leaves_other_rows_empty(tmp_path):
 def test_join_by_order_keeps_the_files_dialect_and_replaces_old_temperatures(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("V_b (mV);T_tip (K);dT_tip (K);I_h (mA)\n1000,5;999;9;0,14\n2000,5;;;0,28\n")
-    found = [row("a.txt"), row("b.txt", float("nan"), float("nan"))]
+    found = read("a.txt", ("b.txt", np.nan, np.nan))
     assert join(read_bias_log(log), found).splitlines() == [
         "V_b (mV);I_h (mA);T_tip (K);dT_tip (K)",
         "1000,5;0,14;500,0;3,0",
@@ -256,20 +335,31 @@ def test_join_by_order_keeps_the_files_dialect_and_replaces_old_temperatures(tmp
     [
         ("", ["a.txt"], "no rows"),
         ("1,2\n3,4\n", ["a.txt"], "no bias column in '1,2'"),
-        ("V_b (V),I\n1,2,3\n", ["a.txt"], "line 2: 3 cells in '1,2,3', expected 2"),
-        ("V_b (V),I\nx,2\n", ["a.txt"], "line 2: bias 'x', expected a number"),
+        ("V_b (V),I\n1,2,3\n", ["a.txt"], "line 2: 3 cells, expected 2"),
+        ("V_b (V),I\nx,2\n", ["a.txt"], "line 2: V_b: found 'x', expected a number"),
         ("V_b (V),I\n1,2\n2,3\n", ["a.txt"], "2 rows and 1 spectra"),
         ("V_b (V),I\n1,2\n2,3\n", ["a_1V.txt", "b_7V.txt"], "no row at the bias of b_7V.txt"),
         ("V_b (V),I\n1,2\n2,3\n", ["a_1V.txt", "b_1V.txt"], "two spectra at 1 V"),
-        ("V_b (V),file\n1,z.txt\n", ["a.txt"], "'z.txt' is not among those given"),
+        ("V_b (V),file\n1,z.txt\n", ["a.txt"], "line 2: spectrum 'z.txt' is not among those given"),
+        ("V_b (V),file\n1,a.txt\n", ["p/a.txt", "q/a.txt"], "'a.txt' names 2 of them"),
+        ("V_b (V),I\n,2\n--,3\n", ["a_1V.txt", "b_2V.txt"], "no row at the bias of a_1V.txt"),
+        ("V_b (mA),I\n1,2\n", ["a.txt"], "line 1: V_b .mA.: unit 'mA' is not understood"),
+        ('V_b (V),I\n1,"2\n', ["a.txt"], "line 2: found '1,\"2', expected quotes in pairs"),
     ],
 )
 def test_logs_that_cannot_be_joined(text, names, words, tmp_path):
     log = tmp_path / "log.csv"
     log.write_text(text)
     with pytest.raises(InputError, match=words) as caught:
-        join(read_bias_log(log), [row(name) for name in names], str(log))
+        join(read_bias_log(log), read(*names))
     assert str(log) in str(caught.value)
+
+
+def test_an_error_below_a_tenth_of_a_kelvin_is_not_written_as_none(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("V_b (V),I_h (mA)\n1,0.14\n")
+    lines = join(read_bias_log(log), read(("a.txt", 295.0, 0.031))).splitlines()
+    assert lines[1] == "1,0.14,295.0,0.031"
 
 
 # --- figures and the check -----------------------------------------------------------------
@@ -280,21 +370,23 @@ def test_check_prints_its_conclusion_and_writes_figure_and_numbers(run, tmp_path
         "raman-check", "--plot", tmp_path / "check.pdf", "-o", tmp_path / "check.json"
     )
     assert status == 0
-    assert out.strip() == paper_check().conclusion()
+    check = paper_check()
+    assert out.strip() == conclusion(check)
     numbers = json.loads((tmp_path / "check.json").read_text())
     assert numbers["conclusion"] == out.strip()
-    assert [line["error_at_hottest"] for line in numbers["lines"]] == [
-        result.error_at_hottest for result in paper_check().results
-    ]
+    assert numbers["truth"] == check.truth
+    for place, line in enumerate(numbers["lines"]):
+        expected = check.isel(line=place)
+        assert line.pop("name") == expected.line.item()
+        assert line == {name: expected[name].item() for name in line}
+        assert {"error_at_hottest", "true_at_knee", "discrepancy", "explained"} <= set(line)
     assert (tmp_path / "check.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_figure_holds_spectra_calibration_and_residuals(hot_plate):
-    from hotlever.raman.series import calibrate_from
-
     found, lines = calibrate_from(read_spectra([hot_plate]))
-    rows = read_lines(lines, Thermometer(found))
-    figure = figures.thermometry(lines, rows, found, lines)
+    table = read_lines(lines, Thermometer(found))
+    figure = figures.thermometry(lines, table, found, lines)
     stack, upper, lower = figure.axes
     labels = [text.get_text() for text in stack.texts]
     assert labels[0] == "295 K"
@@ -313,5 +405,6 @@ def test_figure_without_calibration_or_without_series(examples):
     assert [text.get_text() for text in bare.axes[0].texts] == [
         line.spectrum.name for line in lines
     ]
-    rows = read_lines(lines, Thermometer(published(), reference=522.39))
-    assert len(figures.thermometry(lines, rows, published()).axes) == 3
+    law = published_raman_calibration()
+    table = read_lines(lines, Thermometer(law, reference=522.39))
+    assert len(figures.thermometry(lines, table, law).axes) == 3

@@ -12,10 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hotlever.errors import InputError
+from hotlever.raman.block import find_block
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.spectrum import read_file, read_spectra, read_spectrum, spectrum_files
 from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
-from hotlever.raman.tables import decode, parse_table
+from hotlever.tables import decode
 
 
 def rows(x, y, separator="\t", comma=False, end="\n"):
@@ -172,7 +173,7 @@ def test_any_table_of_two_columns_is_read_back(
     text = end.join(lines)
     if comma:
         text = text.replace(".", ",")
-    table = parse_table(decode(text.encode(encoding), "f"), "f")
+    table = find_block(decode(text.encode(encoding), "f").splitlines(), "f")
     np.testing.assert_allclose(table.values[order], np.stack([x, y], axis=1), atol=1e-9)
 
 
@@ -213,6 +214,16 @@ BAD = {
     ),
     "flat": (b"".join(b"%d 7\n" % i for i in range(450, 600)), "no column of intensities"),
     "truncated wdf": (b"WDF1" + bytes(40), "not a readable WiRE file"),
+    "million lines": (b"520 1\n" * 1_000_000, "1000000 lines, expected at most 100000"),
+    "one line": (b"1 " * 100_000, "line 1: 200000 characters"),
+    "huge jcamp": (
+        b"##TITLE=a\n##NPOINTS=1000000000\n##FIRSTX=0\n##LASTX=9\n##XYDATA=(X++(Y..Y))\n0 1\n",
+        "more NPOINTS than the file can hold",
+    ),
+    "jcamp bomb": (
+        b"##TITLE=a\n##XYDATA=(X++(Y..Y))\n440J1" + b"1Z" * 50_000 + b"\n##END=\n",
+        "a repeat count without a value",
+    ),
 }
 
 
@@ -323,6 +334,24 @@ def test_wire_file_with_two_spectra(silicon, tmp_path):
         read_spectrum(file)
 
 
+@pytest.mark.parametrize(
+    ("place", "value", "words"),
+    [
+        (8, 0, "blocks do not follow each other"),
+        (60, 0xFFFF, "65535 samples|not a readable WiRE file"),
+        (60, 256, "304 Raman shifts and 256 intensities"),
+        (72, 0xFFFFFFFF, "spectra of|not a readable WiRE file"),
+    ],
+)
+def test_damaged_wire_files_are_refused_at_once(silicon, tmp_path, place, value, words):
+    pytest.importorskip("wdf", reason="needs the raman extra")
+    raw = bytearray(wdf_bytes(*silicon[:1], [silicon[1]]))
+    struct.pack_into("<I", raw, place, value)
+    (tmp_path / "a.wdf").write_bytes(raw)
+    with pytest.raises(InputError, match=words):
+        read_file(tmp_path / "a.wdf")
+
+
 def test_wire_file_on_a_wavelength_axis(silicon, tmp_path):
     pytest.importorskip("wdf", reason="needs the raman extra")
     x, y = silicon
@@ -405,9 +434,9 @@ def test_missing_library_is_named_with_the_way_to_get_it(
 # --- real files ----------------------------------------------------------------------------
 
 
-def test_real_files_are_read_and_hold_a_line(real_spectra: Path):
+def test_real_files_are_read_and_hold_a_line(real_spectra: list[Path]):
     expected = {"FMNT-M_BW532": 1800, "FMNT-M_Ho785": 1000, "labram": 1010}
-    spectra = read_spectra([real_spectra])
+    spectra = read_spectra(real_spectra)
     assert len(spectra) == len(expected)
     for spectrum, (start, samples) in zip(spectra, sorted(expected.items()), strict=True):
         assert spectrum.name.startswith(start)
@@ -417,16 +446,15 @@ def test_real_files_are_read_and_hold_a_line(real_spectra: Path):
         assert abs(peak.centre - 520.5) < max(3.0, 3.0 * peak.centre_stderr)
 
 
-def test_bwtek_dark_subtracted_column_and_raman_shift_are_chosen(real_spectra: Path):
-    [file] = real_spectra.glob("FMNT-M_BW532*")
-    found = read_spectrum(file)
+def test_bwtek_dark_subtracted_column_and_raman_shift_are_chosen(real_spectra: list[Path]):
+    found = read_spectrum(real_spectra[0])
     at = np.searchsorted(found.x, 451.10)
     assert found.x[at] == pytest.approx(451.10)
     assert found.y[at] == pytest.approx(2446.5)
 
 
-def test_saturated_real_spectrum_is_flagged(real_spectra: Path):
-    spectrum = read_spectrum(real_spectra / "labram_spectrum_wn.txt")
+def test_saturated_real_spectrum_is_flagged(real_spectra: list[Path]):
+    spectrum = read_spectrum(real_spectra[2])
     peak = fit_peak(spectrum.x, spectrum.y)
     assert "saturated" in peak.flags
     assert spectrum.metadata["Instrument"] == "LabRAM HR Evol"

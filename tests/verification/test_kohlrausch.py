@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bare import bare_equations
+from bare import bare_equations, state_at
 from skfem import MeshTri
 from skfem.element import ElementTriP2, ElementTriP3
 
-from hotlever.lever.continuation import BranchFollower
-from hotlever.materials.spieser2017 import published
 from hotlever.probe import Taper, Terminal
+from hotlever.spieser2017 import published
 
 SUPPLY = Terminal("supply", (2.0, 0.0), (2.0, 1.0))
 GROUND = Terminal("ground", (0.0, 2.0), (1.0, 2.0))
@@ -50,8 +49,9 @@ def temperatures(mesh, voltage, *, element=None, taper=None, quadrature=6):
         taper=taper,
         quadrature=quadrature,
     )
-    state = BranchFollower(equations).advance_to(voltage)
-    return equations.space.tip_temperature(state.x), equations.space.highest_temperature(state.x)
+    x = state_at(equations, voltage)
+    rises = equations.space.tip_rise(x), equations.space.rises(x).max(axis=0)
+    return tuple(293.0 + rise.item() for rise in rises)
 
 
 def exact_high_doped(voltage):

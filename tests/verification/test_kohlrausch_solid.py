@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bare import state_at
 from skfem.element import ElementTetP2
 from test_kohlrausch import GROUND, HIGH_DOPED, SUPPLY
 
-from hotlever.lever.continuation import BranchFollower
+from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.operators import FiniteElements
-from hotlever.lever.space import LeverSpace
-from hotlever.materials.spieser2017 import published
-from hotlever.probe import Circuit, Layout, Region
+from hotlever.lever.full_space import FullSpace
+from hotlever.probe import Layout, Region
 from hotlever.probe.solid import SolidMeshOptions, mesh_solid
+from hotlever.spieser2017 import published
 
 OUTLINE = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
 
@@ -26,10 +26,9 @@ def highest(voltage, refinement):
         heater=0.2, lever=0.2, corner=0.05, rim=100.0, grading=0.4, refinement=refinement
     )
     mesh = mesh_solid(layout, sizes)
-    space = LeverSpace(mesh, FiniteElements(mesh.elements, ElementTetP2(), 4))
-    circuit = Circuit(series_resistance_ohm=0.0)
-    equations = LeverEquations(space, circuit, published("option III").material)
-    return space.highest_temperature(BranchFollower(equations).advance_to(voltage).x)
+    space = FullSpace(mesh, FiniteElements(mesh.elements, ElementTetP2(), 4))
+    equations = LeverEquations(space, published("option III").material, 293.0)
+    return 293.0 + space.rises(state_at(equations, voltage)).max()
 
 
 @pytest.mark.parametrize("voltage", [0.5, 1.0])

@@ -8,12 +8,12 @@ from bare import bare_equations
 from skfem import MeshTri
 from skfem.element import ElementTriP1, ElementTriP2, ElementTriP3
 
-from hotlever.lever.equations import Pin, PinnedEquations
-from hotlever.lever.newton import NewtonOptions, newton
+from hotlever.lever.newton import NewtonOptions, find_roots
+from hotlever.lever.space import LEVER
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.silicon import conductivity_low_doped, thermal_conductivity
-from hotlever.materials.spieser2017 import published
 from hotlever.probe import Taper, Terminal
+from hotlever.spieser2017 import published
 
 LENGTH, WIDTH, BIAS, BASE = 2.0, 1.0, 1.5, 293.0
 TAPER = Taper((1.0, 0.5), (1.0, 0.0), 2.0)
@@ -63,25 +63,27 @@ class Exact:
         return heat, charge
 
 
-class Loaded(PinnedEquations):
-    """The lever's equations with the manufactured sources."""
+class Loaded:
+    """The equations at a lever voltage with the manufactured sources; see `newton.Equations`."""
 
     def __init__(self, equations, exact) -> None:
-        super().__init__(equations, Pin(1.0, 0.0), BIAS)
-        space = equations.space
-        heat, charge = exact.loads(*space.operators.positions)
-        sheet = 0.1 * space.mesh.layout.thickness_um
-        loads = np.zeros(space.operators.size)
-        heat_nodal = space.operators.gather(space.operators.weak_form(sheet * heat, 0.0))
-        charge_nodal = space.operators.gather(space.operators.weak_form(sheet * charge, 0.0))
-        loads = np.zeros(space.size + 2)
-        for unknowns, nodal in ((space._T, heat_nodal), (space._V, charge_nodal)):
-            free = (unknowns >= 0) & (unknowns < space.size)
-            loads[unknowns[free]] = nodal[free]
-        self._loads = loads
+        self.equations, space = equations, equations.space
+        self.scale, self.step_limit = equations.scale, equations.step_limit
+        points = space.weights.size
+        sheet = 0.1 * space.thickness_um * space.weights[:, 0]
+        values = space.elements.sampling[:points]
+        heat, charge = (
+            values.T @ (sheet * load) for load in exact.loads(*space.elements.positions)
+        )
+        self.loads = space.from_nodal(heat, charge, 0.0)[:, None]
 
-    def residual(self, x):
-        return super().residual(x) - self._loads
+    def residual(self, x, which):
+        residual = self.equations.balance(x)
+        residual[-1] = x[-1] - BIAS
+        return residual - self.loads
+
+    def factorised(self, x, which):
+        return self.equations.factorised(x, LEVER)
 
 
 def errors(element, refinements, amplitude):
@@ -102,20 +104,16 @@ def errors(element, refinements, amplitude):
     )
     exact = Exact(amplitude)
     space = equations.space
-    start = equations.start()
-    x, y = space.operators.nodes
-    for unknowns, nodal in (
-        (space._T, exact.temperature(x, y)[0]),
-        (space._V, exact.potential(x, y)[0]),
-    ):
-        free = unknowns >= 0
-        start[unknowns[free]] = nodal[free]
-    solved = newton(Loaded(equations, exact), start, NewtonOptions()).x
-    T, V = space.nodal(solved, BASE)
-    points, weights = space.operators.positions, space.operators.weights
+    x, y = space.elements.nodes
+    start = space.from_nodal(exact.temperature(x, y)[0] - BASE, exact.potential(x, y)[0], BIAS)
+    solved = find_roots(Loaded(equations, exact), start[:, None], NewtonOptions()).x
+    points, weights = space.elements.positions, space.elements.weights
+    values = space.elements.sampling[: weights.size]
     return [
-        np.sqrt(np.sum(weights * (space.operators.evaluate(nodal)[0] - field(*points)[0]) ** 2))
-        for nodal, field in ((T, exact.temperature), (V, exact.potential))
+        np.sqrt(np.sum(weights * (values @ nodal - field(*points)[0]) ** 2))
+        for nodal, field in zip(
+            space.nodal(solved[:, 0], BASE), (exact.temperature, exact.potential), strict=True
+        )
     ]
 
 

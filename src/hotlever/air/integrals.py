@@ -10,12 +10,9 @@ written as inverse hyperbolic sines: the two differ by terms that cancel between
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hotlever.air.panels import Panels
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from hotlever.types import Array
 
 #: Stands for zero below a fraction whose factor vanishes there.
 _TINY = 1e-150
@@ -84,9 +81,7 @@ def rectangle_pairs(first: Panels, second: Panels) -> Array:
     differences = np.stack([high[0] - low[1], low[0] - low[1], high[0] - high[1], low[0] - high[1]])
     for one in range(3):
         for other in range(3):
-            pairs = np.flatnonzero((first.flat_axis == one) & (second.flat_axis == other))
-            if not pairs.size:
-                continue
+            pairs = (first.flat_axis == one) & (second.flat_axis == other)
             d = differences[:, pairs]
             if one == other:
                 u, v = (axis for axis in range(3) if axis != one)
@@ -132,14 +127,11 @@ def _perpendicular(u: Array, v: Array, w: Array) -> Array:
         (a * bb / 2, a * c, b),
         (a * cc / 2, a * b, c),
     ):
-        terms -= power * np.arctan(product / _away_from_zero(height * distance))
+        below = height * distance
+        terms -= power * np.arctan(product / np.where(np.abs(below) < _TINY, _TINY, below))
     twice, once = np.array([1.0, -1.0, -1.0, 1.0]), np.array([1.0, -1.0])
     total: Array = np.einsum("u,v,w,uvwn->n", twice, once, once, terms)
     return total
-
-
-def _away_from_zero(values: Array) -> Array:
-    return np.where(np.abs(values) < _TINY, _TINY, values)
 
 
 def far_pairs(first: Panels, second: Panels, offsets: Array) -> Array:

@@ -9,23 +9,25 @@ what that air would conduct along the plate is taken off the silicon in
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from hotlever import __version__
-from hotlever.air.chip import chip_panels
-from hotlever.air.panels import Panels, mirror_group
-from hotlever.air.single_layer import Progress, layer_potential, single_layer
-from hotlever.air.surface import PanelOptions, lever_surface
-from hotlever.air.surroundings import Surroundings
+from hotlever.air.panels import Mirror, Panels, mirror_group
+from hotlever.air.single_layer import layer_potential, single_layer_matrix
+from hotlever.air.surface import PanelOptions, chip_panels, lever_surface
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout
+from hotlever.probe.surroundings import Surroundings
+from hotlever.spieser2017 import BASE_TEMPERATURE_K
+from hotlever.types import Array, Progress
 
-Array = NDArray[np.float64]
+#: Panels of a lever that takes no finer ones than the default: its matrix has half a gigabyte.
+_MOST_PANELS = 8000
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class AirOperator:
 def air_operator(
     layout: Layout,
     surroundings: Surroundings | None = None,
-    base_temperature_K: float = 293.0,
+    base_temperature_K: float = BASE_TEMPERATURE_K,
     options: PanelOptions | None = None,
     progress: Progress | None = None,
 ) -> AirOperator:
@@ -78,6 +80,8 @@ def air_operator(
     InputError
         If a region of the layout is not an axis-parallel rectangle, or the surface below crosses
         the lever.
+    ComputationError
+        If the dimensions of the lever differ too much.
     """
     surroundings, options = surroundings or Surroundings(), options or PanelOptions()
     facts = {
@@ -92,26 +96,15 @@ def air_operator(
     known = stored(path, lambda a: AirOperator(a["sites"], a["matrix"], float(a["filling"])))
     if known is not None:
         return known
-    operator = make_operator(layout, surroundings, base_temperature_K, options, progress)
+    operator = PanelledAir(layout, surroundings, base_temperature_K, options, progress).operator()
     store_arrays(path, {name: np.asarray(value) for name, value in vars(operator).items()})
     return operator
-
-
-def make_operator(
-    layout: Layout,
-    surroundings: Surroundings,
-    base_temperature_K: float,
-    options: PanelOptions,
-    progress: Progress | None = None,
-) -> AirOperator:
-    """Make the operator: see `air_operator`."""
-    return PanelledAir(layout, surroundings, base_temperature_K, options, progress).operator()
 
 
 class PanelledAir:
     """Panels on a lever and its surroundings, with their single layer factorised.
 
-    Parameters are those of `air_operator`.
+    Parameters and errors are those of `air_operator`.
 
     Attributes
     ----------
@@ -128,21 +121,27 @@ class PanelledAir:
         layout: Layout,
         surroundings: Surroundings,
         base_temperature_K: float,
-        options: PanelOptions | None = None,
+        options: PanelOptions,
         progress: Progress | None = None,
     ) -> None:
-        options = options or PanelOptions()
         self.surface = lever_surface(layout, options, mirrored=surroundings.symmetric)
         chip = [chip_panels(layout, options)] if surroundings.chip else []
-        self.panels = Panels.joined([self.surface.panels, *chip])
-        below = surroundings.surface(layout.tip, layout.thickness_um, base_temperature_K)
+        self.panels = Panels(np.concatenate([one.corners for one in (self.surface.panels, *chip)]))
+        most = int(_MOST_PANELS * options.refinement**2)
+        if len(self.panels) > most:
+            raise ComputationError(
+                f"air: this lever takes {len(self.panels)} panels, more than {most}; are its "
+                "thickness and heater too small for its other dimensions?"
+            )
+        below = _mirrors_below(layout, surroundings, base_temperature_K)
         if any(mirror.height(self.panels.corners).min() <= 0 for mirror in below):
             raise InputError(
                 "surroundings: the surface below crosses the lever or its chip; expected a larger "
                 "surface_gap_um or another surface_tilt_deg"
             )
-        self.mirrors = mirror_group([*self.surface.mid_plane, *below])
-        layer = single_layer(self.panels, self.mirrors, progress)
+        mid_plane = [Mirror.in_plane((0, 0, 0), (0, 0, 1), +1.0)] if self.surface.mirrored else []
+        self.mirrors = mirror_group([*mid_plane, *below])
+        layer = single_layer_matrix(self.panels, self.mirrors, progress)
         own = np.arange(len(self.surface.panels))
         jump = np.full(len(self.panels), surroundings.jump_length_um(base_temperature_K))
         jump[own] = surroundings.jump_length_um(surroundings.jump_temperature_K)
@@ -177,3 +176,20 @@ class PanelledAir:
         for mirror in self.mirrors:
             total += mirror.sign * layer_potential(points, self.panels.reflected(mirror), flux)
         return total
+
+
+def _mirrors_below(
+    layout: Layout, surroundings: Surroundings, base_temperature_K: float
+) -> list[Mirror]:
+    """Return the mirror of the flat surface below, where θ = 0; none in free space.
+
+    Every panel has a mirror panel of opposite density behind the surface. A jump length g at the
+    surface moves the mirror back by g: θ falls to zero there.
+    """
+    if surroundings.surface_gap_um is None:
+        return []
+    tilt = math.radians(surroundings.surface_tilt_deg)
+    normal = np.array([-math.sin(tilt), 0.0, math.cos(tilt)])
+    below_tip = np.array([*layout.tip, -layout.thickness_um / 2 - surroundings.surface_gap_um])
+    point = below_tip - surroundings.jump_length_um(base_temperature_K) * normal
+    return [Mirror.in_plane(point, normal, -1.0)]

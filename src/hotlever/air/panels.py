@@ -10,11 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from hotlever.types import Array, Index
 
 
 @dataclass(frozen=True)
@@ -90,18 +91,8 @@ class Panels:
     def __len__(self) -> int:
         return len(self.corners)
 
-    @classmethod
-    def joined(cls, parts: Sequence[Panels]) -> Panels:
-        """Return the panels of all parts, in order."""
-        return cls(np.concatenate([part.corners for part in parts]))
-
-    @classmethod
-    def triangles(cls, points: Array, triangles: NDArray[np.intp]) -> Panels:
-        """Return triangles, given by points (n, 3) and corner numbers (m, 3)."""
-        return cls(points[triangles[:, [0, 1, 2, 2]]])
-
-    def chosen(self, index: NDArray[np.intp]) -> Panels:
-        """Return some of the panels."""
+    def chosen(self, index: NDArray[Any]) -> Panels:
+        """Return some of the panels, by number or by mask."""
         return Panels(self.corners[index])
 
     def reflected(self, mirror: Mirror) -> Panels:
@@ -110,28 +101,21 @@ class Panels:
 
     @cached_property
     def _halves(self) -> tuple[Array, Array]:
-        """Areas (n, 2) and centroids (n, 2, 3) of the two triangles of each panel."""
-        c = self.corners
-        crossed = np.stack(
-            [
-                np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]),
-                np.cross(c[:, 2] - c[:, 0], c[:, 3] - c[:, 0]),
-            ],
-            axis=1,
-        )
-        centroids = np.stack([c[:, [0, 1, 2]].mean(axis=1), c[:, [0, 2, 3]].mean(axis=1)], axis=1)
-        return 0.5 * np.linalg.norm(crossed, axis=2), centroids
+        """Corners (n, 2, 3, 3) and areas (n, 2) of the two triangles of each panel."""
+        corners = self.corners[:, [[0, 1, 2], [0, 2, 3]]]
+        sides = corners[:, :, 1:] - corners[:, :, :1]
+        return corners, 0.5 * np.linalg.norm(np.cross(sides[:, :, 0], sides[:, :, 1]), axis=2)
 
     @cached_property
     def areas(self) -> Array:
         """Areas (µm²), shape (n,)."""
-        return self._halves[0].sum(axis=1)
+        return self._halves[1].sum(axis=1)
 
     @cached_property
     def centres(self) -> Array:
         """Centroids (µm), shape (n, 3)."""
-        areas, centroids = self._halves
-        return np.einsum("nh,nhd->nd", areas, centroids) / self.areas[:, None]
+        corners, areas = self._halves
+        return np.einsum("nh,nhd->nd", areas, corners.mean(axis=2)) / self.areas[:, None]
 
     @cached_property
     def radii(self) -> Array:
@@ -141,18 +125,16 @@ class Panels:
     @cached_property
     def moments(self) -> Array:
         """Mean of the outer square of the position about the centroid (µm²), shape (n, 3, 3)."""
-        areas, _ = self._halves
-        total = np.zeros((len(self), 3, 3))
-        for half, places in enumerate(([0, 1, 2], [0, 2, 3])):
-            at = self.corners[:, places] - self.centres[:, None]
-            # of a triangle: (Σ v vᵀ + (Σ v)(Σ v)ᵀ) / 12
-            whole = at.sum(axis=1)
-            square = np.einsum("nkd,nke->nde", at, at) + np.einsum("nd,ne->nde", whole, whole)
-            total += (areas[:, half] / 12.0)[:, None, None] * square
-        return total / self.areas[:, None, None]
+        corners, areas = self._halves
+        at = corners - self.centres[:, None, None]
+        # of a triangle: (Σ v vᵀ + (Σ v)(Σ v)ᵀ) / 12
+        whole = at.sum(axis=2)
+        square = np.einsum("nhkd,nhke->nhde", at, at) + np.einsum("nhd,nhe->nhde", whole, whole)
+        total = np.einsum("nh,nhde->nde", areas / 12.0, square)
+        return np.asarray(total / self.areas[:, None, None])
 
     @cached_property
-    def flat_axis(self) -> NDArray[np.intp]:
+    def flat_axis(self) -> Index:
         """Coordinate axis normal to each axis-parallel rectangle; −1 for any other panel."""
         edges = np.roll(self.corners, -1, axis=1) - self.corners
         tolerance = 1e-12 * self.radii[:, None]

@@ -8,18 +8,14 @@ infinity, the heat that leaves panel i is A_i q_i with V q = b, b_i = ∫_i θ.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hotlever.air.integrals import far_pairs, potential, rectangle_pairs
 from hotlever.air.panels import IDENTITY, Mirror, Panels
 from hotlever.threads import one_blas_thread
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Progress = Callable[[int, int], None]
+from hotlever.types import Array, Index, Progress
 
 #: Pairs whose centroids are this many times the sum of their radii apart are far.
 FAR = 3.0
@@ -31,7 +27,7 @@ _ROWS, _PAIRS = 32, 8192
 
 
 @one_blas_thread
-def single_layer(
+def single_layer_matrix(
     panels: Panels, mirrors: Sequence[Mirror] = (IDENTITY,), progress: Progress | None = None
 ) -> Array:
     """Return the Galerkin matrix of 1/(4πR).
@@ -120,16 +116,11 @@ def _by_quadrature(first: Panels, second: Panels) -> Array:
     """
     gaps = np.linalg.norm(first.centres - second.centres, axis=1)
     touching = gaps < _TOUCHING * (first.radii + second.radii)
-    result = np.empty(len(first))
+    result = np.zeros(len(first))
     for pairs, order in ((touching, TOUCHING_ORDER), (~touching, NEAR_ORDER)):
-        index = np.flatnonzero(pairs)
-        if not index.size:
-            continue
-        one, other = first.chosen(index), second.chosen(index)
+        one, other = first.chosen(pairs), second.chosen(pairs)
         for panels, source in ((one, other), (other, one)):
             points, weights = panels.points(order)
             values = potential(points, source.corners[:, None])
-            result[index] = np.einsum("nq,nq->n", weights, values) / 2 + (
-                result[index] if panels is other else 0.0
-            )
+            result[pairs] += np.einsum("nq,nq->n", weights, values) / 2
     return result

@@ -7,20 +7,22 @@ and errors of meters are propagated through the models and through the knee.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hotlever.calibration.knee import IVCurve, Knee, find_knee
+from hotlever.calibration.transfer import TemperatureCurve
 from hotlever.errors import InputError
-from hotlever.fitting.fit_file import FitFile
-from hotlever.fitting.measurement import Measurement
-from hotlever.lever.lever import OBSERVABLE_COLUMNS, Lever
-from hotlever.materials import Material
-from hotlever.materials.spieser2017 import published
-from hotlever.probe import MeshOptions, Probe
-
-Array = NDArray[np.float64]
+from hotlever.fitting import Fit, Measurement
+from hotlever.fitting.models import ForwardModel, full_model
+from hotlever.lever import Branch, Lever
+from hotlever.lever.dataset import OBSERVABLES
+from hotlever.lever.lever import COARSE
+from hotlever.materials import PARAMETERS, Material
+from hotlever.probe import Probe
+from hotlever.spieser2017 import published
+from hotlever.types import Array
 
 #: Levers whose scatter stands for that of any lever of unknown material (Table II).
 MATERIAL_SCATTER = ("lever 1", "lever 2", "lever 3", "lever 4")
@@ -62,15 +64,9 @@ class Tolerances:
 
 @dataclass(frozen=True)
 class Variation:
-    """A lever that might be the true one.
+    """A lever that might be the true one: what is changed (`name`), and which source it counts to.
 
-    Attributes
-    ----------
-    source, name : str
-        What the change belongs to, and what is changed.
-    probe : Probe
-    share : float
-        Weight of its squared effect in the variance.
+    Its squared effect has the weight `share` in the variance.
     """
 
     source: str
@@ -86,9 +82,9 @@ def geometry_variations(probe: Probe, tolerance: float) -> Iterator[Variation]:
             continue
         value = getattr(probe.shape, name)
         try:
-            changed = probe.with_values({name: value * (1.0 + _SMALL)})
+            changed = probe.with_(**{name: value * (1.0 + _SMALL)})
         except InputError:  # where that does not fit, smaller
-            changed = probe.with_values({name: value * (1.0 - _SMALL)})
+            changed = probe.with_(**{name: value * (1.0 - _SMALL)})
         yield Variation("geometry", name, changed, (tolerance / _SMALL) ** 2)
 
 
@@ -99,17 +95,13 @@ def material_variations(probe: Probe, tolerance: float = 1.0) -> Iterator[Variat
     known = [published(name).material for name in MATERIAL_SCATTER]
     names = [name for name in Material.model_fields if name != "n_hd"]
     logarithms = np.log([[getattr(material, name) for name in names] for material in known])
-    for name, row in zip(MATERIAL_SCATTER, logarithms - logarithms.mean(axis=0), strict=True):
-        values = {
-            key: getattr(probe.material, key) * float(np.exp(change))
-            for key, change in zip(names, row, strict=True)
-        }
-        yield Variation(
-            "material", name, probe.with_values(values), tolerance**2 / (len(known) - 1)
-        )
+    nominal = np.array([getattr(probe.material, name) for name in names])
+    for lever, row in zip(MATERIAL_SCATTER, logarithms - logarithms.mean(axis=0), strict=True):
+        changed = probe.with_(**dict(zip(names, (nominal * np.exp(row)).tolist(), strict=True)))
+        yield Variation("material", lever, changed, tolerance**2 / (len(known) - 1))
 
 
-def fit_variations(fit: FitFile) -> Iterator[Variation]:
+def fit_variations(fit: Fit) -> Iterator[Variation]:
     """Yield levers one standard error away along each principal axis of a fit's covariance.
 
     Raises
@@ -118,91 +110,132 @@ def fit_variations(fit: FitFile) -> Iterator[Variation]:
         If the fit states no errors.
     """
     if not np.isfinite(fit.covariance).all():
-        raise InputError(f"{fit.path}: the fit states no standard errors, which a budget needs")
-    material = fit.probe.material
-    scale = np.array([getattr(material, name) for name in fit.names])
+        raise InputError("the fit states no standard errors, which an error budget needs")
+    scale = np.array([getattr(fit.probe.material, name) for name in fit.names])
     variances, axes = np.linalg.eigh(fit.covariance / np.outer(scale, scale))
     for number, (variance, axis) in enumerate(zip(variances, axes.T, strict=True), start=1):
-        change = np.sqrt(max(float(variance), 0.0)) * axis
         # relative changes as factors, so that no parameter changes its sign
-        values = {
-            name: getattr(material, name) * float(np.exp(share))
-            for name, share in zip(fit.names, change, strict=True)
-        }
-        yield Variation("fit", f"axis {number}", fit.probe.with_values(values))
+        values = scale * np.exp(np.sqrt(max(float(variance), 0.0)) * axis)
+        changed = fit.probe.with_(**dict(zip(fit.names, values.tolist(), strict=True)))
+        yield Variation("fit", f"axis {number}", changed)
 
 
-def refitted(fit: FitFile, data: Measurement, changed: Probe, mesh: MeshOptions) -> Probe:
+def refitted(fit: Fit, changed: Probe) -> Probe:
     """Return a changed probe with the material that its fit to the same data would have found.
 
     So much of an error in a dimension is seen by the data and made up for by the material. Two
-    steps of Gauss and Newton from the fit to the unchanged probe, with the fit's weights; a
-    direction that the data do not tell stays where it is.
-
-    Parameters
-    ----------
-    fit : FitFile
-        Of the unchanged probe.
-    data : Measurement
-    changed : Probe
-        With the fit's material.
-    mesh : MeshOptions
+    steps of Gauss and Newton from the fit to the unchanged probe, on a coarse mesh; a direction
+    that the data do not tell stays where it is.
     """
-    bias = data.bias_V[np.isfinite([data.observable(name) for name in fit.observables]).any(axis=0)]
-    bias = np.unique(bias)
+    bias = fit.residuals().bias
+    rows = [list(OBSERVABLES).index(name) for name in fit.observables]
+    columns = [list(PARAMETERS).index(name) for name in fit.names]
 
-    def seen(probe: Probe, sensitivities: bool) -> tuple[Array, Array]:
-        lever = Lever(probe.in_medium(fit.medium), mesh)
-        sweep = lever.sweep(bias, sensitivities=sensitivities)
-        values = np.stack([sweep[OBSERVABLE_COLUMNS[name]].values for name in fit.observables])
-        if not sensitivities:
-            return values, np.empty(0)
-        slopes = sweep.sensitivity.sel(observable=list(fit.observables), parameter=fit.names)
-        return values, slopes.values
+    def model(probe: Probe) -> ForwardModel:
+        return full_model(Lever(probe.in_medium(fit.medium), COARSE), bias)
 
-    target, _ = seen(fit.probe, False)
+    target = model(fit.probe).predict(fit.probe.material).values[rows]
+    of_changed, material = model(changed), changed.material
     scale = np.abs(target).max(axis=1)[:, None]
+    seen = None
     for _ in range(2):
-        values, slopes = seen(changed, True)
-        size = np.array([getattr(changed.material, name) for name in fit.names])
-        rows = (slopes * size / scale[:, :, None]).reshape(-1, size.size)
-        system = np.concatenate([rows / _SCATTER, np.eye(size.size) / _SURPRISE])
-        wanted = np.concatenate([((target - values) / scale).ravel() / _SCATTER, 0.0 * size])
+        seen = of_changed.predict(material, seen)
+        size = np.array([getattr(material, name) for name in fit.names])
+        slopes = seen.slopes[rows][:, :, columns] * size / scale[:, :, None]
+        missing = ((target - seen.values[rows]) / scale).ravel()
+        system = np.concatenate(
+            [slopes.reshape(-1, size.size) / _SCATTER, np.eye(size.size) / _SURPRISE]
+        )
+        wanted = np.concatenate([missing / _SCATTER, 0.0 * size])
         step = np.linalg.lstsq(system, wanted, rcond=None)[0]
         moved = dict(zip(fit.names, (size * np.exp(step)).tolist(), strict=True))
-        changed = changed.with_values(moved)
-    return changed
+        material = material.with_(**moved)
+    return changed.with_(**material.model_dump())
 
 
-def combined(parts: dict[str, Array]) -> Array:
-    """Add independent standard errors."""
-    total: Array = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
-    return total
+# --- effects on the tip temperature ---------------------------------------------------------------
 
 
-def spread(
-    variations: list[Variation],
-    nominal: Array,
-    temperature: Callable[[Probe], Array],
-    progress: Callable[[], None],
+def knee_and_meters(
+    curve: IVCurve,
+    model: Branch,
+    reference: TemperatureCurve,
+    knee: Knee,
+    bias: Array,
+    current: Array,
+    tolerances: Tolerances,
 ) -> dict[str, Array]:
-    """Return the standard error of temperatures by source.
+    """Return the effects (K) of the knee's scatter, and of R_s and the meters.
 
-    Parameters
-    ----------
-    variations : list of Variation
-    nominal : ndarray, shape (n,)
-        Temperatures (K) of the unchanged probe.
-    temperature : callable
-        The same of a changed one.
-    progress : callable
-        Called after each.
+    At bias and current (V, mA), for a measured curve whose knee was found with the help of a model.
     """
-    squares: dict[str, Array] = {}
-    for variation in variations:
-        change = temperature(variation.probe) - nominal
-        squares[variation.source] = (
-            squares.get(variation.source, np.zeros_like(change)) + variation.share * change**2
+
+    def temperature(series: float, voltage: float, amperes: float, knee_mW: float) -> Array:
+        lever = curve.circuit.lever_voltage(voltage * bias, series * amperes * current)
+        return reference.at(lever * amperes * current, knee_mW)
+
+    power = knee.power_mW
+    nominal = temperature(1.0, 1.0, 1.0, power)
+    by_knee = temperature(1.0, 1.0, 1.0, power * (1.0 + knee.power_mW_stderr / power)) - nominal
+    shares = tolerances.series_resistance, tolerances.voltage, tolerances.current
+    squares = np.zeros_like(nominal)
+    for series, voltage, amperes in 1.0 + np.diag(shares):
+        ohm = series * curve.circuit.series_resistance_ohm
+        changed = IVCurve(
+            voltage * curve.bias_V,
+            amperes * curve.current_mA,
+            curve.circuit.with_(series_resistance_ohm=float(ohm)),
         )
-        progress()
+        try:
+            moved = find_knee(changed, model).power_mW
+        except InputError:
+            # estimated or hardly determined: the knee moves as the points do
+            moved = power * float(np.median(changed.power_mW / curve.power_mW))
+        squares += (temperature(series, voltage, amperes, moved) - nominal) ** 2
+    return {"k": np.abs(by_knee), "electronics": np.sqrt(squares)}
+
+
+def levers(
+    probe: Probe,
+    fit: Fit | None,
+    tolerances: Tolerances,
+    temperature: Callable[[Probe], Array],
+    step: Callable[[], None],
+) -> dict[str, Array]:
+    """Return the effects (K) of dimensions, and of the material or its fit, on temperatures.
+
+    The material of a fit makes up for an error in a dimension. `step` is called after each lever.
+    """
+    variations = []
+    for variation in geometry_variations(probe, tolerances.geometry):
+        if fit is not None:
+            unchanged = replace(fit, probe=probe.in_medium(fit.medium))
+            variation = replace(variation, probe=refitted(unchanged, variation.probe))
+        variations.append(variation)
+        step()
+    variations += (
+        material_variations(probe, tolerances.material)
+        if fit is None
+        else fit_variations(replace(fit, probe=probe))
+    )
+    nominal, squares = temperature(probe), dict[str, Array]()
+    for variation in variations:
+        square = variation.share * (temperature(variation.probe) - nominal) ** 2
+        squares[variation.source] = squares.get(variation.source, 0.0) + square
+        step()
     return {source: np.sqrt(square) for source, square in squares.items()}
+
+
+def thermometer(measurement: Measurement, tip: Array, notes: list[str]) -> Array:
+    """Return the stated error (K) of the temperatures that a fit was made with, at some others.
+
+    The whole of it, as if it were common to all points, which a calibration error is. Where the
+    measurement states none, a note says so.
+    """
+    known = np.isfinite(measurement.tip_K) & np.isfinite(measurement.tip_error_K)
+    if not known.any():
+        notes.append("the fitted measurement states no errors of its temperatures")
+        return np.zeros_like(tip)
+    order = np.argsort(measurement.tip_K[known])
+    at, errors = measurement.tip_K[known][order], measurement.tip_error_K[known][order]
+    return np.interp(tip, at, errors)

@@ -2,32 +2,39 @@
 
 from __future__ import annotations
 
-import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hotlever import __version__
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.power_law import PowerLaw
+from hotlever.calibration.words import calibration_text
+from hotlever.datasets import labelled
+from hotlever.errors import InputError
 from hotlever.files import write_text
+from hotlever.fitting.embedded import (
+    EmbeddedMeasurement,
+    Number,
+    Section,
+    array,
+    embed,
+    json_text,
+    without_nan,
+)
 from hotlever.fitting.measurement import Measurement
-from hotlever.probe import Probe
+from hotlever.probe import Circuit, Probe
+from hotlever.types import Array
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    import xarray as xr
 
-#: Columns of a calibration's table: name, unit, what it is.
-TABLE_COLUMNS: dict[str, tuple[str, str]] = {
-    "bias_V": ("V", "bias"),
-    "lever_V": ("V", "lever voltage"),
-    "current_mA": ("mA", "heater current"),
-    "power_mW": ("mW", "power dissipated in the lever"),
-    "tip_K": ("K", "tip temperature"),
-    "tip_stderr_K": ("K", "standard error of the tip temperature"),
-}
+
+#: Columns of a calibration's table.
+TABLE_COLUMNS = ("bias_V", "lever_V", "current_mA", "power_mW", "tip_K", "tip_stderr_K")
 
 
 @dataclass(frozen=True)
@@ -46,17 +53,15 @@ class Calibration:
         Largest difference of the law from the model it was fitted to; 0 for a given law.
     k, k_stderr : float
         Power of the measured knee over the threshold of the power law.
-    knee : Knee or None
-        As measured; None if it had to be estimated.
-    knee_mW, knee_stderr_mW, knee_tip_K : float
-        Power and temperature of the knee, measured or estimated.
+    knee : Knee
+        As measured or, where its voltage is NaN, with its power estimated.
+    knee_tip_K : float
+        Tip temperature there.
     table : xarray.Dataset
-        `TABLE_COLUMNS` on the dimension ``bias``, evenly spaced over the measured range.
-    budget : dict of str to ndarray
-        Standard error (K) in each row, by source.
+        `TABLE_COLUMNS` on the dimension ``bias``, evenly spaced over the measured range, and
+        ``budget_K``, the standard error by ``source``.
     measured_rms_K : float
         Rms of the measurement's own tip temperatures about the calibration; NaN if it has none.
-    base_temperature_K : float
     probe : Probe
     measurement : Measurement
     notes : list of str
@@ -68,30 +73,35 @@ class Calibration:
     law_residual_K: float
     k: float
     k_stderr: float
-    knee: Knee | None
-    knee_mW: float
-    knee_stderr_mW: float
+    knee: Knee
     knee_tip_K: float
     table: xr.Dataset
-    budget: dict[str, Array]
     measured_rms_K: float
-    base_temperature_K: float
     probe: Probe
     measurement: Measurement
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def base_temperature_K(self) -> float:
+        """Temperature without power (K)."""
+        return self.probe.circuit.base_temperature_K
 
     @property
     def tip_temperature_uncertainty_K(self) -> float:
         """Largest standard error of the tip temperature in the table (K)."""
         return float(self.table.tip_stderr_K.max())
 
-    def bias_for(self, tip_K: ArrayLike, series_resistance_ohm: float | None = None) -> Array:
+    def tip_temperature(self, power_mW: ArrayLike) -> Array:
+        """Return the tip temperature (K) by power (mW); NaN outside the measured range."""
+        return self._read(power_mW, "power_mW", "tip_K")
+
+    def bias_for(self, tip_K: ArrayLike, circuit: Circuit | None = None) -> Array:
         """Return the bias (V) that heats the tip to a temperature (K).
 
         Parameters
         ----------
         tip_K : array_like
-        series_resistance_ohm : float, optional
+        circuit : Circuit, optional
             That of the measurement by default; power and lever voltage do not depend on it.
 
         Returns
@@ -99,19 +109,28 @@ class Calibration:
         ndarray
             NaN outside the measured range.
         """
-        if series_resistance_ohm is None:
-            series_resistance_ohm = self.probe.circuit.series_resistance_ohm
-        known = self.table.isel(bias=np.flatnonzero(np.isfinite(self.table.tip_K)))
-        tip = np.asarray(tip_K, dtype=float)
-        power = np.interp(tip, known.tip_K, known.power_mW, left=np.nan, right=np.nan)
-        lever = np.interp(power, known.power_mW, known.lever_V)
-        bias: Array = lever + series_resistance_ohm / 1000.0 * power / lever
-        return bias
+        power = self._read(tip_K, "tip_K", "power_mW")
+        lever = self._read(power, "power_mW", "lever_V")
+        return np.asarray((circuit or self.probe.circuit).bias(lever, power / lever))
 
-    def to_json(self) -> str:
-        """Return the calibration file."""
-        at = self._knee_point()
-        rows = self.table.to_dataframe().reset_index(drop=False)
+    def _read(self, at: ArrayLike, along: str, column: str) -> Array:
+        known = np.isfinite(self.table.tip_K.values)
+        x, y = self.table[along].values[known], self.table[column].values[known]
+        return np.interp(np.asarray(at, dtype=float), x, y, left=np.nan, right=np.nan)
+
+    def __repr__(self) -> str:
+        return f"<Calibration of {self.measurement.path or 'a measurement'}>\n{self.text()}"
+
+    def text(self) -> str:
+        """Return the calibration as lines of text, its error budget included."""
+        return calibration_text(self)
+
+    # --- the file -------------------------------------------------------------------------------
+
+    def content(self) -> dict[str, Any]:
+        """Return the content of the calibration file."""
+        budget = self.table.budget_K.transpose("source", "bias")
+        sources = dict(zip(budget.source.values.tolist(), budget.values.tolist(), strict=True))
         content = {
             "route": self.route,
             "medium": self.medium,
@@ -119,47 +138,96 @@ class Calibration:
             "power_law_residual_K": self.law_residual_K,
             "k": self.k,
             "k_stderr": self.k_stderr,
-            "knee": at,
+            "knee": vars(self.knee) | {"tip_K": self.knee_tip_K, "measured": self.knee.measured},
             "tip_temperature_uncertainty_K": self.tip_temperature_uncertainty_K,
-            "uncertainty_budget_K": {
-                source: float(np.nanmax(error)) for source, error in self.budget.items()
-            },
+            "uncertainty_budget_K": {name: float(np.nanmax(e)) for name, e in sources.items()},
             "base_temperature_K": self.base_temperature_K,
-            "table": [
-                {name: _number(row[name]) for name in TABLE_COLUMNS} for _, row in rows.iterrows()
-            ],
+            "table": self.table[list(TABLE_COLUMNS)].to_dataframe().to_dict("records"),
+            "budget_K": sources,
+            "measured_rms_K": self.measured_rms_K,
             "probe": self.probe.values(),
-            "data": {"path": self.measurement.path, "sha256": self.measurement.sha256},
+            "data": embed(self.measurement),
             "notes": self.notes,
             "software": f"hotlever {__version__}",
         }
-        return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
-
-    def _knee_point(self) -> dict[str, float | bool | None]:
-        measured = self.knee is not None
-        knee = self.knee
-        return {
-            "lever_V": knee.lever_V if knee else None,
-            "current_mA": knee.current_mA if knee else None,
-            "power_mW": self.knee_mW,
-            "tip_K": self.knee_tip_K,
-            "lever_V_stderr": knee.lever_V_stderr if knee else None,
-            "current_mA_stderr": knee.current_mA_stderr if knee else None,
-            "power_mW_stderr": self.knee_stderr_mW,
-            "measured": measured,
-        }
+        return dict(without_nan(content))
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the calibration file, whole or not at all."""
-        write_text(path, self.to_json())
+        write_text(path, json_text(self.content()))
 
     def table_csv(self) -> str:
         """Return the table as CSV, to load into an instrument."""
-        columns = [self.table[name].values for name in TABLE_COLUMNS]
-        lines = [",".join(TABLE_COLUMNS)]
-        lines += [",".join(f"{value:.6g}" for value in row) for row in zip(*columns, strict=True)]
-        return "\n".join(lines) + "\n"
+        frame = self.table[list(TABLE_COLUMNS)].to_dataframe()
+        return str(frame.to_csv(index=False, float_format="%.6g", na_rep="nan"))
 
 
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def table_of(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:
+    """Return the table of a calibration: `TABLE_COLUMNS`, and the error by source."""
+    errors = (("source", "bias"), np.array(list(budget.values())))
+    return labelled(
+        {**columns, "budget_K": errors},
+        coordinates={"bias": columns["bias_V"], "source": list(budget)},
+    )
+
+
+class _CalibrationFile(Section):
+    """What a calibration file must hold; see `Calibration.content`."""
+
+    route: str
+    medium: str
+    power_law: dict[str, float]
+    power_law_residual_K: float
+    k: float
+    k_stderr: float
+    knee: dict[str, Number]
+    table: list[dict[str, Number]]
+    budget_K: dict[str, list[Number]]
+    measured_rms_K: Number = np.nan
+    probe: dict[str, dict[str, Any]]
+    data: EmbeddedMeasurement
+    notes: list[str]
+
+
+def read_calibration(path: str | os.PathLike[str]) -> Calibration:
+    """Read a calibration file: all of the calibration, to go on with as if just made.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or is not a calibration file; the text names the key.
+
+    Examples
+    --------
+    >>> read_calibration("calibration.json").bias_for(600.0)  # doctest: +SKIP
+    array(7.74)
+    """
+    found = _CalibrationFile.read(path, "calibration")
+    where, rows = f"{path}: table", len(found.table)
+    columns = {
+        name: array([row.get(name) for row in found.table], (rows,), f"{where}: {name}")
+        for name in TABLE_COLUMNS
+    }
+    if not rows or not found.budget_K or not np.all(np.diff(columns["bias_V"]) > 0):
+        raise InputError(f"{where}: expected rows of rising bias, and a budget of their errors")
+    budget = {
+        source: array(errors, (rows,), f"{path}: budget_K: {source}")
+        for source, errors in found.budget_K.items()
+    }
+    law = {name: value for name, value in found.power_law.items() if name != "threshold_K"}
+    knee = {one.name: found.knee[one.name] for one in fields(Knee) if one.name in found.knee}
+    return Calibration(
+        route=found.route,
+        medium=found.medium,
+        power_law=PowerLaw.of(law, f"{path}: power_law"),
+        law_residual_K=found.power_law_residual_K,
+        k=found.k,
+        k_stderr=found.k_stderr,
+        knee=Knee(**knee),
+        knee_tip_K=found.knee.get("tip_K", np.nan),
+        table=table_of(columns, budget),
+        measured_rms_K=found.measured_rms_K,
+        probe=Probe.from_values(found.probe, f"{path}: probe"),
+        measurement=found.data.measurement(f"{path}: data"),
+        notes=found.notes,
+    )

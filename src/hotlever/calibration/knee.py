@@ -7,44 +7,45 @@ smoothed against the power, and the knee is where the smooth V_l(P_l) is highest
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hotlever.calibration.characteristic import Characteristic, OperatingPoint
 from hotlever.calibration.smoothing import SmoothCurve
 from hotlever.errors import InputError
+from hotlever.lever import Branch, OperatingPoint
+from hotlever.probe import Circuit
+from hotlever.types import Array
 
-Array = NDArray[np.float64]
+Function = Callable[[Array], Array]
 
 #: Points whose power is within this factor of the knee's are used.
 _NEARBY = 2.0
 #: Fewest points near the knee, and fewest on either side of it.
 _FEWEST, _FEWEST_BESIDE = 6, 2
+#: Points below this share of the highest bias may be lost in noise.
+_LOST = 0.01
 #: The knee has been passed once V_l has fallen by this share.
 _FALLEN = 0.05
 #: The knee is sought within this factor of the highest measured lever voltage's power.
 _SEARCH = 1.35
+#: Rows of a smooth table.
+_ROWS = 101
 
 
 @dataclass(frozen=True)
 class IVCurve:
-    """Measured points of a lever, rising in power.
-
-    Attributes
-    ----------
-    bias_V, current_mA : ndarray, shape (n,)
-    series_resistance_ohm : float
-    """
+    """Measured points of a lever, rising in power."""
 
     bias_V: Array
     current_mA: Array
-    series_resistance_ohm: float
+    circuit: Circuit
 
     @classmethod
-    def of(cls, bias_V: ArrayLike, current_mA: ArrayLike, series_resistance_ohm: float) -> IVCurve:
-        """Sort the points by power, and leave out those without bias or current.
+    def of(cls, bias_V: ArrayLike, current_mA: ArrayLike, circuit: Circuit) -> IVCurve:
+        """Sort the points by power, and leave out those without bias or lost in noise near zero.
 
         Raises
         ------
@@ -54,26 +55,28 @@ class IVCurve:
         bias, current = np.asarray(bias_V, dtype=float), np.asarray(current_mA, dtype=float)
         present = np.isfinite(bias) & np.isfinite(current) & (bias > 0)
         bias, current = bias[present], current[present]
-        lever = bias - series_resistance_ohm / 1000.0 * current
+        lever = circuit.lever_voltage(bias, current)
         wrong = (current <= 0) | (lever <= 0)
+        lost = wrong & (bias < _LOST * bias.max(initial=0.0))
+        bias, current, lever, wrong = (values[~lost] for values in (bias, current, lever, wrong))
         if wrong.any():
             place = int(np.argmax(wrong))
             raise InputError(
                 f"at a bias of {bias[place]:g} V the current is {current[place]:g} mA and the "
                 f"lever voltage {lever[place]:.4g} V with a series resistance of "
-                f"{series_resistance_ohm:g} ohm, expected positive ones"
+                f"{circuit.series_resistance_ohm:g} ohm, expected positive ones"
             )
         if bias.size < _FEWEST:
             raise InputError(
                 f"{bias.size} points with bias and current, expected at least {_FEWEST}"
             )
         order = np.argsort(lever * current, kind="stable")
-        return cls(bias[order], current[order], float(series_resistance_ohm))
+        return cls(bias[order], current[order], circuit)
 
     @property
     def lever_V(self) -> Array:
         """V_l = V_b - R_s I_h."""
-        return self.bias_V - self.series_resistance_ohm / 1000.0 * self.current_mA
+        return np.asarray(self.circuit.lever_voltage(self.bias_V, self.current_mA))
 
     @property
     def power_mW(self) -> Array:
@@ -82,7 +85,7 @@ class IVCurve:
 
     def only(self, here: NDArray[np.bool_]) -> IVCurve:
         """Return some of the points."""
-        return IVCurve(self.bias_V[here], self.current_mA[here], self.series_resistance_ohm)
+        return IVCurve(self.bias_V[here], self.current_mA[here], self.circuit)
 
 
 @dataclass(frozen=True)
@@ -98,32 +101,39 @@ class Knee:
         Standard deviation of the current over the current, as the points scatter.
     points : int
         How many were used.
+
+    All but the power are NaN where it had to be estimated.
     """
 
-    lever_V: float
-    current_mA: float
-    power_mW: float
-    bias_V: float
-    lever_V_stderr: float
-    current_mA_stderr: float
-    power_mW_stderr: float
-    bias_V_stderr: float
-    current_noise: float
-    points: int
+    lever_V: float = np.nan
+    current_mA: float = np.nan
+    power_mW: float = np.nan
+    bias_V: float = np.nan
+    lever_V_stderr: float = np.nan
+    current_mA_stderr: float = np.nan
+    power_mW_stderr: float = np.nan
+    bias_V_stderr: float = np.nan
+    current_noise: float = np.nan
+    points: float = np.nan
+
+    @property
+    def measured(self) -> bool:
+        """Whether the points show it."""
+        return bool(np.isfinite(self.lever_V))
 
 
 class KneeOutsideError(InputError):
     """The measured range does not include the knee; the text says which way to go."""
 
 
-def find_knee(curve: IVCurve, like: Characteristic | None = None) -> Knee:
+def find_knee(curve: IVCurve, like: Branch | None = None) -> Knee:
     """Find the knee in a measured I-V curve.
 
     Parameters
     ----------
     curve : IVCurve
         Noisy, unevenly spaced.
-    like : Characteristic, optional
+    like : Branch, optional
         Of a lever that resembles the measured one. Only its relation of temperature to power,
         scaled to the measured knee, is used: the resistance is a smoother function of the
         temperature than of the power. Halves the bias; also says where the knee is to be
@@ -136,7 +146,7 @@ def find_knee(curve: IVCurve, like: Characteristic | None = None) -> Knee:
     InputError
         If there are too few points near it.
     """
-    if curve.series_resistance_ohm == 0.0:
+    if curve.circuit.series_resistance_ohm == 0.0:
         raise InputError(
             "without a series resistance the lever jumps at its knee, so a measured curve ends "
             "there and does not show it; measure with one of some kΩ"
@@ -145,9 +155,10 @@ def find_knee(curve: IVCurve, like: Characteristic | None = None) -> Knee:
     centre = float(curve.power_mW[peak])
     _check_sides(curve, peak, like)
     for _ in range(4):
-        before, (knee, centre) = centre, _around(curve, centre, like)
-        if abs(centre - before) < 1e-4 * centre:
+        knee = _around(curve, centre, like)
+        if abs(knee.power_mW - centre) < 1e-4 * knee.power_mW:
             break
+        centre = knee.power_mW
     return knee
 
 
@@ -158,7 +169,7 @@ def _highest(lever_V: Array) -> int:
     return int(np.argmax(lever_V[: fallen[0]] if fallen.size else lever_V))
 
 
-def _check_sides(curve: IVCurve, peak: int, like: Characteristic | None) -> None:
+def _check_sides(curve: IVCurve, peak: int, like: Branch | None) -> None:
     """Refuse a curve whose highest lever voltage is at one of its ends."""
     if peak < _FEWEST_BESIDE:
         raise KneeOutsideError(
@@ -174,22 +185,21 @@ def _check_sides(curve: IVCurve, peak: int, like: Characteristic | None) -> None
         )
 
 
-def _advice(curve: IVCurve, like: Characteristic | None) -> str:
+def _advice(curve: IVCurve, like: Branch | None) -> str:
     """Say what bias to go to, by a lever that resembles the measured one."""
     if like is None or like.knee is None:
         return "; measure to a higher bias"
-    scale = scale_to(curve, like)
-    knee = scale.applied(like.knee)
-    bias = knee.lever_V + curve.series_resistance_ohm / 1000.0 * knee.current_mA
+    knee = scale_to(curve, like).applied(like.knee)
+    bias = curve.circuit.bias(knee.lever_V, knee.current_mA)
     beyond = max(bias, float(curve.bias_V[-1])) * 1.1
     return (
         f", at about {bias:.1f} V by comparison with the model; measure to {beyond:.1f} V or more"
     )
 
 
-def _around(curve: IVCurve, centre: float, like: Characteristic | None) -> tuple[Knee, float]:
+def _around(curve: IVCurve, centre: float, like: Branch | None) -> Knee:
     """Smooth the points whose power is near `centre`, and find the knee."""
-    warp = _Warp(centre, like)
+    warp, warp_slope = _warp(centre, like)
     power = curve.power_mW
     near = (np.abs(np.log(power / centre)) < np.log(_NEARBY)) & np.isfinite(warp(power))
     used = curve.only(near)
@@ -200,7 +210,7 @@ def _around(curve: IVCurve, centre: float, like: Characteristic | None) -> tuple
             f"the knee, expected at least {_FEWEST} with {_FEWEST_BESIDE} on either side; measure "
             "more finely there"
         )
-    smooth = _smoothed(used, warp)
+    smooth = _smoothed(used, warp, warp_slope)
     low, high = max(centre / _SEARCH, power[0]), min(centre * _SEARCH, power[-1])
     grid = np.linspace(low, high, 3001)
     ln_V = 0.5 * np.log(grid) + smooth.value(warp(grid))
@@ -215,19 +225,20 @@ def _around(curve: IVCurve, centre: float, like: Characteristic | None) -> tuple
     curvature, tilt, _ = np.polyfit(grid[around] - grid[place], ln_V[around], 2)
     knee_power = float(grid[place] - tilt / (2.0 * curvature))
     at = np.array(knee_power)
-    error_P = float(smooth.slope_stderr(float(warp(at))) * warp.slope(at) / (-2.0 * curvature))
+    error_P = float(smooth.slope_stderr(float(warp(at))) * warp_slope(at) / (-2.0 * curvature))
     lever_V = float(np.exp(0.5 * np.log(knee_power) + smooth.value(warp(at))))
     error_V = lever_V * smooth.value_stderr(float(warp(at)))
     current = knee_power / lever_V
     error_I = current * np.hypot(error_P / knee_power, error_V / lever_V)
-    series = used.series_resistance_ohm / 1000.0
     # V_b = V + R_s P / V
-    error_b = np.hypot(series * error_P / lever_V, error_V * (1.0 - series * current / lever_V))
-    knee = Knee(
+    by_P = used.circuit.bias(0.0, 1.0 / lever_V)
+    by_V = used.circuit.bias(1.0, -current / lever_V)
+    error_b = np.hypot(by_P * error_P, by_V * error_V)
+    return Knee(
         lever_V,
         current,
         knee_power,
-        lever_V + series * current,
+        used.circuit.bias(lever_V, current),
         error_V,
         float(error_I),
         error_P,
@@ -235,77 +246,54 @@ def _around(curve: IVCurve, centre: float, like: Characteristic | None) -> tuple
         smooth.noise_factor,
         power.size,
     )
-    return knee, knee_power
 
 
-def _smoothed(curve: IVCurve, warp: _Warp) -> SmoothCurve:
+def _smoothed(curve: IVCurve, warp: Function, warp_slope: Function) -> SmoothCurve:
     """Smooth the logarithm of the root of the resistance, V_l = sqrt(P_l R_l), along `warp`."""
     power, lever = curve.power_mW, curve.lever_V
     along, ln_root_R = warp(power), np.log(lever) - 0.5 * np.log(power)
     # an error in the current moves a point along power and voltage; what counts is how far it
     # leaves the curve, whose slope is known better after each turn
-    by_current_V = -curve.series_resistance_ohm / 1000.0
+    by_current_V = curve.circuit.lever_voltage(0.0, 1.0)
     by_current_P = lever + by_current_V * curve.current_mA
     smooth = SmoothCurve(along, ln_root_R, curve.current_mA / lever)
     for _ in range(2):
-        slope = 0.5 / power + smooth.slope(along) * warp.slope(power)
+        slope = 0.5 / power + smooth.slope(along) * warp_slope(power)
         leaving = np.abs(by_current_V / lever - slope * by_current_P) * curve.current_mA
         smooth = SmoothCurve(along, ln_root_R, leaving, smooth)
     return smooth
 
 
-def smooth_rows(
-    curve: IVCurve, knee_mW: float, like: Characteristic | None = None, count: int = 101
-) -> tuple[Array, Array]:
+def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> tuple[Array, Array]:
     """Return current (mA) at evenly spaced biases (V) over the measured range, smoothed.
 
-    Parameters
-    ----------
-    curve : IVCurve
-    knee_mW : float
-        Power of the knee, measured or estimated.
-    like : Characteristic, optional
-        See `find_knee`.
-    count : int
-
-    Returns
-    -------
-    bias, current : ndarray, shape (count,)
+    The power of the knee may be measured or estimated; for `like` see `find_knee`.
     """
-    warp = _Warp(knee_mW, like)
+    warp, warp_slope = _warp(knee_mW, like)
     used = curve.only(np.isfinite(warp(curve.power_mW)))
-    smooth = _smoothed(used, warp)
+    smooth = _smoothed(used, warp, warp_slope)
     power = np.linspace(used.power_mW[0], used.power_mW[-1], 4000)
     lever = np.sqrt(power) * np.exp(smooth.value(warp(power)))
     current = power / lever
-    bias = np.maximum.accumulate(lever + used.series_resistance_ohm / 1000.0 * current)
-    asked = np.linspace(max(used.bias_V[0], bias[0]), min(used.bias_V.max(), bias[-1]), count)
+    bias = np.maximum.accumulate(used.circuit.bias(lever, current))
+    asked = np.linspace(max(used.bias_V[0], bias[0]), min(used.bias_V.max(), bias[-1]), _ROWS)
     return asked, np.interp(asked, bias, current)
 
 
-class _Warp:
-    """The coordinate in which the resistance is smooth: zero without power, one at the knee.
+def _warp(centre: float, like: Branch | None) -> tuple[Function, Function]:
+    """Return the coordinate in which the resistance is smooth, and its derivative, by the power.
 
-    The temperature rise of a lever that resembles the measured one; without it, the power.
+    The temperature rise of a lever that resembles the measured one; without it, the power. It is
+    zero without power, and one at the knee.
     """
-
-    def __init__(self, centre: float, like: Characteristic | None) -> None:
-        self._centre, self._like = centre, like if like is not None and like.knee else None
-
-    def __call__(self, power: Array) -> Array:
-        if self._like is None or self._like.knee is None:
-            return power / self._centre
-        knee, base = self._like.knee, self._like.base_temperature_K
-        tip = self._like.tip_temperature(power / self._centre * knee.power_mW)
-        return (tip - base) / (knee.tip_K - base)
-
-    def slope(self, power: Array) -> Array:
-        """Return the derivative by the power."""
-        if self._like is None or self._like.knee is None:
-            return np.full_like(power, 1.0 / self._centre)
-        knee, base = self._like.knee, self._like.base_temperature_K
-        scale = knee.power_mW / self._centre
-        return self._like.tip_slope(power * scale) * scale / (knee.tip_K - base)
+    if like is None or like.knee is None:
+        return lambda power: power / centre, lambda power: np.full_like(power, 1.0 / centre)
+    base, knee_mW = like.base_temperature_K, like.knee.power_mW
+    rise, scale = like.knee.tip_K - base, like.knee.power_mW / centre
+    return (
+        lambda power: (like.tip_temperature(power / centre * knee_mW) - base) / rise,
+        lambda power: like.tip_slope(power * scale) * scale / rise,
+    )
 
 
 # --- the scale between a measured curve and a lever that resembles it -----------------------------
@@ -316,13 +304,7 @@ class Scale:
     """How a measured I-V curve is stretched against that of another lever.
 
     The measured lever needs `power` times the power for the same temperature, and then has
-    `resistance` times the resistance.
-
-    Attributes
-    ----------
-    power, resistance : float
-    power_stderr : float
-        From the scatter of the points about the stretched curve.
+    `resistance` times the resistance. `power_stderr` follows from the scatter of the points.
     """
 
     power: float
@@ -331,12 +313,12 @@ class Scale:
 
     def applied(self, point: OperatingPoint) -> OperatingPoint:
         """Return a point of the other lever, stretched."""
+        lever_V = point.lever_V * float(np.sqrt(self.power * self.resistance))
         power = self.power * point.power_mW
-        resistance = self.resistance * point.lever_V / point.current_mA
-        return OperatingPoint.of(float(np.sqrt(power * resistance)), power, point.tip_K)
+        return OperatingPoint(lever_V, power / lever_V, power, point.tip_K)
 
 
-def scale_to(curve: IVCurve, like: Characteristic) -> Scale:
+def scale_to(curve: IVCurve, like: Branch) -> Scale:
     """Stretch the resistance against power of one lever to the points of another.
 
     Uses every point up to the knee, and needs no knee: the resistance rises with the temperature,

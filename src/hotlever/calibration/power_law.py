@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import os
-from dataclasses import asdict, dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 from scipy.optimize import elementwise
 
-from hotlever.errors import InputError, unknown_name
-from hotlever.files import read_text
+from hotlever.errors import InputError
+from hotlever.files import read_json
+from hotlever.records import Record
+from hotlever.spieser2017 import BASE_TEMPERATURE_K, POWER_LAW
 
 
-@dataclass(frozen=True)
-class PowerLaw:
+class PowerLaw(Record):
     """Tip temperature against the power dissipated in the lever (Eq. 12).
 
     Below the threshold T = T_RT + a P + b P^m, above it T = T_RT + c P, with P in mW.
@@ -38,9 +38,11 @@ class PowerLaw:
     nonlinear_K: float
     exponent: float
     hot_K_per_mW: float
-    threshold_mW: float
+    threshold_mW: float = Field(gt=0)
 
-    def tip_temperature(self, power_mW: ArrayLike, base_temperature_K: float = 293.0) -> NDArray:
+    def tip_temperature(
+        self, power_mW: ArrayLike, base_temperature_K: float = BASE_TEMPERATURE_K
+    ) -> NDArray:
         """Return the tip temperature (K) at a power (mW).
 
         Examples
@@ -55,9 +57,11 @@ class PowerLaw:
         return base_temperature_K + rise
 
     def _cold_rise(self, power: NDArray) -> NDArray:
-        return self.linear_K_per_mW * power + self.nonlinear_K * power**self.exponent
+        # noise may take a power below zero
+        heating = np.maximum(power, 0.0)
+        return self.linear_K_per_mW * power + self.nonlinear_K * heating**self.exponent
 
-    def power(self, tip_K: ArrayLike, base_temperature_K: float = 293.0) -> NDArray:
+    def power(self, tip_K: ArrayLike, base_temperature_K: float = BASE_TEMPERATURE_K) -> NDArray:
         """Return the lowest power (mW) that gives a tip temperature (K).
 
         Temperatures inside the jump belong to the threshold. Where the branches overlap (a
@@ -101,12 +105,11 @@ class PowerLaw:
 
         The paper's transfer from vacuum to air: P is replaced by P / k.
         """
-        return PowerLaw(
-            self.linear_K_per_mW / k,
-            self.nonlinear_K / k**self.exponent,
-            self.exponent,
-            self.hot_K_per_mW / k,
-            self.threshold_mW * k,
+        return self.with_(
+            linear_K_per_mW=self.linear_K_per_mW / k,
+            nonlinear_K=self.nonlinear_K / k**self.exponent,
+            hot_K_per_mW=self.hot_K_per_mW / k,
+            threshold_mW=self.threshold_mW * k,
         )
 
     def meeting(self) -> PowerLaw:
@@ -127,12 +130,12 @@ class PowerLaw:
         ratio = (self.hot_K_per_mW - self.linear_K_per_mW) / self.nonlinear_K
         if not ratio > 0 or self.exponent == 1.0:
             raise InputError("the branches of this power law do not meet at a positive power")
-        return replace(self, threshold_mW=float(ratio ** (1.0 / (self.exponent - 1.0))))
+        return self.with_(threshold_mW=float(ratio ** (1.0 / (self.exponent - 1.0))))
 
-    def values(self, base_temperature_K: float = 293.0) -> dict[str, float]:
+    def values(self, base_temperature_K: float = BASE_TEMPERATURE_K) -> dict[str, float]:
         """Return the coefficients and ``threshold_K``, as calibration files have them."""
         threshold_K = float(self.tip_temperature(self.threshold_mW, base_temperature_K))
-        return {**asdict(self), "threshold_K": threshold_K}
+        return {**self.model_dump(), "threshold_K": threshold_K}
 
 
 def read_power_law(path: str | os.PathLike[str]) -> PowerLaw:
@@ -143,34 +146,17 @@ def read_power_law(path: str | os.PathLike[str]) -> PowerLaw:
     InputError
         If the file cannot be read, or a coefficient is missing, misspelt or not positive.
     """
-    try:
-        content = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise InputError(f"{path}: not valid JSON: {error}") from None
-    section = content.get("power_law", content) if isinstance(content, dict) else content
+    content = read_json(path)
+    section = content.get("power_law", content)
     if not isinstance(section, dict):
         raise InputError(f"{path}: found no power law, expected an object with its coefficients")
-    known = [field.name for field in fields(PowerLaw)]
-    allowed = {*known, "threshold_K"}
-    for name in section:
-        if name not in allowed and section is content:
-            raise unknown_name("key", name, known, str(path))
-    values = {}
-    for name in known:
-        value = section.get(name)
-        if value is None:
-            raise InputError(f"{path}: {name} is missing")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
-            raise InputError(f"{path}: {name} = {value!r}, expected a positive number")
-        values[name] = float(value)
-    return PowerLaw(**values)
+    known = {name: value for name, value in section.items() if name != "threshold_K"}
+    law = PowerLaw.of(known, str(path))
+    for name, value in law:
+        if not value > 0:
+            raise InputError(f"{path}: {name} = {value:g}, expected a positive number")
+    return law
 
 
 #: As published, doi:10.1063/1.4981883.
-EQ12 = PowerLaw(
-    linear_K_per_mW=103.0,
-    nonlinear_K=11.2,
-    exponent=3.1,
-    hot_K_per_mW=213.0,
-    threshold_mW=2.95,
-)
+EQ12 = PowerLaw(**POWER_LAW)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import minimize, minimize_scalar
 
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.errors import InputError
-
-Array = NDArray[np.float64]
+from hotlever.spieser2017 import BASE_TEMPERATURE_K
+from hotlever.types import Array
 
 #: Range in which the exponent of the cold branch is sought. At one, it is the linear term.
 _EXPONENTS = (1.2, 12.0)
@@ -31,18 +31,14 @@ class PowerLawFit:
         Standard error of each coefficient, from the scatter about the law. That of a
         discontinuous law's threshold is half the range of thresholds that describe the data as
         well, within one variance.
-    continuous : bool
     power_mW, residual_K : ndarray, shape (n,)
         Data minus law, rising in power.
-    base_temperature_K : float
     """
 
     law: PowerLaw
     stderr: dict[str, float]
-    continuous: bool
     power_mW: Array
     residual_K: Array
-    base_temperature_K: float
 
     @property
     def rms_K(self) -> float:
@@ -60,7 +56,7 @@ def fit_power_law(
     tip_K: ArrayLike,
     tip_error_K: ArrayLike | None = None,
     *,
-    base_temperature_K: float = 293.0,
+    base_temperature_K: float = BASE_TEMPERATURE_K,
     threshold_mW: float | None = None,
     continuous: bool = False,
 ) -> PowerLawFit:
@@ -98,18 +94,17 @@ def fit_power_law(
         law, stderr = _continuous(power, rise, weight)
     else:
         law, stderr = _two_branches(power, rise, weight, threshold_mW)
-    residual = rise - law.tip_temperature(power, 0.0)
-    return PowerLawFit(law, stderr, continuous, power, residual, base_temperature_K)
+    return PowerLawFit(law, stderr, power, rise - law.tip_temperature(power, 0.0))
 
 
 def _data(
     power_mW: ArrayLike, tip_K: ArrayLike, tip_error_K: ArrayLike | None, base: float
 ) -> tuple[Array, Array, Array]:
-    power, tip = np.asarray(power_mW, dtype=float), np.asarray(tip_K, dtype=float)
-    error = np.ones_like(power) if tip_error_K is None else np.asarray(tip_error_K, dtype=float)
-    present = np.isfinite(power) & np.isfinite(tip) & np.isfinite(error) & (power > 0) & (error > 0)
-    order = np.argsort(power[present], kind="stable")
-    power, tip, error = (values[present][order] for values in (power, tip, error))
+    """Return power, rise and weight, rising in power."""
+    given = power_mW, tip_K, 1.0 if tip_error_K is None else tip_error_K
+    data = np.stack(np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in given)))
+    data = data[:, np.isfinite(data).all(axis=0) & (data[0] > 0) & (data[2] > 0)]
+    power, tip, error = data[:, np.argsort(data[0], kind="stable")]
     if power.size < _FEWEST_COLD + _FEWEST_HOT:
         raise InputError(
             f"{power.size} temperatures with a power above zero, expected at least "
@@ -136,23 +131,23 @@ def _two_branches(
                 f"{power.size - splits[0]} above it, expected at least {_FEWEST_COLD} and "
                 f"{_FEWEST_HOT}"
             )
-    squares = np.array([_split_squares(power, rise, weight, split) for split in splits])
+    found = [_divided(power, rise, weight, split) for split in splits]
+    squares = np.array([each for _, each in found])
     best = int(np.argmin(squares))
-    split = splits[best]
-    a, b, m = _cold(power[:split], rise[:split], weight[:split])[0].tolist()
-    c = _hot(power[split:], rise[split:], weight[split:])
-    law = PowerLaw(a, b, m, c, power[split - 1])
+    split, (a, b, m, c) = splits[best], found[best][0]
+    law = PowerLaw(**_named(a, b, m, c, power[split - 1]))
     variance = squares[best] / max(power.size - 5, 1)
     spread = 0.0
     if threshold is None:
         threshold = _between(law, float(power[split - 1]), float(power[split]))
         alike = [splits[place] for place in np.flatnonzero(squares <= squares[best] + variance)]
         spread = (power[max(alike)] - power[min(alike) - 1]) / 2.0
-    law = PowerLaw(a, b, m, c, float(threshold))
-    cold = _cold_slopes(power[:split], b, m) * weight[:split, None]
-    errors = np.sqrt(variance * np.diag(np.linalg.pinv(cold.T @ cold)))
-    hot_error = np.sqrt(variance / np.sum((weight[split:] * power[split:]) ** 2))
-    return law, _named(*errors, hot_error, spread)
+    cold, hot = power[:split], power[split:, None]
+    slopes = np.stack([cold, cold**m, b * np.log(cold) * cold**m], axis=1)
+    covariance = _covariance(slopes, weight[:split], variance)
+    (hot_variance,) = _covariance(hot, weight[split:], variance).ravel()
+    errors = np.sqrt([*np.diag(covariance), hot_variance])
+    return law.with_(threshold_mW=float(threshold)), _named(*errors, spread)
 
 
 def _between(law: PowerLaw, low: float, high: float) -> float:
@@ -164,36 +159,32 @@ def _between(law: PowerLaw, low: float, high: float) -> float:
     return meeting if low <= meeting < high else middle
 
 
-def _split_squares(power: Array, rise: Array, weight: Array, split: int) -> float:
-    cold = _cold(power[:split], rise[:split], weight[:split])[1]
-    slope = _hot(power[split:], rise[split:], weight[split:])
-    hot = np.sum((weight[split:] * (rise[split:] - slope * power[split:])) ** 2)
-    return float(cold + hot)
-
-
-def _hot(power: Array, rise: Array, weight: Array) -> float:
-    return float(np.sum(weight**2 * power * rise) / np.sum((weight * power) ** 2))
-
-
-def _cold(power: Array, rise: Array, weight: Array) -> tuple[Array, float]:
-    """Fit a P + b P^m: linear in a and b for each m. Return the three and the squares."""
+def _divided(
+    power: Array, rise: Array, weight: Array, split: int
+) -> tuple[tuple[float, ...], float]:
+    """Fit each branch by itself; return a, b, m and c, and the sum of squares."""
+    cold, hot = slice(split), slice(split, None)
 
     def at(exponent: float) -> tuple[Array, float]:
-        return _linear(np.stack([power, power**exponent], axis=1), rise, weight)
+        columns = np.stack([power[cold], power[cold] ** exponent], axis=1)
+        return _linear(columns, rise[cold], weight[cold])
 
-    found = minimize_scalar(lambda m: at(m)[1], bounds=_EXPONENTS, method="bounded")
-    coefficients, squares = at(float(found.x))
-    return np.append(coefficients, found.x), squares
-
-
-def _cold_slopes(power: Array, b: float, m: float) -> Array:
-    return np.stack([power, power**m, b * np.log(power) * power**m], axis=1)
+    m = float(minimize_scalar(lambda m: at(m)[1], bounds=_EXPONENTS, method="bounded").x)
+    (a, b), squares = at(m)
+    (c,), more = _linear(power[hot, None], rise[hot], weight[hot])
+    return (a, b, m, c), squares + more
 
 
 def _linear(columns: Array, rise: Array, weight: Array) -> tuple[Array, float]:
     """Solve weighted linear least squares; return the coefficients and the sum of squares."""
     coefficients: Any = np.linalg.lstsq(columns * weight[:, None], rise * weight, rcond=None)[0]
     return coefficients, float(np.sum((weight * (rise - columns @ coefficients)) ** 2))
+
+
+def _covariance(columns: Array, weight: Array, variance: float) -> Array:
+    """Return the covariance of the coefficients of weighted columns."""
+    weighted = columns * weight[:, None]
+    return np.asarray(np.linalg.pinv(weighted.T @ weighted) * variance)
 
 
 # --- branches that meet -----------------------------------------------------------------------
@@ -225,14 +216,13 @@ def _continuous(power: Array, rise: Array, weight: Array) -> tuple[PowerLaw, dic
             np.where(power > threshold, b * (m - 1) * power * threshold ** (m - 2), 0.0),
         ]
     )
-    weighted = slopes * weight[:, None]
-    covariance = np.linalg.pinv(weighted.T @ weighted) * squares / max(power.size - 4, 1)
+    covariance = _covariance(slopes, weight, squares / max(power.size - 4, 1))
     by_all = threshold ** (m - 1) * np.array(
         [threshold ** (1 - m), 1.0, b * np.log(threshold), b * (m - 1) / threshold]
     )
     errors = np.sqrt(np.diag(covariance))
     hot_error = np.sqrt(by_all @ covariance @ by_all)
-    law = PowerLaw(float(a), float(b), m, float(a + b * threshold ** (m - 1)), threshold)
+    law = PowerLaw(**_named(a, b, m, a + b * threshold ** (m - 1), threshold))
     return law, _named(*errors[:3], hot_error, errors[3])
 
 
@@ -240,5 +230,5 @@ def _meeting_columns(power: Array, m: float, threshold: float) -> Array:
     return np.stack([power, power * np.minimum(power, threshold) ** (m - 1)], axis=1)
 
 
-def _named(*errors: float) -> dict[str, float]:
-    return {field.name: float(error) for field, error in zip(fields(PowerLaw), errors, strict=True)}
+def _named(*values: float) -> dict[str, float]:
+    return dict(zip(PowerLaw.model_fields, map(float, values), strict=True))

@@ -8,11 +8,11 @@ round off a sharp bend as smoother covariances do.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
-Array = NDArray[np.float64]
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array
 
 #: Ranges of length, amplitude and noise, for coordinates and values of the order of one.
 _BOUNDS = ((0.03, 5.0), (1e-3, 20.0), (1e-6, 0.3))
@@ -29,20 +29,16 @@ class SmoothCurve:
     x, y : ndarray, shape (n,)
         Points and values, both of the order of one.
     noise : ndarray, shape (n,)
-        Standard errors of the values up to a common factor, which is found.
+        Standard errors of the values up to a common factor, `noise_factor`, which is found.
     start : SmoothCurve, optional
         A curve through similar values, to begin the search at.
-
-    Attributes
-    ----------
-    length, amplitude, noise_factor : float
-        Of the covariance, and the factor of `noise`.
     """
 
     length: float
     amplitude: float
     noise_factor: float
 
+    @one_blas_thread
     def __init__(self, x: Array, y: Array, noise: Array, start: SmoothCurve | None = None) -> None:
         self._x, self._offset, self._noise = x, float(np.mean(y)), noise
         values = y - self._offset
@@ -68,37 +64,31 @@ class SmoothCurve:
         covariance[np.diag_indices_from(covariance)] += (noise_factor * self._noise) ** 2 + 1e-11
         return cho_factor(covariance, lower=True)
 
-    def _scaled(self, x: Array) -> Array:
-        return (np.asarray(x)[..., None] - self._x) * np.sqrt(5.0) / self.length
-
-    def _covariance(self, x: Array) -> Array:
-        return self.amplitude**2 * _matern(np.abs(self._scaled(x))) + _MEAN_VARIANCE
-
-    def _covariance_slope(self, x: Array) -> Array:
-        scaled = self._scaled(x)
+    def _covariances(self, x: Array) -> tuple[Array, Array]:
+        """Return the covariances of value and slope at some places with the values."""
+        scaled = (np.asarray(x)[..., None] - self._x) * np.sqrt(5.0) / self.length
         bell = (1.0 + np.abs(scaled)) * np.exp(-np.abs(scaled))
-        return -(self.amplitude**2) * np.sqrt(5.0) / (3.0 * self.length) * scaled * bell
+        tilt = -(self.amplitude**2) * np.sqrt(5.0) / (3.0 * self.length) * scaled * bell
+        return self.amplitude**2 * _matern(np.abs(scaled)) + _MEAN_VARIANCE, tilt
 
     def value(self, x: Array) -> Array:
         """Return the curve."""
-        mean: Array = self._offset + self._covariance(x) @ self._weights
-        return mean
+        return np.asarray(self._offset + self._covariances(x)[0] @ self._weights)
 
     def slope(self, x: Array) -> Array:
         """Return the derivative of the curve."""
-        mean: Array = self._covariance_slope(x) @ self._weights
-        return mean
+        return np.asarray(self._covariances(x)[1] @ self._weights)
 
     def value_stderr(self, x: float) -> float:
         """Return the standard error of the curve at a point."""
-        k = self._covariance(np.array(x))
-        prior = self.amplitude**2 + _MEAN_VARIANCE
-        return float(np.sqrt(max(prior - k @ cho_solve(self._factor, k), 0.0)))
+        return self._stderr(self._covariances(np.array(x))[0], self.amplitude**2 + _MEAN_VARIANCE)
 
     def slope_stderr(self, x: float) -> float:
         """Return the standard error of the derivative at a point."""
-        k = self._covariance_slope(np.array(x))
         prior = 5.0 / 3.0 * (self.amplitude / self.length) ** 2
+        return self._stderr(self._covariances(np.array(x))[1], prior)
+
+    def _stderr(self, k: Array, prior: float) -> float:
         return float(np.sqrt(max(prior - k @ cho_solve(self._factor, k), 0.0)))
 
 

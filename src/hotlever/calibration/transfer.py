@@ -12,12 +12,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hotlever.calibration.characteristic import Characteristic
 from hotlever.calibration.power_law import PowerLaw
-
-Array = NDArray[np.float64]
+from hotlever.errors import ComputationError
+from hotlever.lever import Branch, Lever, OperatingPoint
+from hotlever.probe import MeshOptions, Probe
+from hotlever.types import Array
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,6 @@ class TemperatureCurve:
     tip : callable
         Temperature (K) of powers (mW); NaN where nothing is known.
     knee_mW : float
-        Power at which the reference has its knee.
     """
 
     tip: Callable[[Array], Array]
@@ -48,29 +47,55 @@ def curve_of_law(law: PowerLaw, base_temperature_K: float) -> TemperatureCurve:
 
 
 def curve_of_model(
-    models: Mapping[str, Characteristic],
-    medium: str,
-    measured_knee: tuple[str, float] | None = None,
+    models: Mapping[str, Branch], medium: str, measured_knee: tuple[str, float] | None = None
 ) -> TemperatureCurve:
-    """Return the model of a lever in a medium as a reference.
+    """Return the model of a lever, by medium, in the medium it is to be calibrated in as reference.
 
-    Parameters
-    ----------
-    models : mapping of str to Characteristic
-        By medium.
-    medium : str
-        Of the lever to be calibrated.
-    measured_knee : tuple of str and float, optional
-        Medium and power (mW) of a knee that was measured on the lever which the model was fitted
-        to. It takes the place of the model's, since models are less sure of the knee than of the
-        temperature at a power.
+    A knee that was measured (medium and power in mW) on the lever which the model was fitted to
+    takes the place of the model's, since models are less sure of the knee than of the temperature
+    at a power.
     """
-    model = models[medium]
-    assert model.knee is not None
-    knee = model.knee.power_mW
+    knee_mW = knee_of(models[medium]).power_mW
     if measured_knee is not None:
         where, power = measured_knee
-        there = models[where].knee
-        assert there is not None
-        knee *= power / there.power_mW
-    return TemperatureCurve(model.tip_temperature, knee)
+        knee_mW *= power / knee_of(models[where]).power_mW
+    return TemperatureCurve(models[medium].tip_temperature, knee_mW)
+
+
+def knee_of(model: Branch) -> OperatingPoint:
+    """Return the knee of a model.
+
+    Raises
+    ------
+    ComputationError
+        If it has none.
+    """
+    if model.knee is None:
+        raise ComputationError(
+            f"the model has no knee below {model.hottest_K:.0f} K; calibrate a lever whose model "
+            "has one"
+        )
+    return model.knee
+
+
+class Models(dict[str, Branch]):
+    """The models of one probe by medium, each solved when it is first asked for; all have a knee.
+
+    `solved` is called after each.
+    """
+
+    def __init__(
+        self,
+        probe: Probe,
+        mesh: MeshOptions | None = None,
+        solved: Callable[[], None] = lambda: None,
+    ) -> None:
+        super().__init__()
+        self._probe, self._mesh, self._solved = probe, mesh, solved
+
+    def __missing__(self, medium: str) -> Branch:
+        model = Lever(self._probe.in_medium(medium), self._mesh).branch()
+        knee_of(model)
+        self[medium] = model
+        self._solved()
+        return model

@@ -1,6 +1,5 @@
-"""The command line of hotlever; importing a command's module registers it."""
+"""The command line of hotlever: one module for each command, and `main`, which runs them."""
 
-from hotlever.cli import calibrate, design, fit, probe, raman, reproduce, sweep
-from hotlever.cli.app import app, main
+from hotlever.cli.running import main
 
-__all__ = ["app", "calibrate", "design", "fit", "main", "probe", "raman", "reproduce", "sweep"]
+__all__ = ["main"]

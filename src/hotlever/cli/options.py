@@ -2,35 +2,79 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from functools import partial
+from inspect import Signature, signature
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-import numpy as np
-import typer
-from numpy.typing import NDArray
+from typer import Argument, Option
 
-from hotlever.air.surroundings import Medium
-from hotlever.errors import InputError, unknown_name
-from hotlever.probe import Probe
+from hotlever.errors import InputError, shown
+from hotlever.files import Outputs
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from hotlever.probe import Probe
+
+#: Between these (V) a lever has a current that can be told from none, and no spark.
+LEAST_BIAS, MOST_BIAS = 1e-6, 1e4
+#: A sweep of so many biases takes minutes, as does a design varied so often.
+MOST_BIASES, MOST_DESIGNS = 10_000, 1000
+
+File = Path | None
 ProbeFile = Annotated[
-    Path | None,
-    typer.Argument(metavar="[PROBE.toml]", help="Probe file; the reference probe if left out."),
+    File, Argument(metavar="[PROBE.toml]", help="Probe file; the reference probe if left out.")
 ]
+PlotFile = Annotated[File, Option("--plot", help="Draw to this file: .png, .svg or .pdf.")]
+SweepPlot = Annotated[
+    File, Option("--plot", help="Draw the sweep to this file: .png, .svg or .pdf.")
+]
+MediumOption = Annotated[str | None, Option(help="vacuum or air; what the files say if left out.")]
 
 
-MediumOption = Annotated[
-    str | None, typer.Option(help="vacuum or air; what the files say if left out.")
-]
+def options_of(function: Callable[..., Any], name: str) -> Callable[[Callable[..., None]], Any]:
+    """Let a command have the options of a function, which it calls as its argument `name`."""
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        def run(**given: Any) -> None:
+            options = {key: given.pop(key) for key in added}
+            command(**given, **{name: partial(function, **options)})
+
+        added = signature(function, eval_str=True).parameters
+        own = signature(command, eval_str=True).parameters
+        nested = [added.values() if key == name else [one] for key, one in own.items()]
+        taken = [one for group in nested for one in group]
+        run.__signature__ = Signature(taken)  # type: ignore[attr-defined]
+        run.__annotations__ = {one.name: one.annotation for one in taken}
+        run.__doc__ = command.__doc__
+        return run
+
+    return decorate
 
 
 def load_probe(path: Path | None) -> Probe:
     """Read a probe file, or return the reference probe."""
+    from hotlever.probe import Probe
+
     return Probe.reference() if path is None else Probe.from_file(path)
+
+
+def check_plot(outputs: Outputs, plot: Path | None) -> None:
+    """Check that a figure can be written, if one is asked for."""
+    if plot is not None:
+        from hotlever.figures import FIGURE_TYPES
+
+        outputs.file(plot, *FIGURE_TYPES)
 
 
 def check_medium(medium: str | None) -> None:
     """Refuse a medium that does not exist."""
+    from hotlever.probe.surroundings import Medium
+
     if medium is not None and medium not in get_args(Medium):
         raise InputError(f"--medium {medium}: expected {' or '.join(get_args(Medium))}")
 
@@ -44,18 +88,53 @@ def parse_bias(text: str) -> NDArray[np.float64]:
     [1.0, 6.0, 11.0]
     """
     where = f"--bias {text}"
-    parts = text.split(":")
-    if len(parts) != 3:
-        raise InputError(f"{where}: expected START:STOP:COUNT in volts, such as 1:11:25")
-    start, stop = parse_number(parts[0], where), parse_number(parts[1], where)
-    if not parts[2].isdecimal() or int(parts[2]) < 1:
-        raise InputError(f"{where}: COUNT is {parts[2]!r}, expected a whole number of 1 or more")
-    count = int(parts[2])
+    start, stop, biases = _parse_range(text, where, "such as 1:11:25 (V)", MOST_BIASES)
     if start < 0 or stop < start:
         raise InputError(f"{where}: expected 0 <= START <= STOP")
-    if (count == 1) != (start == stop):
+    if (biases.size == 1) != (start == stop):
         raise InputError(f"{where}: COUNT 1 goes with START = STOP, more with START < STOP")
-    return np.linspace(start, stop, count)
+    if biases[biases > 0].min(initial=LEAST_BIAS) < LEAST_BIAS or stop > MOST_BIAS:
+        raise InputError(
+            f"{where}: expected biases of 0, or from {LEAST_BIAS:g} to {MOST_BIAS:g} V"
+        )
+    return biases
+
+
+def parse_vary(text: str) -> tuple[str, NDArray[np.float64]]:
+    """Parse ``NAME=START:STOP:COUNT``, ends included.
+
+    Examples
+    --------
+    >>> name, values = parse_vary("heater_length_um=3:6:4")
+    >>> name, values.tolist()
+    ('heater_length_um', [3.0, 4.0, 5.0, 6.0])
+    """
+    where, example = f"--vary {text}", "such as heater_length_um=3:6:7"
+    name, equals, numbers = text.partition("=")
+    if not equals:
+        raise InputError(f"{where}: expected NAME=START:STOP:COUNT, {example}")
+    start, stop, values = _parse_range(numbers, where, example, MOST_DESIGNS)
+    if values.size < 2 or start == stop:
+        raise InputError(f"{where}: expected two values or more, {example}")
+    return name.strip(), values
+
+
+def _parse_range(
+    text: str, where: str, example: str, most: int
+) -> tuple[float, float, NDArray[np.float64]]:
+    import numpy as np
+
+    parts = text.split(":")
+    if len(parts) != 3:
+        raise InputError(f"{where}: expected START:STOP:COUNT, {example}")
+    start, stop = parse_number(parts[0], where), parse_number(parts[1], where)
+    # a number of more digits than the limit has is too large without being read
+    readable = parts[2].isdecimal() and len(parts[2]) <= len(str(most))
+    if not readable or not 1 <= int(parts[2]) <= most:
+        raise InputError(
+            f"{where}: COUNT is {shown(parts[2])}, expected a whole number from 1 to {most}"
+        )
+    return start, stop, np.linspace(start, stop, int(parts[2]))
 
 
 def parse_number(text: str, where: str) -> float:
@@ -63,57 +142,36 @@ def parse_number(text: str, where: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        value = float("nan")
-    if not np.isfinite(value):
-        raise InputError(f"{where}: found {text!r}, expected a number")
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{where}: found {shown(text)}, expected a number")
     return value
 
 
-def parse_settings(settings: list[str]) -> dict[str, float]:
-    """Parse ``NAME=VALUE`` pairs.
+def check_number(option: str, value: float | None, least: float, most: float) -> None:
+    """Refuse a number out of bounds."""
+    if value is not None and not least <= value <= most:
+        raise InputError(f"{option} {value:g}: expected a number from {least:g} to {most:g}")
+
+
+def parse_values(
+    option: str, settings: list[str] | None, bare: bool = False
+) -> dict[str, float | None]:
+    """Parse ``NAME=VALUE`` pairs, or bare names where these are allowed.
 
     Examples
     --------
-    >>> parse_settings(["a0=9e-4"])
+    >>> parse_values("--set", ["a0=9e-4"])
     {'a0': 0.0009}
-    """
-    values = {}
-    for setting in settings:
-        name, equals, value = setting.partition("=")
-        if not equals:
-            raise InputError(f"--set {setting}: expected NAME=VALUE")
-        values[name.strip()] = parse_number(value, f"--set {name}")
-    return values
-
-
-def parse_fixed(settings: list[str]) -> dict[str, float | None]:
-    """Parse ``NAME`` or ``NAME=VALUE``: parameters to hold.
-
-    Examples
-    --------
-    >>> parse_fixed(["n_d=3.3e17", "p"])
+    >>> parse_values("--fix", ["n_d=3.3e17", "p"], bare=True)
     {'n_d': 3.3e+17, 'p': None}
     """
     values: dict[str, float | None] = {}
-    for setting in settings:
-        name, equals, value = setting.partition("=")
-        values[name.strip()] = parse_number(value, f"--fix {name}") if equals else None
+    for setting in settings or []:
+        name, equals, value = (part.strip() for part in setting.partition("="))
+        if not (equals or bare):
+            raise InputError(f"{option} {setting}: expected NAME=VALUE")
+        if name in values:
+            raise InputError(f"{option} {name}: given twice, expected once")
+        values[name] = parse_number(value, f"{option} {name}") if equals else None
     return values
-
-
-def check_choice(option: str, value: str, choices: tuple[str, ...]) -> None:
-    """Refuse a value that is none of the choices, with the nearest one."""
-    if value not in choices:
-        raise unknown_name("value", value, choices, option)
-
-
-def check_output(path: Path | None, *suffixes: str) -> None:
-    """Refuse an output file early: of an unknown type, or in a folder that does not exist."""
-    if path is None:
-        return
-    if suffixes and path.suffix.lower() not in suffixes:
-        raise InputError(
-            f"{path}: unknown file type '{path.suffix}', expected {' or '.join(suffixes)}"
-        )
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist")

@@ -2,54 +2,49 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
 import typer
+from typer import Option
 
-from hotlever.cli.app import Commands, app, stdout
-from hotlever.cli.options import ProbeFile, check_output, load_probe
+from hotlever.cli.application import Commands, app
+from hotlever.cli.options import File, PlotFile, ProbeFile, check_plot, load_probe
+from hotlever.cli.output import give
 from hotlever.errors import unknown_name
-from hotlever.materials.silicon import inversion_temperature
-from hotlever.probe import Probe, mesh_layout
+from hotlever.files import Outputs
 
 probe_app = typer.Typer(
     cls=Commands, help="Write, describe and draw probes.", rich_markup_mode=None
 )
 app.add_typer(probe_app, name="probe")
 
-_NEW = {"three-leg": Probe.reference, "u-shape": Probe.u_shape}
+#: Shapes, and the methods of `Probe` that make one.
+_NEW = {"three-leg": "reference", "u-shape": "u_shape"}
 
 
 @probe_app.command()
 def new(
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File; standard output if left out.")
-    ] = None,
-    shape: Annotated[str, typer.Option(help=f"One of: {', '.join(_NEW)}.")] = "three-leg",
+    output: File = Option(None, "-o", "--output", help="File; standard output if left out."),
+    shape: str = Option("three-leg", help=f"One of: {', '.join(_NEW)}."),
 ) -> None:
     """Write the reference probe as a commented file."""
+    from hotlever.probe import Probe
+
     if shape not in _NEW:
         raise unknown_name("shape", shape, _NEW)
-    probe = _NEW[shape]()
+    probe = getattr(Probe, _NEW[shape])()
     if output is None:
-        stdout.print(probe.to_toml(), end="", markup=False)
+        give(probe.to_toml())
     else:
         probe.to_file(output)
 
 
 @probe_app.command()
-def show(
-    probe_file: ProbeFile = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Draw to this file: .png, .svg or .pdf.")
-    ] = None,
-) -> None:
+def show(probe_file: ProbeFile = None, plot: PlotFile = None) -> None:
     """Draw and describe a probe."""
-    from hotlever.report.figures import probe_drawing
-    from hotlever.report.style import FIGURE_TYPES, save_figure
+    from hotlever.materials.silicon import inversion_temperature
+    from hotlever.probe import mesh_layout
 
-    check_output(plot, *FIGURE_TYPES)
+    outputs = Outputs(probe_file)
+    check_plot(outputs, plot)
     probe = load_probe(probe_file)
     layout = probe.layout()
     name = "reference probe" if probe_file is None else probe_file.name
@@ -69,8 +64,11 @@ def show(
         "material: " + ", ".join(f"{key} {value:g}" for key, value in material),
         "inversion temperature of the heater: "
         f"{inversion_temperature(material.n_d, material.p):.1f} K",
-        f"mesh: {mesh_layout(layout).triangles.nelements} triangles",
+        f"mesh: {mesh_layout(layout).elements.nelements} triangles",
     ]
-    stdout.print("\n".join(lines), markup=False)
     if plot is not None:
-        save_figure(probe_drawing(layout, name), plot)
+        from hotlever import figures
+
+        with outputs.together():
+            figures.save_figure(figures.probe_drawing(layout, name), plot)
+    give("\n".join([*lines, ""]))

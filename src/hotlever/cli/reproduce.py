@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
+from typer import Option
 
-from hotlever.cli.app import app, progress, stdout
+from hotlever.cli.application import app
+from hotlever.cli.output import give, progress
+from hotlever.files import Outputs
 
 
-@app.command()
-def reproduce(
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder for the page and its figures.")
-    ] = Path("reproduce"),
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick", help="Leave out what takes longest: k by geometry, the tip, the mesh."
-        ),
-    ] = False,
+@app.command("reproduce")
+def reproduce_command(
+    output: Path = Option(
+        Path("reproduce"), "-o", "--output", help="Folder for the page and its figures."
+    ),
+    quick: bool = Option(
+        False, "--quick", help="Leave out what takes longest: k by geometry, the tip, the mesh."
+    ),
 ) -> None:
     """Compute the paper's tables and figures and put them on one page."""
     from hotlever.report.reproduce import reproduce_page
 
+    outputs = Outputs()
+    outputs.folder(output)
     with progress("reproduce") as update:
         page = reproduce_page(quick=quick, progress=update)
-    stdout.print(f"{page.write(output)}", markup=False)
+    with outputs.together():
+        written = page.write(output)
+    give(f"{written}\n")

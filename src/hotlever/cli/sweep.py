@@ -4,146 +4,135 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Any
 
-import typer
+from typer import Option
 
-from hotlever.cli.app import app, note, progress, stdout
+from hotlever.cli.application import app
 from hotlever.cli.options import (
+    File,
     MediumOption,
     ProbeFile,
-    check_choice,
+    SweepPlot,
     check_medium,
-    check_output,
+    check_plot,
     load_probe,
     parse_bias,
-    parse_settings,
+    parse_values,
 )
-from hotlever.errors import ComputationError
-from hotlever.files import output_folder
-from hotlever.probe import Probe
+from hotlever.cli.output import give, note, progress
+from hotlever.errors import ComputationError, unknown_name
+from hotlever.files import Outputs, output_folder
 
 if TYPE_CHECKING:
-    from hotlever.lever import Lever
-    from hotlever.lever.lever import LeverState
-    from hotlever.lever.state_store import StateStore
-    from hotlever.lever3d import SolidLever
+    from hotlever.lever import Lever, State
+    from hotlever.probe import Probe
 
 MODELS = ("flat", "full-3d")
 
 
-@app.command()
-def sweep(
+@app.command("sweep")
+def sweep_command(
     probe_file: ProbeFile = None,
-    bias: Annotated[str, typer.Option(help="START:STOP:COUNT in volts, ends included.")] = (
-        "1:11:25"
-    ),
+    bias: str = Option("1:11:25", help="START:STOP:COUNT in volts, ends included."),
     medium: MediumOption = None,
-    model: Annotated[
-        str,
-        typer.Option(
-            help="flat: the lever in its plane; full-3d: its true thickness and the air around it "
-            "(minutes; goes on where it was stopped)."
-        ),
-    ] = "flat",
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Change a value of the probe file."),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."),
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Draw the sweep to this file: .png, .svg or .pdf.")
-    ] = None,
-    fields: Annotated[
-        Path | None, typer.Option(help="Write the fields at each bias as VTU to this folder.")
-    ] = None,
+    model: str = Option(
+        "flat",
+        help="flat: the lever in its plane; full-3d: its true thickness and the air around it "
+        "(minutes; goes on where it was stopped).",
+    ),
+    settings: list[str] | None = Option(
+        None, "--set", metavar="NAME=VALUE", help="Change a value of the probe file."
+    ),
+    output: File = Option(
+        None, "-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."
+    ),
+    plot: SweepPlot = None,
+    fields: File = Option(None, help="Write the fields at each bias as VTU to this folder."),
 ) -> None:
     """Solve a lever over a range of bias."""
     from hotlever.lever import sweep_csv, write_sweep
-    from hotlever.report.figures import sweep_overview
-    from hotlever.report.style import FIGURE_TYPES, save_figure
 
     values = parse_bias(bias)
-    check_choice("--model", model, MODELS)
+    if model not in MODELS:
+        raise unknown_name("value", model, MODELS, "--model")
     check_medium(medium)
-    check_output(output, ".csv", ".nc")
-    check_output(plot, *FIGURE_TYPES)
-    probe = load_probe(probe_file).with_values(parse_settings(settings or []))
-    if medium is not None:
-        probe = probe.in_medium(medium)
-    lever, store, fields_writer = _made(probe, model)
-
-    failure: ComputationError | None = None
+    outputs = Outputs(probe_file)
+    outputs.file(output, ".csv", ".nc")
+    check_plot(outputs, plot)
+    outputs.folder(fields)
+    probe = load_probe(probe_file).with_(**parse_values("--set", settings))
+    lever = _lever(probe if medium is None else probe.in_medium(medium), model)
+    states: list[State] = []
     with progress("sweep") as update:
-        try:
-            ramp = lever.solve(values, update, store)
-        except ComputationError as error:
-            ramp, failure = error.partial, error
-    data = lever.dataset(ramp)
-    for text in filter(None, data.attrs["notes"].split("\n")):
-        note(text)
+        data, failure = _reached(lambda: lever.sweep(values, progress=update))
+        if failure is not None and not data.bias.size:
+            raise failure
+        if fields is not None:
+            states, ended = _reached(lambda: lever.solve(data.bias_V.values, update))
+            failure = failure or ended
+    note(*filter(None, data.attrs["notes"].split("\n")))
+    with outputs.together():
+        if output is not None:
+            write_sweep(data, output)
+        if plot is not None:
+            from hotlever import figures
+
+            figures.save_figure(figures.sweep_overview(data), plot)
+        if fields is not None:
+            _write_fields(lever, states, output_folder(fields))
     if output is None:
-        stdout.print(sweep_csv(data), end="", markup=False)
-    else:
-        write_sweep(data, output)
-    if plot is not None:
-        save_figure(sweep_overview(data), plot)
-    if fields is not None:
-        write = fields_writer(output_folder(fields))
-        for state in ramp.states:
-            write(state)
+        give(sweep_csv(data))
     if failure is not None:
         raise failure
 
 
-def _made(
-    probe: Probe, model: str
-) -> tuple[Lever, StateStore | None, Callable[[Path], Callable[[LeverState], None]]]:
-    """Make the lever, the place to keep its states, and what writes fields to a folder."""
+def _reached(work: Callable[[], Any]) -> tuple[Any, ComputationError | None]:
+    """Return what a computation gives; if it fails, what it reached, and the failure."""
+    try:
+        return work(), None
+    except ComputationError as error:
+        if error.partial is None:
+            raise
+        return error.partial, error
+
+
+def _lever(probe: Probe, model: str) -> Lever:
     if model == "full-3d":
         from hotlever.lever3d import SolidLever
 
         with progress("mesh and air"):
-            solid = SolidLever(probe)
-        return solid, solid.store(), lambda folder: _solid_writer(solid, folder)
+            return SolidLever(probe)
 
     from hotlever.lever import Lever
 
     with progress("air") as update:
-        flat = Lever(probe, progress=update)
-    return flat, None, lambda folder: _flat_writer(flat, folder)
+        return Lever(probe, progress=update)
 
 
-def _flat_writer(lever: Lever, folder: Path) -> Callable[[LeverState], None]:
+def _write_fields(lever: Lever, states: list[State], folder: Path) -> None:
+    """Write the fields of states to a folder, those of the air too where there is some."""
+    from hotlever.lever3d import SolidLever
+
+    def name(state: State, suffix: str) -> Path:
+        return folder / f"bias_{state.bias_V:08.4f}V{suffix}"
+
+    if isinstance(lever, SolidLever):
+        from hotlever import figures
+        from hotlever.lever3d.fields import temperature_slices, write_solid_vtu
+
+        for state in states:
+            write_solid_vtu(state, name(state, ".vtu"))
+            if lever.medium == "air":
+                slices = figures.temperature_slices(temperature_slices(state))
+                figures.save_figure(slices, name(state, ".png"))
+        return
+
     from hotlever.lever.air_fields import AirFields
     from hotlever.lever.fields import FieldMapper, write_vtu
 
-    mapper = FieldMapper(lever)
-    air = AirFields(lever) if lever.medium == "air" else None
-
-    def write(state: LeverState) -> None:
-        write_vtu(mapper.map(state.x), folder / f"{_name(state)}.vtu")
+    mapper, air = FieldMapper(lever), AirFields(lever) if lever.medium == "air" else None
+    for state in states:
+        write_vtu(mapper.map(state), name(state, ".vtu"))
         if air is not None:
-            air.write_vtu(state.x, folder / f"{_name(state)}_air.vtu")
-
-    return write
-
-
-def _solid_writer(lever: SolidLever, folder: Path) -> Callable[[LeverState], None]:
-    from hotlever.lever3d.fields import write_solid_vtu
-    from hotlever.report.air_figures import temperature_slices
-    from hotlever.report.style import save_figure
-
-    def write(state: LeverState) -> None:
-        write_solid_vtu(lever, state.x, folder / f"{_name(state)}.vtu")
-        if lever.medium == "air":
-            save_figure(temperature_slices(lever, state.x), folder / f"{_name(state)}.png")
-
-    return write
-
-
-def _name(state: LeverState) -> str:
-    return f"bias_{state.bias:08.4f}V"
+            air.write_vtu(state, name(state, "_air.vtu"))

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,71 +14,16 @@ from typing import Any
 from dask.system import CPU_COUNT
 
 from hotlever import __version__
-from hotlever.cache import CACHE_VARIABLE, cache_folder
-from hotlever.cluster import local_client, remote_client, run_all
-from hotlever.errors import HotleverError, InputError, unknown_name
-from hotlever.files import output_folder, write_text
-from hotlever.fitting.fit import fit, with_measured_circuit
-from hotlever.fitting.least_squares import Weights
-from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement, read_measurement
+from hotlever.cluster import guarded, local_client, remote_client, run_all
+from hotlever.errors import HotleverError, InputError
+from hotlever.files import Outputs, output_folder, read_json, write_text
+from hotlever.fitting.estimation import fit, with_measured_circuit
+from hotlever.fitting.measurement import Measurement, read_measurement
+from hotlever.fitting.options import FitOptions
 from hotlever.lever.lever import Lever
-from hotlever.lever.reduced_cache import cached_reduction
-from hotlever.materials import parameter
+from hotlever.lever.reduction import cached_reduction
 from hotlever.probe import Probe
-
-Progress = Callable[[int, int], None]
-
-
-@dataclass(frozen=True)
-class FitRequest:
-    """What is asked of every lever; see `hotlever.fitting.fit` for the meaning.
-
-    Attributes
-    ----------
-    probe : Probe
-    observables : tuple of str or None
-    fixed : mapping of str to float or None
-    robust, drift : bool
-    weights : {"maximum", "errors"}
-    medium : {"vacuum", "air"} or None
-
-    Raises
-    ------
-    InputError
-        If a name does not exist or a value is impossible.
-    """
-
-    probe: Probe = field(default_factory=Probe.reference)
-    observables: tuple[str, ...] | None = None
-    fixed: Mapping[str, float | None] = field(default_factory=dict)
-    robust: bool = False
-    drift: bool = False
-    weights: Weights = "maximum"
-    medium: str | None = None
-
-    def __post_init__(self) -> None:
-        for name in self.fixed:
-            parameter(name)
-        held = {name: value for name, value in self.fixed.items() if value is not None}
-        self.probe.material.with_(**held)
-        for name in self.observables or ():
-            if name not in OBSERVABLE_SYMBOLS:
-                raise unknown_name("observable", name, OBSERVABLE_SYMBOLS)
-
-    def record(self, measurement: Measurement) -> dict[str, Any]:
-        """Return all that a fit depends on, for its file: the same again need not be fitted."""
-        record = {
-            "sha256": measurement.sha256,
-            "probe": self.probe.values(),
-            "observables": self.observables,
-            "fixed": self.fixed,
-            "robust": self.robust,
-            "drift": self.drift,
-            "weights": self.weights,
-            "medium": self.medium,
-            "version": __version__,
-        }
-        return dict(json.loads(json.dumps(record)))
+from hotlever.types import Progress
 
 
 @dataclass(frozen=True)
@@ -127,7 +71,8 @@ class Batch:
 def fit_many(
     paths: Sequence[str | os.PathLike[str]],
     folder: str | os.PathLike[str],
-    request: FitRequest | None = None,
+    probe: Probe | None = None,
+    options: FitOptions | None = None,
     *,
     processes: int | None = None,
     scheduler: str | None = None,
@@ -137,7 +82,8 @@ def fit_many(
     """Fit many levers and write a fit file for each as soon as it is done.
 
     A file that cannot be read or fitted is reported in the result; the others go on. A lever
-    whose fit file is there already, from the same data, request and version, is not fitted again.
+    whose fit file is there already, from the same data, probe, options and version, is not fitted
+    again.
 
     Parameters
     ----------
@@ -145,8 +91,9 @@ def fit_many(
         Measurement files.
     folder : path
         Where the fit files go, named after the data files.
-    request : FitRequest, optional
-        The reference probe and all observables by default.
+    probe : Probe, optional
+        The reference probe by default.
+    options : FitOptions, optional
     processes : int, optional
         Local worker processes; by default as many as there are processors. They are started by
         spawn: a script needs ``if __name__ == "__main__"``.
@@ -163,43 +110,56 @@ def fit_many(
     ComputationError
         If the scheduler is lost. What was done by then is written.
     """
-    request = request or FitRequest()
+    probe, options = probe or Probe.reference(), options or FitOptions()
     if processes is not None and processes < 1:
         raise InputError(f"found processes = {processes}, expected 1 or more")
-    target, data = output_folder(folder), lever_names(paths)
+    outputs, target, data = Outputs(*paths), Path(folder), lever_names(paths)
+    outputs.folder(target)
     files = {name: target / f"{name}.json" for name in data}
     batch, waiting = Batch(), {}
-    for name, path in data.items():
-        try:
-            measurement = read_measurement(path)
-        except InputError as error:
-            batch.failures[str(path)] = error
-            continue
-        content = _written_before(files[name], request.record(measurement))
-        if content is None:
-            waiting[name] = measurement
-        else:
-            batch.fits[name] = LeverFit(name, files[name], content)
-            batch.reused += 1
+
+    def failed(path: str | Path, error: HotleverError) -> None:
+        text = str(error)
+        batch.failures[str(path)] = (
+            error if text.startswith(str(path)) else type(error)(f"{path}: {text}")
+        )
 
     def tell() -> None:
         if progress is not None:
             progress(len(batch.fits) + len(batch.failures), len(files))
 
+    for name, path in data.items():
+        try:
+            measurement = read_measurement(path)
+            if target.is_dir():
+                outputs.target(files[name])
+        except InputError as error:
+            failed(path, error)
+            continue
+        content = _written_before(files[name], _request(measurement, probe, options))
+        if content is None:
+            waiting[name] = measurement
+        else:
+            batch.fits[name] = LeverFit(name, files[name], content)
+            batch.reused += 1
     tell()
-    with _shared_cache(), _client(min(processes or CPU_COUNT, len(waiting)), scheduler) as client:
+    with _client(min(processes or CPU_COUNT, len(waiting)), scheduler) as client:
         if client is not None:
-            _reduce(request, waiting, reducing)
+            for name, reason in _reduced(probe, options, waiting, reducing).items():
+                failed(waiting.pop(name).path, reason)
             names = list(waiting)
-            tasks = ((measurement, request) for measurement in waiting.values())
+            tasks = ((measurement, probe, options) for measurement in waiting.values())
             for number, result in run_all(client, _fitted, tasks):
                 name, measurement = names[number], waiting[names[number]]
-                if isinstance(result, HotleverError):
-                    batch.failures[measurement.path] = _failure(measurement.path, result)
-                else:
-                    content = {**result, "request": request.record(measurement)}
+                try:
+                    if isinstance(result, HotleverError):
+                        raise result
+                    content = {**result, "request": _request(measurement, probe, options)}
+                    output_folder(target)
                     _write(content, files[name])
                     batch.fits[name] = LeverFit(name, files[name], content)
+                except HotleverError as error:
+                    failed(measurement.path, error)
                 tell()
     batch.fits = {name: batch.fits[name] for name in files if name in batch.fits}
     return batch
@@ -210,17 +170,35 @@ def lever_names(paths: Sequence[str | os.PathLike[str]]) -> dict[str, Path]:
 
     Examples
     --------
-    >>> list(lever_names(["a/lever-1.csv", "a/lever-2.csv", "a/lever-1.csv"]))
+    >>> list(lever_names(["a/lever-1.csv", "a/lever-2.csv", "a/../a/lever-1.csv"]))
     ['lever-1', 'lever-2']
     >>> list(lever_names(["a/lever-1.csv", "b/lever-1.csv"]))
     ['a_lever-1.csv', 'b_lever-1.csv']
     """
-    different = list(dict.fromkeys(map(Path, paths)))
-    count = Counter(path.stem for path in different)
-    return {
-        path.stem if count[path.stem] == 1 else "_".join(path.relative_to(path.anchor).parts): path
-        for path in different
-    }
+    different: dict[object, Path] = {}
+    for path in map(Path, paths):
+        different.setdefault(_identity(path), path)
+    count = Counter(path.stem.casefold() for path in different.values())
+    names: dict[str, Path] = {}
+    for path in different.values():
+        alone = count[path.stem.casefold()] == 1
+        name = path.stem if alone else "_".join(path.relative_to(path.anchor).parts)
+        # a file name need not be text; and not all disks tell a from A
+        name = name.encode(errors="backslashreplace").decode()
+        taken, number, plain = {one.casefold() for one in names}, 2, name
+        while name.casefold() in taken:
+            name, number = f"{plain}-{number}", number + 1
+        names[name] = path
+    return names
+
+
+def _identity(path: Path) -> object:
+    """Return what two names of one file have in common."""
+    try:
+        found = path.stat()
+    except OSError:
+        return os.path.realpath(path)
+    return found.st_dev, found.st_ino
 
 
 def _write(content: dict[str, Any], file: Path) -> None:
@@ -230,11 +208,10 @@ def _write(content: dict[str, Any], file: Path) -> None:
 def _written_before(file: Path, record: dict[str, Any]) -> dict[str, Any] | None:
     """Return a fit file that was made from the same; None if there is none."""
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_json(file)
+    except InputError:
         return None
-    same = isinstance(content, dict) and content.get("request") == record
-    return content if same else None
+    return content if content.get("request") == record else None
 
 
 @contextmanager
@@ -247,52 +224,44 @@ def _client(processes: int, scheduler: str | None) -> Iterator[Any]:
         yield client
 
 
-@contextmanager
-def _shared_cache() -> Iterator[None]:
-    """Let local workers find reduced levers on disk, even if the user's cache is switched off."""
-    if cache_folder() is not None:
-        yield
-        return
-    with tempfile.TemporaryDirectory(prefix="hotlever-") as folder:
-        os.environ[CACHE_VARIABLE] = folder
-        try:
-            yield
-        finally:
-            os.environ[CACHE_VARIABLE] = ""
+def _request(measurement: Measurement, probe: Probe, options: FitOptions) -> dict[str, Any]:
+    """Return all that a fit depends on, for its file: the same again need not be fitted."""
+    record = {
+        "sha256": measurement.sha256,
+        "probe": probe.values(),
+        "options": options.values(),
+        "version": __version__,
+    }
+    return dict(json.loads(json.dumps(record)))
 
 
-def _reduce(
-    request: FitRequest, waiting: Mapping[str, Measurement], progress: Progress | None
-) -> None:
-    """Reduce each geometry once, before the workers need it.
+def _reduced(
+    probe: Probe,
+    options: FitOptions,
+    waiting: Mapping[str, Measurement],
+    progress: Progress | None,
+) -> dict[str, HotleverError]:
+    """Reduce each geometry once, before the workers need it; return why some levers have none.
 
-    Base temperature and medium are part of it.
+    Base temperature and medium are part of a geometry.
     """
-    probes = (
-        with_measured_circuit(request.probe, measurement, request.medium)[0]
-        for measurement in waiting.values()
-    )
-    different = {(one.circuit.base_temperature_K, one.surroundings.medium): one for one in probes}
-    for one in different.values():
-        cached_reduction(Lever(one), progress=progress)
+    known: dict[object, HotleverError | None] = {}
+
+    def reduce_one(measurement: Measurement) -> HotleverError | None:
+        measured, _ = with_measured_circuit(probe, measurement, options.medium)
+        geometry = measured.circuit.base_temperature_K, measured.surroundings.medium
+        if geometry not in known:
+            known[geometry] = guarded(_reduce, (measured, progress))
+        return known[geometry]
+
+    results = {name: guarded(reduce_one, (data,)) for name, data in waiting.items()}
+    return {name: error for name, error in results.items() if error is not None}
 
 
-def _fitted(measurement: Measurement, request: FitRequest) -> dict[str, Any]:
+def _reduce(probe: Probe, progress: Progress | None) -> None:
+    cached_reduction(Lever(probe), progress=progress)
+
+
+def _fitted(measurement: Measurement, probe: Probe, options: FitOptions) -> dict[str, Any]:
     """Fit one lever, in a worker; return the content of its fit file."""
-    result = fit(
-        measurement,
-        request.probe,
-        observables=request.observables,
-        fixed=request.fixed,
-        robust=request.robust,
-        drift=request.drift,
-        weights=request.weights,
-        medium=request.medium,
-    )
-    return dict(json.loads(result.to_json()))
-
-
-def _failure(path: str, found: HotleverError) -> HotleverError:
-    """Return an error that names the data file."""
-    text = str(found)
-    return type(found)(text if text.startswith(path) else f"{path}: {text}")
+    return fit(measurement, probe, options).content()

@@ -7,11 +7,10 @@ doi:10.1214/20-BA1221.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.stats import norm, rankdata
+from scipy.special import ndtri
 
-Array = NDArray[np.float64]
+from hotlever.types import Array
 
 
 def split_rhat(chains: Array) -> float:
@@ -73,8 +72,10 @@ def _rhat(chains: Array) -> float:
 
 def _normal_ranks(values: Array) -> Array:
     """Replace values by the normal scores of their ranks."""
-    ranks = rankdata(values, method="average").reshape(values.shape)
-    scores: Array = norm.ppf((ranks - 0.375) / (values.size + 0.25))
+    _, place, count = np.unique(values.ravel(), return_inverse=True, return_counts=True)
+    # equal values share their mean rank
+    ranks = (np.cumsum(count) - 0.5 * (count - 1))[place].reshape(values.shape)
+    scores: Array = ndtri((ranks - 0.375) / (values.size + 0.25))
     return scores
 
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hotlever.types import Array
 
 #: Observables that have a zero, with the unit it is given in.
 ZEROED = {"current": "mA", "reader": "V"}
@@ -23,12 +23,8 @@ _NOTICED = 7.0
 class Drift:
     """Straight lines over the rows of some observables.
 
-    Parameters
-    ----------
-    observables : sequence of str
-        The rows of the data; those of `ZEROED` get a line.
-    present : ndarray of bool, shape (k, n)
-        Which data there are.
+    Those of `ZEROED` get a line; `present`, (k, n), says which data there are. Weights, by which
+    residuals are multiplied, have the same shape.
     """
 
     def __init__(self, observables: Sequence[str], present: NDArray[np.bool_]) -> None:
@@ -43,15 +39,7 @@ class Drift:
         self._columns = self._columns[:, :, kept]
 
     def line(self, difference: Array, weights: Array) -> Array:
-        """Return the lines that fit a difference best, shape (k, n).
-
-        Parameters
-        ----------
-        difference : ndarray, shape (k, n)
-            Data minus prediction.
-        weights : ndarray, shape (k, n)
-            By which residuals are multiplied.
-        """
+        """Return the lines that fit a difference (data minus prediction) best, shape (k, n)."""
         matrix = (weights[..., None] * self._columns)[self._present]
         target = (weights * difference)[self._present]
         return np.asarray(self._columns @ np.linalg.lstsq(matrix, target)[0])
@@ -64,13 +52,8 @@ class Drift:
     def noticed(self, residual: Array, jacobian: Array, weights: Array) -> list[str]:
         """Say which observables have a zero that stands out of the scatter.
 
-        Parameters
-        ----------
-        residual : ndarray, shape (N,)
-            Weighted data minus prediction at the optimum without lines.
-        jacobian : ndarray, shape (N, m)
-            What the parameters could take up instead.
-        weights : ndarray, shape (k, n)
+        By the weighted residual (data minus prediction, N) at the optimum without lines, and by
+        what the parameters could take up instead, (N, m).
         """
         columns = (weights[..., None] * self._columns)[self._present]
         basis = np.linalg.qr(jacobian)[0]
@@ -84,26 +67,16 @@ class Drift:
         # each datum's own variance, as in the covariance of the parameters
         influence = inverse @ columns.T * rest
         errors = np.sqrt((influence**2).sum(axis=1))
-        lines = self._columns @ sizes
-        found = []
-        for place, name in enumerate(self._names):
-            if name not in ZEROED:
-                continue
-            mine = np.any(self._columns[place], axis=0)
-            if np.any(np.abs(sizes[mine]) > _NOTICED * errors[mine]):
-                found.append(f"{name}: {self.described(name, *lines[place, [0, -1]])}")
-        return found
+        out = np.abs(sizes) > _NOTICED * errors
+        return self.in_words(self._columns @ sizes, np.any(self._columns, axis=1) @ out)
 
-    def lines_in_words(self, line: Array) -> list[str]:
-        """Describe lines from `line`."""
+    def in_words(self, line: Array, which: NDArray[np.bool_] | None = None) -> list[str]:
+        """Describe lines from `line`; some of them, if not all."""
+        which = np.any(self._columns, axis=(1, 2)) if which is None else which
         return [
-            f"{name}: {self.described(name, *line[place, [0, -1]])}"
-            for place, name in enumerate(self._names)
-            if name in ZEROED
+            f"{name}: the zero goes from {first:+.3g} to {last:+.3g} {ZEROED[name]} along the file"
+            for name, first, last, asked in zip(
+                self._names, *line[:, [0, -1]].T, which, strict=True
+            )
+            if asked
         ]
-
-    @staticmethod
-    def described(name: str, first: float, last: float) -> str:
-        """Return the zero at the first and at the last row in words."""
-        unit = ZEROED[name]
-        return f"the zero goes from {first:+.3g} to {last:+.3g} {unit} along the file"

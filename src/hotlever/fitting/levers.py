@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
-from hotlever import __version__
+from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.materials import PARAMETERS
-
-Array = NDArray[np.float64]
+from hotlever.text import INVERSION
 
 #: Levers are said to differ if equal ones would scatter as much less often than this.
 _RARE = 0.01
 #: A lever stands apart beyond this many standard deviations (median-based) of the others, which
 #: takes this many levers to tell.
 _APART, _FEWEST = 5.0, 6
-INVERSION = "inversion_temperature"
 
 
 def compare_levers(fits: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
@@ -33,7 +29,7 @@ def compare_levers(fits: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
     Parameters
     ----------
     fits : mapping of str to mapping
-        The contents of fit files (`hotlever.fitting.fit.Fit.to_json`), by the name of the lever.
+        The contents of fit files (`hotlever.fitting.result.Fit.content`), by the name of the lever.
 
     Returns
     -------
@@ -52,85 +48,53 @@ def compare_levers(fits: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
     if not fits:
         raise InputError("no fits to compare, expected one or more")
     quantities = [*PARAMETERS, INVERSION]
-    rows = np.array([_row(name, content) for name, content in fits.items()])
+    rows = np.array([_row(name, content) for name, content in fits.items()], dtype=float)
     value, stderr = rows[..., 0], rows[..., 1]
-    count = len(rows)
     known = np.isfinite(stderr) & (stderr > 0)
     weights = np.where(known, 1.0 / np.where(known, stderr, 1.0) ** 2, np.nan)
     middle = (weights * value).sum(axis=0) / weights.sum(axis=0)
-    scatter = value.std(axis=0, ddof=1) if count > 1 else np.full(len(quantities), np.nan)
-    mean_stderr = np.full(len(quantities), np.nan)
-    mean_stderr[known.any(axis=0)] = np.nanmean(
-        np.where(known, stderr, np.nan)[:, known.any(axis=0)], axis=0
-    )
+    scatter = value.std(axis=0, ddof=1) if len(rows) > 1 else np.full(len(quantities), np.nan)
+    with np.errstate(invalid="ignore"):  # no error at all is none on average
+        mean_stderr = np.where(known, stderr, 0.0).sum(axis=0) / known.sum(axis=0)
     units = [*(known.unit for known in PARAMETERS.values()), "K"]
-    data = xr.Dataset(
+    return labelled(
         {
             "value": (("lever", "quantity"), value),
             "stderr": (("lever", "quantity"), stderr),
-            "mean": ("quantity", value.mean(axis=0)),
-            "scatter": ("quantity", scatter),
-            "mean_stderr": ("quantity", mean_stderr),
-            "chi_square": ("quantity", (weights * (value - middle) ** 2).sum(axis=0)),
+            "mean": value.mean(axis=0),
+            "scatter": scatter,
+            "mean_stderr": mean_stderr,
+            "chi_square": (weights * (value - middle) ** 2).sum(axis=0),
         },
-        coords={"lever": list(fits), "quantity": quantities, "unit": ("quantity", units)},
-        attrs={"software": f"hotlever {__version__}"},
+        "quantity",
+        {"lever": list(fits), "quantity": quantities, "unit": ("quantity", units)},
     )
-    for name, unit, text in (
-        ("value", "of the quantity", "fitted value"),
-        ("stderr", "of the quantity", "its standard error"),
-        ("mean", "of the quantity", "mean of the levers"),
-        ("scatter", "of the quantity", "standard deviation between the levers"),
-        ("mean_stderr", "of the quantity", "mean of the standard errors"),
-        ("chi_square", "1", "chi-square of the values about their weighted mean"),
-    ):
-        data[name].attrs = {"units": unit, "long_name": text}
-    return data
 
 
-def _row(name: str, content: Mapping[str, Any]) -> list[tuple[float, float]]:
+def _row(name: str, content: Mapping[str, Any]) -> list[tuple[float | None, float | None]]:
     """Return value and standard error of each quantity in a fit file."""
-
-    def number(found: float | None) -> float:
-        return math.nan if found is None else float(found)
-
     try:
-        row = [
-            (number(entry["value"]), number(entry["stderr"]))
-            for entry in (content["parameters"][key] for key in PARAMETERS)
-        ]
+        entries = [content["parameters"][key] for key in PARAMETERS]
         inversion = content["inversion_temperature_K"], content["inversion_temperature_stderr_K"]
+        return [*((entry["value"], entry["stderr"]) for entry in entries), inversion]
     except (KeyError, TypeError) as error:
         raise InputError(f"{name}: not a fit file, {error} is missing") from error
-    return [*row, (number(inversion[0]), number(inversion[1]))]
 
 
 def statements(data: xr.Dataset) -> list[str]:
-    """Say in words whether the levers differ by more than their errors, and which stand apart.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `compare_levers`.
-    """
-    found: list[str] = []
-    count = data.sizes["lever"]
-    judged = [
-        name for name in data.quantity.values if np.isfinite(data.chi_square.sel(quantity=name))
+    """Say in words whether the levers differ by more than their errors, and which stand apart."""
+    count, chi_square = data.sizes["lever"], data.chi_square.values
+    if count < 2 or np.isnan(chi_square).all():
+        return []
+    limit = chdtri(count - 1, _RARE)
+    found = [
+        f"the levers differ in {_said(str(one.quantity.item()))}: they scatter by "
+        f"{one.scatter.item() / abs(one['mean'].item()):.1%}, "
+        f"{one.scatter.item() / one.mean_stderr.item():.1f} times the mean standard error"
+        for one in (data.isel(quantity=place) for place in np.flatnonzero(chi_square > limit))
     ]
-    if count < 2 or not judged:
-        return found
-    limit = chi2.ppf(1.0 - _RARE, count - 1)
-    alike = [name for name in judged if data.chi_square.sel(quantity=name) <= limit]
-    for name in judged:
-        if name not in alike:
-            one = data.sel(quantity=name)
-            found.append(
-                f"the levers differ in {_said(name)}: they scatter by "
-                f"{one.scatter.item() / abs(one['mean'].item()):.1%}, "
-                f"{one.scatter.item() / one.mean_stderr.item():.1f} times the mean standard error"
-            )
-    if alike:
+    alike = data.quantity.values[chi_square <= limit]
+    if alike.size:
         found.append(
             f"the scatter of {_listed([_said(name) for name in alike])} between the levers is no "
             "larger than the standard errors explain"
@@ -138,7 +102,7 @@ def statements(data: xr.Dataset) -> list[str]:
     if count >= _FEWEST:
         found += [
             f"{lever} stands apart from the other levers in {_listed(names)}"
-            for lever, names in _apart(data.sel(quantity=judged)).items()
+            for lever, names in _apart(data.isel(quantity=np.isfinite(chi_square))).items()
         ]
     return found
 
@@ -167,24 +131,15 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def levers_csv(data: xr.Dataset) -> str:
-    """Return a table with one row for each lever: value and standard error of each quantity.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `compare_levers`.
-    """
-    columns = {INVERSION: f"{INVERSION}_K"}
+    """Return a table with one row for each lever: value and standard error of each quantity."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    header = ["lever"]
-    for quantity in data.quantity.values:
-        column = columns.get(quantity, quantity)
-        header += [
-            column,
-            column.replace("_K", "_stderr_K") if column.endswith("_K") else f"{column}_stderr",
-        ]
-    writer.writerow(header)
+    header = (
+        f"{name}{kind}{'_K' if name == INVERSION else ''}"
+        for name in data.quantity.values
+        for kind in ("", "_stderr")
+    )
+    writer.writerow(["lever", *header])
     pairs = np.stack([data.value.values, data.stderr.values], axis=-1)
     for lever, row in zip(data.lever.values, pairs.reshape(len(pairs), -1), strict=True):
         writer.writerow([lever, *("" if np.isnan(cell) else f"{cell:.8g}" for cell in row)])

@@ -9,17 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.stats import qmc
 
-from hotlever.lever.equations import OBSERVABLES
-from hotlever.lever.reduced import ReducedSpace
-from hotlever.lever.reduction import BOX, material_in_box, place_in_box
+from hotlever.fitting.residuals import Residuals
+from hotlever.lever.atlas import BOX, Atlas, material_in_box, place_in_box
 from hotlever.materials import Material
-from hotlever.probe.probe import Circuit
-
-Array = NDArray[np.float64]
+from hotlever.probe import Circuit
+from hotlever.types import Array
 
 #: c_κ is sought in this range; the others in their box, and a little beyond.
 _C_KAPPA = (0.3, 1.1)
@@ -30,68 +26,24 @@ _COMPARED, _IMPROVED = 64, 3
 _SOFT = 0.03
 
 
-class QuickPrediction:
-    """A whole measurement, predicted from the atlas of a reduced lever.
+def quick_prediction(atlas: Atlas, circuit: Circuit, material: Material, bias: Array) -> Array:
+    """Return I_h (mA), V_r (V) and T_tip (K) at some biases, (3, n), read off an atlas.
 
-    Parameters
-    ----------
-    space : ReducedSpace
-        With an atlas.
-    circuit : Circuit
-    bias : ndarray, shape (n,)
+    Beyond its ends the curves go on level.
     """
-
-    def __init__(self, space: ReducedSpace, circuit: Circuit, bias: Array) -> None:
-        assert space.atlas is not None
-        self._bias, self._kohm = bias, circuit.series_resistance_ohm / 1000.0
-        self._atlas, self._stretched = space.atlas, ~space.is_temperature()
-        self._tip = circuit.base_temperature_K + space.atlas.grid**2
-        # V_l, I_h and V_r as functionals of the unknowns of the atlas
-        self._functionals = np.zeros((3, space.size + 2))
-        self._functionals[0, -2] = self._functionals[1, -1] = 1.0
-        reader = space.reader_weights()
-        if reader is not None:
-            self._functionals[2, reader[0]] = reader[1]
-
-    def __call__(self, material: Material) -> Array:
-        """Return I_h (mA), V_r (V) and T_tip (K), shape (3, n); the ends go on level."""
-        lever, current, reader = self._atlas.branch(
-            place_in_box(material), self._stretched, material.c_kappa, self._functionals
-        )
-        bias = np.maximum.accumulate(lever + self._kohm * current)
-        return np.stack(
-            [np.interp(self._bias, bias, values) for values in (current, reader, self._tip)]
-        )
+    lever, current, reader = atlas.shown(material).T
+    rising = np.maximum.accumulate(circuit.bias(lever, current))
+    tip = circuit.base_temperature_K + atlas.u**2
+    return np.stack([np.interp(bias, rising, values) for values in (current, reader, tip)])
 
 
 def starting_material(
-    space: ReducedSpace,
-    circuit: Circuit,
-    given: Material,
-    varied: Sequence[str],
-    bias: Array,
-    data: Array,
-    scale: Array,
+    atlas: Atlas, circuit: Circuit, given: Material, varied: Sequence[str], residuals: Residuals
 ) -> Material:
     """Find a material to start a fit from.
 
-    Parameters
-    ----------
-    space : ReducedSpace
-        Without an atlas the given material is returned.
-    circuit : Circuit
-    given : Material
-        Where the parameters that are not varied stay; itself one of the candidates.
-    varied : sequence of str
-    bias : ndarray, shape (n,)
-    data : ndarray, shape (3, n)
-        In the order of `OBSERVABLES`, NaN where nothing was measured or is to be compared.
-    scale : ndarray, shape (3, n)
-        By which differences are divided.
+    The parameters that are not varied stay as they are in `given`, itself one of the candidates.
     """
-    if space.atlas is None:
-        return given
-    quick, present = QuickPrediction(space, circuit, bias), np.isfinite(data)
     box = [name for name in varied if name in BOX]
     free = [*box, *(["c_kappa"] if "c_kappa" in varied else [])]
     home = place_in_box(given)
@@ -106,18 +58,21 @@ def starting_material(
             values["c_kappa"] = low + float(point[-1]) * (high - low)
         return given.with_(**values)
 
-    def differences(point: Array) -> Array:
-        return np.asarray(((quick(material(point)) - data) / scale)[present])
+    def differences(of: Material) -> Array:
+        values = quick_prediction(atlas, circuit, of, residuals.bias)[residuals.rows]
+        return np.asarray(((values - residuals.data) / residuals.largest)[residuals.present])
 
-    def badness(point: Array) -> float:
+    def badness(of: Material) -> float:
         # one glitch must not decide
-        return float(np.sum(np.log1p((differences(point) / _SOFT) ** 2)))
+        return float(np.sum(np.log1p((differences(of) / _SOFT) ** 2)))
+
+    from scipy.stats import qmc  # takes long, and most fits start elsewhere
 
     candidates = qmc.Sobol(len(free), seed=0).random(_COMPARED)
-    best = sorted(candidates, key=badness)[:_IMPROVED]
+    best = sorted(candidates, key=lambda point: badness(material(point)))[:_IMPROVED]
     improved = [
         least_squares(
-            differences,
+            lambda point: differences(material(point)),
             point,
             bounds=(-_BEYOND, 1.0 + _BEYOND),
             loss="cauchy",
@@ -127,15 +82,4 @@ def starting_material(
         ).x
         for point in best
     ]
-    found = min(improved, key=badness)
-    known = ((quick(given) - data) / scale)[present]
-    if np.sum(np.log1p((known / _SOFT) ** 2)) < badness(found):
-        return given
-    return material(found)
-
-
-def aligned(places: Sequence[int], rows: Array) -> Array:
-    """Place the rows of some observables among all three, NaN elsewhere."""
-    full = np.full((len(OBSERVABLES), *rows.shape[1:]), np.nan)
-    full[list(places)] = rows
-    return full
+    return min([given, *map(material, improved)], key=badness)

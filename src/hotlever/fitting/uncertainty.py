@@ -5,24 +5,20 @@ In numbers for the fit file, and in words.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from dask.system import CPU_COUNT
 
-from hotlever.cluster import local_client, run_all
-from hotlever.errors import HotleverError
-from hotlever.fitting.fit import Fit
+from hotlever.cluster import local_processes
+from hotlever.fitting.embedded import json_text, without_nan
 from hotlever.fitting.posterior import BAND_QUANTILES, predictive_band, sample_posterior
 from hotlever.fitting.profile import profile_likelihood
+from hotlever.fitting.result import Fit
 from hotlever.materials import PARAMETERS
-
-Array = NDArray[np.float64]
-Progress = Callable[[int, int], None]
+from hotlever.types import Array, Progress
 
 #: Chains are called unsettled above this R̂ or below this effective sample size (Vehtari et al.,
 #: doi:10.1214/20-BA1221).
@@ -30,6 +26,8 @@ _RHAT, _EFFECTIVE = 1.01, 400
 #: A parameter is called undetermined if this share of the samples lies within the second share
 #: of its range from a bound, or if its spread is more than the third share of the prior's.
 _AT_BOUND, _NEAR, _AS_WIDE = 0.025, 0.02, 0.7
+#: The reduced lever is said to be off from this error on (K).
+_REDUCED_ERROR_K = 1.0
 #: Intervals are said to differ from those of the standard error by more than this share of it.
 _DIFFERENT = 0.5
 
@@ -56,7 +54,7 @@ class Uncertainty:
         """Say in words what the data leave open, and what that means for the tip temperature."""
         found = []
         if self.posterior is not None:
-            found += _unsettled(self.posterior)
+            found += _unsettled(self.posterior) + _unreduced(self.posterior)
             for name in self.fit.names:
                 found += _about(self.fit, name, self.posterior[name].values.ravel())
         for profile in self.profiles.values():
@@ -67,26 +65,26 @@ class Uncertainty:
             found.append(
                 "the predicted tip temperature is uncertain by at most "
                 f"{(high - low)[widest] / 2:.1f} K (half of the 95 % band, at "
-                f"{self.band.bias_V.values[widest]:.3g} V), the model taken as exact"
+                f"{self.band.bias.values[widest]:.3g} V), the model taken as exact"
             )
         return found
 
     def to_json(self) -> str:
         """Return the fit file with the keys ``posterior`` and ``profiles`` beside its own."""
-        content = json.loads(self.fit.to_json())
+        content = self.fit.content()
         if self.posterior is not None:
             content["posterior"] = _posterior_content(self.posterior)
         if self.band is not None:
             content["posterior"]["band"] = {
-                name: _listed(self.band[name].values)
-                for name in ("quantile", "bias_V", "tip_K", "power_mW", "tip_at_power_K")
+                name.replace("bias", "bias_V"): self.band[name].values.tolist()
+                for name in ("quantile", "bias", "tip_K", "power_mW", "tip_at_power_K")
             }
         if self.profiles:
             content["profiles"] = {
                 name: _profile_content(profile) for name, profile in self.profiles.items()
             }
         content["uncertainty_notes"] = self.statements()
-        return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+        return json_text(without_nan(content))
 
 
 def examine(
@@ -94,7 +92,7 @@ def examine(
     *,
     samples: int | None = None,
     profiles: bool = False,
-    processes: int = 1,
+    processes: int | None = None,
     sampling: Progress | None = None,
     banding: Progress | None = None,
     profiling: Progress | None = None,
@@ -108,8 +106,9 @@ def examine(
         Of the posterior, at least; none by default.
     profiles : bool
         Whether to profile every parameter that the fit varied.
-    processes : int
-        Started by spawn, if more than one: see `sample_posterior`.
+    processes : int, optional
+        Started by spawn, if more than one: see `sample_posterior`. By default one for each
+        processor.
     sampling, banding, profiling : callable, optional
         Called with the steps (for profiles: parameters) done and their number.
 
@@ -120,6 +119,7 @@ def examine(
     ComputationError
         If no start for sampling is found, a worker process dies, or the lever cannot be solved.
     """
+    processes = processes or CPU_COUNT
     curves = _profiles(fit, processes, profiling) if profiles else {}
     posterior = band = None
     if samples is not None:
@@ -130,25 +130,13 @@ def examine(
 
 def _profiles(fit: Fit, processes: int, progress: Progress | None) -> dict[str, xr.Dataset]:
     """Profile each varied parameter; some at a time in processes of their own."""
-    names = fit.names
-    found: dict[str, xr.Dataset] = {}
-
-    def tell() -> None:
-        if progress is not None:
-            progress(len(found), len(names))
-
-    tell()
-    if processes == 1:
-        for name in names:
-            found[name] = profile_likelihood(fit, name)
-            tell()
-        return found
-    with local_client(min(processes, len(names))) as client:
-        for number, result in run_all(client, profile_likelihood, ((fit, name) for name in names)):
-            if isinstance(result, HotleverError):
-                raise result
+    tell = progress or (lambda done, total: None)
+    names, found = fit.names, {}
+    tell(0, len(names))
+    with local_processes(min(processes, len(names))) as run:
+        for number, result in run(profile_likelihood, [(fit, name) for name in names]):
             found[names[number]] = result
-            tell()
+            tell(len(found), len(names))
     return {name: found[name] for name in names}
 
 
@@ -166,31 +154,37 @@ def _unsettled(posterior: xr.Dataset) -> list[str]:
     ]
 
 
+def _unreduced(posterior: xr.Dataset) -> list[str]:
+    """Say whether the posterior reaches where the reduced lever is not to be trusted."""
+    error = posterior.attrs["reduced_error_K"]
+    text = (
+        f"the reduced lever is off by up to {error:.1f} K at the outermost samples of the posterior"
+    )
+    return [text] if error > _REDUCED_ERROR_K else []
+
+
 def _about(fit: Fit, name: str, values: Array) -> list[str]:
     """Say whether a parameter is undetermined, or its interval not that of its standard error."""
     known, fitted = PARAMETERS[name], fit.parameters[name]
-    span = known.upper - known.lower
+    span, undetermined = known.upper - known.lower, f"{name} is not determined by these data: its"
     for bound, inwards in ((known.lower, 1.0), (known.upper, -1.0)):
         if np.mean(inwards * (values - bound) < _NEAR * span) > _AT_BOUND:
-            return [
-                f"{name} is not determined by these data: its posterior reaches its bound "
-                f"{bound:g} {'' if known.unit == '1' else known.unit}".rstrip()
-            ]
+            unit = "" if known.unit == "1" else f" {known.unit}"
+            return [f"{undetermined} posterior reaches its bound {bound:g}{unit}"]
     if values.std() > _AS_WIDE * span / np.sqrt(12.0):
-        return [
-            f"{name} is not determined by these data: its posterior is about as wide as its bounds"
-        ]
+        return [f"{undetermined} posterior is about as wide as its bounds"]
     if not fitted.stderr:
         return []
-    low, high = np.percentile(values, (2.5, 97.5))
     # two standard errors, nearly: the quantile of the normal distribution
     reach = 1.96 * fitted.stderr
-    if max(abs(low - fitted.value + reach), abs(high - fitted.value - reach)) > _DIFFERENT * reach:
-        return [
-            f"{name}: 95 % of the posterior lies between {low:.4g} and {high:.4g}, not between "
-            f"{fitted.value - reach:.4g} and {fitted.value + reach:.4g} as its standard error says"
-        ]
-    return []
+    said = np.array([fitted.value - reach, fitted.value + reach])
+    found = np.percentile(values, (2.5, 97.5))
+    if np.abs(found - said).max() <= _DIFFERENT * reach:
+        return []
+    return [
+        f"{name}: 95 % of the posterior lies between {found[0]:.4g} and {found[1]:.4g}, not "
+        f"between {said[0]:.4g} and {said[1]:.4g} as its standard error says"
+    ]
 
 
 def _posterior_content(posterior: xr.Dataset) -> dict[str, Any]:
@@ -220,16 +214,11 @@ def _posterior_content(posterior: xr.Dataset) -> dict[str, Any]:
 
 def _profile_content(profile: xr.Dataset) -> dict[str, Any]:
     return {
-        "value": _listed(profile.value.values),
-        "delta_chi_square": _listed(profile.delta_chi_square.values),
+        "value": profile.value.values.tolist(),
+        "delta_chi_square": profile.delta_chi_square.values.tolist(),
         "interval": {
-            f"{100 * level:.0f}": _listed(profile.interval.sel(level=level).values)
+            f"{100 * level:.0f}": profile.interval.sel(level=level).values.tolist()
             for level in profile.level.values
         },
         "notes": profile.attrs["notes"].splitlines(),
     }
-
-
-def _listed(values: Array) -> Any:
-    """Return an array as lists, with None for what is not a number: JSON has no NaN."""
-    return np.where(np.isnan(values), np.array(None), values).tolist()

@@ -1,20 +1,15 @@
 """The coupled electro-thermal problem of a lever in vacuum or air, and sweeps over the bias."""
 
-from hotlever.lever.lever import (
-    Lever,
-    LeverState,
-    Ramp,
-    probe_of,
-    read_sweep,
-    sweep,
-    sweep_csv,
-    write_sweep,
-)
+from hotlever.lever.branch import Branch, OperatingPoint
+from hotlever.lever.dataset import probe_of, read_sweep, sweep_csv, write_sweep
+from hotlever.lever.lever import Lever, sweep
+from hotlever.lever.state import State
 
 __all__ = [
+    "Branch",
     "Lever",
-    "LeverState",
-    "Ramp",
+    "OperatingPoint",
+    "State",
     "probe_of",
     "read_sweep",
     "sweep",

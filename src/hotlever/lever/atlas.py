@@ -1,8 +1,8 @@
-"""Known branches of a reduced lever, from which states of any material are guessed.
+"""Known branches of a reduced lever, from which those of any material are guessed.
 
-Branches are compared at the same u = √(T_tip − T_base), in which every unknown is smooth down to
-zero bias and at the knee. At every u the unknowns are quadratic functions of the parameters,
-fitted to the known states and their derivatives. The bias follows for any series resistor.
+At every node of the branches, the same for all, states and current are quadratic functions of the
+parameters, fitted to known states and their exact derivatives. The conductivity scale c_κ needs no
+fit in vacuum: scaling κ scales V² at the same temperatures.
 """
 
 from __future__ import annotations
@@ -11,120 +11,107 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, CubicSpline, make_interp_spline
 
-Array = NDArray[np.float64]
+from hotlever.lever.equations import SHOWN
+from hotlever.materials import Material
+from hotlever.types import Array
 
-#: Points of the common grid in u.
-_GRID = 33
+#: Parameter ranges that reduced levers are made for. n_d is spread evenly in its logarithm.
+BOX: dict[str, tuple[float, float]] = {
+    "delta": (0.5, 0.9),
+    "n_d": (2.0e17, 9.0e17),
+    "p": (2.35, 3.0),
+    "a0": (7.5e-4, 1.15e-3),
+    "a1": (0.85e-6, 1.5e-6),
+}
+
+
+def material_in_box(material: Material, shares: Array) -> Material:
+    """Return the material at a point of the box given by numbers between 0 and 1."""
+    values = {}
+    for share, (name, (low, high)) in zip(shares, BOX.items(), strict=True):
+        even = low * (high / low) ** share if name == "n_d" else low + share * (high - low)
+        values[name] = float(even)
+    return material.with_(**values)
+
+
+def place_in_box(material: Material) -> Array:
+    """Invert `material_in_box`, beyond the box too."""
+    shares = []
+    for name, (low, high) in BOX.items():
+        value = getattr(material, name)
+        if name == "n_d":
+            value, low, high = np.log([value, low, high])
+        shares.append((value - low) / (high - low))
+    return np.array(shares)
+
+
+def box_slopes(material: Material) -> Array:
+    """Return how far each parameter moves per unit of its share of the box, (5,)."""
+    return np.array(
+        [
+            getattr(material, name) * np.log(high / low) if name == "n_d" else high - low
+            for name, (low, high) in BOX.items()
+        ]
+    )
 
 
 @dataclass(frozen=True)
 class Atlas:
-    """Quadratic functions of the parameters that give a branch on a grid.
+    """Quadratic functions of the parameters that give a branch at its nodes.
 
     Attributes
     ----------
-    grid : ndarray, shape (g,)
-        u (K^½), from 0.
-    surface : ndarray, shape (terms, g, n)
-        Coefficients, for the terms of `_terms`, of the unknowns up to V_l, and of I_h (mA).
+    u : ndarray, shape (k,)
+        √(T_tip − T_base) (K^½) of the nodes, the first zero.
+    surface : ndarray, shape (terms, k, size + 4)
+        Coefficients, for the terms of `_terms`, of the states and of V_l (V), I_h (mA), V_r (V).
+    grows : ndarray of bool, shape (size + 4,)
+        What grows with √c_κ: all but temperatures.
     c_kappa : float or ndarray, shape ()
-        Of all branches.
+        Of all known branches.
     """
 
-    grid: Array
+    u: Array
     surface: Array
+    grows: NDArray[np.bool_]
     c_kappa: float | Array
 
     @classmethod
     def fitted(
-        cls, grid: Array, places: Array, states: Array, slopes: Array, c_kappa: float
+        cls,
+        u: Array,
+        materials: list[Material],
+        values: Array,
+        slopes: Array,
+        grows: NDArray[np.bool_],
     ) -> Atlas:
-        """Fit the coefficients to known branches.
+        """Fit the coefficients to known branches of m materials with the same c_κ.
 
-        Parameters
-        ----------
-        grid : ndarray, shape (g,)
-        places : ndarray, shape (k, p)
-            Parameters of each branch, between 0 and 1.
-        states : ndarray, shape (k, g, n)
-        slopes : ndarray, shape (k, g, n, p)
-            Derivatives by the parameters.
-        c_kappa : float
+        Of the values, (m, k, size + 4), the slopes are the derivatives by the parameters of the
+        box, (m, k, size + 4, 5).
         """
-        values, gradients = zip(*(_terms(place) for place in places), strict=True)
-        matrix = np.concatenate([np.stack(values), *(gradient.T for gradient in gradients)])
-        known = np.concatenate([states, *np.moveaxis(slopes, 3, 1)])
-        surface = np.linalg.lstsq(matrix, known.reshape(len(known), -1))[0]
-        return cls(grid, surface.reshape(-1, *states.shape[1:]), c_kappa)
+        places = [place_in_box(material) for material in materials]
+        terms, gradients = zip(*(_terms(place) for place in places), strict=True)
+        matrix = np.concatenate([np.stack(terms), *(gradient.T for gradient in gradients)])
+        units = np.stack([box_slopes(material) for material in materials])
+        by_share = slopes * units[:, None, None, :]
+        rows = np.concatenate([values, *np.moveaxis(by_share, 3, 1)])
+        surface = np.linalg.lstsq(matrix, rows.reshape(len(rows), -1))[0]
+        return cls(u, surface.reshape(-1, *values.shape[1:]), grows, materials[0].c_kappa)
 
-    def widened(self, *places_and_counts: int) -> Atlas:
-        """Return an atlas with further unknowns, all zero: at a place, so many, and so on."""
-        pairs = zip(places_and_counts[::2], places_and_counts[1::2], strict=True)
-        places = np.concatenate([np.full(count, place) for place, count in pairs])
-        surface = np.insert(self.surface, places.astype(int), 0.0, axis=2)
-        return Atlas(self.grid, surface, self.c_kappa)
+    def states(self, material: Material) -> Array:
+        """Return the states of a material at the nodes, (size + 1, k), to some ten kelvin."""
+        return self._at(material)[:, : -len(SHOWN)].T
 
-    def guess(
-        self,
-        place: Array,
-        stretched: NDArray[np.bool_],
-        c_kappa: float,
-        series_resistance_kohm: float,
-        bias: Array,
-    ) -> Array | None:
-        """Guess the states of a material at some biases.
+    def shown(self, material: Material) -> Array:
+        """Return V_l (V), I_h (mA) and V_r (V) of a material at the nodes, shape (k, 3)."""
+        return self._at(material)[:, -len(SHOWN) :]
 
-        Parameters
-        ----------
-        place : ndarray, shape (p,)
-            Its parameters.
-        stretched : ndarray of bool, shape (n,)
-            The unknowns that grow with √c_κ: all but temperatures.
-        c_kappa : float
-        series_resistance_kohm : float
-        bias : ndarray, shape (b,)
-            V.
-
-        Returns
-        -------
-        ndarray, shape (n, b) or None
-            Unknowns up to V_l, and V_b; None where the branch folds back or ends too early.
-        """
-        branch = np.tensordot(_terms(place)[0], self.surface, axes=1)
-        branch[:, stretched] *= np.sqrt(c_kappa / self.c_kappa)
-        branch[:, -1] = branch[:, -2] + series_resistance_kohm * branch[:, -1]
-        if np.any(np.diff(branch[:, -1]) <= 0) or bias.max() > branch[-1, -1]:
-            return None
-        spline = CubicSpline(self.grid, branch)
-        # where the bias rises along the branch, the inverse of its spline is a short search
-        u = np.interp(bias, branch[:, -1], self.grid)
-        for _ in range(3):
-            slope = np.maximum(spline(u, 1)[:, -1], 1e-3)
-            u = np.clip(u + (bias - spline(u)[:, -1]) / slope, 0.0, self.grid[-1])
-        found = spline(u).T
-        found[-1] = bias
+    def _at(self, material: Material) -> Array:
+        found = np.tensordot(_terms(place_in_box(material))[0], self.surface, axes=1)
+        found[:, self.grows] *= np.sqrt(material.c_kappa / self.c_kappa)
         return np.asarray(found)
-
-    def branch(
-        self, place: Array, stretched: NDArray[np.bool_], c_kappa: float, functionals: Array
-    ) -> Array:
-        """Return linear functionals of the unknowns and of I_h on the grid.
-
-        Parameters
-        ----------
-        place, stretched, c_kappa
-            As for `guess`.
-        functionals : ndarray, shape (f, n)
-
-        Returns
-        -------
-        ndarray, shape (f, g)
-        """
-        stretch = np.where(stretched, np.sqrt(c_kappa / self.c_kappa), 1.0)
-        weights = (functionals * stretch) @ np.moveaxis(self.surface, 1, 2)
-        return np.asarray(np.tensordot(_terms(place)[0], weights, axes=1))
 
 
 def _terms(place: Array) -> tuple[Array, Array]:
@@ -137,33 +124,3 @@ def _terms(place: Array) -> tuple[Array, Array]:
         np.concatenate([[1.0], place, place[first] * place[second]]),
         np.concatenate([np.zeros((1, count)), unit, gradient]),
     )
-
-
-def branch_on_grid(u: Array, values: Array, along: Array, others: Array, grid: Array) -> tuple:
-    """Bring a branch from where it was solved to the common grid.
-
-    Parameters
-    ----------
-    u : ndarray, shape (m,)
-        Rising, from 0.
-    values : ndarray, shape (m, n)
-    along : ndarray, shape (m, n)
-        Derivatives of the values by u.
-    others : ndarray, shape (m, n, p)
-        Quantities without derivatives.
-    grid : ndarray, shape (g,)
-
-    Returns
-    -------
-    tuple of ndarray
-        Shapes (g, n) and (g, n, p).
-    """
-    return (
-        CubicHermiteSpline(u, values, along)(grid),
-        make_interp_spline(u, others, k=3)(grid),
-    )
-
-
-def common_grid(ends: Array) -> Array:
-    """Return the grid that all branches reach, for the last u of each."""
-    return np.linspace(0.0, float(ends.min()), _GRID)

@@ -1,13 +1,13 @@
-"""The coupled electro-thermal equations of a lever in its circuit.
+"""The coupled electro-thermal equations of a lever.
 
 Heat (paper's first equation, with the sign corrected) and charge::
 
     −∇·(κ ∇T) = σ |∇V|² − heat lost to air,    ∇·(σ ∇V) = 0,
 
-with T = base temperature at all terminals, V = 0 at ground, V = V_l on the supply contact,
-no current into the reader, and V_l + R_s I_h = V_b. A state is the vector of the free nodal
-values, then V_l, then V_b; one more condition, the *pin*, selects a state on the branch: a
-given bias, or a point along the arc. Units are µm, V, mA, mW and K.
+with T = base temperature at all terminals, V = 0 at ground, V = V_l on the supply contact and no
+current into the reader. One more condition, the *pin*, selects a state: its tip temperature. The
+circuit does not enter: what a lever shows at a tip temperature does not depend on it. Units are
+µm, V, mA, mW and K. Several states stand side by side, see `hotlever.lever.space`.
 
 The loss to air is linear in θ = ∫κ_air dT on the surface (`hotlever.air.operator`). The air
 operator fills the plate itself with air too; κ is therefore κ_Si − κ_air where there is air.
@@ -15,15 +15,13 @@ operator fills the plate itself with air too; κ is therefore κ_Si − κ_air w
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hotlever.lever.newton import LinearSolve
-from hotlever.lever.space import Fields, LeverSpace, Tangent, Tapered
-from hotlever.materials import PARAMETERS, Material
+from hotlever.lever.space import LEVER, TIP, Factors, Fields, Fluxes, Pin, Space, Tangent
+from hotlever.materials import Material
 from hotlever.materials.air import kirchhoff_variable, thermal_conductivity_of_air
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.silicon import (
@@ -31,10 +29,7 @@ from hotlever.materials.silicon import (
     conductivity_low_doped,
     thermal_conductivity,
 )
-from hotlever.probe.layout import Part
-from hotlever.probe.probe import Circuit
-
-Array = NDArray[np.float64]
+from hotlever.types import Array
 
 #: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
 PER_CM_TO_MILLI_PER_UM = 0.1
@@ -42,8 +37,11 @@ PER_CM_TO_MILLI_PER_UM = 0.1
 #: The laws that the equations use.
 LAWS = (thermal_conductivity, conductivity_low_doped, conductivity_high_doped)
 
-#: What a fit compares, by the name users give it.
-OBSERVABLES = ("current", "reader", "tip")
+#: What an instrument shows of a state, in the order of `LeverEquations.observed`.
+SHOWN = ("lever_V", "current_mA", "reader_V")
+
+#: Error (relative) to which derivatives are solved, and the most rounds of refinement.
+_EXACT, _MOST_ROUNDS = 1e-6, 6
 
 
 @dataclass(frozen=True)
@@ -52,10 +50,10 @@ class Conductivities:
 
     Attributes
     ----------
-    kappa, sigma : ndarray, shape (elements, points)
+    kappa, sigma : ndarray, shape (points, n)
         mW/K and mA/V.
     kappa_by, sigma_by : dict of str to ndarray
-        Derivatives by ``T`` and by fit parameter.
+        Derivatives by ``T``, or by the material parameters asked for.
     """
 
     kappa: Array
@@ -64,147 +62,39 @@ class Conductivities:
     sigma_by: dict[str, Array]
 
 
-class Jacobian(Protocol):
-    """The linearised equations before the circuit equation and the pin are added."""
-
-    current_gradient: tuple[NDArray[np.intp], Array]
-
-    def completed(self, series_resistance_kohm: float, pin_bias: float, pin_tip: float) -> Any:
-        """Return the square matrix; the last rows are circuit equation and pin."""
-        ...
-
-    def factorised(
-        self, series_resistance_kohm: float, pin_bias: float, pin_tip: float
-    ) -> LinearSolve:
-        """Complete and factorise."""
-        ...
-
-
-class AirTerm(Protocol):
-    """Loss to air between the unknowns of a space: linear in θ at some sites.
-
-    Attributes
-    ----------
-    filling : float
-        See `hotlever.air.operator.AirOperator`.
-    """
-
-    filling: float
-
-    def temperature(self, x: Array, base_temperature_K: float) -> Array:
-        """Return the temperature (K) at the sites."""
-        ...
-
-    def weak_form(self, theta: Array) -> Array:
-        """Return the heat lost for θ (mW/µm) at the sites, as `Space.weak_form` does."""
-        ...
-
-    def heat(self, theta: Array) -> tuple[float, float]:
-        """Return the heat lost (mW), and its part that is tested at the leg ends."""
-        ...
-
-    def added(self, jacobian: Any, kappa: Array) -> Jacobian:
-        """Return the Jacobian with air; κ_air (mW/(K µm)) at the sites."""
-        ...
-
-
-class Space(Protocol):
-    """Unknowns and operators of a lever: finite elements, or a reduced basis of them.
-
-    A state has ``size`` values, then V_l, then V_b. See `LeverSpace` for the methods.
-    """
-
-    size: int
-    tip: tuple[NDArray[np.intp], Array]
-    tapered: list[Tapered]
-    air: Any  # an AirTerm, or None in vacuum
-
-    @property
-    def thickness_um(self) -> float | Array:
-        """Thickness of the silicon (µm), where it varies at the quadrature points."""
-        ...
-
-    def fields(self, x: Array, base_temperature_K: float) -> Fields:
-        """Return temperature and gradients at the quadrature points."""
-        ...
-
-    def weak_form(
-        self, heat_source: Array | float, heat_flux: Array | float, charge_flux: Array
-    ) -> Array:
-        """Return the weak equations of the values, and last the current I_h into V_l."""
-        ...
-
-    def jacobian(self, tangent: Tangent) -> Jacobian:
-        """Assemble the linearised equations."""
-        ...
-
-    def start(self, base_temperature_K: float) -> Array:
-        """Return the exact state without bias."""
-        ...
-
-    def is_temperature(self) -> NDArray[np.bool_]:
-        """Return which of the unknowns are temperatures."""
-        ...
-
-    def tip_temperature(self, x: Array) -> float:
-        """Return T_tip (K)."""
-        ...
-
-    def highest_temperature(self, x: Array) -> float:
-        """Return the highest temperature (K)."""
-        ...
-
-    def reader_weights(self) -> tuple[NDArray[np.intp], Array] | None:
-        """Return unknowns and weights that give V_r; None without a reader."""
-        ...
-
-
-class Pin(NamedTuple):
-    """The condition ``bias V_b + tip T_tip = value`` that selects a state on the branch."""
-
-    bias: float
-    tip: float
-
-
 class LeverEquations:
-    """Residual, Jacobian and observables of one lever with one material in one circuit.
+    """Residual, Jacobian and derivatives of one lever with one material.
 
     Parameters
     ----------
     space : Space
-    circuit : Circuit
     material : Material
+    base_temperature_K : float
+
+    Attributes
+    ----------
+    scale, step_limit : ndarray, shape (size + 1, 1)
+        For Newton's method: the size of one unit of each unknown, by which kelvin and volts
+        compare, and the largest step.
     """
 
-    def __init__(self, space: Space, circuit: Circuit, material: Material) -> None:
-        self.space, self.circuit, self.material = space, circuit, material
+    def __init__(self, space: Space, material: Material, base_temperature_K: float) -> None:
+        self.space, self.material = space, material
+        self.base_temperature_K = base_temperature_K
         self._sheet = PER_CM_TO_MILLI_PER_UM * space.thickness_um
         self._latest: tuple[Array, tuple[Fields, Conductivities]] | None = None
-        self._doping = [
-            tapered_doping(
-                region.along,
-                material.n_d,
-                material.delta,
-                length=region.length_um,
-                n_hd=material.n_hd,
-            )
-            for region in space.tapered
-        ]
-        temperature = space.is_temperature()
-        self.scale = np.where(temperature, 1.0, 0.01)
-        self.step_limit = np.where(temperature, 60.0, 5.0)
+        along, length_um = space.tapered.along, space.tapered.length_um
+        self._doping = tapered_doping(
+            along, material.n_d, material.delta, length=length_um, n_hd=material.n_hd
+        )
+        self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]
+        self.step_limit = np.where(space.is_temperature, 60.0, 5.0)[:, None]
 
     # --- the laws at the quadrature points --------------------------------------------------
 
-    def conductivities(self, T: Array) -> Conductivities:
-        """Evaluate κ and σ with their derivatives.
-
-        Parameters
-        ----------
-        T : ndarray, shape (elements, points)
-            Temperature (K).
-        """
-        material, sheet = self.material, self._sheet
+    def conductivities(self, T: Array, names: Sequence[str] = ("T",)) -> Conductivities:
+        """Evaluate κ and σ at temperatures (K), (points, n), with some of their derivatives."""
+        material, here = self.material, self.space.tapered.points
         kappa, kappa_by = thermal_conductivity(T, material.c_kappa)
         if self.space.air is not None:
             filling = self.space.air.filling
@@ -212,236 +102,182 @@ class LeverEquations:
             kappa = kappa - filling * of_air
             kappa_by = {**kappa_by, "T": kappa_by["T"] - filling * of_air_by["T"]}
         sigma, sigma_by = conductivity_high_doped(T, material.a0, material.a1)
-        sigma_by |= {name: np.zeros_like(sigma) for name in ("n_d", "delta", "p")}
-        for region, (n, n_by) in zip(self.space.tapered, self._doping, strict=True):
-            here = region.elements
-            value, by = conductivity_low_doped(T[here], n, material.p)
-            sigma[here] = value
-            sigma_by["T"][here] = by["T"]
-            sigma_by["p"][here] = by["p"]
-            for name in ("n_d", "delta"):
-                sigma_by[name][here] = by["n"] * n_by[name]
-            for name in ("a0", "a1"):
-                sigma_by[name][here] = 0.0
+        n, n_by = self._doping
+        sigma[here], low_by = conductivity_low_doped(T[here], n, material.p)
+        low_by |= {name: low_by["n"] * n_by[name] for name in ("n_d", "delta")}
+
+        def sheet_by(name: str) -> Array:
+            by = np.zeros_like(sigma) + sigma_by.get(name, 0.0)
+            by[here] = low_by.get(name, 0.0)
+            return np.asarray(self._sheet * by)
+
+        nothing = np.zeros_like(kappa)
         return Conductivities(
-            sheet * kappa,
-            sheet * sigma,
-            {name: sheet * values for name, values in kappa_by.items()},
-            {name: sheet * values for name, values in sigma_by.items()},
+            self._sheet * kappa,
+            self._sheet * sigma,
+            {name: self._sheet * kappa_by.get(name, nothing) for name in names},
+            {name: sheet_by(name) for name in names},
         )
 
-    def per_cm(self, sheet_conductivity: Array) -> Array:
-        """Return a conductivity in S/cm or W/(cm K) of a sheet conductivity in mA/V or mW/K."""
-        return sheet_conductivity / self._sheet
-
     def at(self, x: Array) -> tuple[Fields, Conductivities]:
-        """Return the fields of a state, and κ and σ, at the quadrature points."""
-        # residual, Jacobian and sensitivities are asked for at the same state one by one
+        """Return the fields of states (size + 1, n), and κ and σ, at the quadrature points."""
+        # residual, Jacobian and derivatives are asked for at the same states one by one
         if self._latest is None or self._latest[0] is not x:
-            fields = self.space.fields(x, self.circuit.base_temperature_K)
+            fields = self.space.fields(x, self.base_temperature_K)
             self._latest = (x, (fields, self.conductivities(fields.T)))
         return self._latest[1]
 
-    # --- Newton's method and continuation ----------------------------------------------------
+    # --- the equations ------------------------------------------------------------------------
 
-    def pinned(self, pin: Pin, value: float) -> PinnedEquations:
-        """Return square equations: these and the condition that `pin` has this value."""
-        return PinnedEquations(self, pin, value)
-
-    def residual(self, x: Array) -> Array:
-        """Return the residual without the pin, shape (size + 1,)."""
+    def fluxes(self, x: Array) -> Fluxes:
+        """Return what the weak equations test."""
         fields, laws = self.at(x)
-        weak = self.space.weak_form(
-            -laws.sigma * _square(fields.grad_V),
+        return Fluxes(
+            -laws.sigma * square(fields.grad_V),
             laws.kappa * fields.grad_T,
             laws.sigma * fields.grad_V,
         )
+
+    def balance(self, x: Array) -> Array:
+        """Return the residuals of heat and charge, and last the current I_h (mA), (size + 1, n)."""
+        weak = self.space.weak_form(self.fluxes(x))
         if self.space.air is not None:
-            weak += self.space.air.weak_form(self._kirchhoff(x)[0])
-        weak[-1] = x[-2] + self.series_kohm * weak[-1] - x[-1]
+            weak += self.space.air.weak_form(self.kirchhoff(x)[0])
         return weak
 
-    def tangent(self, fields: Fields, laws: Conductivities) -> Tangent:
-        """Linearise the equations at the quadrature points."""
-        return Tangent(
-            heat_source_T=-laws.sigma_by["T"] * _square(fields.grad_V),
+    def kirchhoff(self, x: Array) -> tuple[Array, Array]:
+        """Return θ (mW/µm) and κ_air (mW/(K µm)) at the sites of the air operator."""
+        base = self.base_temperature_K
+        theta, by = kirchhoff_variable(base + self.space.air.rise(x), base)
+        return PER_CM_TO_MILLI_PER_UM * theta, PER_CM_TO_MILLI_PER_UM * by["T"]
+
+    def factorised(self, x: Array, pin: Pin = TIP) -> Factors:
+        """Return the factorised Jacobians of states, with the row of a pin last."""
+        fields, laws = self.at(x)
+        tangent = Tangent(
+            heat_source_T=-laws.sigma_by["T"] * square(fields.grad_V),
             heat_flux_T=laws.kappa_by["T"] * fields.grad_T,
             kappa=laws.kappa,
             heat_source_V=-2.0 * laws.sigma * fields.grad_V,
             charge_flux_T=laws.sigma_by["T"] * fields.grad_V,
             sigma=laws.sigma,
         )
+        kappa_air = None if self.space.air is None else self.kirchhoff(x)[1]
+        return self.space.factorised(tangent, kappa_air, pin)
 
-    def jacobian(self, x: Array) -> Jacobian:
-        """Return the Jacobian of the free values and of the current, ready to be completed."""
-        jacobian = self.space.jacobian(self.tangent(*self.at(x)))
-        if self.space.air is None:
-            return jacobian
-        return self.space.air.added(jacobian, self._kirchhoff(x)[1])
+    # --- derivatives --------------------------------------------------------------------------
 
-    def _kirchhoff(self, x: Array) -> tuple[Array, Array]:
-        """Return θ (mW/µm) and κ_air (mW/(K µm)) at the sites of the air operator."""
-        base = self.circuit.base_temperature_K
-        theta, by = kirchhoff_variable(self.space.air.temperature(x, base), base)
-        return PER_CM_TO_MILLI_PER_UM * theta, PER_CM_TO_MILLI_PER_UM * by["T"]
+    def flux_changes(self, x: Array, change: Array) -> Fluxes:
+        """Return how the fluxes of states (size + 1, n) change with the unknowns, to first order.
 
-    @property
-    def series_kohm(self) -> float:
-        """Series resistance R_s (kΩ), which makes volts of milliamperes."""
-        return self.circuit.series_resistance_ohm / 1000.0
+        There may be one change of each state, (size + 1, n), or several, (size + 1, n, k).
+        """
+        fields, laws = self.at(x)
+        moved = self.space.fields(change, 0.0)
 
-    def start(self) -> Array:
-        """Return the exact state at zero bias."""
-        return self.space.start(self.circuit.base_temperature_K)
+        def fitting(known: Array) -> Array:
+            return known if change.ndim == 2 else known[..., None]
+
+        grad_T, grad_V = fitting(fields.grad_T), fitting(fields.grad_V)
+        sigma = fitting(laws.sigma_by["T"]) * moved.T
+        kappa = fitting(laws.kappa_by["T"]) * moved.T
+        heat_source = sigma * fitting(square(fields.grad_V))
+        heat_source += 2.0 * fitting(laws.sigma) * (grad_V * moved.grad_V).sum(axis=0)
+        return Fluxes(
+            -heat_source,
+            kappa * grad_T + fitting(laws.kappa) * moved.grad_T,
+            sigma * grad_V + fitting(laws.sigma) * moved.grad_V,
+        )
+
+    def balance_change(self, x: Array, change: Array) -> Array:
+        """Return how `balance` changes with the unknowns: the Jacobian times changes."""
+        weak = self.space.weak_form(self.flux_changes(x, change))
+        if self.space.air is not None:
+            kappa = self.kirchhoff(x)[1]
+            kappa = kappa if change.ndim == 2 else kappa[..., None]
+            weak += self.space.air.weak_form(kappa * self.space.air.rise(change))
+        return weak
+
+    def by_parameter(self, x: Array, names: Sequence[str]) -> Array:
+        """Return how `balance` changes with some material parameters, (size + 1, n, k)."""
+        fields, _ = self.at(x)
+        laws = self.conductivities(fields.T, names)
+        sigma = np.stack([laws.sigma_by[name] for name in names], axis=-1)
+        kappa = np.stack([laws.kappa_by[name] for name in names], axis=-1)
+        grad_T, grad_V = fields.grad_T[..., None], fields.grad_V[..., None]
+        heat = -sigma * square(fields.grad_V)[..., None]
+        return self.space.weak_form(Fluxes(heat, kappa * grad_T, sigma * grad_V))
+
+    def solve_linear(
+        self, x: Array, factors: Factors, right_hand_side: Array, pin: Pin = TIP
+    ) -> Array:
+        """Solve Jacobian at `x` times change = right-hand side, the last row that of the pin.
+
+        The factors, with the same pin, may be those of states nearby: what they lack is removed by
+        refinement. Right-hand sides are one of each state or several, as in `flux_changes`.
+        """
+        states = np.arange(x.shape[1])
+        scale = self.scale.reshape(-1, *(1,) * (right_hand_side.ndim - 1))
+        change = factors.solve(right_hand_side, states)
+        for _ in range(_MOST_ROUNDS):
+            rest = right_hand_side - self.balance_change(x, change)
+            rest[-1] = right_hand_side[-1] - pin.of(self.space, change)
+            correction = factors.solve(rest, states)
+            change = change + correction
+            ratio = _length(correction / scale) / _length(change / scale)
+            # the next correction would be smaller by the same ratio once more
+            if not np.any(ratio**2 > _EXACT):
+                break
+        return change
+
+    def along(self, x: Array, factors: Factors) -> Array:
+        """Return the derivative of states by the tip temperature, (size + 1, n) per kelvin."""
+        unit = np.zeros_like(x)
+        unit[-1] = 1.0
+        return self.solve_linear(x, factors, unit)
+
+    def cold(self) -> tuple[Array, Array]:
+        """Return how the state leaves the one without power, by u = √(rise of the tip).
+
+        Heat and charge decouple at the base temperature: the potential grows as u, and the
+        temperature as u².
+
+        Returns
+        -------
+        first, second : ndarray, shape (size + 1, 1)
+            x = first u + second u² + O(u³).
+        """
+        nothing = np.zeros((self.space.size + 1, 1))
+        unit = nothing.copy()
+        unit[-1] = 1.0
+        factors = self.factorised(nothing, LEVER)
+        potential = self.solve_linear(nothing, factors, unit, LEVER)
+        grad_V = self.space.fields(potential, 0.0).grad_V
+        joule = self.at(nothing)[1].sigma * square(grad_V)
+        heat = self.space.weak_form(Fluxes(joule, 0.0 * grad_V, 0.0 * grad_V))
+        heat[-1] = 0.0
+        rise = self.solve_linear(nothing, factors, heat, LEVER)
+        per_square_volt = self.space.tip_rise(rise)
+        return potential / np.sqrt(per_square_volt), rise / per_square_volt
 
     # --- what is measured ------------------------------------------------------------------------
 
-    def measured(self, x: Array) -> Array:
-        """Return I_h (mA), V_r (V, NaN without a reader) and T_tip (K), shape (3,)."""
-        fields, laws = self.at(x)
-        current = self.space.weak_form(0.0, 0.0, laws.sigma * fields.grad_V)[-1]
-        return np.array([current, self._reader_voltage(x), self.space.tip_temperature(x)])
-
-    def _reader_voltage(self, x: Array) -> float:
-        reader = self.space.reader_weights()
-        return float("nan") if reader is None else float(reader[1] @ x[reader[0]])
-
-    def observe(self, x: Array) -> dict[str, float]:
-        """Return everything that is observed of a solved state, balances included.
-
-        Returns
-        -------
-        dict
-            ``current_mA``, ``lever_V``, ``reader_V`` (NaN without a reader), ``tip_K``,
-            ``power_mW``, resistances ``heater_ohm``, ``leg1_ohm``, ``leg2_ohm`` (Joule heat of
-            the part over I_h²; they add up to V_l / I_h; NaN without current), ``max_K``, and
-            for the balances ``ground_current_mA``, ``end_heat_mW`` and ``air_heat_mW`` (0 in
-            vacuum).
-
-        Raises
-        ------
-        TypeError
-            If the space is not the full finite-element one.
-        """
-        space = self.space
-        if not isinstance(space, LeverSpace):
-            raise TypeError("balances and resistances need the full finite-element space")
-        fields, laws = self.at(x)
-        source, heat = laws.sigma * _square(fields.grad_V), laws.kappa * fields.grad_T
-        charge = laws.sigma * fields.grad_V
-        current = float(space.weak_form(-source, heat, charge)[-1])
-        end_heat, ground_current = space.end_fluxes(-source, heat, charge)
-        lever = float(x[-2])
-        air_heat = 0.0
-        if space.air is not None:
-            air_heat, at_ends = space.air.heat(self._kirchhoff(x)[0])
-            end_heat -= at_ends
-
-        def resistance(part: Part) -> float:
-            if current == 0.0:
-                return float("nan")
-            return 1000.0 * space.integral(source, part) / current**2
-
-        return {
-            "current_mA": current,
-            "lever_V": lever,
-            "reader_V": self._reader_voltage(x),
-            "tip_K": space.tip_temperature(x),
-            "power_mW": lever * current,
-            "heater_ohm": resistance("heater"),
-            "leg1_ohm": resistance("leg 1"),
-            "leg2_ohm": resistance("leg 2"),
-            "max_K": space.highest_temperature(x),
-            "ground_current_mA": ground_current,
-            "end_heat_mW": end_heat,
-            "air_heat_mW": air_heat,
-        }
-
-    def by_parameter(self, x: Array) -> Array:
-        """Return derivatives of the weak equations and of I_h by the six parameters.
-
-        Returns
-        -------
-        ndarray, shape (size + 1, 6)
-            At fixed fields, in the order of `PARAMETERS`.
-        """
-        fields, laws = self.at(x)
-        square = _square(fields.grad_V)
-        columns = []
-        for name in PARAMETERS:
-            sigma = laws.sigma_by.get(name, np.zeros_like(laws.sigma))
-            kappa = laws.kappa_by.get(name, np.zeros_like(laws.kappa))
-            columns.append(
-                self.space.weak_form(-sigma * square, kappa * fields.grad_T, sigma * fields.grad_V)
-            )
-        return np.stack(columns, axis=-1)
-
-    def sensitivities(self, x: Array) -> Array:
-        """Return derivatives of I_h, V_r and T_tip by the six parameters, at a fixed bias.
-
-        Parameters
-        ----------
-        x : ndarray
-            A solved state.
-
-        Returns
-        -------
-        ndarray, shape (3, 6)
-            In the order of `OBSERVABLES` and of `PARAMETERS`; mA, V and K per unit of the
-            parameter. The row of V_r is NaN without a reader.
-        """
-        by_parameter = self.by_parameter(x)
-        right_hand_side = np.zeros((x.size, len(PARAMETERS)))
-        right_hand_side[:-1] = -by_parameter
-        right_hand_side[-2] *= self.series_kohm
-        jacobian = self.jacobian(x)
-        change = jacobian.factorised(self.series_kohm, 1.0, 0.0).solve(right_hand_side)
-        observed = self._observed_change(jacobian, change)
-        observed[0] += by_parameter[-1]
-        return observed
+    def observed(self, x: Array) -> Array:
+        """Return V_l (V), I_h (mA) and V_r (V, NaN without a reader), shape (3, n): `SHOWN`."""
+        current = self.balance(x)[-1]
+        return np.stack([x[-1], current, self.space.reader_voltage(x)])
 
     def observed_change(self, x: Array, change: Array) -> Array:
-        """Return how I_h, V_r and T_tip change with the unknowns, to first order.
-
-        Parameters
-        ----------
-        x : ndarray, shape (n,)
-        change : ndarray, shape (n,) or (n, k)
-
-        Returns
-        -------
-        ndarray, shape (3,) or (3, k)
-            mA, V (NaN without a reader) and K.
-        """
-        return self._observed_change(self.jacobian(x), change)
-
-    def _observed_change(self, jacobian: Jacobian, change: Array) -> Array:
-        unknowns, slopes = jacobian.current_gradient
-        current = slopes @ change[unknowns]
-        tip_unknowns, tip_weights = self.space.tip
-        tip = tip_weights @ change[tip_unknowns]
-        reader = self.space.reader_weights()
-        if reader is None:
-            return np.stack([current, np.full_like(current, np.nan), tip])
-        return np.stack([current, reader[1] @ change[reader[0]], tip])
+        """Return how `observed` changes with the unknowns, to first order."""
+        current = self.balance_change(x, change)[-1]
+        return np.stack([change[-1], current, self.space.reader_voltage(change)])
 
 
-class PinnedEquations:
-    """The lever's equations and one condition on V_b and T_tip; see `newton.Equations`."""
-
-    def __init__(self, lever: LeverEquations, pin: Pin, value: float) -> None:
-        self._lever, self._pin, self._value = lever, pin, value
-        self.scale, self.step_limit = lever.scale, lever.step_limit
-
-    def residual(self, x: Array) -> Array:
-        """Return the residual, shape (size + 2,)."""
-        pinned = self._pin.bias * x[-1] + self._pin.tip * self._lever.space.tip_temperature(x)
-        return np.append(self._lever.residual(x), pinned - self._value)
-
-    def factorised(self, x: Array) -> LinearSolve:
-        """Return the factorised Jacobian."""
-        return self._lever.jacobian(x).factorised(self._lever.series_kohm, *self._pin)
+def _length(columns: Array) -> Array:
+    """Return the largest entry of each column; never zero."""
+    return np.maximum(np.abs(columns).max(axis=0), 1e-300)
 
 
-def _square(gradient: Array) -> Array:
-    return np.einsum("deq,deq->eq", gradient, gradient)
+def square(gradient: Array) -> Array:
+    """Return the squared length of vectors (dimension, points, n)."""
+    return np.einsum("dpn,dpn->pn", gradient, gradient)

@@ -1,4 +1,4 @@
-"""Newton's method with a step limit. It knows no physics."""
+"""Newton's method for several systems side by side, with a step limit. It knows no physics."""
 
 from __future__ import annotations
 
@@ -6,19 +6,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hotlever.errors import NewtonError
-
-Array = NDArray[np.float64]
-
-
-class LinearSolve(Protocol):
-    """A factorised matrix."""
-
-    def solve(self, right_hand_side: Array) -> Array:
-        """Solve for one right-hand side (n,) or several (n, k)."""
-        ...
+from hotlever.lever.space import Factors
+from hotlever.types import Array, Index
 
 
 @dataclass(frozen=True)
@@ -28,7 +19,7 @@ class NewtonOptions:
     Attributes
     ----------
     tolerance : float
-        Largest error of the root, in units of `Equations.scale`.
+        Largest error of a root, in units of `Equations.scale`.
     keep_while : float
         A factorised Jacobian is kept while each step is shorter than this share of the last.
     max_iterations : int
@@ -40,53 +31,40 @@ class NewtonOptions:
 
 
 class Equations(Protocol):
-    """What Newton's method needs: F(x), and a factorised dF/dx.
+    """What Newton's method needs: F(x) of several systems, and their factorised Jacobians.
 
     Attributes
     ----------
-    scale : ndarray, shape (n,)
+    scale : ndarray, shape (unknowns, 1)
         Size of one unit of each unknown, by which kelvin and volts compare.
-    step_limit : ndarray, shape (n,)
+    step_limit : ndarray, shape (unknowns, 1)
         Largest step of each unknown; a longer step is shortened as a whole.
     """
 
     scale: Array
     step_limit: Array
 
-    def residual(self, x: Array) -> Array:
-        """Return F(x), shape (n,)."""
+    def residual(self, x: Array, which: Index) -> Array:
+        """Return F(x), (unknowns, n), of some of the systems."""
         ...
 
-    def factorised(self, x: Array) -> LinearSolve:
-        """Return the factorised Jacobian at `x`."""
+    def factorised(self, x: Array, which: Index) -> Factors:
+        """Return the factorised Jacobians of some of the systems at `x`, (unknowns, n)."""
         ...
 
 
 @dataclass(frozen=True)
 class NewtonResult:
-    """A root, and the Jacobian factorised last, near it."""
+    """Roots, (unknowns, n), and Jacobians factorised near them."""
 
     x: Array
-    jacobian: LinearSolve
-    iterations: int
+    factors: Factors
 
 
-def newton(
-    equations: Equations,
-    x: Array,
-    options: NewtonOptions,
-    jacobian: LinearSolve | None = None,
+def find_roots(
+    equations: Equations, x: Array, options: NewtonOptions, factors: Factors | None = None
 ) -> NewtonResult:
-    """Find a root of F near `x`.
-
-    Parameters
-    ----------
-    equations : Equations
-    x : ndarray, shape (n,)
-        Start.
-    options : NewtonOptions
-    jacobian : LinearSolve, optional
-        Of a nearby place, to begin with; made at `x` by default.
+    """Find the roots of F near `x`, (unknowns, n), beginning with factors of nearby places.
 
     Raises
     ------
@@ -99,27 +77,39 @@ def newton(
     derivative of one per unit is pessimistic for a lever); with an old one the steps shrink
     by a steady ratio r and leave s r. Both estimates decide when to stop.
     """
-    fresh, last = jacobian is None, np.inf
-    jacobian = jacobian or equations.factorised(x)
+    x = x.copy()
+    every = np.arange(x.shape[1])
+    fresh = np.full(every.size, factors is None)
+    factors = factors or equations.factorised(x, every)
+    last = np.full(every.size, np.inf)
+    active = every
     for iteration in range(1, options.max_iterations + 1):
-        residual = equations.residual(x)
-        step = -jacobian.solve(residual)
-        length = _length(step, equations.scale)
-        if not fresh and not length < options.keep_while * last:
-            jacobian, fresh = equations.factorised(x), True
-            step = -jacobian.solve(residual)
-            length = _length(step, equations.scale)
-        if not np.isfinite(length):
+        here = x[:, active]
+        residual = equations.residual(here, active)
+        step = -factors.solve(residual, active)
+        length = _length(step / equations.scale)
+        slow = ~fresh[active] & ~(length < options.keep_while * last[active])
+        if slow.any():
+            again = active[slow]
+            factors = factors.replaced(again, equations.factorised(here[:, slow], again))
+            fresh[again] = True
+            step[:, slow] = -factors.solve(residual[:, slow], again)
+            length = _length(step / equations.scale)
+        if not np.isfinite(length).all():
             raise NewtonError(f"a step was not finite after {iteration} iterations", partial=x)
-        shortening = max(1.0, _length(step, equations.step_limit))
-        x = x + step / shortening
+        shortening = np.maximum(1.0, _length(step / equations.step_limit))
+        x[:, active] = here + step / shortening
         # nothing is known yet of an old Jacobian's first step
-        ratio = length if fresh else length / last if np.isfinite(last) else 1.0
-        if shortening == 1.0 and length * ratio < options.tolerance:
-            return NewtonResult(x, jacobian, iteration)
-        fresh, last = False, length
+        known = np.isfinite(last[active])
+        old = np.where(known, length / np.where(known, last[active], 1.0), 1.0)
+        ratio = np.where(fresh[active], length, old)
+        done = (shortening == 1.0) & (length * ratio < options.tolerance)
+        fresh[active], last[active] = False, length
+        active = active[~done]
+        if not active.size:
+            return NewtonResult(x, factors)
     raise NewtonError(f"not converged after {options.max_iterations} iterations", partial=x)
 
 
-def _length(step: Array, unit: Array) -> float:
-    return float(np.max(np.abs(step / unit)))
+def _length(columns: Array) -> Array:
+    return np.asarray(np.abs(columns).max(axis=0))

@@ -2,44 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
-from scipy.stats import qmc
 
-from hotlever.errors import BranchEndError
-from hotlever.lever.atlas import Atlas, branch_on_grid, common_grid
-from hotlever.lever.equations import LeverEquations
+from hotlever import __version__
+from hotlever.cache import cache_file, store_arrays, stored
+from hotlever.lever.atlas import BOX, Atlas, material_in_box
+from hotlever.lever.equations import SHOWN
 from hotlever.lever.lever import Lever
-from hotlever.lever.reduced import ReducedSpace, leading_modes
-from hotlever.materials import PARAMETERS, Material
+from hotlever.lever.reduced import ReducedLever, ReducedSpace
+from hotlever.lever.sensitivities import Linearised
+from hotlever.materials import PARAMETERS
 from hotlever.threads import one_blas_thread
+from hotlever.types import Array, Index, Progress
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-
-#: Parameter ranges that the modes are made for. The shape of the fields does not depend on
-#: c_κ: scaling κ scales V² at the same temperatures. n_d is spread evenly in its logarithm.
-BOX: dict[str, tuple[float, float]] = {
-    "delta": (0.5, 0.9),
-    "n_d": (2.0e17, 9.0e17),
-    "p": (2.35, 3.0),
-    "a0": (7.5e-4, 1.15e-3),
-    "a1": (0.85e-6, 1.5e-6),
-}
-#: In air, where silicon competes with air, c_κ does change the shape.
-IN_AIR: dict[str, tuple[float, float]] = {"c_kappa": (0.55, 0.8)}
+#: Range of c_κ, whose derivative joins the snapshots in air: silicon competes with air there.
+_C_KAPPA_IN_AIR = 0.25
 #: Tip temperature (K) up to which states are collected.
 HOTTEST = 1350.0
-#: Size of the changes of a snapshot: share of the box, and K.
-PARAMETER_STEP, BRANCH_STEP = 0.25, 50.0
-#: Training levers have this series resistance (Ω), with which the bias rises along a branch. The
-#: states of a given lever voltage do not depend on it.
-_TRAINING_OHM = 5000.0
+#: Size of the changes of a state that join the snapshots: share of the box, and K.
+_PARAMETER_STEP, _BRANCH_STEP = 0.25, 50.0
 
 
 @dataclass(frozen=True)
@@ -68,201 +53,167 @@ class ReductionOptions:
     seed: int = 0
 
 
-@dataclass(frozen=True)
-class Snapshot:
-    """A full state with the material it belongs to, and its neighbourhood.
-
-    Attributes
-    ----------
-    material : Material
-    x : ndarray, shape (n,)
-    changes : ndarray, shape (n, k)
-        Changes of the state with each parameter by `PARAMETER_STEP` of the box, then by
-        `BRANCH_STEP` along the branch, and in air with c_κ; the tip temperature is held for the
-        parameters.
-    tip_K : float
-    """
-
-    material: Material
-    x: Array
-    changes: Array
-    tip_K: float
-
-
 @one_blas_thread
 def reduce(
-    lever: Lever,
-    options: ReductionOptions | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> ReducedSpace:
-    """Make a reduced space for a lever's geometry.
+    lever: Lever, options: ReductionOptions | None = None, progress: Progress | None = None
+) -> ReducedLever:
+    """Make the reduced lever of a lever's geometry, medium and base temperature.
 
     Parameters
     ----------
     lever : Lever
-        Its material and series resistance do not matter; its base temperature does.
+        Its material and circuit do not matter.
     options : ReductionOptions, optional
     progress : callable, optional
         Called with the parameter sets done and their number.
     """
     options = options or ReductionOptions()
-    probe = lever.probe.with_values({"series_resistance_ohm": _TRAINING_OHM})
-    training = Lever(probe, space=lever.space)
-    branches: list[list[Snapshot]] = []
-    for done, material in enumerate(training_materials(probe.material, options), start=1):
-        branches.append(list(collect(training.with_material(material))))
+    training = []
+    from scipy.stats import qmc  # takes long, and most commands reduce nothing
+
+    shares = qmc.Sobol(len(BOX), seed=options.seed).random(options.parameter_sets)
+    for done, row in enumerate(shares, start=1):
+        training.append(_trained(lever.with_material(material_in_box(lever.probe.material, row))))
         if progress is not None:
             progress(done, options.parameter_sets)
-    return reduced_space(training, branches, options)
+    space = _modes(lever, training, options)
+    points, weights = _empirical_rule(space, training, options)
+    base = lever.circuit.base_temperature_K
+    few, atlas = space.at_points(points, weights), _atlas(space, training)
+    return ReducedLever(space, few, points, atlas, base)
 
 
-def training_materials(material: Material, options: ReductionOptions) -> list[Material]:
-    """Spread parameter sets over the box (a Sobol sequence)."""
-    shares = qmc.Sobol(len(BOX), seed=options.seed).random(options.parameter_sets)
-    return [material_in_box(material, row) for row in shares]
+def cached_reduction(lever: Lever, progress: Progress | None = None) -> ReducedLever:
+    """Return the reduced lever of a lever's geometry and medium, from the cache or `reduce`."""
+    reduced = known_reduction(lever)
+    if reduced is None:
+        reduced = reduce(lever, None, progress)
+        store_arrays(_file(lever), reduced.arrays())
+    return reduced
 
 
-def material_in_box(material: Material, shares: Array) -> Material:
-    """Return the material at a point of the box given by numbers between 0 and 1."""
-    values = {}
-    for share, (name, (low, high)) in zip(shares, BOX.items(), strict=True):
-        even = low * (high / low) ** share if name == "n_d" else low + share * (high - low)
-        values[name] = float(even)
-    return material.with_(**values)
+def known_reduction(lever: Lever) -> ReducedLever | None:
+    """Return the reduced lever of a lever's geometry and medium, if it is in the cache."""
+    base = lever.circuit.base_temperature_K
+    return stored(_file(lever), lambda arrays: ReducedLever.from_arrays(lever.space, base, arrays))
 
 
-def place_in_box(material: Material) -> Array:
-    """Invert `material_in_box`, beyond the box too."""
-    shares = []
-    for name, (low, high) in BOX.items():
-        value = getattr(material, name)
-        if name == "n_d":
-            value, low, high = np.log([value, low, high])
-        shares.append((value - low) / (high - low))
-    return np.array(shares)
+def _file(lever: Lever) -> Path | None:
+    """Return the file of a reduced lever, named by all that it depends on."""
+    elements, air = lever.space.elements, lever.space.air
+    facts = {
+        "version": __version__,
+        "shape": lever.probe.shape.model_dump(),
+        "tip": lever.probe.tip and lever.probe.tip.model_dump(),
+        "base_temperature_K": lever.circuit.base_temperature_K,
+        "n_hd": lever.probe.material.n_hd,
+        "options": asdict(ReductionOptions()),
+        # a change of Netgen's mesh makes a new file instead of a wrong answer
+        "nodes": elements.nodes,
+        "elements": elements.dofs,
+        "points": elements.positions,
+        "air": np.empty(0) if air is None else air.operator.matrix,
+    }
+    return cache_file("reduced", facts)
 
 
-def collect(lever: Lever) -> Iterator[Snapshot]:
-    """Follow the branch of one material and yield states and their neighbourhoods."""
-    follower = lever.follower()
-    equations = lever.equations
-    hottest = lever.space.highest_temperature
-    with suppress(BranchEndError):  # legs can run away before the tip is hot
-        for state in follower.follow_arc(lambda state: hottest(state.x) < HOTTEST):
-            changes = neighbourhood(equations, state.x)
-            yield Snapshot(lever.probe.material, state.x, changes, state.tip)
+# --- training ---------------------------------------------------------------------------------
 
 
-def neighbourhood(equations: LeverEquations, x: Array) -> Array:
-    """Return the changes of a state with parameters and along the branch: see `Snapshot`."""
-    # at a given tip temperature, so that a fold does no harm
-    solver = equations.jacobian(x).factorised(equations.series_kohm, 0.0, 1.0)
-    by_parameter = equations.by_parameter(x)
-    columns: list[tuple[str, float, float] | None] = [(name, *BOX[name]) for name in BOX]
-    columns.append(None)
-    if equations.space.air is not None:
-        columns += [(name, *IN_AIR[name]) for name in IN_AIR]
-    right_hand_side = np.zeros((x.size, len(columns)))
-    for place, entry in enumerate(columns):
-        if entry is None:
-            right_hand_side[-1, place] = BRANCH_STEP
-            continue
-        name, low, high = entry
-        change = by_parameter[:, list(PARAMETERS).index(name)]
-        right_hand_side[:-1, place] = -change * PARAMETER_STEP * (high - low)
-    right_hand_side[-2] *= equations.series_kohm
-    changes: Array = solver.solve(right_hand_side)
-    return changes
+def _trained(lever: Lever) -> Linearised:
+    """Return a branch and its derivatives, without the factors: those of all branches are large."""
+    found = Linearised.of(lever.branch(HOTTEST), lambda _: True, lever.equations)
+    return replace(found, factors=None)
 
 
-@one_blas_thread
-def reduced_space(
-    lever: Lever, branches: list[list[Snapshot]], options: ReductionOptions
-) -> ReducedSpace:
-    """Find modes, quadrature rule and atlas from the snapshots of some branches."""
-    full, base = lever.space, lever.probe.circuit.base_temperature_K
-    is_T = full.is_temperature()[: full.size]
-    cold = lever.follower().state.tangent
-    lift = np.where(is_T, 0.0, cold[: full.size] / cold[full.size])
-    snapshots = [snapshot for branch in branches for snapshot in branch]
-    states = np.stack([snapshot.x for snapshot in snapshots])
-    changes = np.concatenate([snapshot.changes.T for snapshot in snapshots])
-    vectors = np.concatenate([states, changes])
-    free = vectors[:, : full.size] - vectors[:, full.size : full.size + 1] * lift
-    free[: len(states), is_T] -= base
-    modes_T = leading_modes(np.where(is_T, free, 0.0), options.modes_T)
-    modes_V = leading_modes(np.where(is_T, 0.0, free), options.modes_V)
-    space = ReducedSpace(full, modes_T, modes_V, lift, base)
-    space.use_points(*_empirical_rule(lever, space, snapshots, options))
-    space.atlas = _atlas(lever, space, branches)
-    return space
+def _modes(lever: Lever, training: list[Linearised], options: ReductionOptions) -> ReducedSpace:
+    """Find the modes of states, and of their changes with parameters and along the branch."""
+    full = lever.space
+    hot = full.is_temperature[:-1]
+    cold = training[0].branch.slopes[:, 0]
+    lift = np.where(hot, 0.0, cold[:-1] / cold[-1])
+    widths = {name: high - low for name, (low, high) in BOX.items()}
+    if full.air is not None:
+        widths["c_kappa"] = _C_KAPPA_IN_AIR
+    vectors = []
+    for one in training:
+        u = one.branch.u[1:]
+        vectors.append(one.branch.x[:, 1:])
+        vectors.append(one.branch.slopes[:, 1:] * (_BRANCH_STEP / (2.0 * u)))
+        for name, width in widths.items():
+            change = one.changes[:, 1:, list(PARAMETERS).index(name)]
+            vectors.append(change * (_PARAMETER_STEP * width))
+    together = np.concatenate(vectors, axis=1).T
+    free = together[:, :-1] - together[:, -1:] * lift
+    modes_T = leading_modes(np.where(hot, free, 0.0), options.modes_T)
+    modes_V = leading_modes(np.where(hot, 0.0, free), options.modes_V)
+    return ReducedSpace(full, modes_T, modes_V, lift)
 
 
-def _atlas(lever: Lever, space: ReducedSpace, branches: list[list[Snapshot]]) -> Atlas:
-    base, size = lever.probe.circuit.base_temperature_K, space.size
-    kohm = lever.probe.circuit.series_resistance_ohm / 1000.0
-    rises = [
-        np.sqrt(np.maximum(0.0, [snapshot.tip_K - base for snapshot in branch]))
-        for branch in branches
-    ]
-    grid = common_grid(np.array([rise[-1] for rise in rises]))
-    states, slopes = [], []
-    for rise, branch in zip(rises, branches, strict=True):
-        values = np.stack([space.coordinates(snapshot.x) for snapshot in branch])
-        by = np.stack([space.coordinates(snapshot.changes, change=True) for snapshot in branch])
-        # the last unknown is V_b = V_l + R_s I_h
-        for array in (values.T, np.moveaxis(by, 1, 0)):
-            array[size + 1] = (array[size + 1] - array[size]) / kohm
-        along = by[:, :, len(BOX)] * (2.0 * rise[:, None] / BRANCH_STEP)
-        hot = rise > 0
-        u, values, along, by = rise[hot], values[hot], along[hot], by[hot, :, : len(BOX)]
-        # at zero bias nothing is hot, and potentials grow evenly with u
-        start = np.where(space.is_temperature(), 0.0, 2.0 * values[0] / u[0] - along[0])
-        u = np.append(0.0, u)
-        values = np.vstack([np.zeros_like(start), values])
-        along = np.vstack([start, along])
-        by = np.concatenate([np.zeros_like(by[:1]), by]) / PARAMETER_STEP
-        (low, high), n_d = BOX["n_d"], branch[0].material.n_d
-        by[..., list(BOX).index("n_d")] *= n_d * np.log(high / low) / (high - low)
-        state, slope = branch_on_grid(u, values, along, by, grid)
-        states.append(state)
-        slopes.append(slope)
-    places = np.stack([place_in_box(branch[0].material) for branch in branches])
-    c_kappa = branches[0][0].material.c_kappa
-    return Atlas.fitted(grid, places, np.stack(states), np.stack(slopes), c_kappa)
+def leading_modes(vectors: Array, count: int) -> Array:
+    """Return the leading modes of some vectors, scaled so that their largest entry is one."""
+    # the eigenvectors of the Gram matrix: far fewer vectors than values
+    _, combinations = np.linalg.eigh(vectors @ vectors.T)
+    modes = combinations[:, ::-1][:, :count].T @ vectors
+    modes = np.linalg.qr(modes.T)[0].T
+    scaled: Array = modes / np.abs(modes).max(axis=1, keepdims=True)
+    return scaled
+
+
+def _atlas(space: ReducedSpace, training: list[Linearised]) -> Atlas:
+    """Fit states and what they show at the nodes that all branches have."""
+    common = training[0].branch.u
+    for one in training[1:]:
+        common = common[np.isin(common.round(9), one.branch.u.round(9))]
+    columns = [list(PARAMETERS).index(name) for name in BOX]
+    values, slopes = [], []
+    for one in training:
+        here = np.flatnonzero(np.isin(one.branch.u.round(9), common.round(9)))
+        states, changes = space.coordinates(one.branch.x), space.coordinates(one.changes)
+        values.append(np.vstack([states, one.branch.values[:, :3].T])[:, here].T)
+        together = np.concatenate([changes, one.shown.swapaxes(0, 1)])
+        slopes.append(together[:, here][..., columns].swapaxes(0, 1))
+    return Atlas.fitted(
+        common,
+        [one.branch.equations.material for one in training],
+        np.nan_to_num(np.stack(values)),  # a lever without reader shows no V_r
+        np.nan_to_num(np.stack(slopes)),
+        np.append(~space.is_temperature, [True] * len(SHOWN)),
+    )
 
 
 def _empirical_rule(
-    lever: Lever, space: ReducedSpace, snapshots: list[Snapshot], options: ReductionOptions
+    space: ReducedSpace, training: list[Linearised], options: ReductionOptions
 ) -> tuple[Index, Array]:
     """Choose quadrature points and positive weights that keep the projected equations.
 
-    The rule integrates the projected equations of all snapshots as the full one does, up to
+    The rule integrates the projected equations of all training states as the full one does, up to
     the tolerance: a non-negative least-squares problem on random combinations of their
     integrands.
     """
     rng = np.random.default_rng(options.seed)
-    full_weights = space.full.operators.weights.ravel()
-    sketch = np.zeros((options.sketch, full_weights.size))
-    for snapshot in snapshots:
-        equations = lever.with_material(snapshot.material).equations
-        fields, laws = equations.at(snapshot.x)
-        heat = (laws.sigma * (fields.grad_V**2).sum(axis=0)).ravel()
-        power = heat @ full_weights
-        flux_T = (laws.kappa * fields.grad_T).reshape(2, -1)
-        flux_V = (laws.sigma * fields.grad_V).reshape(2, -1)
-        integrands = np.concatenate(
-            [
-                space.heat_integrands(-heat, flux_T) / power,
-                space.charge_integrands(flux_V) * (snapshot.x[-2] / power),
-            ]
-        )
-        rows = rng.integers(0, options.sketch, len(integrands))
-        signs = rng.choice((-1.0, 1.0), len(integrands))
-        np.add.at(sketch, rows, signs[:, None] * integrands * full_weights)
+    weights = space.weights[:, 0]
+    T = space.temperature.matrix.reshape(space.temperature.kinds, weights.size, -1)
+    V = space.potential.matrix.reshape(space.potential.kinds, weights.size, -1)
+    sketch = np.zeros((options.sketch, weights.size))
+    for one in training:
+        for column in range(1, one.branch.u.size):
+            fluxes = one.branch.equations.fluxes(one.branch.x[:, [column]])
+            heat = np.concatenate([fluxes.heat_source[None], fluxes.heat])[..., 0]
+            power = -fluxes.heat_source[:, 0] @ weights
+            lever_V = one.branch.x[-1, column]
+            integrands = np.concatenate(
+                [
+                    np.einsum("dqm,dq->mq", T, heat) / power,
+                    np.einsum("dqm,dq->mq", V, fluxes.charge[..., 0]) * (lever_V / power),
+                ]
+            )
+            rows = rng.integers(0, options.sketch, len(integrands))
+            signs = rng.choice((-1.0, 1.0), len(integrands))
+            np.add.at(sketch, rows, signs[:, None] * integrands * weights)
     values, vectors = np.linalg.eigh(sketch @ sketch.T)
     kept = values > (options.rule_tolerance**2) * values[-1]
     directions = (vectors[:, kept] / np.sqrt(values[kept])).T @ sketch
     shares, _ = nnls(directions, directions.sum(axis=1), maxiter=20 * len(directions))
     points = np.flatnonzero(shares)
-    return points, shares[points] * full_weights[points]
+    return points, shares[points] * weights[points]

@@ -3,101 +3,75 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 
 import meshio
 import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
 
+from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file
 from hotlever.lever.equations import PER_CM_TO_MILLI_PER_UM
-from hotlever.lever3d.lever import SolidLever
+from hotlever.lever.state import State
+from hotlever.lever3d.lever import SolidLever, surface_nodes
 from hotlever.lever3d.still_air import ngsolve
 from hotlever.materials.air import temperature_from_kirchhoff
-from hotlever.probe.solid import AIR, IMAGE
+from hotlever.probe.solid import AIR, material_names
+from hotlever.types import Array
 
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class SolidFields:
-    """Temperature and potential at the vertices of the mesh.
-
-    Attributes
-    ----------
-    points : ndarray, shape (n, 3)
-        µm.
-    tetrahedra : ndarray of int, shape (m, 4)
-        The silicon's first.
-    region : ndarray of int, shape (m,)
-        Index into the layout's regions; -1 in air.
-    temperature, potential : ndarray, shape (n,)
-        K and V; the potential is NaN off the silicon.
-    """
-
-    points: Array
-    tetrahedra: NDArray[np.intp]
-    region: NDArray[np.intp]
-    temperature: Array
-    potential: Array
+#: Points along each side of a slice.
+_SLICE_POINTS = 161
 
 
-def solid_fields(lever: SolidLever, x: Array) -> SolidFields:
-    """Return the fields of a state in the silicon and, if there is any, in the meshed air."""
-    solid, base = lever.solid, lever.probe.circuit.base_temperature_K
-    T, V = lever.space.nodal(x, base)
-    at_vertices = lever.space.operators.basis.nodal_dofs[0]
-    points = np.array(solid.netgen.Coordinates())
-    temperature = np.full(len(points), base)
-    potential = np.full(len(points), np.nan)
-    tetrahedra, region = solid.vertices[solid.elements.t.T], solid.region
-    if lever.air is not None:
-        theta = lever.air.at_vertices(lever.in_the_air(x)[0])
-        temperature = temperature_from_kirchhoff(theta / PER_CM_TO_MILLI_PER_UM, base)
-        elements = solid.netgen.Elements3D().NumPy()
-        names = [solid.netgen.GetMaterial(int(k)) for k in range(1, elements["index"].max() + 1)]
-        of_air = np.array([name == AIR for name in names])[elements["index"] - 1]
-        air = elements["nodes"][of_air, :4].astype(np.intp) - 1
-        tetrahedra = np.concatenate([tetrahedra, air])
-        region = np.concatenate([region, np.full(len(air), -1, dtype=np.intp)])
-    temperature[solid.vertices] = T[at_vertices]
-    potential[solid.vertices] = V[at_vertices]
-    used, numbers = np.unique(tetrahedra, return_inverse=True)
-    return SolidFields(
-        points[used],
-        numbers.reshape(tetrahedra.shape),
-        region,
-        temperature[used],
-        potential[used],
-    )
-
-
-def write_solid_vtu(lever: SolidLever, x: Array, path: str | os.PathLike[str]) -> None:
+def write_solid_vtu(state: State, path: str | os.PathLike[str]) -> None:
     """Write a state as VTU, for ParaView and the like: lever and air in one file.
 
-    Point data: temperature_K, potential_V. Cell data: region, -1 in air.
+    Point data: temperature_K, potential_V (NaN off the silicon). Cell data: region, -1 in air.
     """
-    fields = solid_fields(lever, x)
+    solid = _solid(state).solid
+    points, elements = np.array(solid.netgen.Coordinates()), solid.netgen.Elements3D().NumPy()
+    air = elements["nodes"][material_names(solid.netgen) == AIR, :4].astype(np.intp) - 1
+    # the image ball is not part of it
+    tetrahedra = np.concatenate([solid.vertices[solid.elements.t.T], air])
+    used, numbers = np.unique(tetrahedra, return_inverse=True)
+    potential = np.full(len(points), np.nan)
+    potential[solid.vertices] = _of_vertices(state)[1]
     mesh = meshio.Mesh(
-        fields.points,
-        [("tetra", fields.tetrahedra)],
-        point_data={"temperature_K": fields.temperature, "potential_V": fields.potential},
-        cell_data={"region": [fields.region.astype(np.int32)]},
+        points[used],
+        [("tetra", numbers.reshape(tetrahedra.shape))],
+        point_data={"temperature_K": _temperature(state)[used], "potential_V": potential[used]},
+        cell_data={"region": [np.append(solid.region, np.full(len(air), -1)).astype(np.int32)]},
     )
     with whole_file(path) as temporary:
         mesh.write(temporary, file_format="vtu")
 
 
-def temperature_at(lever: SolidLever, x: Array, points: Array) -> Array:
+def _of_vertices(state: State) -> tuple[Array, Array]:
+    """Return temperature (K) and potential (V) at the vertices of the silicon."""
+    T, V = state.nodal
+    vertices = state.lever.space.elements.basis.nodal_dofs[0]
+    return T[vertices], V[vertices]
+
+
+def _temperature(state: State) -> Array:
+    """Return the temperature (K) at all vertices of Netgen's mesh; without meaning in the image."""
+    lever = _solid(state)
+    solid, base, air = lever.solid, lever.circuit.base_temperature_K, lever.space.air
+    temperature = np.full(len(solid.netgen.Coordinates()), base)
+    if air is not None:
+        theta = air.operator.at_vertices(lever.in_the_air(state)[0])
+        temperature = temperature_from_kirchhoff(theta / PER_CM_TO_MILLI_PER_UM, base)
+    temperature[solid.vertices] = _of_vertices(state)[0]
+    return temperature
+
+
+def temperature_at(state: State, points: Array) -> Array:
     """Return the temperature at any points inside the sphere of air.
 
     Parameters
     ----------
-    lever : SolidLever
-        In air.
-    x : ndarray
-        Unknowns of a solved state.
+    state : State
+        Of a solid lever in air.
     points : ndarray, shape (n, 3)
         µm.
 
@@ -106,18 +80,13 @@ def temperature_at(lever: SolidLever, x: Array, points: Array) -> Array:
     ndarray, shape (n,)
         K, linear between the vertices of the mesh; NaN outside the sphere.
     """
-    air = lever.air
-    if air is None:
+    lever = _solid(state)
+    if lever.space.air is None:
         raise InputError("this lever is in vacuum: expected one in air")
-    fields = solid_fields(lever, x)
-    every = np.full(air.mesh.nv, lever.probe.circuit.base_temperature_K)
-    inside = np.unique(
-        [v.nr for part in air.mesh.Elements() if part.mat != IMAGE for v in part.vertices]
-    )
-    every[inside] = fields.temperature
+    air = lever.space.air.operator
     ng = ngsolve()
     linear = ng.GridFunction(ng.H1(air.mesh, order=1))
-    linear.vec.FV().NumPy()[:] = every
+    linear.vec.FV().NumPy()[:] = _temperature(state)
     centre, radius = np.array(air.centre), air.radius_um
     result = np.full(len(points), np.nan)
     near = np.linalg.norm(points - centre, axis=1) < 0.97 * radius
@@ -125,32 +94,78 @@ def temperature_at(lever: SolidLever, x: Array, points: Array) -> Array:
     return result
 
 
-def heat_by_region(lever: SolidLever, x: Array) -> dict[str, float]:
+def temperature_slices(state: State) -> xr.Dataset:
+    """Return the temperature in the plane along the lever and across it, far and near the heater.
+
+    Parameters
+    ----------
+    state : State
+        Of a solid lever in air.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``temperature`` (slice, z, place) at ``along_um`` of the slice's ``axis``, x or y, and
+        ``z_um``; bias, tip and base temperature as attributes.
+    """
+    layout = _solid(state).solid.layout
+    tip = np.array([*layout.tip, 0.0])
+    low, high = layout.box
+    far, near = 0.675 * (high - low).max(), 2.0 * layout.heater.sides.max()
+    middle = np.array([low[0] + high[0], 2.0 * tip[1], 0.0]) / 2
+    slices = {
+        "along the lever": (0, middle, far),
+        "across, at the tip": (1, tip, far),
+        "along, near the heater": (0, tip, near),
+        "across, near the heater": (1, tip, near),
+    }
+    axis, centre, reach = (np.array(column) for column in zip(*slices.values(), strict=True))
+    z = reach[:, None] * np.linspace(-1.0, 1.0, _SLICE_POINTS)
+    along = centre[range(4), axis][:, None] + z
+    points = np.tile(centre[:, None, None], (1, _SLICE_POINTS, _SLICE_POINTS, 1))
+    points[range(4), ..., axis] = along[:, None]
+    points[..., 2] = z[..., None]
+    temperature = temperature_at(state, points.reshape(-1, 3)).reshape(points.shape[:-1])
+    return labelled(
+        {"temperature": (("slice", "z", "place"), temperature)},
+        coordinates={
+            "slice": list(slices),
+            "axis": ("slice", np.array(["x", "y"])[axis]),
+            "along_um": (("slice", "place"), along),
+            "z_um": (("slice", "z"), z),
+        },
+        bias_V=state.bias_V,
+        tip_K=state.tip_K,
+        base_K=state.lever.circuit.base_temperature_K,
+    )
+
+
+def _solid(state: State) -> SolidLever:
+    if not isinstance(state.lever, SolidLever):
+        raise InputError("a state of a flat lever, expected one of a SolidLever")
+    return state.lever
+
+
+def heat_by_region(state: State) -> dict[str, float]:
     """Return the heat (mW) that each region of the lever gives to the air.
 
     A node on the border of regions gives to each by its share of the surface around the node.
     """
-    heat = np.zeros(lever.space.operators.size)
-    heat[lever.surface] = lever.in_the_air(x)[1]
-    mesh, basis = lever.solid.elements, lever.space.operators.basis
+    lever = _solid(state)
+    heat = np.zeros(lever.space.elements.size)
+    lost = lever.in_the_air(state)[1]
+    mesh, basis = lever.solid.elements, lever.space.elements.basis
+    heat[surface_nodes(lever.solid, lever.space.elements, lever.space.air.operator)] = lost
     facets = mesh.boundary_facets()
     a, b, c = np.moveaxis(mesh.p[:, mesh.facets[:, facets]], 1, 0)
     area = np.linalg.norm(np.cross((b - a).T, (c - a).T), axis=1) / 2
-    region = lever.solid.region[mesh.f2t[0, facets]]
     names = [one.name for one in lever.solid.layout.regions]
+    region = lever.solid.region[mesh.f2t[0, facets]]
+    nodes = np.concatenate(
+        [basis.nodal_dofs[0, mesh.facets[:, facets]], basis.edge_dofs[0, mesh.f2e[:, facets]]]
+    )
     share = np.zeros((len(names), heat.size))
-    for number in range(len(names)):
-        mine = facets[region == number]
-        nodes = np.concatenate(
-            [basis.nodal_dofs[0, mesh.facets[:, mine]], basis.edge_dofs[0, _edges(mesh, mine)]]
-        )
-        np.add.at(share[number], nodes, np.broadcast_to(area[region == number], nodes.shape))
+    np.add.at(share, (region, nodes), area)
     total = share.sum(axis=0)
     share = np.divide(share, total, out=np.zeros_like(share), where=total > 0)
     return dict(zip(names, (share @ heat).tolist(), strict=True))
-
-
-def _edges(mesh: object, facets: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Numbers of the three edges of each facet, shape (3, facets)."""
-    edges: NDArray[np.intp] = np.asarray(mesh.f2e)[:, facets]  # type: ignore[attr-defined]
-    return edges

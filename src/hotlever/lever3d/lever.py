@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+
 import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_matrix
 from skfem.element import ElementTetP2
 
 from hotlever import __version__
+from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
+from hotlever.lever.dataset import at_bias
+from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import PER_CM_TO_MILLI_PER_UM
-from hotlever.lever.lever import Lever
-from hotlever.lever.operators import FiniteElements
-from hotlever.lever.space import LeverSpace
-from hotlever.lever.state_store import StateStore
+from hotlever.lever.full_space import FullSpace
+from hotlever.lever.lever import Lever, checked_bias
+from hotlever.lever.state import State
 from hotlever.lever3d.still_air import OpenAir, ngsolve
 from hotlever.materials.air import kirchhoff_variable
 from hotlever.probe import Probe
 from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from hotlever.types import Array, Index, Progress
 
 #: Radius of the sphere of air in the paper (µm).
 SPHERE_RADIUS = 60.0
@@ -28,23 +35,18 @@ SPHERE_RADIUS = 60.0
 class SolidLever(Lever):
     """A lever of tetrahedra; everything else is as with `Lever`.
 
+    States at a bias are solved from those of the flat lever, which are a kelvin or two away, and
+    kept in the cache: a sweep that was stopped goes on where it was.
+
     Parameters
     ----------
-    probe : Probe
+    probe : Probe or path
         Its surroundings say whether it is in vacuum or in air, and then in free space.
     mesh : SolidMeshOptions, optional
     sphere_radius_um : float
         Radius of the meshed air around the lever. The air reaches to infinity with any radius.
     air_order : int
         Order of the elements in the air, 2 or more; on the lever θ is quadratic.
-
-    Attributes
-    ----------
-    solid : SolidMesh
-    air : OpenAir or None
-        None in vacuum.
-    surface : ndarray of int
-        Nodes of the silicon on its surface, in the order of `air`.
 
     Raises
     ------
@@ -55,58 +57,157 @@ class SolidLever(Lever):
 
     def __init__(
         self,
-        probe: Probe,
+        probe: Probe | str | os.PathLike[str],
         mesh: SolidMeshOptions | None = None,
         *,
         sphere_radius_um: float = SPHERE_RADIUS,
         air_order: int = 3,
     ) -> None:
-        around = probe.surroundings
-        in_air = around.medium == "air"
+        self._options, self._sphere_radius_um, self._air_order = mesh, sphere_radius_um, air_order
+        self.probe = Probe.given(probe)
+        self.space = self._meshed()
+        self._prepare()
+
+    def _prepare(self) -> None:
+        super()._prepare()
+        # a copy for another probe has a flat lever of its own
+        for name in ("_flat", "_from_flat"):
+            vars(self).pop(name, None)
+
+    def _meshed(self) -> FullSpace:
+        """Mesh the silicon, and the air around it if there is any: one mesh for both."""
+        in_air = self.medium == "air"
         if in_air:
             ngsolve()  # says what to install, before the meshing
+            around = self.probe.surroundings
             if around != type(around)(medium="air"):
                 raise InputError(
                     "[surroundings]: the full 3-D simulation knows free space only; expected no "
                     "surface below, no chip and no temperature jump"
                 )
-        self.solid = mesh_solid(
-            probe.layout(), mesh, sphere_radius_um=sphere_radius_um if in_air else None
+        radius = self._sphere_radius_um
+        solid = mesh_solid(
+            self.probe.layout(), self._options, sphere_radius_um=radius if in_air else None
         )
-        space = LeverSpace(self.solid, FiniteElements(self.solid.elements, ElementTetP2(), 4))
-        self.air: OpenAir | None = None
-        self.surface: Index = np.empty(0, dtype=np.intp)
-        if in_air:
-            self.air = OpenAir(
-                self.solid.netgen, self.solid.centre, sphere_radius_um, order=air_order
-            )
-            self.surface = surface_nodes(self.solid, space.operators, self.air)
-            space = space.in_air_at_nodes(self.air, self.surface)
-        super().__init__(probe, space=space)
+        space = FullSpace(solid, FiniteElements(solid.elements, ElementTetP2(), 4))
+        if not in_air:
+            return space
+        air = OpenAir(solid.netgen, solid.centre, radius, order=self._air_order)
+        return space.in_air_at_nodes(air, surface_nodes(solid, space.elements, air))
 
-    def store(self) -> StateStore:
-        """Return where the states of this very lever are kept."""
-        air = self.air
-        return StateStore(
-            {
-                "version": __version__,
-                "probe": self.probe.values(),
-                "nodes": self.space.operators.nodes,
-                "air": None if air is None else [air.radius_um, air.order, air.size],
-            }
+    def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
+        """Return the space in the probe's surroundings; air needs a mesh of its own."""
+        return self._meshed()
+
+    def solve(self, bias: ArrayLike, progress: Progress | None = None) -> list[State]:
+        """Find the states that a slow ramp of the bias takes; see `Lever.solve`."""
+        values = checked_bias(bias)
+        try:
+            guesses = self._flat.solve(values)
+        except ComputationError as error:
+            error.partial = self._from_guesses(values, error.partial, progress)
+            raise
+        return self._from_guesses(values, guesses, progress)
+
+    def _from_guesses(
+        self, values: Array, guesses: Sequence[State], progress: Progress | None
+    ) -> list[State]:
+        """Solve at some biases, as many as there are states of the flat lever."""
+        states: list[State] = []
+        for value, guess in zip(values.tolist(), guesses, strict=False):
+            try:
+                states.append(self._kept(value) or self._solved(value, guess))
+            except ComputationError as error:
+                error.partial = states
+                raise
+            if progress is not None:
+                progress(len(states), values.size)
+        return states
+
+    def sweep(
+        self,
+        bias: ArrayLike,
+        *,
+        sensitivities: bool = False,
+        progress: Progress | None = None,
+    ) -> xr.Dataset:
+        """Solve the lever at each of some biases; see `Lever.sweep`."""
+        if sensitivities:
+            raise InputError("sensitivities are known of the flat lever only")
+        values = checked_bias(bias)
+        try:
+            states = self.solve(values, progress)
+        except ComputationError as error:
+            error.partial = self._table(values, error.partial)
+            raise
+        return self._table(values, states)
+
+    def _table(self, values: Array, states: Sequence[State]) -> xr.Dataset:
+        """Return what is observed of states, with the notes on jumps of the flat lever's ramp."""
+        reading = self._flat.branch_to(float(values.max())).read(self.circuit, values)
+        data = self.dataset(states, reading.notes(values))
+        return at_bias(data, values[: len(states)])
+
+    # --- from the flat lever ----------------------------------------------------------------------
+
+    @cached_property
+    def _flat(self) -> Lever:
+        return Lever(self.probe)
+
+    @cached_property
+    def _from_flat(self) -> csr_matrix:
+        """The matrix from nodal values of the flat lever to those of this one."""
+        flat, nodes = self._flat.space.elements, self.space.elements.nodes
+        element, shares = flat.at_points(nodes[:2].T)
+        rows = np.repeat(np.arange(len(element)), shares.shape[1])
+        return csr_matrix(
+            (shares.ravel(), (rows, flat.dofs[element].ravel())), shape=(len(element), flat.size)
         )
 
-    def apex_temperature(self, x: Array) -> float:
+    def _solved(self, bias: float, flat: State) -> State:
+        """Solve at a bias from the flat lever's state, and keep the result."""
+        T, V = (self._from_flat @ values for values in flat.nodal)
+        base = self.circuit.base_temperature_K
+        guess = self.space.from_nodal(T - base, V, flat.lever_V)[:, None]
+        state = self.polished(guess, bias)
+        store_arrays(self._file(bias), {"x": state.x})
+        return state
+
+    def _kept(self, bias: float) -> State | None:
+        """Return the state at a bias that was solved before; None if there is none."""
+        x = stored(self._file(bias), lambda arrays: arrays["x"])
+        return None if x is None or len(x) != self.space.size + 1 else State(self, x)
+
+    def _file(self, bias: float) -> Path | None:
+        air = None if self.space.air is None else self.space.air.operator
+        facts = {
+            "version": __version__,
+            "probe": self.probe.values(),
+            "nodes": self.space.elements.nodes,
+            "air": None if air is None else [air.radius_um, air.order, air.size],
+            "bias_V": bias,
+        }
+        return cache_file("states", facts)
+
+    # --- what only a solid has --------------------------------------------------------------------
+
+    @property
+    def solid(self) -> SolidMesh:
+        """The mesh of the silicon, and of the air around it."""
+        mesh = self.space.mesh
+        assert isinstance(mesh, SolidMesh)
+        return mesh
+
+    def apex_temperature(self, state: State) -> float:
         """Return the temperature (K) of the tip's apex; without a tip that of the lever there."""
-        base = self.probe.circuit.base_temperature_K
         points, (tip_x, tip_y) = self.solid.elements.p, self.solid.layout.tip
-        lowest = points[2] + 1e-3 * np.hypot(points[0] - tip_x, points[1] - tip_y)
-        near = np.hypot(points[0] - tip_x, points[1] - tip_y) < self.solid.layout.thickness_um
+        away = np.hypot(points[0] - tip_x, points[1] - tip_y)
+        lowest = points[2] + 1e-3 * away
+        near = away < self.solid.layout.thickness_um
         vertex = int(np.argmin(np.where(near, lowest, np.inf)))
-        node = self.space.operators.basis.nodal_dofs[0, vertex]
-        return float(self.space.nodal(x, base)[0][node])
+        return float(state.nodal[0][self.space.elements.basis.nodal_dofs[0, vertex]])
 
-    def in_the_air(self, x: Array) -> tuple[Array, Array]:
+    def in_the_air(self, state: State) -> tuple[Array, Array]:
         """Return what a state gives to the air.
 
         Returns
@@ -114,21 +215,23 @@ class SolidLever(Lever):
         coefficients : ndarray
             Of θ in the air (mW/µm); see `OpenAir`.
         heat : ndarray
-            From each node of `surface` (mW).
+            From each node of the silicon's surface (mW), in the order of `OpenAir`.
 
         Raises
         ------
         InputError
             If the lever is in vacuum.
         """
-        if self.air is None:
+        air = self.space.air
+        if air is None:
             raise InputError("this lever is in vacuum: it gives no heat to air")
-        base = self.probe.circuit.base_temperature_K
-        theta, _ = kirchhoff_variable(self.space.nodal(x, base)[0][self.surface], base)
-        return self.air.solve(PER_CM_TO_MILLI_PER_UM * theta)
+        base = self.circuit.base_temperature_K
+        theta, _ = kirchhoff_variable(base + air.rise(state.x)[:, 0], base)
+        coefficients, heat = air.operator.solve(PER_CM_TO_MILLI_PER_UM * theta)
+        return coefficients, heat
 
 
-def surface_nodes(mesh: SolidMesh, operators: FiniteElements, air: OpenAir) -> Index:
+def surface_nodes(mesh: SolidMesh, of_silicon: FiniteElements, air: OpenAir) -> Index:
     """Return the numbers of the silicon's nodes on its surface, in the order of the air's.
 
     Raises
@@ -136,7 +239,7 @@ def surface_nodes(mesh: SolidMesh, operators: FiniteElements, air: OpenAir) -> I
     ComputationError
         If the two meshes do not match.
     """
-    basis = operators.basis
+    basis = of_silicon.basis
     vertices = np.searchsorted(mesh.vertices, air.vertices)
     edges = np.sort(np.searchsorted(mesh.vertices, air.edges), axis=1)
     count = len(mesh.vertices)

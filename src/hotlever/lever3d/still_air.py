@@ -10,19 +10,16 @@ D. A. Lowther, IEEE Trans. Magn. 25, 4135 (1989), with the factor r'/R taken out
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import LinearOperator
 
 from hotlever.errors import InputError
 from hotlever.probe.solid import AIR, IMAGE, LEVER_SURFACE, SPHERE
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from hotlever.types import Array, Index
 
 
 def ngsolve() -> Any:
@@ -67,6 +64,8 @@ class OpenAir:
         Edges of the mesh on the body, each by its vertices, the smaller one first.
     """
 
+    filling = 0.0  # no air is modelled inside the silicon
+
     def __init__(
         self,
         mesh: Any,
@@ -92,15 +91,10 @@ class OpenAir:
             (np.array(values), (np.array(rows), np.array(columns))), shape=shape
         )
         diagonal = self._matrix.diagonal()
-        self.size = int((diagonal != 0).sum())
-        surface = self._lay_out_surface(ng)
-        free = ng.BitArray(shape[0])
-        free.Clear()
-        for dof in np.flatnonzero(diagonal != 0):
-            free.Set(int(dof))
-        for dof in surface:
-            free.Clear(int(dof))
-        self._inverse = form.mat.Inverse(free, inverse="sparsecholesky")
+        self.size = int(np.count_nonzero(diagonal))
+        free = diagonal != 0
+        free[self._lay_out_surface(ng)] = False
+        self._inverse = form.mat.Inverse(ng.BitArray(free.tolist()), inverse="sparsecholesky")
         self._right, self._left = form.mat.CreateColVector(), form.mat.CreateColVector()
         self._form = form  # the inverse refers to its matrix
 
@@ -116,41 +110,33 @@ class OpenAir:
             vertices.update(vertex.nr for vertex in element.vertices)
             edges.update({edge.nr: edge for edge in element.edges if edge.nr not in edges})
             dofs.update(self.space.GetDofNrs(element))
-        numbers = sorted(edges)
-        ends = np.array(
-            [sorted(v.nr for v in self.mesh[edges[number]].vertices) for number in numbers]
-        ).reshape(-1, 2)
+        ordered = [edges[number] for number in sorted(edges)]
+        ends = [sorted(vertex.nr for vertex in self.mesh[edge].vertices) for edge in ordered]
         self.vertices = np.array(sorted(vertices), dtype=np.intp)
-        self.edges = ends.astype(np.intp)
-        first = [self.space.GetDofNrs(edges[number])[0] for number in numbers]
+        self.edges = np.array(ends, dtype=np.intp).reshape(-1, 2)
+        of_vertices = self._vertex_dofs(ng, self.vertices)
+        of_edges = np.array([self.space.GetDofNrs(edge)[0] for edge in ordered], dtype=np.intp)
         # hierarchical basis: an edge's function is zero at its ends and `peak` in its middle
-        peak = self._edge_peak(ng)
-        count = self.vertices.size
-        position = np.searchsorted(self.vertices, self.edges)
-        middle = count + np.arange(len(first))
-        rows = [[self.space.GetDofNrs(ng.NodeId(ng.VERTEX, int(v)))[0] for v in self.vertices]]
-        columns, values = [np.arange(count)], [np.ones(count)]
-        for column, value in ((middle, 1.0), (position[:, 0], -0.5), (position[:, 1], -0.5)):
-            rows.append(first)
-            columns.append(column)
-            values.append(np.full(len(first), value / peak))
+        peak = float(ng.fem.H1FE(ng.ET.SEGM, 2).CalcShape(0.5)[2])
+        count, more = len(of_vertices), len(of_edges)
+        values = np.repeat([1.0, 1.0 / peak, -0.5 / peak], [count, more, 2 * more])
+        rows = np.concatenate([of_vertices, of_edges, of_edges, of_edges])
+        at_ends = np.searchsorted(self.vertices, self.edges).T.ravel()
+        columns = np.concatenate([np.arange(count + more), at_ends])
         self._to_coefficients = csr_matrix(
-            (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
-            shape=(self.space.ndof, count + len(first)),
+            (values, (rows, columns)), shape=(self.space.ndof, count + more)
         )
         return np.array(sorted(dofs), dtype=np.intp)
 
-    def _edge_peak(self, ng: Any) -> float:
-        """Value of an edge's quadratic basis function in the middle of the edge."""
-        from ngsolve import fem
-
-        values = fem.H1FE(ng.ET.SEGM, 2).CalcShape(0.5)
-        return float(values[2])
+    def _vertex_dofs(self, ng: Any, vertices: Iterable[int]) -> Index:
+        """Return the degree of freedom of each of some vertices, negative where there is no air."""
+        nodes = (ng.NodeId(ng.VERTEX, int(vertex)) for vertex in vertices)
+        return np.array([self.space.GetDofNrs(node)[0] for node in nodes], dtype=np.intp)
 
     @property
     def matrix(self) -> LinearOperator:
         """The operator from θ to heat, for `hotlever.lever.air_loss.AirLoss`."""
-        return self._operator(lambda theta: self.solve(theta)[1])
+        return self.less(np.zeros(self._to_coefficients.shape[1]))
 
     @property
     def sites(self) -> Array:
@@ -158,20 +144,15 @@ class OpenAir:
         points = np.array(self.mesh.ngmesh.Coordinates())
         return np.concatenate([points[self.vertices], points[self.edges].mean(axis=1)])
 
-    @property
-    def filling(self) -> float:
-        """No air is modelled inside the silicon."""
-        return 0.0
-
     def less(self, diagonal: Array) -> LinearOperator:
         """Return the operator less a diagonal matrix."""
-        return self._operator(lambda theta: self.solve(theta)[1] - diagonal * theta)
 
-    def _operator(self, product: Callable[[Array], Array]) -> LinearOperator:
-        count = self._to_coefficients.shape[1]
-        return LinearOperator(
-            (count, count), matvec=lambda theta: product(theta.ravel()), dtype=float
-        )
+        def product(theta: Array) -> Array:
+            theta = theta.ravel()
+            heat: Array = self.solve(theta)[1] - diagonal * theta
+            return heat
+
+        return LinearOperator((diagonal.size, diagonal.size), matvec=product, dtype=float)
 
     def solve(self, theta: Array) -> tuple[Array, Array]:
         """Solve the air for θ on the body.
@@ -198,20 +179,12 @@ class OpenAir:
     def at_infinity(self, coefficients: Array) -> float:
         """Return the heat that arrives at infinity (θ times µm), by the value of w at zero."""
         x, y, z = self.centre
-        w = self.field(coefficients)(self.mesh(x + 3 * self.radius_um, y, z))
+        field = ngsolve().GridFunction(self.space)
+        field.vec.FV().NumPy()[:] = coefficients
+        w = field(self.mesh(x + 3 * self.radius_um, y, z))
         return float(4 * np.pi * self.radius_um * w)
 
     def at_vertices(self, coefficients: Array) -> Array:
         """Return a solution at all vertices of the mesh; zero where there is no air."""
-        ng = ngsolve()
-        values = np.zeros(self.mesh.nv)
-        for vertex in range(self.mesh.nv):
-            (dof,) = self.space.GetDofNrs(ng.NodeId(ng.VERTEX, vertex))
-            values[vertex] = coefficients[dof] if dof >= 0 else 0.0
-        return values
-
-    def field(self, coefficients: Array) -> Any:
-        """Return a solution as a grid function of NGSolve."""
-        field = ngsolve().GridFunction(self.space)
-        field.vec.FV().NumPy()[:] = coefficients
-        return field
+        dofs = self._vertex_dofs(ngsolve(), range(self.mesh.nv))
+        return np.where(dofs >= 0, coefficients[dofs], 0.0)

@@ -2,7 +2,8 @@
 
 Equation 13 of Spieser et al., J. Appl. Phys. 121, 174503 (2017), doi:10.1063/1.4981883, after
 Kadoya, Matsunaga and Nagashima, J. Phys. Chem. Ref. Data 14, 947 (1985). Still air obeys
-∇·(κ_air(T) ∇T) = 0; with θ = ∫κ_air dT this is Laplace's equation for θ.
+∇·(κ_air(T) ∇T) = 0; with θ = ∫κ_air dT this is Laplace's equation for θ. `T` is in K, κ_air in
+W cm⁻¹ K⁻¹ and θ, zero at a base temperature, in W cm⁻¹.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.materials.law import FORMULA_FROM, FORMULA_TO, Array, Partials, law
+from hotlever.materials.laws import FORMULA_FROM, FORMULA_TO, Evaluated, law
+from hotlever.types import Array
 
 #: Coefficient and exponent of T (K) of each term of Eq. 13, in W cm⁻¹ K⁻¹.
 _TERMS = (
@@ -21,6 +23,10 @@ _TERMS = (
     (9.14, -2.0),
     (-6.50e2, -3.0),
 )
+#: Specific gas constant (J kg⁻¹ K⁻¹) and ratio of specific heats of air.
+GAS_CONSTANT, HEAT_RATIO = 287.05, 1.4
+#: Standard pressure (mbar).
+ATMOSPHERE = 1013.25
 
 
 def _sum(T: Array, order: int) -> Array:
@@ -39,36 +45,18 @@ def _sum(T: Array, order: int) -> Array:
     for coefficient, power in _TERMS:
         if order == 1:
             total += coefficient * power * raised(power - 1.0)
-        elif order == -1 and power == -1.0:
-            total += coefficient * np.log(T)
-        elif order == -1:
-            total += coefficient / (power + 1.0) * raised(power + 1.0)
-        else:
+        elif order == 0:
             total += coefficient * raised(power)
+        elif power == -1.0:
+            total += coefficient * np.log(T)
+        else:
+            total += coefficient / (power + 1.0) * raised(power + 1.0)
     return total
 
 
-#: Specific gas constant (J kg⁻¹ K⁻¹) and ratio of specific heats of air.
-GAS_CONSTANT, HEAT_RATIO = 287.05, 1.4
-#: Standard pressure (mbar).
-ATMOSPHERE = 1013.25
-
-
 @law(meant_for=(290.0, 1300.0), source="Eq. 13; Kadoya et al., JPCRD 14, 947 (1985)")
-def thermal_conductivity_of_air(T: ArrayLike) -> tuple[Array, Partials]:
-    """Thermal conductivity of air at atmospheric pressure (Eq. 13).
-
-    Parameters
-    ----------
-    T : array_like
-        Temperature (K); meant for 290 to 1300 K.
-
-    Returns
-    -------
-    kappa : ndarray
-        W cm⁻¹ K⁻¹.
-    partials : dict
-        ``T``.
+def thermal_conductivity_of_air(T: ArrayLike) -> Evaluated:
+    """Thermal conductivity κ_air of air at atmospheric pressure (Eq. 13).
 
     Examples
     --------
@@ -84,15 +72,13 @@ def thermal_conductivity_of_air(T: ArrayLike) -> tuple[Array, Partials]:
     meant_for=(290.0, 1300.0),
     source="E. H. Kennard, Kinetic Theory of Gases (McGraw-Hill, 1938), sec. 180",
 )
-def temperature_jump_length(
-    T: ArrayLike, pressure_mbar: float, accommodation: float
-) -> tuple[Array, Partials]:
-    """Jump length of rarefied air: T_gas − T_wall = g ∂T/∂n at a wall, n into the gas.
+def temperature_jump_length(T: ArrayLike, pressure_mbar: float, accommodation: float) -> Evaluated:
+    """Jump length g (µm) of rarefied air: T_gas − T_wall = g ∂T/∂n at a wall, n into the gas.
 
     g = (2 − α)/α √(2πRT) κ / ((γ + 1) c_v p), about 1.6 mean free paths for α = 1. Two parallel
     plates with this jump exchange heat exactly as in a dense gas and as in free molecular flow;
     between the two, and for a lone body in free molecular flow (where it gives up to twice the
-    loss), it is an approximation.
+    loss), it is an approximation. The partial derivative is by ``T``.
 
     Parameters
     ----------
@@ -101,13 +87,6 @@ def temperature_jump_length(
     pressure_mbar : float
     accommodation : float
         Thermal accommodation coefficient α of the wall, above 0 and up to 1.
-
-    Returns
-    -------
-    length : ndarray
-        µm.
-    partials : dict
-        ``T``.
 
     Examples
     --------
@@ -128,23 +107,11 @@ def temperature_jump_length(
     return per_kappa * kappa, {"T": per_kappa * (slope + 0.5 * kappa / T)}
 
 
-def kirchhoff_variable(T: ArrayLike, base_temperature_K: float) -> tuple[Array, Partials]:
+def kirchhoff_variable(T: ArrayLike, base_temperature_K: float) -> Evaluated:
     """Kirchhoff variable of air, θ = ∫κ_air dT from the base temperature.
 
-    Parameters
-    ----------
-    T : array_like
-        Temperature (K). From 200 to 1700 K the integral of Eq. 13; beyond, κ_air stays at its
-        value at the limit, so that θ rises for any T.
-    base_temperature_K : float
-        Where θ is zero.
-
-    Returns
-    -------
-    theta : ndarray
-        W cm⁻¹.
-    partials : dict
-        ``T``: κ_air.
+    From 200 to 1700 K the integral of Eq. 13; beyond, κ_air stays at its value at the limit, so
+    that θ rises for any `T`.
 
     Examples
     --------
@@ -161,18 +128,6 @@ def kirchhoff_variable(T: ArrayLike, base_temperature_K: float) -> tuple[Array, 
 
 def temperature_from_kirchhoff(theta: ArrayLike, base_temperature_K: float) -> Array:
     """Invert `kirchhoff_variable`: the temperature of the air where θ is known.
-
-    Parameters
-    ----------
-    theta : array_like
-        W cm⁻¹.
-    base_temperature_K : float
-        Where θ is zero.
-
-    Returns
-    -------
-    T : ndarray
-        K.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""The doping profile along a heater that borders high-doped silicon."""
+"""The doping profile along a heater that borders high-doped silicon, and what makes it.
+
+The dopant diffuses into the heater while the high-doped silicon is annealed.
+"""
 
 from __future__ import annotations
 
@@ -6,36 +9,33 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import erf
 
-from hotlever.materials.law import Array, Partials
+from hotlever.errors import InputError
+from hotlever.materials.laws import Evaluated, law
+from hotlever.types import Array
+
+#: Of phosphorus: pre-exponential factor (cm²/s), activation energy over the gas constant (K).
+_FACTOR, _ACTIVATION = 10.5, 85000.0 / 1.98720
 
 
 def tapered_doping(
     x: ArrayLike, n_d: float, delta: float, *, length: float, n_hd: float
-) -> tuple[Array, Partials]:
-    """Doping concentration after diffusion from both ends of a heater.
+) -> Evaluated:
+    """Doping concentration (cm⁻³, from `n_d` to `n_hd`) after diffusion from both ends of a heater.
 
     The paper's unnumbered equation between Eqs. 4 and 5: the step profile of a heater of
-    `length` between high-doped neighbours, smoothed by 1-D diffusion over the length Δ.
+    `length` between high-doped neighbours, smoothed by 1-D diffusion over the length Δ. The
+    partial derivatives are by ``x``, ``n_d`` and ``delta``.
 
     Parameters
     ----------
     x : array_like
         Position along the heater axis from the heater's centre (µm).
-    n_d : float
-        Doping concentration of the undiffused heater (cm⁻³).
+    n_d, n_hd : float
+        Doping concentration of the undiffused heater and of the high-doped silicon (cm⁻³).
     delta : float
         Diffusion length Δ = 2 √(D t_a) (µm).
     length : float
         Geometrical heater length l_h (µm).
-    n_hd : float
-        Doping concentration of the high-doped silicon (cm⁻³).
-
-    Returns
-    -------
-    n : ndarray
-        cm⁻³, between `n_d` and `n_hd`.
-    partials : dict
-        ``n_d``, ``delta``, ``x``.
 
     Examples
     --------
@@ -53,3 +53,47 @@ def tapered_doping(
         "delta": -per_unit * (bell_right * right + bell_left * left) / delta,
         "x": per_unit * (bell_right - bell_left) / delta,
     }
+
+
+@law(
+    meant_for=(1323.0, 1623.0),
+    source="C. S. Fuller and J. A. Ditzenberger, J. Appl. Phys. 27, 544 (1956)",
+)
+def phosphorus_diffusivity(T: ArrayLike) -> Evaluated:
+    """Diffusion coefficient of phosphorus in silicon (cm² s⁻¹) at a temperature (K).
+
+    Fuller and Ditzenberger, J. Appl. Phys. 27, 544 (1956): 10.5 cm²/s
+    exp(−85 kcal/mol / RT), ± 40 %, for concentrations at which it does not depend on them. Above
+    some 10¹⁹ cm⁻³ phosphorus is faster. The paper takes 10⁻¹² cm²/s at 1150 °C.
+
+    Examples
+    --------
+    >>> from hotlever.spieser2017 import ANNEALING_K
+    >>> D, _ = phosphorus_diffusivity(ANNEALING_K)
+    >>> f"{D:.1e}"
+    '9.3e-13'
+    """
+    T = np.asarray(T, dtype=float)
+    D = _FACTOR * np.exp(-_ACTIVATION / T)
+    return D, {"T": D * _ACTIVATION / T**2}
+
+
+def diffusion_length(temperature_K: ArrayLike, time_s: ArrayLike) -> Array:
+    """Return the diffusion length Δ = 2 √(D t_a) (µm) of phosphorus after annealing.
+
+    Raises
+    ------
+    InputError
+        If a temperature or a time is not positive.
+
+    Examples
+    --------
+    >>> from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
+    >>> diffusion_length(ANNEALING_K, ANNEALING_S).round(2).item()
+    0.82
+    """
+    temperature, time = np.asarray(temperature_K, dtype=float), np.asarray(time_s, dtype=float)
+    if not (np.all(temperature > 0) and np.all(time > 0)):
+        raise InputError("annealing needs a positive temperature (K) and a positive time (s)")
+    length: Array = 2.0 * np.sqrt(phosphorus_diffusivity(temperature)[0] * time) * 1e4
+    return length

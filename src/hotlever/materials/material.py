@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Any, NamedTuple
 
 from pydantic import Field, model_validator
 
@@ -11,17 +11,10 @@ from hotlever.records import Record
 
 
 class Parameter(NamedTuple):
-    """One fit parameter as users meet it.
+    """One fit parameter as users meet it: its name in files, its symbol in the paper, its unit.
 
-    Attributes
-    ----------
-    name, symbol, unit : str
-        Name in files, symbol in the paper, unit.
-    scale : float
-        Size of the parameter, by which a fit divides to work with numbers of order one.
-    lower, upper : float
-        Bounds within which silicon levers make sense; a fit stays inside.
-    meaning : str
+    A fit divides by the `scale`, to work with numbers of order one, and stays between `lower` and
+    `upper`, within which silicon levers make sense.
     """
 
     name: str
@@ -65,35 +58,28 @@ def parameter(name: str, where: str = "") -> Parameter:
     return PARAMETERS[name]
 
 
-Positive = Annotated[float, Field(gt=0)]
+def _of_silicon(name: str) -> Any:
+    """Return the bounds of a parameter, twice as wide as a fit's, and what it is."""
+    known = PARAMETERS[name]
+    meaning = f"{known.meaning}, {known.symbol} ({known.unit})"
+    return Field(ge=known.lower / 2, le=2 * known.upper, description=meaning)
 
 
 class Material(Record):
-    """Material parameters (section ``[material]`` of a probe file).
+    """Parameters of the laws in Eqs. 4 to 11 (section ``[material]`` of a probe file)."""
 
-    Attributes
-    ----------
-    c_kappa : float
-        Scale c_κ of the thermal conductivity (Eq. 4).
-    delta : float
-        Diffusion length Δ of the doping profile (µm).
-    n_d : float
-        Doping concentration of the heater (cm⁻³).
-    p : float
-        Phonon scattering exponent (Eq. 10).
-    a0, a1 : float
-        High-doped resistivity at 300 K (Ω cm) and its slope (Ω cm K⁻¹), Eq. 11.
-    n_hd : float
-        Doping concentration of the high-doped silicon (cm⁻³).
-    """
-
-    c_kappa: Positive
-    delta: Positive
-    n_d: Positive
-    p: Positive
-    a0: Positive
-    a1: Annotated[float, Field(ge=0)]
-    n_hd: Positive = 2.2e20
+    c_kappa: float = _of_silicon("c_kappa")
+    delta: float = _of_silicon("delta")
+    n_d: float = _of_silicon("n_d")
+    p: float = _of_silicon("p")
+    a0: float = _of_silicon("a0")
+    a1: float = _of_silicon("a1")
+    n_hd: float = Field(
+        default=2.2e20,
+        ge=1e18,
+        le=1e22,
+        description="doping concentration of the high-doped silicon (cm⁻³)",
+    )
 
     @model_validator(mode="after")
     def _heater_is_the_low_doped_part(self) -> Material:

@@ -2,52 +2,53 @@
 
 Equations 4 to 11 of Spieser et al., J. Appl. Phys. 121, 174503 (2017),
 doi:10.1063/1.4981883, called "the paper" below. Units are the paper's: cm, V, A, W, K.
-Every function returns its value and the partial derivatives with respect to its arguments;
-see `hotlever.materials.law` for the convention and for what happens outside a law's range.
+
+The laws take arrays of the temperature `T` (K), the local doping concentration `n` (cm⁻³, see
+`hotlever.materials.doping`) and the phonon scattering exponent `p`; `carrier` is "electron" or
+"hole". What they return, and what happens outside a law's range: `hotlever.materials.laws`.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import elementwise
 
-from hotlever.materials.law import FORMULA_TO, Array, Partials, law
+from hotlever.materials.laws import FORMULA_TO, Evaluated, Partials, law
+from hotlever.types import Array
 
+Carrier = Literal["electron", "hole"]
+
+#: Melting point (K): no state of a lever beyond it is meaningful.
+MELTING_POINT = 1687.0
 #: Boltzmann constant (eV/K), CODATA 2018.
 BOLTZMANN = 8.617333262e-5
 #: Elementary charge (C) as rounded in Eq. 5.
 ELEMENTARY_CHARGE = 1.6e-19
-#: Eq. 9 prints 0.746 for (m_e/m_h)^½; the masses it quotes, 0.33 and 0.55, give 0.775.
-#: The printed number is kept because the published parameters were fitted with it.
-HOLE_IMPURITY_RATIO = 0.746
-#: Eq. 10, (m_e/m_h)^(5/2).
-HOLE_PHONON_RATIO = 0.279
+#: Mobility of a carrier over that of electrons, limited by impurities (Eq. 9) and by phonons
+#: (Eq. 10). For holes Eq. 9 prints 0.746 for (m_e/m_h)^½; the masses it quotes, 0.33 and 0.55,
+#: give 0.775. The printed number is kept because the published parameters were fitted with it.
+IMPURITY_RATIO: dict[Carrier, float] = {"electron": 1.0, "hole": 0.746}
+PHONON_RATIO: dict[Carrier, float] = {"electron": 1.0, "hole": 0.279}  # (m_e/m_h)^(5/2)
+#: Where the slope of Eq. 4 steps (K), through a tanh that is 1 K wide.
+_STEP = 680.0
 
 
-@law(meant_for=(290.0, 1300.0), source="Eq. 4; Fulkerson et al., Phys. Rev. 167, 765 (1968)")
-def thermal_conductivity(T: ArrayLike, c_kappa: float = 1.0) -> tuple[Array, Partials]:
-    """Thermal conductivity of silicon, c_κ κ_Si(T) (Eq. 4).
+@law(
+    meant_for=(290.0, 1300.0),
+    source="Eq. 4; Fulkerson et al., Phys. Rev. 167, 765 (1968)",
+    steps=(_STEP,),
+)
+def thermal_conductivity(T: ArrayLike, c_kappa: float = 1.0) -> Evaluated:
+    """Thermal conductivity of silicon, c_κ κ_Si(T), in W cm⁻¹ K⁻¹ (Eq. 4).
 
     Parameters
     ----------
     T : array_like
-        Temperature (K); meant for 290 to 1300 K.
     c_kappa : float
         Reduction by phonon scattering in a thin structure.
-
-    Returns
-    -------
-    kappa : ndarray
-        W cm⁻¹ K⁻¹.
-    partials : dict
-        ``T``, ``c_kappa``.
-
-    Notes
-    -----
-    The slope of 1/κ steps at 680 K through a tanh that is 1 K wide; its derivative is exact.
 
     Examples
     --------
@@ -56,7 +57,7 @@ def thermal_conductivity(T: ArrayLike, c_kappa: float = 1.0) -> tuple[Array, Par
     [141.4, 52.5, 30.8]
     """
     T = np.asarray(T, dtype=float)
-    above = T - 680.0
+    above = T - _STEP
     step = np.tanh(above)
     resistivity = 0.707 + 3.15e-3 * (T - 300.0) + 5.25e-4 * (1.0 + step) * above
     slope = 3.15e-3 + 5.25e-4 * (1.0 + step + above * (1.0 - step**2))
@@ -67,22 +68,8 @@ def thermal_conductivity(T: ArrayLike, c_kappa: float = 1.0) -> tuple[Array, Par
 @law(
     meant_for=(200.0, 1300.0), source="Eq. 7; Berggren and Sernelius, Phys. Rev. B 24, 1971 (1981)"
 )
-def band_gap(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
-    """Band gap of doped silicon with band-gap narrowing (Eq. 7, second line).
-
-    Parameters
-    ----------
-    T : array_like
-        Temperature (K).
-    n : array_like
-        Doping concentration (cm⁻³).
-
-    Returns
-    -------
-    gap : ndarray
-        eV.
-    partials : dict
-        ``T``, ``n``.
+def band_gap(T: ArrayLike, n: ArrayLike) -> Evaluated:
+    """Band gap of doped silicon with band-gap narrowing, in eV (Eq. 7, second line).
 
     Examples
     --------
@@ -98,22 +85,8 @@ def band_gap(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
 
 
 @law(meant_for=(200.0, 1300.0), source="Eq. 7; Altermatt et al. (1999)")
-def intrinsic_density(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
-    """Intrinsic carrier density (Eq. 7, first line).
-
-    Parameters
-    ----------
-    T : array_like
-        Temperature (K).
-    n : array_like
-        Doping concentration (cm⁻³), which narrows the gap.
-
-    Returns
-    -------
-    n_i : ndarray
-        cm⁻³.
-    partials : dict
-        ``T``, ``n``.
+def intrinsic_density(T: ArrayLike, n: ArrayLike) -> Evaluated:
+    """Intrinsic carrier density, in cm⁻³ (Eq. 7, first line); doping narrows the gap.
 
     Examples
     --------
@@ -132,36 +105,12 @@ def intrinsic_density(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
 
 
 @law(meant_for=(200.0, 1300.0), source="Eq. 6")
-def electron_density(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
-    """Electron density in n-doped silicon (Eq. 6, first line).
-
-    Parameters
-    ----------
-    T : array_like
-        Temperature (K).
-    n : array_like
-        Doping concentration (cm⁻³).
-
-    Returns
-    -------
-    n_e : ndarray
-        cm⁻³.
-    partials : dict
-        ``T``, ``n``.
-    """
-    return _carriers(T, n)[0]
+def carrier_density(T: ArrayLike, n: ArrayLike, carrier: Carrier = "electron") -> Evaluated:
+    """Density of electrons, or of holes n_i²/n_e, in n-doped silicon, in cm⁻³ (Eq. 6)."""
+    return _carriers(T, n)[carrier]
 
 
-@law(meant_for=(200.0, 1300.0), source="Eq. 6")
-def hole_density(T: ArrayLike, n: ArrayLike) -> tuple[Array, Partials]:
-    """Hole density in n-doped silicon, n_i²/n_e (Eq. 6, second line).
-
-    Parameters and returns as in `electron_density`.
-    """
-    return _carriers(T, n)[1]
-
-
-def _carriers(T: ArrayLike, n: ArrayLike) -> tuple[tuple[Array, Partials], tuple[Array, Partials]]:
+def _carriers(T: ArrayLike, n: ArrayLike) -> dict[Carrier, Evaluated]:
     """Electrons and holes together, as they share n_i."""
     n = np.asarray(n, dtype=float)
     n_i, d_i = intrinsic_density.formula(T, n)
@@ -171,25 +120,14 @@ def _carriers(T: ArrayLike, n: ArrayLike) -> tuple[tuple[Array, Partials], tuple
     # n_e - n_h = n and n_e n_h = n_i² give (n_e + n_h) dn_e = n_e dn + 2 n_i dn_i
     d_T = 2.0 * n_i * d_i["T"] / root
     d_n = (electrons + 2.0 * n_i * d_i["n"]) / root
-    return (electrons, {"T": d_T, "n": d_n}), (holes, {"T": d_T, "n": d_n - 1.0})
+    return {
+        "electron": (electrons, {"T": d_T, "n": d_n}),
+        "hole": (holes, {"T": d_T, "n": d_n - 1.0}),
+    }
 
 
-def impurity_mobility(n: ArrayLike, carrier: str = "electron") -> tuple[Array, Partials]:
-    """Mobility limited by impurity scattering (Eq. 9).
-
-    Parameters
-    ----------
-    n : array_like
-        Doping concentration (cm⁻³).
-    carrier : {"electron", "hole"}
-        Holes take the printed ratio 0.746 (see `HOLE_IMPURITY_RATIO`).
-
-    Returns
-    -------
-    mobility : ndarray
-        cm² V⁻¹ s⁻¹.
-    partials : dict
-        ``n``.
+def impurity_mobility(n: ArrayLike, carrier: Carrier = "electron") -> Evaluated:
+    """Mobility limited by impurity scattering, in cm² V⁻¹ s⁻¹ (Eq. 9).
 
     Examples
     --------
@@ -197,30 +135,13 @@ def impurity_mobility(n: ArrayLike, carrier: str = "electron") -> tuple[Array, P
     410.0
     """
     n = np.asarray(n, dtype=float)
-    ratio = 1.0 if carrier == "electron" else HOLE_IMPURITY_RATIO
-    mobility = ratio * 4.1e11 / np.sqrt(n)
+    mobility = IMPURITY_RATIO[carrier] * 4.1e11 / np.sqrt(n)
     return mobility, {"n": -0.5 * mobility / n}
 
 
 @law(meant_for=(290.0, 1300.0), source="Eq. 10; Dürig, J. Appl. Phys. 98, 044906 (2005)")
-def phonon_mobility(T: ArrayLike, p: float, carrier: str = "electron") -> tuple[Array, Partials]:
-    """Mobility limited by phonon scattering (Eq. 10).
-
-    Parameters
-    ----------
-    T : array_like
-        Temperature (K).
-    p : float
-        Phonon scattering exponent.
-    carrier : {"electron", "hole"}
-        Holes take the printed ratio 0.279.
-
-    Returns
-    -------
-    mobility : ndarray
-        cm² V⁻¹ s⁻¹.
-    partials : dict
-        ``T``, ``p``.
+def phonon_mobility(T: ArrayLike, p: float, carrier: Carrier = "electron") -> Evaluated:
+    """Mobility limited by phonon scattering, in cm² V⁻¹ s⁻¹ (Eq. 10).
 
     Examples
     --------
@@ -228,14 +149,14 @@ def phonon_mobility(T: ArrayLike, p: float, carrier: str = "electron") -> tuple[
     400.0
     """
     T = np.asarray(T, dtype=float)
-    ratio = 1.0 if carrier == "electron" else HOLE_PHONON_RATIO
     cold = 300.0 / T
-    mobility = ratio * 1.6e3 * cold**p
+    mobility = PHONON_RATIO[carrier] * 1.6e3 * cold**p
     return mobility, {"T": -p * mobility / T, "p": mobility * np.log(cold)}
 
 
-def _mobility(T: Array, n: Array, p: float, carrier: str) -> tuple[Array, Partials]:
-    """Combine impurity and phonon scattering by Matthiessen's rule (Eq. 8)."""
+@law(meant_for=(290.0, 1300.0), source="Eq. 8")
+def mobility(T: ArrayLike, n: ArrayLike, p: float, carrier: Carrier = "electron") -> Evaluated:
+    """Carrier mobility by Matthiessen's rule, in cm² V⁻¹ s⁻¹ (Eq. 8)."""
     impurity, d_impurity = impurity_mobility(n, carrier)
     phonon, d_phonon = phonon_mobility.formula(T, p, carrier)
     share = 1.0 / (impurity + phonon)
@@ -247,86 +168,34 @@ def _mobility(T: Array, n: Array, p: float, carrier: str) -> tuple[Array, Partia
     }
 
 
-@law(meant_for=(290.0, 1300.0), source="Eq. 8")
-def mobility(
-    T: ArrayLike, n: ArrayLike, p: float, carrier: str = "electron"
-) -> tuple[Array, Partials]:
-    """Carrier mobility by Matthiessen's rule (Eq. 8).
-
-    Parameters
-    ----------
-    T : array_like
-        Temperature (K).
-    n : array_like
-        Doping concentration (cm⁻³).
-    p : float
-        Phonon scattering exponent.
-    carrier : {"electron", "hole"}
-
-    Returns
-    -------
-    mobility : ndarray
-        cm² V⁻¹ s⁻¹.
-    partials : dict
-        ``T``, ``n``, ``p``.
-    """
-    return _mobility(np.asarray(T, dtype=float), np.asarray(n, dtype=float), p, carrier)
-
-
 @law(meant_for=(290.0, 1300.0), source="Eq. 5")
-def conductivity_low_doped(T: ArrayLike, n: ArrayLike, p: float) -> tuple[Array, Partials]:
-    """Electrical conductivity of the low-doped silicon of heater and reader (Eq. 5).
-
-    Parameters
-    ----------
-    T : array_like
-        Temperature (K); meant for 290 to 1300 K.
-    n : array_like
-        Local doping concentration (cm⁻³), see `hotlever.materials.doping`.
-    p : float
-        Phonon scattering exponent.
-
-    Returns
-    -------
-    sigma : ndarray
-        S cm⁻¹.
-    partials : dict
-        ``T``, ``n``, ``p``.
-    """
-    T, n = np.asarray(T, dtype=float), np.asarray(n, dtype=float)
+def conductivity_low_doped(T: ArrayLike, n: ArrayLike, p: float) -> Evaluated:
+    """Electrical conductivity of the low-doped heater and reader, in S cm⁻¹ (Eq. 5)."""
     sigma: Array = np.zeros(np.broadcast(T, n).shape)
     total: Partials = {"T": sigma, "n": sigma, "p": sigma}
-    for carrier, (density, d_density) in zip(("electron", "hole"), _carriers(T, n), strict=True):
-        speed, d_speed = _mobility(T, n, p, carrier)
+    for carrier, (density, d_density) in _carriers(T, n).items():
+        speed, d_speed = mobility.formula(T, n, p, carrier)
         sigma = sigma + ELEMENTARY_CHARGE * density * speed
         total = {
             name: total[name]
-            + ELEMENTARY_CHARGE
-            * (density * d_speed[name] + (d_density[name] * speed if name in d_density else 0.0))
+            + ELEMENTARY_CHARGE * (density * d_speed[name] + d_density.get(name, 0.0) * speed)
             for name in total
         }
     return sigma, total
 
 
 @law(meant_for=(290.0, 1300.0), source="Eq. 11; Chapman et al., J. Appl. Phys. 34, 3291 (1963)")
-def conductivity_high_doped(T: ArrayLike, a0: float, a1: float) -> tuple[Array, Partials]:
-    """Electrical conductivity of the quasi-metallic high-doped silicon (Eq. 11).
+def conductivity_high_doped(T: ArrayLike, a0: float, a1: float) -> Evaluated:
+    """Electrical conductivity of the quasi-metallic high-doped silicon, in S cm⁻¹ (Eq. 11).
 
     Parameters
     ----------
     T : array_like
-        Temperature (K); meant for temperatures above 300 K.
+        Meant for temperatures above 300 K.
     a0 : float
         Resistivity at 300 K (Ω cm).
     a1 : float
         Temperature coefficient of the resistivity (Ω cm K⁻¹).
-
-    Returns
-    -------
-    sigma : ndarray
-        S cm⁻¹.
-    partials : dict
-        ``T``, ``a0``, ``a1``.
 
     Examples
     --------
@@ -336,29 +205,22 @@ def conductivity_high_doped(T: ArrayLike, a0: float, a1: float) -> tuple[Array, 
     """
     above = np.asarray(T, dtype=float) - 300.0
     sigma = 1.0 / (a0 + a1 * above)
-    d_resistivity = -(sigma**2)
+    by_resistivity = -(sigma**2)
     return sigma, {
-        "T": d_resistivity * a1,
-        "a0": d_resistivity,
-        "a1": d_resistivity * above,
+        "T": by_resistivity * a1,
+        "a0": by_resistivity,
+        "a1": by_resistivity * above,
     }
 
 
 def inversion_temperature(n: ArrayLike, p: ArrayLike) -> Array:
-    """Temperature at which the resistivity of low-doped silicon is highest, dρ/dT = 0.
-
-    Parameters
-    ----------
-    n : array_like
-        Doping concentration (cm⁻³).
-    p : array_like
-        Phonon scattering exponent; broadcast with `n`.
+    """Temperature T_i (K) at which the resistivity of low-doped silicon is highest, dρ/dT = 0.
 
     Returns
     -------
     ndarray
-        Inversion temperature T_i (K), of the common shape; NaN where the resistivity has no
-        maximum between 300 and 1700 K, as at very high doping.
+        Of the common shape of `n` and `p`; NaN where the resistivity has no maximum between 300
+        and 1700 K, as at very high doping.
 
     Examples
     --------

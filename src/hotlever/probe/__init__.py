@@ -1,8 +1,9 @@
 """Probes: shapes, layouts, meshes and the probe file."""
 
+from hotlever.probe.circuit import Circuit
 from hotlever.probe.layout import Layout, Region, Taper, Terminal
 from hotlever.probe.mesh import MeshOptions, ProbeMesh, mesh_layout
-from hotlever.probe.probe import Circuit, Probe
+from hotlever.probe.probe import Probe
 from hotlever.probe.shapes import ThreeLeg, UShape
 from hotlever.probe.tip import Tip
 

@@ -10,7 +10,10 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from hotlever.probe.tip import Tip
+from hotlever.types import Array
 
 Point = tuple[float, float]
 
@@ -23,14 +26,7 @@ Part = Literal["heater", "leg 1", "leg 2", "reader branch"]
 class Taper:
     """Axis along which the doping of a low-doped region is tapered.
 
-    Attributes
-    ----------
-    centre : tuple of float
-        Centre of the heater (µm).
-    axis : tuple of float
-        Unit vector along the current.
-    length_um : float
-        Geometrical length l_h (µm).
+    From its `centre` along the current, `axis` (a unit vector), over the geometrical length l_h.
     """
 
     centre: Point
@@ -46,6 +42,18 @@ class Region:
     part: Part
     outline: tuple[Point, ...]
     taper: Taper | None = None
+
+    @property
+    def box(self) -> Array:
+        """Least and largest corner, shape (2, 2)."""
+        outline = np.array(self.outline)
+        return np.stack([outline.min(axis=0), outline.max(axis=0)])
+
+    @property
+    def sides(self) -> Array:
+        """Extent along x and y, shape (2,)."""
+        low, high = self.box
+        return np.asarray(high - low)
 
 
 @dataclass(frozen=True)
@@ -97,13 +105,19 @@ class Layout:
             raise ValueError("the heater of a layout must be low-doped, with a taper")
         return taper
 
+    @property
+    def box(self) -> Array:
+        """Least and largest corner of the lever, shape (2, 2)."""
+        boxes = np.array([region.box for region in self.regions])
+        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
     def terminal(self, name: str) -> Terminal | None:
         """Return the terminal of this name, or None if the layout has none."""
         return next((terminal for terminal in self.terminals if terminal.name == name), None)
 
     def reentrant_corners(self) -> list[Point]:
         """Corners where the silicon spans more than 180°, at which fields are singular."""
-        corners = {_rounded(point) for region in self.regions for point in region.outline}
+        corners = {(round(x, 6), round(y, 6)) for region in self.regions for x, y in region.outline}
         return sorted(
             corner
             for corner in corners
@@ -114,12 +128,9 @@ class Layout:
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> tuple[Point, ...]:
-    """Outline of an axis-parallel rectangle, counter-clockwise."""
+    """Outline of an axis-parallel rectangle, counter-clockwise from (x0, the lower y)."""
+    y0, y1 = sorted((y0, y1))
     return ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
-
-
-def _rounded(point: Point) -> Point:
-    return round(point[0], 6), round(point[1], 6)
 
 
 def _angle_at(point: Point, outline: tuple[Point, ...]) -> float:

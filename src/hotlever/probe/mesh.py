@@ -5,23 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from skfem import MeshTet, MeshTri
 
 from hotlever.errors import ComputationError
-from hotlever.probe.layout import Layout, Point, Terminal
+from hotlever.probe.layout import Layout, Region, Terminal
+from hotlever.types import Array
 
 _ON_LINE = 1e-6  # µm
+_NOT_MESHED = "Netgen could not mesh this layout; are its parts of too different a size?"
 
 
 @dataclass(frozen=True)
-class MeshOptions:
-    """Sizes of the triangles, in proportion to the layout.
-
-    The defaults keep I_h and V_r within 1e-4 and T_tip within 0.1 K of a converged mesh, from
-    1 to 11 V and for all published parameters; ``benchmarks/mesh_convergence.py`` prints it.
+class MeshSizes:
+    """Sizes of triangles or tetrahedra, in proportion to the layout.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class MeshOptions:
     corner : float
         Edge at re-entrant corners, as a share of the heater's narrow side.
     lever : float
-        Largest edge elsewhere, as a share of the lever's length.
+        Largest edge elsewhere in the silicon, as a share of the lever's length.
     grading : float
         How fast sizes may grow away from small ones (0 to 1).
     """
@@ -45,69 +45,78 @@ class MeshOptions:
 
 
 @dataclass(frozen=True)
+class MeshOptions(MeshSizes):
+    """Sizes of the triangles; see `MeshSizes`.
+
+    The defaults keep I_h and V_r within 1e-4 and T_tip within 0.1 K of a converged mesh, from
+    1 to 11 V and for all published parameters; ``benchmarks/mesh_convergence.py`` prints it.
+
+    Attributes
+    ----------
+    panels : float
+        Divides the sizes of the panels that stand for the air, see `hotlever.air.surface`.
+    """
+
+    panels: float = 1.0
+
+
+@dataclass(frozen=True)
 class ProbeMesh:
-    """A triangulated layout.
+    """A layout cut into triangles, or tetrahedra.
 
     Attributes
     ----------
     layout : Layout
-    triangles : skfem.MeshTri
-        Vertices (2, n) in µm and triangles (3, m).
+    elements : skfem.MeshTri or skfem.MeshTet
+        Vertices (2 or 3, n) in µm and elements (3 or 4, m).
     region : ndarray of int, shape (m,)
-        Index into ``layout.regions`` of each triangle.
+        Index into ``layout.regions`` of each element; a tip belongs to the heater.
     terminal_facets : mapping of str to ndarray of int
-        Facet indices of `triangles` on each terminal, by the terminal's name.
+        Facets of `elements` on each terminal, by the terminal's name.
     """
 
     layout: Layout
-    triangles: MeshTri
+    elements: MeshTri | MeshTet
     region: NDArray[np.intp]
     terminal_facets: Mapping[str, NDArray[np.intp]]
-
-    @property
-    def elements(self) -> MeshTri:
-        """The triangles."""
-        return self.triangles
 
 
 def mesh_layout(layout: Layout, options: MeshOptions | None = None) -> ProbeMesh:
     """Triangulate a layout with Netgen.
 
-    Parameters
-    ----------
-    layout : Layout
-    options : MeshOptions, optional
-
     Raises
     ------
     ComputationError
-        If Netgen makes no mesh, or a terminal has no edge on the outline.
+        If Netgen cannot mesh it, or a terminal has no edge on the outline.
     """
-    options = options or MeshOptions()
-    points, triangles, region = _netgen(layout, options)
-    mesh = MeshTri(points.T.copy(), triangles.T.copy())
-    edges = {terminal.name: facets_on(mesh, terminal) for terminal in layout.terminals}
-    return ProbeMesh(layout, mesh, region, edges)
+    try:
+        mesh, region = _netgen(layout, options or MeshOptions())
+    except RuntimeError as error:
+        raise ComputationError(f"{_NOT_MESHED} ({error})") from error
+    # where Netgen fails at a face it says so to the terminal only, and leaves a hole
+    outlines = [np.array(region.outline).T for region in layout.regions]
+    if not np.isclose(_area(mesh.p[:, mesh.t]), sum(map(_area, outlines)), rtol=1e-9):
+        raise ComputationError(_NOT_MESHED)
+    return ProbeMesh(layout, mesh, region, terminal_facets(mesh, layout))
 
 
-def _netgen(
-    layout: Layout, options: MeshOptions
-) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
+def _area(corners: Array) -> float:
+    """Return the area of polygons whose corners (2, k, ...) go round."""
+    x, y = corners
+    twice = (x * np.roll(y, -1, axis=0) - y * np.roll(x, -1, axis=0)).sum(axis=0)
+    return float(np.abs(twice).sum()) / 2
+
+
+def _netgen(layout: Layout, options: MeshOptions) -> tuple[MeshTri, NDArray[np.intp]]:
     # imported here: OpenCASCADE takes a quarter of a second to load, and a saved sweep can be
     # read and drawn without it
     from netgen.occ import Glue, OCCGeometry, WorkPlane
 
-    def extent(points: tuple[Point, ...]) -> NDArray[np.float64]:
-        return np.ptp(np.array(points), axis=0)
-
-    narrow = extent(layout.heater.outline).min() / options.refinement
-    whole = max(extent(region.outline).max() for region in layout.regions) / options.refinement
+    narrow = layout.heater.sides.min() / options.refinement
+    whole = max(region.sides.max() for region in layout.regions) / options.refinement
     faces = []
     for index, region in enumerate(layout.regions):
-        plane = WorkPlane().MoveTo(*region.outline[0])
-        for point in region.outline[1:]:
-            plane.LineTo(*point)
-        face = plane.Close().Face()
+        face = face_of(region, WorkPlane())
         face.name = f"{index}"
         if region.part == "heater":
             face.maxh = options.heater * narrow
@@ -118,41 +127,51 @@ def _netgen(
         if any(math.dist((vertex.p[0], vertex.p[1]), corner) < _ON_LINE for corner in corners):
             vertex.maxh = options.corner * narrow
     # gluing keeps the faces' names but not their order
-    names = [int(face.name) for face in shape.faces]
+    names = np.array([int(face.name) for face in shape.faces])
     mesh = OCCGeometry(shape, dim=2).GenerateMesh(
         maxh=options.lever * whole, grading=options.grading
     )
     elements = mesh.Elements2D().NumPy()
     if not len(elements):
         raise ComputationError("Netgen made no triangles for this layout")
-    # a copy: Coordinates() is a view of memory that goes away with Netgen's mesh
-    points = np.array(mesh.Coordinates())[:, :2]
+    # copies: Coordinates() is a view of memory that goes away with Netgen's mesh
+    points = np.array(mesh.Coordinates())[:, :2].T.copy()
     triangles = elements["nodes"][:, :3].astype(np.intp) - 1
-    region = np.array(names)[elements["index"] - 1]
-    return points, triangles, region
+    return MeshTri(points, triangles.T.copy()), names[elements["index"] - 1]
 
 
-def facets_on(mesh: MeshTri | MeshTet, terminal: Terminal) -> NDArray[np.intp]:
-    """Return the boundary facets with all corners on the terminal's line, or above or below it.
+def face_of(region: Region, plane: Any) -> Any:
+    """Draw a region's outline on one of Netgen's work planes."""
+    plane.MoveTo(*region.outline[0])
+    for point in region.outline[1:]:
+        plane.LineTo(*point)
+    return plane.Close().Face()
+
+
+def terminal_facets(mesh: MeshTri | MeshTet, layout: Layout) -> dict[str, NDArray[np.intp]]:
+    """Return the boundary facets on, above or below the line of each terminal, by its name.
 
     Raises
     ------
     ComputationError
-        If there are none.
+        If a terminal has none.
     """
     facets = mesh.boundary_facets()
-    corners = mesh.p[:2, mesh.facets[:, facets].ravel()]
-    on = _on_segment(corners, terminal.start, terminal.end).reshape(-1, facets.size).all(axis=0)
-    if not on.any():
-        kind = "edge" if mesh.dim() == 2 else "face"
-        raise ComputationError(f"terminal '{terminal.name}' touches no {kind} of the lever")
-    return np.asarray(facets[on], dtype=np.intp)
+    corners = mesh.p[:2, mesh.facets[:, facets]]
+    found = {terminal.name: facets[_on(terminal, corners)] for terminal in layout.terminals}
+    for name, here in found.items():
+        if not here.size:
+            kind = "edge" if mesh.dim() == 2 else "face"
+            raise ComputationError(f"terminal '{name}' touches no {kind} of the lever")
+    return found
 
 
-def _on_segment(points: NDArray[np.float64], start: Point, end: Point) -> NDArray[np.bool_]:
-    """Whether points (2, n) lie on the segment from `start` to `end`."""
-    a, b = np.array(start), np.array(end)
-    length = np.linalg.norm(b - a)
-    along = (b - a) @ (points - a[:, None]) / length
-    across = (b - a)[0] * (points[1] - a[1]) - (b - a)[1] * (points[0] - a[0])
-    return (np.abs(across / length) < _ON_LINE) & (along > -_ON_LINE) & (along < length + _ON_LINE)
+def _on(terminal: Terminal, corners: Array) -> NDArray[np.bool_]:
+    """Whether all corners of facets (2, k, facets) lie on a terminal's line."""
+    start = np.array(terminal.start)
+    line = np.array(terminal.end) - start
+    length = np.linalg.norm(line)
+    x, y = corners - start[:, None, None]
+    along, across = (line[0] * x + line[1] * y) / length, (line[0] * y - line[1] * x) / length
+    on = (np.abs(across) < _ON_LINE) & (along > -_ON_LINE) & (along < length + _ON_LINE)
+    return np.asarray(on.all(axis=0))

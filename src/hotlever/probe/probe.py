@@ -5,38 +5,33 @@ from __future__ import annotations
 import os
 import tomllib
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Any
 
-import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
-from hotlever.air.surroundings import Surroundings
-from hotlever.errors import InputError, unknown_name
+from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_text, write_text
-from hotlever.materials import PARAMETERS, Material
-from hotlever.materials.spieser2017 import DOI, published
+from hotlever.materials import Material
+from hotlever.probe.circuit import Circuit
 from hotlever.probe.layout import Layout
 from hotlever.probe.shapes import Shape, ThreeLeg, UShape, shape_of
+from hotlever.probe.surroundings import Surroundings
 from hotlever.probe.tip import Tip
 from hotlever.records import Record
+from hotlever.spieser2017 import DOI, published
 
+#: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
+#: gigabytes to read.
+_LARGEST, _LONGEST_LINE = 1_000_000, 1000
 
-class Circuit(Record):
-    """The measuring circuit (section ``[circuit]`` of a probe file).
-
-    Attributes
-    ----------
-    series_resistance_ohm : float
-        Series resistance R_s between the bias source and the lever (Ω); 0 is allowed.
-    base_temperature_K : float
-        Temperature of the leg ends (K).
-    """
-
-    series_resistance_ohm: Annotated[float, Field(ge=0)] = 5600.0
-    base_temperature_K: Annotated[float, Field(ge=250, le=1000)] = 293.0
-
-
-SECTIONS = ("probe", "circuit", "material", "surroundings", "tip")
+#: What the sections of a probe file hold, beside the shape in ``[probe]``.
+_PARTS: dict[str, type[Record]] = {
+    "circuit": Circuit,
+    "material": Material,
+    "surroundings": Surroundings,
+    "tip": Tip,
+}
+SECTIONS = ("probe", *_PARTS)
 
 
 class Probe(Record):
@@ -49,7 +44,7 @@ class Probe(Record):
     >>> probe = Probe.reference()
     >>> probe.shape.length_um, probe.circuit.series_resistance_ohm
     (54.4, 5600.0)
-    >>> probe.with_values({"n_d": 4e17, "series_resistance_ohm": 0}).material.n_d
+    >>> probe.with_(n_d=4e17, series_resistance_ohm=0).material.n_d
     4e+17
     """
 
@@ -62,8 +57,7 @@ class Probe(Record):
     @model_validator(mode="after")
     def _tip_stands_on_the_heater(self) -> Probe:
         if self.tip is not None:
-            heater = np.array(self.shape.layout().heater.outline)
-            room = np.ptp(heater, axis=0).min() / 2
+            room = self.shape.layout().heater.sides.min() / 2
             if not self.tip.base_radius_um < room:
                 raise ValueError(
                     f"the tip's base has a radius of {self.tip.base_radius_um:.4g} µm, expected "
@@ -108,6 +102,21 @@ class Probe(Record):
         )
 
     @classmethod
+    def given(cls, probe: Probe | str | os.PathLike[str]) -> Probe:
+        """Return a probe as it is, or read one from a probe file.
+
+        Raises
+        ------
+        InputError
+            If it is neither, or the file is at fault.
+        """
+        if isinstance(probe, Probe):
+            return probe
+        if isinstance(probe, str | os.PathLike):
+            return cls.from_file(probe)
+        raise InputError(f"found {type(probe).__name__}, expected a Probe or a probe file")
+
+    @classmethod
     def from_values(cls, values: dict[str, Any], where: str) -> Probe:
         """Make a probe of the sections of a probe file; `where` names it in an error.
 
@@ -120,23 +129,19 @@ class Probe(Record):
             if name not in SECTIONS:
                 raise unknown_name("section", name, SECTIONS, where)
             if not isinstance(section, dict):
-                raise InputError(f"{where}: [{name}] must be a section, found {section!r}")
+                raise InputError(f"{where}: [{name}] must be a section, found {shown(section)}")
         if "probe" not in values:
             raise InputError(f"{where}: section [probe] is missing")
-        tip = values.get("tip")
-        sections = {
-            "shape": shape_of(values["probe"], f"{where}: [probe]"),
-            "circuit": Circuit.of(values.get("circuit", {}), f"{where}: [circuit]"),
-            "material": Material.of(
-                {**published("option III").material.model_dump(), **values.get("material", {})},
-                f"{where}: [material]",
-            ),
-            "surroundings": Surroundings.of(
-                values.get("surroundings", {}), f"{where}: [surroundings]"
-            ),
-            "tip": None if tip is None else Tip.of(tip, f"{where}: [tip]"),
-        }
-        return cls.of(sections, where)
+        given = {name: values[name] for name in _PARTS if name in values}
+        if "material" in given:
+            given["material"] = {
+                **published("option III").material.model_dump(),
+                **given["material"],
+            }
+        parts: dict[str, Any] = {"shape": shape_of(values["probe"], f"{where}: [probe]")}
+        for name, section in given.items():
+            parts[name] = _PARTS[name].of(section, f"{where}: [{name}]")
+        return cls.of(parts, where)
 
     @classmethod
     def from_file(cls, path: str | os.PathLike[str]) -> Probe:
@@ -149,25 +154,34 @@ class Probe(Record):
         InputError
             If the file cannot be read or its content is at fault.
         """
+        text = read_text(path, largest=_LARGEST)
+        for number, line in enumerate(text.splitlines(), start=1):
+            if len(line) > _LONGEST_LINE:
+                raise InputError(
+                    f"{path}: line {number}: {len(line)} characters, expected at most "
+                    f"{_LONGEST_LINE}"
+                )
         try:
-            values = tomllib.loads(read_text(path))
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"{path}: not valid TOML: {error}") from None
+            values = tomllib.loads(text)
+        except RecursionError:
+            raise InputError(f"{path}: not valid TOML: nested too deeply") from None
+        except ValueError as error:
+            # a number of thousands of digits is a ValueError too
+            reason = str(error).partition(";")[0]
+            raise InputError(f"{path}: not valid TOML: {reason}") from None
         return cls.from_values(values, str(path))
+
+    @property
+    def _sections(self) -> dict[str, Record]:
+        """The sections of its file."""
+        present = {name: getattr(self, name) for name in _PARTS if getattr(self, name)}
+        return {"probe": self.shape, **present}
 
     def values(self) -> dict[str, dict[str, Any]]:
         """Return the sections as plain values: what `from_values` takes."""
-        sections = {
-            "probe": self.shape.model_dump(exclude_none=True),
-            "circuit": self.circuit.model_dump(),
-            "material": self.material.model_dump(),
-            "surroundings": self.surroundings.model_dump(exclude_none=True),
-        }
-        if self.tip is not None:
-            sections["tip"] = self.tip.model_dump()
-        return sections
+        return {name: part.model_dump(exclude_none=True) for name, part in self._sections.items()}
 
-    def with_values(self, changes: dict[str, Any]) -> Probe:
+    def with_(self, **changes: Any) -> Probe:
         """Return a copy with some values changed, each named by its key in a probe file.
 
         Raises
@@ -175,9 +189,7 @@ class Probe(Record):
         InputError
             If a name exists in no section (the nearest one is given) or a value is impossible.
         """
-        sections = self.values()
-        sections["probe"] = self.shape.model_dump()
-        sections["surroundings"] = self.surroundings.model_dump()
+        sections = {name: part.model_dump() for name, part in self._sections.items()}
         for name, value in changes.items():
             section = next((values for values in sections.values() if name in values), None)
             if section is None:
@@ -185,6 +197,13 @@ class Probe(Record):
                 raise unknown_name("name", name, known)
             section[name] = value
         return Probe.from_values(sections, "probe")
+
+    def __repr__(self) -> str:
+        # the probe file without its comments
+        lines = (line.partition("#")[0].rstrip() for line in self.to_toml().splitlines())
+        return "\n".join(filter(None, lines))
+
+    __str__ = __repr__
 
     def in_medium(self, medium: str) -> Probe:
         """Return the probe in vacuum or in air.
@@ -194,7 +213,7 @@ class Probe(Record):
         InputError
             If the medium is neither.
         """
-        return self.with_values({"medium": medium})
+        return self.with_(medium=medium)
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip."""
@@ -202,39 +221,32 @@ class Probe(Record):
 
     def to_toml(self) -> str:
         """Return the probe as a commented probe file."""
-        comments = {
-            **self.shape.description(),
-            "series_resistance_ohm": "between the bias source and the lever, R_s",
-            "base_temperature_K": "of the leg ends",
-            **{p.name: f"{p.meaning}, {p.symbol} ({p.unit})" for p in PARAMETERS.values()},
-            "n_hd": "doping concentration of the high-doped silicon (cm⁻³)",
-            **Surroundings.description(),
-            **Tip.description(),
-        }
         lines = ["# A hotlever probe file: lengths in µm, temperatures in K."]
         if self.shape == Probe.reference().shape:
             lines.append(
                 "# The reference probe. No drawing of the published lever exists: these dimensions"
                 f"\n# are inferred from the operating points in doi:{DOI}."
             )
-        for name, section in self.values().items():
-            lines += ["", f"[{name}]"]
-            if name == "surroundings":
-                section = self.surroundings.model_dump()
-            for key, value in section.items():
-                entry = f"# {key} =" if value is None else f"{key} = {_toml(value)}"
-                lines.append(f"{entry:<32}# {comments[key]}" if key in comments else entry)
+        for name, part in self._sections.items():
+            lines += ["", f"[{name}]", *_entries(part)]
         if self.tip is None:
             example = Tip(height_um=0.7, half_angle_deg=20, apex_radius_um=0.02)
             lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]
-            lines.append("# [tip]")
-            for key, value in example.model_dump().items():
-                lines.append(f"{f'# {key} = {_toml(value)}':<32}# {comments[key]}")
+            lines += ["# [tip]", *_entries(example, "# ")]
         return "\n".join(lines) + "\n"
 
     def to_file(self, path: str | os.PathLike[str]) -> None:
         """Write the probe as a commented probe file, whole or not at all."""
         write_text(path, self.to_toml())
+
+
+def _entries(part: Record, start: str = "") -> list[str]:
+    """Return the lines of a section, each with what its value is."""
+    meaning, lines = part.description(), []
+    for key, value in part.model_dump(exclude_none=isinstance(part, Shape)).items():
+        entry = f"# {key} =" if value is None else f"{start}{key} = {_toml(value)}"
+        lines.append(f"{entry:<32}# {meaning[key]}" if key in meaning else entry)
+    return lines
 
 
 def _toml(value: str | float) -> str:

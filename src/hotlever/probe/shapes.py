@@ -6,7 +6,7 @@ The base of the lever is at x = 0, the legs run along +x, and y = 0 is the line 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated, Literal
+from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -14,7 +14,16 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.probe.layout import Layout, Part, Region, Taper, Terminal, rectangle
 from hotlever.records import Record
 
-Length = Annotated[float, Field(gt=0)]
+#: No part of a lever is smaller (µm), nor are two that do not touch nearer to each other.
+_SMALLEST = 0.01
+#: A heater is at most as many times as long as it is wide, or as wide as long: it is meshed in
+#: steps of its narrow side.
+_SLENDER = 30.0
+
+
+def _length(meaning: str, least: float = 0.05, most: float = 1000.0, **default: Any) -> Any:
+    """Return a dimension's bounds (µm), within which any lever lies by far, and what it is."""
+    return Field(ge=least, le=most, description=meaning, **default)
 
 
 class Shape(Record):
@@ -27,8 +36,26 @@ class Shape(Record):
         """Return the regions, terminals and tip of this shape."""
 
     @abstractmethod
-    def description(self) -> dict[str, str]:
-        """Return what each dimension is, by key, for the comments of a probe file."""
+    def _parts_fit(self) -> None:
+        """Raise a ValueError if the parts do not fit together."""
+
+    @model_validator(mode="after")
+    def _can_be_meshed(self) -> Self:
+        self._parts_fit()
+        layout = self.layout()
+        for region in layout.regions:
+            side = region.sides.min()
+            _need(
+                side >= _SMALLEST,
+                f"the {region.name} is {side:.2g} µm long or wide, expected {_SMALLEST} µm or more",
+            )
+        narrow, long = sorted(layout.heater.sides)
+        _need(
+            long <= _SLENDER * narrow,
+            f"the heater is {long:g} µm by {narrow:g} µm, expected at most {_SLENDER:g} times as "
+            "long as wide",
+        )
+        return self
 
 
 def _need(condition: bool, text: str) -> None:
@@ -44,19 +71,20 @@ class ThreeLeg(Shape):
     """
 
     shape: Literal["three-leg"] = "three-leg"
-    length_um: Length
-    centre_leg_width_um: Length
-    outer_leg_width_um: Length
-    gap_um: Length
-    bridge_width_um: Length
-    heater_length_um: Length
-    heater_width_um: Length
-    thickness_um: Length
-    reader_length_um: Length
-    reader_centre_um: Length | None = None
+    length_um: float = _length("base to front edge", 2, 2000)
+    centre_leg_width_um: float = _length("leg that the current enters by")
+    outer_leg_width_um: float = _length("left leg (to ground) and right leg (reader)")
+    gap_um: float = _length("between the centre leg and each outer leg")
+    bridge_width_um: float = _length("front bar, along the lever")
+    heater_length_um: float = _length("low-doped part behind the bridge, tip at its centre")
+    heater_width_um: float = _length("across the lever")
+    thickness_um: float = _length("of the silicon", 0.01, 20)
+    reader_length_um: float = _length("low-doped part of the right leg")
+    reader_centre_um: float | None = _length(
+        "base to the reader's centre; left out: 2/3 of the length", 0.05, 2000, default=None
+    )
 
-    @model_validator(mode="after")
-    def _parts_fit(self) -> ThreeLeg:
+    def _parts_fit(self) -> None:
         front = self.length_um - self.bridge_width_um
         _need(
             self.heater_length_um < front,
@@ -65,9 +93,9 @@ class ThreeLeg(Shape):
         )
         widest = self.centre_leg_width_um + 2 * self.gap_um
         _need(
-            self.heater_width_um < widest,
+            self.heater_width_um < widest - 2 * _SMALLEST,
             f"heater_width_um = {self.heater_width_um:g} must be less than the {widest:g} µm "
-            "between the outer legs",
+            f"between the outer legs, by {2 * _SMALLEST} µm",
         )
         half, centre = self.reader_length_um / 2, self._reader_centre
         _need(
@@ -75,7 +103,6 @@ class ThreeLeg(Shape):
             f"the reader ({centre - half:g} to {centre + half:g} µm) must lie between the base "
             f"and the bridge (0 to {front:g} µm); see reader_length_um and reader_centre_um",
         )
-        return self
 
     @property
     def _reader_centre(self) -> float:
@@ -128,21 +155,6 @@ class ThreeLeg(Shape):
             thickness_um=self.thickness_um,
         )
 
-    def description(self) -> dict[str, str]:
-        """Return what each dimension is, by key."""
-        return {
-            "length_um": "base to front edge",
-            "centre_leg_width_um": "leg that the current enters by",
-            "outer_leg_width_um": "left leg (to ground) and right leg (reader)",
-            "gap_um": "between the centre leg and each outer leg",
-            "bridge_width_um": "front bar, along the lever",
-            "heater_length_um": "low-doped part behind the bridge, tip at its centre",
-            "heater_width_um": "across the lever",
-            "thickness_um": "of the silicon",
-            "reader_length_um": "low-doped part of the right leg",
-            "reader_centre_um": "base to the reader's centre; left out: 2/3 of the length",
-        }
-
 
 class UShape(Shape):
     """A two-legged lever: the heater lies across the front, between the legs.
@@ -153,16 +165,17 @@ class UShape(Shape):
     """
 
     shape: Literal["u-shape"] = "u-shape"
-    length_um: Length
-    leg_width_um: Length
-    gap_um: Length
-    bridge_width_um: Length
-    heater_length_um: Length
-    heater_width_um: Length
-    thickness_um: Length
+    length_um: float = _length("base to front edge", 2, 2000)
+    leg_width_um: float = _length("both legs")
+    gap_um: float = _length("between the legs")
+    bridge_width_um: float = _length("front bar, along the lever")
+    heater_length_um: float = _length(
+        "low-doped middle of the bar, across the lever, tip at its centre"
+    )
+    heater_width_um: float = _length("along the lever")
+    thickness_um: float = _length("of the silicon", 0.01, 20)
 
-    @model_validator(mode="after")
-    def _parts_fit(self) -> UShape:
+    def _parts_fit(self) -> None:
         _need(
             self.bridge_width_um < self.length_um,
             f"bridge_width_um = {self.bridge_width_um:g} must be less than "
@@ -178,7 +191,6 @@ class UShape(Shape):
             f"heater_length_um = {self.heater_length_um:g} must not exceed "
             f"gap_um = {self.gap_um:g}",
         )
-        return self
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
@@ -190,15 +202,10 @@ class UShape(Shape):
         tip = (middle, 0.0)
 
         def side(name: str, part: Part, sign: int) -> list[Region]:
-            def mirrored(x0: float, y0: float, x1: float, y1: float) -> tuple:
-                low, high = sorted((sign * y0, sign * y1))
-                return rectangle(x0, low, x1, high)
-
-            leg = Region(f"{name} leg", part, mirrored(0, inner, self.length_um, outer))
-            if heater == inner:
-                return [leg]
-            bar = mirrored(back, heater, self.length_um, inner)
-            return [leg, Region(f"{name} bar", part, bar)]
+            leg = rectangle(0, sign * inner, self.length_um, sign * outer)
+            bar = rectangle(back, sign * heater, self.length_um, sign * inner)
+            both = [Region(f"{name} leg", part, leg), Region(f"{name} bar", part, bar)]
+            return both[:1] if heater == inner else both
 
         return Layout(
             regions=(
@@ -219,18 +226,6 @@ class UShape(Shape):
             thickness_um=self.thickness_um,
         )
 
-    def description(self) -> dict[str, str]:
-        """Return what each dimension is, by key."""
-        return {
-            "length_um": "base to front edge",
-            "leg_width_um": "both legs",
-            "gap_um": "between the legs",
-            "bridge_width_um": "front bar, along the lever",
-            "heater_length_um": "low-doped middle of the bar, across the lever, tip at its centre",
-            "heater_width_um": "along the lever",
-            "thickness_um": "of the silicon",
-        }
-
 
 SHAPES: dict[str, type[Shape]] = {"three-leg": ThreeLeg, "u-shape": UShape}
 
@@ -246,6 +241,6 @@ def shape_of(values: dict, where: str) -> Shape:
     name = values.get("shape")
     if name is None:
         raise InputError(f"{where}: shape is missing (one of: {', '.join(SHAPES)})")
-    if name not in SHAPES:
+    if not isinstance(name, str) or name not in SHAPES:
         raise unknown_name("shape", str(name), SHAPES, where)
     return SHAPES[name].of(values, where)

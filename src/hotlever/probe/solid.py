@@ -8,8 +8,8 @@ sphere's: the image of all space outside under the Kelvin transform (`hotlever.l
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,83 +18,60 @@ from skfem import MeshTet
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout
-from hotlever.probe.mesh import facets_on
+from hotlever.probe.mesh import MeshSizes, ProbeMesh, face_of, terminal_facets
 
 _ON_LINE = 1e-6  # µm
 #: Largest edge on the sphere, as a share of its radius: with longer ones Netgen fails to pair
 #: the sphere with the image ball.
 _COARSEST_SPHERE = 0.25
 
+#: Steps along the rims and cells in the heater at which a lever takes two minutes to solve.
+_MOST_ALONG_RIMS, _MOST_IN_HEATER = 4000, 2500
+
 #: Names of the parts of the mesh outside the silicon.
 AIR, IMAGE, SPHERE, LEVER_SURFACE = "air", "image", "sphere", "lever"
 
 
 @dataclass(frozen=True)
-class SolidMeshOptions:
-    """Sizes of the tetrahedra.
+class SolidMeshOptions(MeshSizes):
+    """Sizes of the tetrahedra; see `hotlever.probe.mesh.MeshSizes`.
 
     The defaults keep T_tip within 0.3 K and I_h within 3e-4 of the flat lever, from 1 to 11 V
     without air; ``benchmarks/air_3d.py`` prints it.
 
     Attributes
     ----------
-    refinement : float
-        Divides all sizes: 2 halves them.
-    heater : float
-        Largest edge in the heater, as a share of its narrow side.
-    corner : float
-        Edge along re-entrant corners, as a share of the heater's narrow side.
-    lever : float
-        Largest edge elsewhere in the silicon, as a share of the lever's length.
     rim : float
         Largest edge along the edges of the silicon, as a share of its thickness: the flux into
         the air is singular there.
     sphere : float
         Largest edge in the air and in the image ball, as a share of the sphere's radius.
-    grading : float
-        How fast sizes may grow away from small ones (0 to 1).
     """
 
-    refinement: float = 1.0
     heater: float = 0.15
     corner: float = 0.04
     lever: float = 0.05
     rim: float = 2.0
     sphere: float = 0.3
-    grading: float = 0.5
 
 
 @dataclass(frozen=True)
-class SolidMesh:
+class SolidMesh(ProbeMesh):
     """A lever cut into tetrahedra, and the mesh of the air around it.
 
     Attributes
     ----------
-    layout : Layout
-    elements : skfem.MeshTet
-        Vertices (3, n) in µm and tetrahedra (4, m) of the silicon.
-    region : ndarray of int, shape (m,)
-        Index into ``layout.regions``; a tip belongs to the heater.
-    terminal_facets : mapping of str to ndarray of int
-        Facets of `elements` on each terminal.
     netgen : netgen.meshing.Mesh
         The whole mesh, with the air if there is any.
     vertices : ndarray of int, shape (n,)
         Number in the whole mesh of each vertex of the silicon.
     centre : tuple of float
         Of the sphere (µm).
-    radius_um : float or None
-        Of the sphere; None without air.
     """
 
-    layout: Layout
-    elements: MeshTet
-    region: NDArray[np.intp]
-    terminal_facets: Mapping[str, NDArray[np.intp]]
     netgen: Any
     vertices: NDArray[np.intp]
     centre: tuple[float, float, float]
-    radius_um: float | None
 
 
 def mesh_solid(
@@ -115,20 +92,22 @@ def mesh_solid(
     Raises
     ------
     InputError
-        If the sphere does not contain the lever with some room.
+        If the sphere does not contain the lever with some room, or the lever takes too many
+        tetrahedra.
     ComputationError
         If Netgen makes no mesh.
     """
     from netgen.occ import OCCGeometry
 
+    _check_size(layout)
     options = options or SolidMeshOptions()
-    corners = np.array([point for region in layout.regions for point in region.outline])
-    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    low, high = layout.box
+    middle = (low + high) / 2
     centre = (float(middle[0]), float(middle[1]), 0.0)
     shape = _silicon(layout, options)
-    whole = max(np.ptp(corners, axis=0))
-    largest = options.lever * whole / options.refinement
+    largest = options.lever * (high - low).max() / options.refinement
     if sphere_radius_um is not None:
+        corners = np.array([point for region in layout.regions for point in region.outline])
         reach = np.linalg.norm(corners - middle, axis=1).max()
         if not sphere_radius_um > 1.1 * reach:
             raise InputError(
@@ -141,23 +120,36 @@ def mesh_solid(
         mesh = OCCGeometry(shape).GenerateMesh(maxh=largest, grading=options.grading)
     except Exception as error:  # Netgen's own type is not exported
         raise ComputationError(f"Netgen could not mesh the lever: {error}") from error
-    return _take_out_silicon(mesh, layout, centre, sphere_radius_um)
+    return _take_out_silicon(mesh, layout, centre)
+
+
+def _check_size(layout: Layout) -> None:
+    """Refuse a lever that would take hours and gigabytes with tetrahedra of the default sizes."""
+    sizes, thickness = SolidMeshOptions(), layout.thickness_um
+    outlines = [[*region.outline, region.outline[0]] for region in layout.regions]
+    edges = sum(math.dist(a, b) for outline in outlines for a, b in pairwise(outline))
+    narrow, long = sorted(layout.heater.sides.tolist())
+    along_rims = edges / (sizes.rim * thickness)
+    in_heater = narrow * long * thickness / (sizes.heater * narrow) ** 3
+    if max(along_rims / _MOST_ALONG_RIMS, in_heater / _MOST_IN_HEATER) > 1:
+        raise InputError(
+            f"full 3-D simulation: with a thickness of {thickness:g} µm, edges of {edges:.4g} µm "
+            f"in all and a heater {narrow:g} µm narrow this lever takes too many tetrahedra; "
+            "expected sizes that differ less"
+        )
 
 
 def _silicon(layout: Layout, options: SolidMeshOptions) -> Any:
     """The regions as solids, named by their number; the tip belongs to the heater."""
     from netgen.occ import Axes, Axis, Glue, Pnt, WorkPlane, X, Y, Z
 
-    corners = np.array([point for region in layout.regions for point in region.outline])
-    narrow = np.ptp(np.array(layout.heater.outline), axis=0).min() / options.refinement
-    whole = max(np.ptp(corners, axis=0)) / options.refinement
+    narrow = layout.heater.sides.min() / options.refinement
+    whole = np.ptp(layout.box, axis=0).max() / options.refinement
     bottom = -layout.thickness_um / 2
     solids = []
     for index, region in enumerate(layout.regions):
-        plane = WorkPlane(Axes((0, 0, bottom), Z, X)).MoveTo(*region.outline[0])
-        for point in region.outline[1:]:
-            plane.LineTo(*point)
-        solid = plane.Close().Face().Extrude(layout.thickness_um)
+        face = face_of(region, WorkPlane(Axes((0, 0, bottom), Z, X)))
+        solid = face.Extrude(layout.thickness_um)
         solid.mat(f"{index}")
         solid.maxh = (options.heater * narrow) if region.part == "heater" else options.lever * whole
         solids.append(solid)
@@ -185,7 +177,8 @@ def _silicon(layout: Layout, options: SolidMeshOptions) -> Any:
 
 def in_a_sphere(body: Any, centre: tuple[float, float, float], radius: float) -> Any:
     """Put a body (an OCC shape) in a sphere of air, with an image ball beside it (µm)."""
-    from netgen.occ import Glue, Pnt, Sphere
+    from netgen.meshing import IdentificationType
+    from netgen.occ import Compound, Glue, Pnt, Sphere, Vec, gp_Trsf
 
     ball = Sphere(Pnt(*centre), radius)
     ball.faces.name = SPHERE
@@ -196,14 +189,7 @@ def in_a_sphere(body: Any, centre: tuple[float, float, float], radius: float) ->
         if solid.name == AIR:
             for face in solid.faces:
                 face.name = face.name if face.name == SPHERE else LEVER_SURFACE
-    return with_image(inside, centre, radius)
-
-
-def with_image(inside: Any, centre: tuple[float, float, float], radius: float) -> Any:
-    """Set the image ball beside a sphere whose surface is named; the two are meshed alike."""
-    from netgen.meshing import IdentificationType
-    from netgen.occ import Compound, Pnt, Sphere, Vec, gp_Trsf
-
+    # the image ball, whose surface is meshed like the sphere's
     shift = Vec(3 * radius, 0, 0)
     image = Sphere(Pnt(*centre), radius).Move(shift)
     image.mat(IMAGE)
@@ -216,21 +202,24 @@ def with_image(inside: Any, centre: tuple[float, float, float], radius: float) -
     return Compound([inside, image])
 
 
-def _take_out_silicon(
-    mesh: Any, layout: Layout, centre: tuple[float, float, float], radius: float | None
-) -> SolidMesh:
+def material_names(mesh: Any) -> NDArray[np.str_]:
+    """Return the name of the part of space that each of Netgen's tetrahedra belongs to."""
+    numbers = mesh.Elements3D().NumPy()["index"]
+    return np.array([mesh.GetMaterial(number + 1) for number in range(numbers.max())])[numbers - 1]
+
+
+def _take_out_silicon(mesh: Any, layout: Layout, centre: tuple[float, float, float]) -> SolidMesh:
     elements = mesh.Elements3D().NumPy()
     if not len(elements):
         raise ComputationError("Netgen made no tetrahedra for this lever")
-    names = [mesh.GetMaterial(number) for number in range(1, int(elements["index"].max()) + 1)]
-    region_of = np.array([int(name) if name.isdecimal() else -1 for name in names])
-    region = region_of[elements["index"] - 1]
-    tetrahedra = elements["nodes"][region >= 0, :4].astype(np.intp) - 1
+    names = material_names(mesh)
+    silicon = np.char.isdecimal(names)
+    tetrahedra = elements["nodes"][silicon, :4].astype(np.intp) - 1
     vertices, numbers = np.unique(tetrahedra, return_inverse=True)
     # a copy: Coordinates() is a view of memory that goes away with Netgen's mesh
     points = np.array(mesh.Coordinates())[vertices]
-    silicon = MeshTet(
+    solid = MeshTet(
         np.ascontiguousarray(points.T), np.ascontiguousarray(numbers.reshape(tetrahedra.shape).T)
     )
-    facets = {terminal.name: facets_on(silicon, terminal) for terminal in layout.terminals}
-    return SolidMesh(layout, silicon, region[region >= 0], facets, mesh, vertices, centre, radius)
+    region, facets = names[silicon].astype(np.intp), terminal_facets(solid, layout)
+    return SolidMesh(layout, solid, region, facets, mesh, vertices, centre)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,33 +20,17 @@ class Tip(Record):
 
     Its doping is that of the heater above it.
 
-    Attributes
-    ----------
-    height_um : float
-        From the lever's surface to the apex (µm).
-    half_angle_deg : float
-        Between the axis and the side (degrees).
-    apex_radius_um : float
-        Radius of the flat end (µm).
-
     Examples
     --------
     >>> round(Tip(height_um=0.5, half_angle_deg=45, apex_radius_um=0.02).base_radius_um, 6)
     0.52
     """
 
-    height_um: Annotated[float, Field(gt=0)]
-    half_angle_deg: Annotated[float, Field(ge=1, le=80)] = 20.0
-    apex_radius_um: Annotated[float, Field(gt=0)] = 0.02
-
-    @classmethod
-    def description(cls) -> dict[str, str]:
-        """Return what each dimension is, by key."""
-        return {
-            "height_um": "from the lever's surface to the apex",
-            "half_angle_deg": "between the axis and the side",
-            "apex_radius_um": "of the flat end",
-        }
+    height_um: float = Field(ge=0.01, le=100, description="from the lever's surface to the apex")
+    half_angle_deg: float = Field(
+        default=20.0, ge=1, le=80, description="between the axis and the side"
+    )
+    apex_radius_um: float = Field(default=0.02, ge=1e-4, le=10, description="of the flat end")
 
     @property
     def slope(self) -> float:
@@ -58,14 +41,6 @@ class Tip(Record):
     def base_radius_um(self) -> float:
         """Radius where the cone meets the lever (µm)."""
         return self.apex_radius_um + self.height_um * self.slope
-
-    @property
-    def side_area_um2(self) -> float:
-        """Area of side and flat end (µm²), which the cone adds to the surface with its base."""
-        side = math.hypot(self.height_um, self.base_radius_um - self.apex_radius_um)
-        return math.pi * (
-            (self.base_radius_um + self.apex_radius_um) * side + self.apex_radius_um**2
-        )
 
     def thickening_um(self, distance: ArrayLike) -> NDArray[np.float64]:
         """Return what the lever must be thicker to conduct along its plane as with the cone.

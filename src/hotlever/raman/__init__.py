@@ -2,12 +2,16 @@
 
 Section III of Spieser et al. 2017. A spectrum (`spectrum`) is fitted for its line (`fit`,
 `peak`); a hot-plate series gives a calibration (`calibration`); a thermometer (`thermometer`)
-turns line positions into temperatures; `check` asks what the paper's linear law does above the
-hot plate's range.
+turns line positions into temperatures.
 """
 
-from hotlever.raman.calibration import Calibration, Point, calibrate, load, published
-from hotlever.raman.check import paper_check
+from hotlever.raman.calibration import (
+    Point,
+    RamanCalibration,
+    calibrate_raman,
+    published_raman_calibration,
+    read_raman_calibration,
+)
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.series import calibrate_from, measure, read_lines
@@ -15,22 +19,21 @@ from hotlever.raman.spectrum import Spectrum, read_spectra, read_spectrum
 from hotlever.raman.thermometer import Thermometer, laser_heating
 
 __all__ = [
-    "Calibration",
     "NoSiliconLine",
     "Peak",
     "PeakOptions",
     "Point",
+    "RamanCalibration",
     "Spectrum",
     "Thermometer",
-    "calibrate",
     "calibrate_from",
+    "calibrate_raman",
     "fit_peak",
     "laser_heating",
-    "load",
     "measure",
-    "paper_check",
-    "published",
+    "published_raman_calibration",
     "read_lines",
+    "read_raman_calibration",
     "read_spectra",
     "read_spectrum",
 ]

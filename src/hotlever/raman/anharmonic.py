@@ -13,56 +13,55 @@ fitted below 900 K reads too hot above.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.constants import Boltzmann, Planck, speed_of_light
 
-from hotlever.raman.lineshape import Array
-from hotlever.raman.published import BALKANSKI1983
-
-SECOND_RADIATION = Planck * speed_of_light / Boltzmann * 100.0
-"""hc/k, K cm."""
+from hotlever.types import Array
 
 
-def occupation(wavenumber: float, temperature: ArrayLike) -> tuple[Array, Array]:
-    """Bose occupation of a phonon and its derivative with respect to temperature.
+@dataclass(frozen=True)
+class AnharmonicConstants:
+    """Constants of Balkanski's law, cm⁻¹: bare phonon, three-phonon and four-phonon term."""
 
-    Parameters
-    ----------
-    wavenumber : float
-        cm⁻¹.
-    temperature : array_like
-        K; at and below 0 K nothing is occupied.
+    bare: float
+    three_phonon: float
+    four_phonon: float
+    source: str
 
-    Returns
-    -------
-    n, dn_dT : arrays
-        Dimensionless, K⁻¹.
-    """
+
+BALKANSKI1983 = AnharmonicConstants(
+    bare=528.0,
+    three_phonon=-2.96,
+    four_phonon=-0.174,
+    source="Balkanski, Wallis and Haro, Phys. Rev. B 28, 1928 (1983), doi:10.1103/PhysRevB.28.1928",
+)
+
+SECOND_RADIATION = Planck * speed_of_light / Boltzmann * 100.0  #: hc/k, K cm
+
+
+def terms(temperature: ArrayLike) -> tuple[Array, Array, Array, Array]:
+    """Temperature factors of A and of B, 1 + 2·n2 and 1 + 3·n3 + 3·n3², and their derivatives."""
+    n2, dn2 = _occupation(BALKANSKI1983.bare / 2.0, temperature)
+    n3, dn3 = _occupation(BALKANSKI1983.bare / 3.0, temperature)
+    return 1.0 + 2.0 * n2, 1.0 + 3.0 * n3 + 3.0 * n3**2, 2.0 * dn2, (3.0 + 6.0 * n3) * dn3
+
+
+def _occupation(wavenumber: float, temperature: ArrayLike) -> tuple[Array, Array]:
+    """Bose occupation of a phonon and its derivative; at and below 0 K nothing is occupied."""
     t = np.maximum(np.asarray(temperature, dtype=float), 1e-3)
     ratio = np.minimum(SECOND_RADIATION * wavenumber / t, 500.0)
     n = 1.0 / np.expm1(ratio)
     return n, n * (n + 1.0) * ratio / t
 
 
-def terms(
-    temperature: ArrayLike, bare: float = BALKANSKI1983.bare
-) -> tuple[Array, Array, Array, Array]:
-    """Temperature factors of A and of B, and their derivatives.
-
-    Returns
-    -------
-    a, b, da_dT, db_dT : arrays
-        a = 1 + 2·n2, b = 1 + 3·n3 + 3·n3².
-    """
-    n2, dn2 = occupation(bare / 2.0, temperature)
-    n3, dn3 = occupation(bare / 3.0, temperature)
-    return (
-        1.0 + 2.0 * n2,
-        1.0 + 3.0 * n3 + 3.0 * n3**2,
-        2.0 * dn2,
-        (3.0 + 6.0 * n3) * dn3,
-    )
+def gradient(temperature: ArrayLike, reference: float) -> Array:
+    """Derivatives of the line's place to that at the reference temperature, A and B; (n, 3)."""
+    a, b, _, _ = terms(temperature)
+    a_reference, b_reference, _, _ = terms(reference)
+    return np.stack([np.ones_like(a), a - a_reference, b - b_reference], axis=-1)
 
 
 def shift(
@@ -75,9 +74,7 @@ def shift(
 
     Parameters
     ----------
-    temperature : array_like
-        K.
-    reference : float
+    temperature, reference : array_like, float
         K.
     three_phonon, four_phonon : float
         A and B, cm⁻¹; the published constants unless given.
@@ -93,9 +90,8 @@ def shift(
     >>> round(float(value), 1), round(float(slope), 3)
     (-14.9, -0.03)
     """
-    a, b, da, db = terms(temperature)
-    a_ref, b_ref, _, _ = terms(reference)
+    _, _, da, db = terms(temperature)
     return (
-        np.asarray(three_phonon * (a - a_ref) + four_phonon * (b - b_ref)),
+        np.asarray(gradient(temperature, reference) @ [0.0, three_phonon, four_phonon]),
         np.asarray(three_phonon * da + four_phonon * db),
     )

@@ -10,55 +10,61 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from hotlever import __version__
 from hotlever.errors import InputError
 from hotlever.files import read_text, write_text
+from hotlever.materials.silicon import MELTING_POINT
 from hotlever.raman import anharmonic
-from hotlever.raman.lineshape import Array
-from hotlever.raman.published import (
-    BALKANSKI1983,
-    ROOM_TEMPERATURE,
-    SILICON_MELTS,
-    SPIESER2017,
+from hotlever.raman.anharmonic import BALKANSKI1983
+from hotlever.raman.peak import LineShape
+from hotlever.records import Record
+from hotlever.spieser2017 import (
+    BASE_TEMPERATURE_K,
+    DOI,
+    RAMAN_CALIBRATED_TO_K,
+    RAMAN_CONSTANT_K,
+    RAMAN_ERROR_K,
+    RAMAN_ERROR_SHARE,
+    RAMAN_SLOPE_K_CM,
 )
+from hotlever.types import Array
 
-FORMAT: Literal["hotlever-raman-calibration-1"] = "hotlever-raman-calibration-1"
-
-ROOM = (273.0, 323.0)
-"""K; the coldest spectrum of a series must lie here."""
+ROOM = (273.0, 323.0)  #: K; the coldest spectrum of a series must lie here
+#: Fewer temperatures, or a smaller span (K), cannot tell the three- from the four-phonon
+#: term; their ratio is then the published one.
 FREE_FIT_POINTS, FREE_FIT_SPAN = 6, 250.0
-"""Fewer temperatures, or a smaller span (K), cannot tell the three- from the four-phonon
-term; their ratio is then the published one."""
-_TEMPERATURES = np.arange(20.0, SILICON_MELTS + 0.5, 0.5)
+_FLATTEST = -1e-6  # cm⁻¹/K; silicon's line has −0.02
+_TEMPERATURES = np.arange(20.0, MELTING_POINT + 0.5, 0.5)
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+# no number of a calibration is larger, and none may overflow when it is squared
+Number = Annotated[float, Field(ge=-1e12, le=1e12)]
+Size = Annotated[float, Field(ge=0, le=1e12)]
 
 
-class Point(_Model):
+class Point(Record):
     """One spectrum of the series."""
 
     file: str
-    temperature_K: float
-    centre_cm: float
-    centre_stderr_cm: float
+    temperature_K: Number
+    centre_cm: Number
+    centre_stderr_cm: Number
 
 
-class LinearFit(_Model):
+class LinearFit(Record):
     """T − T_RT = constant + slope·shift, the paper's law and error model."""
 
-    constant_K: float
-    slope_K_cm: float = Field(lt=0)
-    slope_stderr_K_cm: float = Field(default=0.0, ge=0)
-    error_constant_K: float = Field(default=SPIESER2017.error_constant, ge=0)
-    error_fraction: float = Field(default=SPIESER2017.error_fraction, ge=0)
-    residual_rms_K: float = Field(default=0.0, ge=0)
+    constant_K: Number
+    slope_K_cm: Number = Field(lt=0)
+    slope_stderr_K_cm: Size = 0.0
+    error_constant_K: Size = RAMAN_ERROR_K
+    error_fraction: Size = RAMAN_ERROR_SHARE
+    residual_rms_K: Size = 0.0
 
     def temperature(self, shift: Array, room_temperature: float) -> Array:
         """Temperature (K) of a shift (cm⁻¹)."""
@@ -69,26 +75,25 @@ class LinearFit(_Model):
         return np.asarray(self.error_constant_K + self.error_fraction * np.maximum(above_room, 0.0))
 
 
-class AnharmonicFit(_Model):
+class AnharmonicFit(Record):
     """Balkanski's law, with a parabola through the same points to judge it by.
 
     ``covariance`` is that of (reference, three_phonon, four_phonon), cm⁻².
     """
 
-    three_phonon_cm: float
-    four_phonon_cm: float
-    covariance: list[list[float]]
-    parabola: list[float] = Field(default=[], max_length=2)
+    three_phonon_cm: float = Field(ge=-100, le=100)
+    four_phonon_cm: float = Field(ge=-100, le=100)
+    covariance: list[list[Number]]
+    parabola: list[Number] = Field(default=[])
     ratio_fixed: bool = False
-    residual_rms_K: float = Field(default=0.0, ge=0)
-    reduced_chi_square: float = Field(default=0.0, ge=0)
+    residual_rms_K: Size = 0.0
+    reduced_chi_square: Size = 0.0
 
     @model_validator(mode="after")
     def _square(self) -> AnharmonicFit:
-        matrix = self.covariance
-        if len(matrix) != 3 or any(len(row) != 3 for row in matrix):
+        if [len(row) for row in self.covariance] != [3, 3, 3]:
             raise ValueError("covariance: expected a matrix of 3 × 3")
-        if self.parabola and len(self.parabola) != 2:
+        if len(self.parabola) not in (0, 2):
             raise ValueError("parabola: expected two coefficients or none")
         return self
 
@@ -100,32 +105,30 @@ class AnharmonicFit(_Model):
 
     def temperature(self, shift: Array, room_temperature: float) -> Array:
         """Temperature (K) of a shift (cm⁻¹); NaN where silicon has none such below melting."""
-        values, _ = self.shift(_TEMPERATURES, room_temperature)
-        return np.asarray(
-            np.interp(shift, values[::-1], _TEMPERATURES[::-1], left=np.nan, right=np.nan)
-        )
+        falling, _ = self.shift(_TEMPERATURES[::-1], room_temperature)
+        return np.asarray(np.interp(shift, falling, _TEMPERATURES[::-1], np.nan, np.nan))
 
 
-class Calibration(_Model):
+class RamanCalibration(Record):
     """What `Thermometer` needs to know of an instrument, both laws, and where they come from."""
 
-    format: Literal["hotlever-raman-calibration-1"] = FORMAT
+    format: Literal["hotlever-raman-calibration-1"] = "hotlever-raman-calibration-1"
     version: str = __version__
     source: str
-    room_temperature_K: float = Field(gt=0, lt=SILICON_MELTS)
-    reference_cm: float | None = None
-    reference_stderr_cm: float = Field(default=0.0, ge=0)
-    range_K: tuple[float, float]
-    line_shape: Literal["lorentzian", "voigt", "fano"] = "lorentzian"
-    resolution_cm: float | None = None
+    room_temperature_K: float = Field(ge=200, le=400)
+    reference_cm: Number | None = None
+    reference_stderr_cm: Size = 0.0
+    range_K: tuple[Number, Number]
+    line_shape: LineShape = "lorentzian"
+    resolution_cm: Number | None = None
     linear: LinearFit
     anharmonic: AnharmonicFit
-    points: list[Point] = []
+    points: list[Point] = Field(default=[])
 
     @model_validator(mode="after")
-    def _falling(self) -> Calibration:
+    def _falling(self) -> RamanCalibration:
         _, slope = self.anharmonic.shift(_TEMPERATURES, self.room_temperature_K)
-        if not np.all(slope[_TEMPERATURES > 100.0] < 0.0):
+        if not np.all(slope[_TEMPERATURES > 100.0] < _FLATTEST):
             raise ValueError(
                 "anharmonic: the line must fall with temperature up to the melting point, "
                 f"found three-phonon {self.anharmonic.three_phonon_cm:g} and four-phonon "
@@ -138,13 +141,9 @@ class Calibration(_Model):
         write_text(path, self.model_dump_json(indent=2) + "\n")
 
     def residuals(self) -> dict[str, Array]:
-        """Of the series: temperature by each law less the hot plate's, and the paper's band.
+        """Of the series, by temperature: what each law reads less the hot plate, the paper's band.
 
-        Returns
-        -------
-        dict
-            ``temperature_K``, ``shift_cm``, ``shift_stderr_cm``, ``linear_K``,
-            ``anharmonic_K`` and ``band_K``, each (n,), in order of temperature.
+        Keys are ``temperature_K``, ``shift_cm``, ``linear_K``, ``anharmonic_K`` and ``band_K``.
         """
         points = sorted(self.points, key=lambda point: point.temperature_K)
         temperature = np.array([point.temperature_K for point in points])
@@ -155,7 +154,6 @@ class Calibration(_Model):
         return {
             "temperature_K": temperature,
             "shift_cm": shift,
-            "shift_stderr_cm": np.array([point.centre_stderr_cm for point in points]),
             "linear_K": linear - temperature,
             # near the fit the law is its tangent; this also holds where it has no inverse
             "anharmonic_K": (shift - predicted) / slope,
@@ -163,22 +161,22 @@ class Calibration(_Model):
         }
 
 
-def published() -> Calibration:
+def published_raman_calibration() -> RamanCalibration:
     """The published laws: the linear one of Spieser et al. 2017 and Balkanski's of 1983.
 
     They hold no reference: give the line's place at room temperature on your instrument.
 
     Examples
     --------
-    >>> law = published().linear
+    >>> law = published_raman_calibration().linear
     >>> law.constant_K, law.slope_K_cm
     (5.0, -41.1)
     """
-    return Calibration(
-        source=f"{SPIESER2017.source}; {BALKANSKI1983.source}",
-        room_temperature_K=ROOM_TEMPERATURE,
-        range_K=(ROOM_TEMPERATURE, SPIESER2017.calibrated_to),
-        linear=LinearFit(constant_K=SPIESER2017.constant, slope_K_cm=SPIESER2017.slope),
+    return RamanCalibration(
+        source=f"Spieser et al. (2017), section III, doi:{DOI}; {BALKANSKI1983.source}",
+        room_temperature_K=BASE_TEMPERATURE_K,
+        range_K=(BASE_TEMPERATURE_K, RAMAN_CALIBRATED_TO_K),
+        linear=LinearFit(constant_K=RAMAN_CONSTANT_K, slope_K_cm=RAMAN_SLOPE_K_CM),
         anharmonic=AnharmonicFit(
             three_phonon_cm=BALKANSKI1983.three_phonon,
             four_phonon_cm=BALKANSKI1983.four_phonon,
@@ -187,12 +185,12 @@ def published() -> Calibration:
     )
 
 
-def calibrate(
+def calibrate_raman(
     points: Sequence[Point],
-    line_shape: Literal["lorentzian", "voigt", "fano"] = "lorentzian",
+    line_shape: LineShape = "lorentzian",
     resolution_cm: float | None = None,
     source: str = "hot-plate series",
-) -> Calibration:
+) -> RamanCalibration:
     """Fit both laws to a hot-plate series.
 
     Parameters
@@ -206,7 +204,7 @@ def calibrate(
 
     Returns
     -------
-    Calibration
+    RamanCalibration
         ``reference_cm`` is the line's place at room temperature by the anharmonic law through
         all points: less noisy than the one spectrum taken there.
 
@@ -222,7 +220,7 @@ def calibrate(
     >>> shifts, _ = anharmonic.shift(temperatures, 300.0)
     >>> series = [Point(file="", temperature_K=t, centre_cm=521.0 + d, centre_stderr_cm=0.03)
     ...           for t, d in zip(temperatures, shifts)]
-    >>> fit = calibrate(series)
+    >>> fit = calibrate_raman(series)
     >>> round(fit.reference_cm, 6), round(fit.anharmonic.three_phonon_cm, 6)
     (521.0, -2.96)
     """
@@ -243,90 +241,83 @@ def calibrate(
         )
     if np.any(stderr <= 0.0):
         raise InputError("calibration: every line position needs a standard error above 0")
-    reference, law, covariance = _fit_anharmonic(temperature, centre, stderr, room)
-    shift = centre - reference
-    design = np.stack([np.ones_like(shift), shift], axis=1)
-    (constant, slope), *_ = np.linalg.lstsq(design, temperature - room, rcond=None)
-    scatter = temperature - room - design @ [constant, slope]
-    freedom = max(temperature.size - 2, 1)
-    slope_error = np.sqrt(scatter @ scatter / freedom / np.sum((shift - shift.mean()) ** 2))
+    reference, law = _fit_anharmonic(temperature, centre, stderr, room)
+    shift, above_room = centre - reference, temperature - room
+    columns, ones = np.vander(shift, 2), np.ones_like(shift)
+    (slope, constant), covariance, variance = _least_squares(columns, above_room, ones)
     if not slope < 0.0:
         raise InputError(
             f"calibration: the line moves by {1 / slope if slope else 0.0:+.4f} cm⁻¹/K with "
             "temperature, expected about -0.024; are the temperatures those of the spectra?"
         )
-    try:
-        return Calibration(
-            source=source,
-            room_temperature_K=room,
-            reference_cm=reference,
-            reference_stderr_cm=float(np.sqrt(covariance[0][0])),
-            range_K=(room, float(temperature.max())),
-            line_shape=line_shape,
-            resolution_cm=resolution_cm,
-            linear=LinearFit(
-                constant_K=constant,
-                slope_K_cm=slope,
-                slope_stderr_K_cm=slope_error,
-                residual_rms_K=float(np.sqrt(np.mean(scatter**2))),
-            ),
-            anharmonic=law,
-            points=list(points),
-        )
-    except ValidationError as error:
-        raise InputError(f"calibration: {_first(error)}") from error
+    linear = {
+        "constant_K": constant,
+        "slope_K_cm": slope,
+        "slope_stderr_K_cm": float(np.sqrt(variance * covariance[0, 0])),
+        "residual_rms_K": _rms(above_room - columns @ [slope, constant]),
+    }
+    content = {
+        "source": source,
+        "room_temperature_K": room,
+        "reference_cm": reference,
+        "reference_stderr_cm": float(np.sqrt(law["covariance"][0][0])),
+        "range_K": (room, float(temperature.max())),
+        "line_shape": line_shape,
+        "resolution_cm": resolution_cm,
+        "linear": linear,
+        "anharmonic": law,
+        "points": list(points),
+    }
+    return RamanCalibration.of(content, "calibration")
 
 
 def _fit_anharmonic(
     temperature: Array, centre: Array, stderr: Array, room: float
-) -> tuple[float, AnharmonicFit, list[list[float]]]:
-    """Weighted linear least squares for the reference and the two phonon terms."""
-    a, b, _, _ = anharmonic.terms(temperature)
-    a_room, b_room, _, _ = anharmonic.terms(room)
-    ones = np.ones_like(temperature)
-    columns = np.stack([ones, a - a_room, b - b_room], axis=1)
-    free = (
-        np.unique(np.round(temperature, 1)).size >= FREE_FIT_POINTS
-        and np.ptp(temperature) >= FREE_FIT_SPAN
-    )
+) -> tuple[float, dict[str, Any]]:
+    """Line's place at room temperature and the law, by weighted linear least squares."""
+    columns = anharmonic.gradient(temperature, room)
+    distinct = np.unique(np.round(temperature, 1)).size
+    free = distinct >= FREE_FIT_POINTS and np.ptp(temperature) >= FREE_FIT_SPAN
     ratio = BALKANSKI1983.four_phonon / BALKANSKI1983.three_phonon
     basis = np.eye(3) if free else np.array([[1.0, 0.0], [0.0, 1.0], [0.0, ratio]])
-    reduced, covariance, chi_square = _weighted(columns @ basis, centre, stderr)
+    reduced, covariance, chi_square = _least_squares(columns @ basis, centre, stderr)
+    # the residuals may scale errors up, never down
+    covariance = basis @ (covariance * max(chi_square, 1.0)) @ basis.T
     reference, three, four = basis @ reduced
-    full = basis @ covariance @ basis.T
-    u = temperature - room
     parabola: list[float] = []
     if free:
-        coefficients, _, _ = _weighted(np.stack([ones, u, u**2], axis=1), centre, stderr)
         # as a shift against the same reference: what the two fits disagree about at room
         # temperature is part of the disagreement
-        parabola = [float(coefficients[1]), float(coefficients[2])]
+        powers = np.vander(temperature - room, 3, increasing=True)
+        parabola = _least_squares(powers, centre, stderr)[0][1:].tolist()
     _, slope = anharmonic.shift(temperature, room, three, four)
-    residual = (centre - columns @ [reference, three, four]) / slope
-    law = AnharmonicFit(
-        three_phonon_cm=three,
-        four_phonon_cm=four,
-        covariance=full.tolist(),
-        parabola=parabola,
-        ratio_fixed=not free,
-        residual_rms_K=float(np.sqrt(np.mean(residual**2))),
-        reduced_chi_square=chi_square,
-    )
-    return float(reference), law, full.tolist()
+    return float(reference), {
+        "three_phonon_cm": three,
+        "four_phonon_cm": four,
+        "covariance": covariance.tolist(),
+        "parabola": parabola,
+        "ratio_fixed": not free,
+        "residual_rms_K": _rms((centre - columns @ [reference, three, four]) / slope),
+        "reduced_chi_square": chi_square,
+    }
 
 
-def _weighted(columns: Array, values: Array, stderr: Array) -> tuple[Array, Array, float]:
-    """Parameters, covariance (scaled up, never down, by the residuals), reduced chi-square."""
+def _least_squares(columns: Array, values: Array, stderr: Array) -> tuple[Array, Array, float]:
+    """Parameters, their covariance for these errors, and the reduced chi-square."""
     weighted = columns / stderr[:, None]
-    parameters, *_ = np.linalg.lstsq(weighted, values / stderr, rcond=None)
+    parameters = np.linalg.lstsq(weighted, values / stderr)[0]
     residual = (values - columns @ parameters) / stderr
     chi_square = float(residual @ residual) / max(values.size - columns.shape[1], 1)
-    covariance = np.linalg.pinv(weighted.T @ weighted, hermitian=True)
-    return np.asarray(parameters), np.asarray(covariance * max(chi_square, 1.0)), chi_square
+    covariance = np.asarray(np.linalg.pinv(weighted.T @ weighted, hermitian=True))
+    return np.asarray(parameters), covariance, chi_square
 
 
-def load(path: str | os.PathLike[str]) -> Calibration:
-    """Read a calibration that `Calibration.save` wrote.
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def read_raman_calibration(path: str | os.PathLike[str]) -> RamanCalibration:
+    """Read a calibration that `RamanCalibration.save` wrote.
 
     Raises
     ------
@@ -334,12 +325,9 @@ def load(path: str | os.PathLike[str]) -> Calibration:
         Naming the key at fault and what was expected.
     """
     try:
-        return Calibration.model_validate_json(read_text(path))
+        return RamanCalibration.model_validate_json(read_text(path))
     except ValidationError as error:
-        raise InputError(f"{path}: not a Raman calibration: {_first(error)}") from error
-
-
-def _first(error: ValidationError) -> str:
-    item = error.errors()[0]
-    key = ".".join(str(part) for part in item["loc"])
-    return f"{key}: {item['msg']}" if key else str(item["msg"])
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        reason = f"{key}: {first['msg']}" if key else first["msg"]
+        raise InputError(f"{path}: not a Raman calibration: {reason}") from error

@@ -7,16 +7,16 @@ import re
 import numpy as np
 
 from hotlever.errors import InputError
-from hotlever.raman.lineshape import Array
-from hotlever.raman.tables import Table
+from hotlever.raman.block import Block
+from hotlever.tables import quantity
+from hotlever.types import Array
 
-SILICON_LINE = 520.0
-"""cm⁻¹; a spectrum must reach it."""
-MARGIN = 5.0
-"""cm⁻¹; and go on this far on both sides."""
+#: cm⁻¹; a spectrum must reach the line, and go on so far on both sides.
+SILICON_LINE, MARGIN = 520.0, 5.0
 
 _MAP_COLUMNS = 40
 _SHIFT = re.compile(r"raman|shift|rel\.?\s*1/cm|wave\b|#wave|cm-1|cm\^-1|1/cm|cm⁻¹|cm\?1", re.I)
+_RAMAN = re.compile(r"raman|shift", re.I)
 _ABSOLUTE = re.compile(r"wave\s*numbers?", re.I)
 _WAVELENGTH = re.compile(r"wave\s*length|lambda|\bnm\b|\(nm\)|\[nm\]", re.I)
 _WANTED = (
@@ -24,6 +24,8 @@ _WANTED = (
     re.compile(r"intensity|counts|cts|signal|ccd|raman\s*int", re.I),
     re.compile(r"raw|spectrum|sample|data|\by\b", re.I),
 )
+_LASER = re.compile(r"laser|excitation", re.I)
+_NO_WAVELENGTH = re.compile(r"pol|power|level", re.I)
 _UNWANTED = re.compile(
     r"pixel|index|^dark$|^reference$|%|absorb|irrad|transm|reflect|wave|^#?[xz]\b|time|background"
     r"|baseline|std|error|sigma",
@@ -31,7 +33,7 @@ _UNWANTED = re.compile(
 )
 
 
-def pick_spectra(table: Table, where: str) -> list[tuple[Array, Array]]:
+def pick_spectra(table: Block, where: str) -> list[tuple[Array, Array]]:
     """Raman shift (cm⁻¹) and intensity, by the columns' names or their values.
 
     One pair, unless the table is a map: an axis in its first row and a spectrum in each other.
@@ -41,7 +43,7 @@ def pick_spectra(table: Table, where: str) -> list[tuple[Array, Array]]:
     InputError
         If there are no two such columns, or the axis is a wavelength without its laser.
     """
-    values, names = table.values, table.names
+    values = table.values
     if values.shape[1] < 2:
         raise InputError(
             f"{where}: one column of numbers, expected Raman shift (cm⁻¹) and intensity"
@@ -51,49 +53,43 @@ def pick_spectra(table: Table, where: str) -> list[tuple[Array, Array]]:
         # LabSpec's maps: positions stand before each spectrum, blanks above them
         axis = np.isfinite(first)
         return [(first[axis], row[axis]) for row in values[1:]]
-    at, laser = _x_column(values, names, table.metadata, where)
+    at, laser = _x_column(table, where)
     x = values[:, at]
     if laser is not None:
         with np.errstate(divide="ignore"):
             x = 1e7 / laser - 1e7 / x
     require_line(x, where)
     others = [j for j in range(values.shape[1]) if j != at]
-    return [(x, values[:, _y_column(values, names, others, where)])]
+    return [(x, values[:, _y_column(table, others, where)])]
 
 
-def _x_column(
-    values: Array, names: list[str], metadata: dict[str, str], where: str
-) -> tuple[int, float | None]:
+def _x_column(table: Block, where: str) -> tuple[int, float | None]:
     """Index of the axis column, and the laser wavelength if it is to be converted by it."""
+    values, names = table.values, table.names
     axes = [j for j in range(values.shape[1]) if _is_axis(values[:, j])]
-    for j in [j for j in axes if names and _SHIFT.search(names[j])]:
-        if not _WAVELENGTH.search(names[j]) or re.search(r"raman|shift", names[j], re.I):
+    for j in axes:
+        wavelength = _WAVELENGTH.search(names[j]) and not _RAMAN.search(names[j])
+        if _SHIFT.search(names[j]) and not wavelength:
             return j, None
+    for j in axes:
+        if _WAVELENGTH.search(names[j]):
+            laser = _laser(table.metadata)
+            if laser is None:
+                raise InputError(
+                    f"{where}: the axis is a wavelength ('{names[j].strip()}') and the file does "
+                    "not name the laser; expected Raman shift in cm⁻¹"
+                )
+            return j, laser
     reaching = [j for j in axes if reaches_line(values[:, j])]
-    for j in [j for j in axes if names and _WAVELENGTH.search(names[j])]:
-        laser = _laser(metadata)
-        if laser is None:
-            raise InputError(
-                f"{where}: the axis is a wavelength ('{names[j].strip()}') and the file does not "
-                "name the laser; expected Raman shift in cm⁻¹"
-            )
-        return j, laser
-    for j in [j for j in reaching if names and _ABSOLUTE.search(names[j])]:
-        return j, None
-    for j in reaching:
-        # a running number reaches 520 too, but a later column may be the axis
-        if not _is_index(values[:, j]) or len(reaching) == 1:
-            return j, None
-    j = reaching[0] if reaching else (axes[0] if axes else 0)
-    return j, None
+    named = [j for j in reaching if _ABSOLUTE.search(names[j])]
+    # a running number reaches 520 too, but a later column may be the axis
+    others = [j for j in reaching if not _is_index(values[:, j])]
+    return (*named, *others, *reaching, *axes, 0)[0], None
 
 
 def _is_axis(column: Array) -> bool:
-    good = column[np.isfinite(column)]
-    if good.size < 2:
-        return False
-    steps = np.diff(good)
-    return bool(max(np.mean(steps >= 0), np.mean(steps <= 0)) > 0.98 and np.ptp(good) > 0)
+    steps = np.diff(column[np.isfinite(column)])
+    return bool(steps.any() and max(np.mean(steps >= 0), np.mean(steps <= 0)) > 0.98)
 
 
 def _is_index(column: Array) -> bool:
@@ -103,42 +99,31 @@ def _is_index(column: Array) -> bool:
 
 def reaches_line(column: Array) -> bool:
     """Whether these values of an axis (cm⁻¹) hold silicon's line."""
+    low, high = SILICON_LINE - MARGIN, SILICON_LINE + MARGIN
     good = column[np.isfinite(column)]
-    return bool(
-        good.size and good.min() <= SILICON_LINE - MARGIN and good.max() >= SILICON_LINE + MARGIN
-    )
+    return bool(good.min(initial=np.inf) <= low and good.max(initial=-np.inf) >= high)
 
 
 def _laser(metadata: dict[str, str]) -> float | None:
     """Laser wavelength in nm, if the header gives a plausible one."""
     for key, value in metadata.items():
-        if re.search(r"laser|excitation", key, re.I) and not re.search(
-            r"pol|power|level", key, re.I
-        ):
-            match = re.search(r"\d+(?:[.,]\d+)?", value)
-            if match and 200.0 < (number := float(match[0].replace(",", "."))) < 1500.0:
+        if _LASER.search(key) and not _NO_WAVELENGTH.search(key):
+            number, _ = quantity(re.sub(r"^\D+", "", value))
+            if number is not None and 200.0 < number < 1500.0:
                 return number
     return None
 
 
-def _y_column(values: Array, names: list[str], others: list[int], where: str) -> int:
-    useful = [j for j in others if _varies(values[:, j])]
-    # a second axis, such as a running number, is no intensity
-    useful = [j for j in useful if not _is_axis(values[:, j])] or useful
+def _y_column(table: Block, others: list[int], where: str) -> int:
+    values, names = table.values, [name.strip() for name in table.names]
+    useful = [j for j in others if np.nanmin(values[:, j]) < np.nanmax(values[:, j])]
     if not useful:
         raise InputError(f"{where}: no column of intensities beside the axis")
-    if names:
-        for wanted in _WANTED:
-            for j in useful:
-                if wanted.search(names[j]) and not _UNWANTED.search(names[j].strip()):
-                    return j
-        useful = [j for j in useful if not _UNWANTED.search(names[j].strip())] or useful
-    return useful[0]
-
-
-def _varies(column: Array) -> bool:
-    good = column[np.isfinite(column)]
-    return bool(good.size and good.max() > good.min())
+    # a second axis, such as a running number, is no intensity
+    useful = [j for j in useful if not _is_axis(values[:, j])] or useful
+    useful = [j for j in useful if not _UNWANTED.search(names[j])] or useful
+    named = (j for wanted in _WANTED for j in useful if wanted.search(names[j]))
+    return next((j for j in named if not _UNWANTED.search(names[j])), useful[0])
 
 
 def require_line(x: Array, where: str) -> None:

@@ -1,4 +1,4 @@
-"""The silicon line and what lies under it, with exact derivatives.
+"""The shape of silicon's Raman line, with exact derivatives.
 
 The one-phonon line of silicon is a Lorentzian. Heavy doping makes it interfere with
 electronic transitions (Fano), and the spectrometer convolves it with its own, nearly
@@ -8,8 +8,8 @@ the background) plus
 
     (1 − f²)·D(e) + 2f·X(e),   D = 1/(1 + e²),   X = e/(1 + e²).
 
-D and X are real and imaginary part of one analytic function, so a Gaussian response turns
-both into real and imaginary part of the Faddeeva function w(z): Abramowitz and
+D and X are real and imaginary part of one analytic function, 1/(1 − ie), so a Gaussian response
+turns both into real and imaginary part of the Faddeeva function w(z): Abramowitz and
 Stegun, Handbook of Mathematical Functions, 7.1 and 7.4.13, with w'(z) = −2z·w(z) + 2i/√π.
 """
 
@@ -18,10 +18,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import wofz
 
-Array = NDArray[np.float64]
+from hotlever.types import Array
 
 SIGMA_PER_FWHM = 1.0 / (2.0 * math.sqrt(2.0 * math.log(2.0)))
 
@@ -56,36 +55,25 @@ def line(
     """
     half = 0.5 * fwhm
     u = x - centre
-    derivatives = np.zeros((4, x.size))
     if sigma == 0.0:
         e = u / half
-        absorptive = 1.0 / (1.0 + e * e)
-        dispersive = e * absorptive
-        # dD/de and dX/de
-        d_absorptive = -2.0 * dispersive * absorptive
-        d_dispersive = absorptive * (1.0 - 2.0 * e * dispersive)
-        slope = (1.0 - fano * fano) * d_absorptive + 2.0 * fano * d_dispersive
-        derivatives[0] = -slope / half
-        derivatives[1] = -slope * e
+        profile = 1.0 / (1.0 - 1j * e)
+        slope = 1j * profile * profile
+        by_centre, by_fwhm, by_sigma = -slope / half, -slope * e, np.zeros_like(slope)
     else:
         width = sigma * math.sqrt(2.0)
         z = (u + 1j * half) / width
         w = wofz(z)
         dw = -2.0 * z * w + 2j / math.sqrt(math.pi)
         factor = math.sqrt(math.pi) * half / width
-        absorptive, dispersive = factor * w.real, factor * w.imag
-
-        def blend(complex_values: NDArray[np.complex128]) -> Array:
-            return np.asarray(
-                (1.0 - fano * fano) * complex_values.real + 2.0 * fano * complex_values.imag
-            )
-
-        derivatives[0] = -factor / width * blend(dw)
-        derivatives[1] = factor * blend(w + dw * (1j * half / width))
-        derivatives[3] = -factor * blend(w + dw * z)
-    value = (1.0 - fano * fano) * absorptive + 2.0 * fano * dispersive
-    derivatives[2] = -2.0 * fano * absorptive + 2.0 * dispersive
-    return value, derivatives
+        profile = factor * w
+        by_centre = -factor / width * dw
+        by_fwhm = factor * (w + dw * (1j * half / width))
+        by_sigma = -factor * (w + dw * z)
+    parts = np.array([profile, by_centre, by_fwhm, by_sigma])
+    value, by_centre, by_fwhm, by_sigma = (1.0 - fano * fano) * parts.real + 2 * fano * parts.imag
+    by_fano = 2.0 * profile.imag - 2.0 * fano * profile.real
+    return value, np.array([by_centre, by_fwhm, by_fano, by_sigma])
 
 
 def band(x: Array, centre: float, fwhm: float) -> tuple[Array, Array]:

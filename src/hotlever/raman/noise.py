@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import find_objects, label, maximum_filter1d, median_filter
 
-from hotlever.raman.lineshape import Array
+from hotlever.types import Array
 
 Mask = NDArray[np.bool_]
 
-SPIKE_SIGMAS = 6.0
-"""A cosmic ray stands this many standard deviations above the fit."""
+SPIKE_SIGMAS = 6.0  #: a cosmic ray stands this many standard deviations above the fit
+#: How far the true line may differ from the line model, as a part of the line's height, before
+#: a difference is taken for a cosmic ray: where the fit leaves noise alone, and where it does not.
 SPIKE_LINE_TOLERANCE = (0.01, 0.04)
-"""How far the true line may differ from the line model, as a part of the line's height, before
-a difference is taken for a cosmic ray: where the fit leaves noise alone, and where it does not."""
-SPIKE_MAX_SAMPLES = 5
-"""A cosmic ray hits no more neighbouring samples than this."""
-PLATEAU_TOLERANCE = 0.006
-"""Samples of a clipped top agree within this part of the line's height."""
+SPIKE_MAX_SAMPLES = 5  #: a cosmic ray hits no more neighbouring samples than this
+PLATEAU_TOLERANCE = 0.006  #: part of the line's height within which a clipped top is flat
 PLATEAU_MIN_SAMPLES = 4
 
 _OFFSETS = np.array([0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 1e6])
@@ -26,24 +23,12 @@ _POISSON_PREFERENCE = 12.0
 
 
 def variance(residual: Array, model: Array, parameters: int) -> Array:
-    """Variance of each sample, from the residuals of a fit.
+    """Variance of each sample, from the residuals of a fit with so many parameters.
 
     Photon noise has a variance proportional to the signal, but neither the detector's gain
     nor the level that was subtracted is in the file. So the variance is s²·(model + o) with
     the scale s² and the offset o of greatest likelihood for these residuals; pure photon
     noise (o = 0) is kept unless the residuals contradict it.
-
-    Parameters
-    ----------
-    residual, model : (n,) array
-        Data minus fit, and the fit, counts.
-    parameters : int
-        Number of fitted parameters.
-
-    Returns
-    -------
-    (n,) array
-        Variance, counts².
 
     Examples
     --------
@@ -53,14 +38,10 @@ def variance(residual: Array, model: Array, parameters: int) -> Array:
     >>> bool(np.allclose(variance(noise, model, 0) / model, 2.0, rtol=0.1))
     True
     """
-    top = float(np.max(np.abs(model)))
-    if top == 0.0:
-        top = 1.0
-    level = np.maximum(model, 0.0) / top
+    level = np.maximum(model, 0.0) / (float(np.max(np.abs(model))) or 1.0)
     offsets = _OFFSETS if level.min() > 1e-3 else _OFFSETS[1:]
     shape = (level + offsets[:, None]) / (1.0 + offsets[:, None])
-    scale = np.mean(residual**2 / shape, axis=1)
-    scale = np.maximum(scale, np.finfo(float).tiny)
+    scale = np.maximum(np.mean(residual**2 / shape, axis=1), np.finfo(float).tiny)
     loss = residual.size * np.log(scale) + np.sum(np.log(shape), axis=1)
     best = int(np.argmin(loss))
     if loss[0] - loss[best] < _POISSON_PREFERENCE:
@@ -84,18 +65,8 @@ def robust_sigma(residual: Array, model: Array) -> Array:
 def spikes(y: Array, model: Array, line_part: Array, trusted: Mask, tolerance: float) -> Mask:
     """Samples hit by cosmic rays: narrow, and far above the fit.
 
-    Parameters
-    ----------
-    y, model, line_part : (n,) array
-        Data, fit, and the silicon line's part of the fit.
-    trusted : (n,) bool array
-        Samples that the noise is judged by.
-    tolerance : float
-        How far the true line may differ from the model, as a part of the line's height.
-
-    Returns
-    -------
-    (n,) bool array
+    The noise is judged by the ``trusted`` samples; the true line may differ from the model's
+    ``line_part`` by ``tolerance`` of its height.
     """
     residual = y - model
     sigma = robust_sigma(residual[trusted], model[trusted])
@@ -106,63 +77,47 @@ def spikes(y: Array, model: Array, line_part: Array, trusted: Mask, tolerance: f
     score = residual / sigma_all
     hit = score > SPIKE_SIGMAS
     # the flanks of a spike that spilled into its neighbours
-    near = np.zeros_like(hit)
-    near[1:] |= hit[:-1]
-    near[:-1] |= hit[1:]
-    hit |= near & (score > 0.5 * SPIKE_SIGMAS)
-    for start, stop in runs(hit):
-        if stop - start > SPIKE_MAX_SAMPLES:
-            hit[start:stop] = False
+    hit |= maximum_filter1d(hit, 3) & (score > 0.5 * SPIKE_SIGMAS)
+    for run in runs(hit):
+        hit[run] = _length(run) <= SPIKE_MAX_SAMPLES
     return hit
 
 
 def likely_spikes(y: Array, base: float) -> Mask:
     """First guess at cosmic rays, before there is a fit: far above the local median."""
-    window = 9
-    padded = np.pad(y, window // 2, mode="reflect")
-    local = np.median(np.lib.stride_tricks.sliding_window_view(padded, window), axis=1)
+    local = median_filter(y, 9, mode="mirror")
     sigma = 1.4826 * float(np.median(np.abs(np.diff(y)))) / np.sqrt(2.0)
     return np.asarray(y - local > 8.0 * sigma + 1.2 * np.maximum(local - base, 0.0))
 
 
 def plateau(y: Array, candidates: Mask, base: float) -> slice | None:
-    """The flat top of a saturated line, or None.
+    """The flat top of a saturated line above its background, or None.
 
     A line that is not clipped has only few samples within a small part of its height; more
-    than its width allows, in one run at the top, is a clipped line.
-
-    Parameters
-    ----------
-    y : (n,) array
-        Counts.
-    candidates : (n,) bool array
-        Samples that are no cosmic rays and may belong to the line.
-    base : float
-        Background level.
+    than its width allows, in one run at the top, is a clipped line. Candidates are samples that
+    are no cosmic rays and may belong to the line.
     """
-    if not candidates.any():
-        return None
-    top = float(y[candidates].max())
+    top = float(y[candidates].max(initial=-np.inf))
     height = top - base
     if height <= 0.0:
         return None
-    at_top = candidates & (y >= top - PLATEAU_TOLERANCE * height)
-    longest = max(runs(at_top), key=lambda run: run[1] - run[0])
-    count = longest[1] - longest[0]
+    at_top = runs(candidates & (y >= top - PLATEAU_TOLERANCE * height))
+    longest = max(at_top, key=_length)
     above_half = int(np.count_nonzero(candidates & (y > base + 0.5 * height)))
     expected = 1.0 + np.sqrt(PLATEAU_TOLERANCE) * above_half
-    if count < PLATEAU_MIN_SAMPLES or count < 2.5 * expected:
-        return None
-    return slice(longest[0], longest[1])
+    return longest if _length(longest) >= max(PLATEAU_MIN_SAMPLES, 2.5 * expected) else None
 
 
-def runs(mask: Mask) -> list[tuple[int, int]]:
-    """Start and stop of each run of True.
+def runs(mask: Mask) -> list[slice]:
+    """Runs of True.
 
     Examples
     --------
     >>> runs(np.array([True, False, True, True]))
-    [(0, 1), (2, 4)]
+    [slice(0, 1, None), slice(2, 4, None)]
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [run for (run,) in find_objects(label(mask)[0])]
+
+
+def _length(run: slice) -> int:
+    return int(run.stop - run.start)

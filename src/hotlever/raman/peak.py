@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.raman import lineshape
-from hotlever.raman.lineshape import Array
+from hotlever.raman.noise import Mask
+from hotlever.types import Array
 
-Shape = Literal["lorentzian", "voigt", "fano"]
+LineShape = Literal["lorentzian", "voigt", "fano"]
 
+#: Part of the spectrum that is fitted, cm⁻¹: the line from 0 K to silicon's melting point
+#: with background on both sides, clear of the 2TA (300 cm⁻¹) and 2TO (950 cm⁻¹) bands.
 WINDOW = (440.0, 600.0)
-"""Part of the spectrum that is fitted, cm⁻¹: the line from 0 K to silicon's melting point
-with background on both sides, clear of the 2TA (300 cm⁻¹) and 2TO (950 cm⁻¹) bands."""
-LINE_RANGE = (475.0, 535.0)
-"""Where a silicon line can be, cm⁻¹."""
-MIN_SAMPLES = 12
-"""Fewer samples than this in the window are no spectrum to fit."""
+LINE_RANGE = (475.0, 535.0)  #: where a silicon line can be, cm⁻¹
+MIN_SAMPLES = 12  #: fewer in the window are no spectrum to fit
 
 
 class NoSiliconLine(InputError):
@@ -31,35 +30,27 @@ class NoSiliconLine(InputError):
 class PeakOptions:
     """How to fit the line.
 
-    Attributes
-    ----------
-    shape : {"lorentzian", "voigt", "fano"}
-        "voigt" adds the spectrometer's Gaussian response, "fano" the asymmetry of heavily
-        doped silicon. A resolution given with "fano" convolves the Fano line too.
-    resolution : float, optional
-        FWHM of the spectrometer's response, cm⁻¹. Left out with "voigt", it is fitted.
-    band : bool
-        Whether a broad band on the low side may be added to the model.
+    The shape "voigt" adds the spectrometer's Gaussian response, "fano" the asymmetry of heavily
+    doped silicon. A resolution given with "fano" convolves the Fano line too.
     """
 
-    shape: Shape = "lorentzian"
+    shape: LineShape = "lorentzian"
+    #: FWHM of the spectrometer's response, cm⁻¹. Left out with "voigt", it is fitted.
     resolution: float | None = None
-    band: bool = True
+    band: bool = True  #: whether a broad band on the low side may be added to the model
 
     def validate(self) -> PeakOptions:
         """Return self, or raise InputError naming the option at fault."""
-        if self.shape not in get_args(Shape):
-            raise unknown_name("line shape", str(self.shape), get_args(Shape))
-        if self.resolution is not None:
-            if not (math.isfinite(self.resolution) and 0 < self.resolution < 50):
-                raise InputError(
-                    f"resolution: found {self.resolution:g}, expected a width in cm⁻¹ "
-                    "between 0 and 50"
-                )
-            if self.shape == "lorentzian":
-                raise InputError(
-                    "resolution: a Lorentzian has none; use the shape 'voigt' (or 'fano')"
-                )
+        if self.shape not in get_args(LineShape):
+            raise unknown_name("line shape", str(self.shape), get_args(LineShape))
+        if self.resolution is None:
+            return self
+        if not 0 < self.resolution < 50:
+            raise InputError(
+                f"resolution: found {self.resolution:g}, expected a width in cm⁻¹ between 0 and 50"
+            )
+        if self.shape == "lorentzian":
+            raise InputError("resolution: a Lorentzian has none; use the shape 'voigt' (or 'fano')")
         return self
 
 
@@ -74,59 +65,29 @@ class Band:
 
 @dataclass(frozen=True)
 class Peak:
-    """The fitted silicon line.
-
-    Attributes
-    ----------
-    centre, centre_stderr : float
-        cm⁻¹.
-    fwhm, fwhm_stderr : float
-        Full width of the Lorentzian, free of the spectrometer's response where that is part
-        of the model, cm⁻¹.
-    area, area_stderr : float
-        Counts · cm⁻¹.
-    height : float
-        Of the Lorentzian, counts.
-    background, slope : float
-        At `origin`, counts, and counts per cm⁻¹.
-    fano, fano_stderr : float
-        Asymmetry 1/q; 0 unless fitted.
-    resolution : float
-        FWHM of the spectrometer's response in the model, cm⁻¹; 0 is none.
-    band : Band or None
-        The low-side band, if the data asked for one.
-    misfit : float
-        Residual variance over the variance of neighbouring differences: 1 where noise is
-        all that is left.
-    samples : int
-        Samples fitted.
-    spikes : tuple of float
-        Positions of the samples left out as cosmic rays, cm⁻¹.
-    clipped : (float, float) or None
-        Ends of the flat top that was left out, cm⁻¹.
-    flags : tuple of str
-        Of "cosmic-ray", "saturated", "low-shoulder", "low-band", "edge", "coarse", "misfit".
-    """
+    """The fitted silicon line: cm⁻¹, and counts."""
 
     centre: float
     centre_stderr: float
-    fwhm: float
+    fwhm: float  #: of the Lorentzian, free of the spectrometer's response where that is modelled
     fwhm_stderr: float
-    area: float
+    area: float  #: counts · cm⁻¹
     area_stderr: float
-    height: float
-    background: float
-    slope: float
+    height: float  #: of the Lorentzian
+    background: float  #: at `origin`
+    slope: float  #: of the background, counts per cm⁻¹
     origin: float
-    fano: float = 0.0
+    fano: float = 0.0  #: asymmetry 1/q; 0 unless fitted
     fano_stderr: float = 0.0
-    resolution: float = 0.0
-    band: Band | None = None
+    resolution: float = 0.0  #: FWHM of the spectrometer's response in the model; 0 is none
+    band: Band | None = None  #: on the low side, if the data asked for one
+    #: Residual variance over that of neighbours' differences: 1 where only noise is left.
     misfit: float = 1.0
-    samples: int = 0
-    spikes: tuple[float, ...] = ()
-    clipped: tuple[float, float] | None = None
-    flags: tuple[str, ...] = field(default=())
+    samples: int = 0  #: fitted
+    spikes: tuple[float, ...] = ()  #: places of the samples left out as cosmic rays
+    clipped: tuple[float, float] | None = None  #: ends of the flat top that was left out
+    #: Of "cosmic-ray", "saturated", "low-shoulder", "low-band", "edge", "coarse", "misfit".
+    flags: tuple[str, ...] = ()
 
     def model(self, x: Array) -> Array:
         """The whole fitted curve at `x` (cm⁻¹), counts."""
@@ -141,6 +102,17 @@ class Peak:
     def baseline(self, x: Array) -> Array:
         """The sloping background at `x` (cm⁻¹), counts."""
         return np.asarray(self.background + self.slope * (np.asarray(x) - self.origin))
+
+
+def in_window(x: Array, where: str) -> Mask:
+    """Samples of an axis (cm⁻¹) that are fitted; InputError if they are too few."""
+    inside = (x >= WINDOW[0]) & (x <= WINDOW[1])
+    if np.count_nonzero(inside) < MIN_SAMPLES:
+        raise InputError(
+            f"{where}{np.count_nonzero(inside)} samples between {WINDOW[0]:g} and {WINDOW[1]:g} "
+            f"cm⁻¹, expected at least {MIN_SAMPLES} around silicon's line"
+        )
+    return np.asarray(inside)
 
 
 def observed_width(lorentzian: float, gaussian: float) -> float:

@@ -1,130 +1,148 @@
-"""The weighted least-squares problem of one spectrum: line, background and band."""
+"""The weighted least-squares problem of one spectrum: line, background and band.
+
+The model has ten parameters, by place: the line's centre, ln fwhm and height, the background's
+level and slope, the line's asymmetry, ln sigma of the spectrometer's response, and the band's
+height, centre and ln fwhm.
+"""
 
 from __future__ import annotations
 
 import math
 import warnings
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import leastsq
 
-from hotlever.raman import lineshape, noise
-from hotlever.raman.lineshape import Array
+from hotlever.raman import lineshape
+from hotlever.raman.noise import Mask
+from hotlever.types import Array
 
 
-def bounded_exp(logarithm: float) -> float:
-    """A width from its logarithm, where a diverging fit may have left any number."""
+class At:
+    """Places of the parameters."""
+
+    CENTRE, LOG_FWHM, HEIGHT, LEVEL, SLOPE, FANO, LOG_SIGMA = range(7)
+    BAND = BAND_HEIGHT, BAND_CENTRE, LOG_BAND_FWHM = 7, 8, 9
+
+
+def width_of(logarithm: float) -> float:
+    """A width from its logarithm (0 from −∞), where a diverging fit may have left any number."""
+    if logarithm == -math.inf:
+        return 0.0
     return math.exp(min(max(float(logarithm), -50.0), 50.0))
 
 
 @dataclass(frozen=True)
 class Problem:
-    """The model on one spectrum's samples, and which parameters it has.
+    """A spectrum, the parameters that are free (ascending), and what is known of them before.
 
-    Parameters are [centre, ln fwhm, height, background, slope, (ln sigma), (fano),
-    (band height, band centre, ln band fwhm)].
+    ``priors`` are places of parameters, with mean and standard deviation. ``clipped`` are the
+    samples of a clipped top.
     """
 
     x: Array
     y: Array
     origin: float
-    fit_sigma: bool
-    fixed_sigma: float
-    fit_fano: bool
-    with_band: bool = False
+    free: tuple[int, ...]
     priors: tuple[tuple[int, float, float], ...] = ()
+    clipped: slice | None = None
 
-    def size(self) -> int:
-        return 5 + self.fit_sigma + self.fit_fano + 3 * self.with_band
+    @property
+    def shown(self) -> Mask:
+        """Samples that no clipped top hides."""
+        shown = np.ones(self.x.size, dtype=bool)
+        if self.clipped is not None:
+            shown[max(self.clipped.start - 1, 0) : self.clipped.stop + 1] = False
+        return shown
 
     def evaluate(self, p: Array) -> tuple[Array, Array, Array]:
-        """Model (n,), its Jacobian (n, parameters), and the line's part (n,)."""
+        """Model (n,), its Jacobian (n, free), and the line's part (n,)."""
         with np.errstate(over="ignore", invalid="ignore"):
-            next_one = 5
-            sigma, fano = self.fixed_sigma, 0.0
-            if self.fit_sigma:
-                sigma = bounded_exp(p[next_one])
-                next_one += 1
-            if self.fit_fano:
-                fano = float(p[next_one])
-                next_one += 1
-            fwhm = bounded_exp(p[1])
-            unit, slopes = lineshape.line(self.x, float(p[0]), fwhm, fano, sigma)
-            part = p[2] * unit
+            centre, log_fwhm, height, level, slope, fano, log_sigma, *band = p.tolist()
+            fwhm, sigma = width_of(log_fwhm), width_of(log_sigma)
+            unit, slopes = lineshape.line(self.x, centre, fwhm, fano, sigma)
+            part = height * unit
             u = self.x - self.origin
-            columns = [p[2] * slopes[0], p[2] * slopes[1], unit, np.ones_like(u), u]
-            if self.fit_sigma:
-                columns.append(p[2] * slopes[3])
-            if self.fit_fano:
-                columns.append(p[2] * slopes[2])
-            value = part + p[3] + p[4] * u
-            if self.with_band:
-                height, centre, log_fwhm = p[next_one : next_one + 3]
-                band_fwhm = bounded_exp(log_fwhm)
-                unit_band, band_slopes = lineshape.band(self.x, float(centre), band_fwhm)
-                value = value + height * unit_band
-                columns += [unit_band, height * band_slopes[0], height * band_slopes[1]]
-            return value, np.stack(columns, axis=1), part
+            value = part + level + slope * u
+            by_centre, by_fwhm, by_fano, by_sigma = height * slopes
+            columns = [by_centre, by_fwhm, unit, np.ones_like(u), u, by_fano, by_sigma]
+            if At.BAND_HEIGHT in self.free:
+                unit, slopes = lineshape.band(self.x, band[1], width_of(band[2]))
+                value += band[0] * unit
+                columns += [unit, *(band[0] * slopes)]
+            return value, np.array([columns[place] for place in self.free]).T, part
 
-    def solve(self, start: Array, variance: Array, use: noise.Mask) -> tuple[Array, Array]:
-        """Weighted least squares: the parameters and the weighted Jacobian at the solution."""
+    def weighted(self, p: Array, variance: Array, use: Mask) -> tuple[Array, Array]:
+        """Residuals over their standard deviations, priors last, and the Jacobian of both."""
+        value, jacobian, _ = self.evaluate(p)
         weight = 1.0 / np.sqrt(variance[use])
-        indices = [index for index, _, _ in self.priors]
-        means = np.array([mean for _, mean, _ in self.priors])
-        spreads = np.array([spread for _, _, spread in self.priors])
-        rows = np.zeros((len(indices), self.size()))
-        rows[np.arange(len(indices)), indices] = 1.0 / spreads if indices else 1.0
-        last: tuple[bytes, Array, Array] = (b"", weight, weight)
+        residual, jacobian = (value - self.y)[use] * weight, jacobian[use] * weight[:, None]
+        if self.priors:
+            places, mean, spread = np.array(self.priors).T
+            residual = np.append(residual, (p[places.astype(int)] - mean) / spread)
+            jacobian = np.append(jacobian, (places[:, None] == self.free) / spread[:, None], 0)
+        if not np.isfinite(residual).all():
+            residual, jacobian = np.full_like(residual, 1e30), np.nan_to_num(jacobian)
+        return residual, jacobian
 
-        def both(p: Array) -> tuple[bytes, Array, Array]:
+    def solve(self, start: Array, variance: Array, use: Mask) -> Array:
+        """Weighted least squares from a start, where the parameters stay that are not free."""
+        free = list(self.free)
+
+        def all_of(some: Array) -> Array:
+            p = start.copy()
+            p[free] = some
+            return p
+
+        @lru_cache(maxsize=1)
+        def at(content: bytes) -> tuple[Array, Array]:
             # MINPACK asks for the residual and the Jacobian at the same point in two calls
-            nonlocal last
-            key = p.tobytes()
-            if key != last[0]:
-                value, jacobian, _ = self.evaluate(p)
-                residual = (value - self.y)[use] * weight
-                scaled = jacobian[use] * weight[:, None]
-                if indices:
-                    residual = np.concatenate([residual, (p[indices] - means) / spreads])
-                    scaled = np.concatenate([scaled, rows])
-                if not np.isfinite(residual).all():
-                    residual, scaled = np.full_like(residual, 1e30), np.nan_to_num(scaled)
-                last = (key, residual, scaled)
-            return last
+            return self.weighted(all_of(np.frombuffer(content)), variance, use)
 
         # leastsq is the thinnest door to MINPACK's Levenberg-Marquardt: the wrapping that
         # least_squares adds takes longer than the fit of a few hundred samples
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
-            p = leastsq(
-                lambda p: both(p)[1],
-                start,
-                Dfun=lambda p: both(p)[2],
+            found = leastsq(
+                lambda some: at(some.tobytes())[0],
+                start[free],
+                Dfun=lambda some: at(some.tobytes())[1],
                 full_output=True,
                 ftol=1e-9,
                 xtol=1e-8,
                 maxfev=200,
             )[0]
-        return np.asarray(p), both(np.asarray(p))[2]
+        return all_of(found)
 
 
 @dataclass(frozen=True)
 class Solution:
+    """Parameters that fit a spectrum, the curve, the noise it leaves, and the samples used."""
+
     problem: Problem
     p: Array
-    jacobian: Array
     value: Array
-    part: Array
     variance: Array
-    use: noise.Mask
+    use: Mask
 
     @property
     def covariance(self) -> Array:
-        """Of the parameters; the variance already carries the residuals' scale."""
-        scale = np.linalg.norm(self.jacobian, axis=0)
+        """Of all parameters (10, 10); the variance already carries the residuals' scale."""
+        _, jacobian = self.problem.weighted(self.p, self.variance, self.use)
+        scale = np.linalg.norm(jacobian, axis=0)
         scale[scale == 0.0] = 1.0
-        scaled = self.jacobian / scale
-        return np.asarray(np.linalg.pinv(scaled.T @ scaled, hermitian=True)) / np.outer(
-            scale, scale
-        )
+        scaled = jacobian / scale
+        covariance = np.zeros((self.p.size, self.p.size))
+        covariance[np.ix_(self.problem.free, self.problem.free)] = np.linalg.pinv(
+            scaled.T @ scaled, hermitian=True
+        ) / np.outer(scale, scale)
+        return covariance
+
+    @property
+    def misfit(self) -> float:
+        """Variance of the weighted residuals over half that of their neighbours' differences."""
+        weighted = ((self.problem.y - self.value) / np.sqrt(self.variance))[self.use]
+        local = 0.5 * float(np.mean(np.diff(weighted) ** 2))
+        return float(np.mean(weighted**2)) / local if local > 0.0 else 1.0

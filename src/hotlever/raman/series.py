@@ -6,32 +6,38 @@ import csv
 import io
 import math
 import os
-from collections.abc import Callable, Iterable, Sequence
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from hotlever.errors import InputError, unknown_name
-from hotlever.raman.calibration import Calibration, Point, calibrate
+from hotlever.raman.calibration import Point, RamanCalibration, calibrate_raman
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.spectrum import Spectrum
-from hotlever.raman.stated import kelvin
-from hotlever.raman.tables import decode
+from hotlever.raman.stated import sample_temperature
 from hotlever.raman.thermometer import Thermometer
+from hotlever.tables import read_table, shown
+from hotlever.types import Progress
 
-COLUMNS = (
-    "file",
-    "center_cm-1",
-    "center_stderr_cm-1",
-    "fwhm_cm-1",
-    "shift_cm-1",
-    "temperature_K",
-    "temperature_error_K",
-    "flags",
-)
-"""Header of the Raman CSV."""
+if TYPE_CHECKING:
+    import xarray as xr
 
-Progress = Callable[[int, int], None]
+#: Numbers of a Raman table: decimal places in the CSV, unit, meaning.
+QUANTITIES = {
+    "center_per_cm": (4, "cm-1", "place of the silicon line"),
+    "center_stderr_per_cm": (4, "cm-1", "standard error of the line's place"),
+    "fwhm_per_cm": (3, "cm-1", "full width of the line at half maximum"),
+    "shift_per_cm": (4, "cm-1", "shift of the line against room temperature"),
+    "temperature_K": (2, "K", "tip temperature"),
+    "temperature_error_K": (2, "K", "standard error of the tip temperature"),
+}
+#: Header of the Raman CSV.
+COLUMNS = ("file", *(name.replace("_per_cm", "_cm-1") for name in QUANTITIES), "flags")
 
 
 @dataclass(frozen=True)
@@ -42,34 +48,12 @@ class Line:
     peak: Peak | None
 
 
-@dataclass(frozen=True)
-class Row:
-    """One row of the Raman CSV; NaN where there is no number."""
-
-    file: str
-    centre: float
-    centre_stderr: float
-    fwhm: float
-    shift: float
-    temperature: float
-    error: float
-    flags: tuple[str, ...]
-
-
 def measure(
     spectra: Sequence[Spectrum],
     options: PeakOptions | None = None,
     progress: Progress | None = None,
 ) -> list[Line]:
-    """Fit the silicon line of each spectrum.
-
-    Parameters
-    ----------
-    spectra : sequence of Spectrum
-    options : PeakOptions, optional
-    progress : callable, optional
-        Called with (spectra done, spectra in all).
-    """
+    """Fit the silicon line of each spectrum; calls ``progress`` with (spectra done, in all)."""
     lines = []
     for done, spectrum in enumerate(spectra, start=1):
         try:
@@ -82,76 +66,53 @@ def measure(
     return lines
 
 
-def read_lines(lines: Iterable[Line], thermometer: Thermometer | None) -> list[Row]:
-    """Rows of the Raman CSV; without a thermometer shift and temperature are left out."""
-    lines = list(lines)
-    rows = []
-    for line, name in zip(lines, _names(line.spectrum for line in lines), strict=True):
-        peak = line.peak
-        if peak is None:
-            nothing = math.nan
-            rows.append(
-                Row(name, nothing, nothing, nothing, nothing, nothing, nothing, ("no-line",))
-            )
-            continue
-        shift = temperature = error = math.nan
-        flags = list(peak.flags)
-        if thermometer is not None:
-            reading = thermometer.read([peak.centre], [peak.centre_stderr])
-            shift, temperature, error = (
-                float(values[0]) for values in (reading.shift, reading.temperature, reading.error)
-            )
-            if math.isnan(temperature):
-                flags.append("no-temperature")
-            elif reading.outside[0]:
-                flags.append("extrapolated")
-        rows.append(
-            Row(
-                name,
-                peak.centre,
-                peak.centre_stderr,
-                peak.fwhm,
-                shift,
-                temperature,
-                error,
-                tuple(flags),
-            )
-        )
-    return rows
+def read_lines(lines: Sequence[Line], thermometer: Thermometer | None) -> xr.Dataset:
+    """Table of lines and, with a thermometer, of shifts and temperatures.
 
-
-def _names(spectra: Iterable[Spectrum]) -> list[str]:
-    """File names; whole paths where two folders hold the same name."""
-    spectra = list(spectra)
-    names = [spectrum.name for spectrum in spectra]
-    if len(set(names)) == len(names):
-        return names
-    return [str(Path(spectrum.folder) / spectrum.name) for spectrum in spectra]
-
-
-def to_csv(rows: Iterable[Row]) -> str:
-    """The Raman CSV.
-
-    Examples
-    --------
-    >>> row = Row("a.txt", 520.7, 0.01, 3.1, float("nan"), float("nan"), float("nan"), ("edge",))
-    >>> print(to_csv([row]).splitlines()[1])
-    a.txt,520.7000,0.0100,3.100,,,,edge
+    Returns
+    -------
+    xarray.Dataset
+        On dimension ``spectrum``: ``file``, the `QUANTITIES` (NaN where there is no number), and
+        ``flags``, separated by semicolons.
     """
+    import xarray as xr  # takes half a second, which not every command has to wait for
+
+    names = [line.spectrum.name for line in lines]
+    if len(set(names)) < len(names):
+        # whole paths, where two folders hold the same name
+        names = [str(Path(line.spectrum.folder) / line.spectrum.name) for line in lines]
+    numbers = np.full((len(QUANTITIES), len(lines)), np.nan)
+    flags = [["no-line"] if line.peak is None else list(line.peak.flags) for line in lines]
+    for place, peak in enumerate(line.peak for line in lines):
+        if peak is not None:
+            numbers[:3, place] = peak.centre, peak.centre_stderr, peak.fwhm
+    if thermometer is not None:
+        reading = thermometer.read(numbers[0], numbers[1])
+        numbers[3:] = reading.shift, reading.temperature, reading.error
+        missing = np.isnan(reading.temperature) & ~np.isnan(numbers[0])
+        for flag, where in (("no-temperature", missing), ("extrapolated", reading.outside)):
+            for place in where.nonzero()[0].tolist():
+                flags[place].append(flag)
+    columns: dict[str, tuple[str, np.ndarray, dict[str, str]]] = {
+        "file": ("spectrum", np.array(names, dtype=str), {"long_name": "file"})
+    }
+    for (name, (_, unit, meaning)), values in zip(QUANTITIES.items(), numbers, strict=True):
+        columns[name] = ("spectrum", values, {"units": unit, "long_name": meaning})
+    joined = np.array([";".join(each) for each in flags], dtype=str)
+    columns["flags"] = ("spectrum", joined, {"long_name": "what was noticed"})
+    return xr.Dataset(columns)
+
+
+def to_csv(table: xr.Dataset) -> str:
+    """The Raman CSV of a table from `read_lines`."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for row in rows:
-        numbers = (
-            (row.centre, 4),
-            (row.centre_stderr, 4),
-            (row.fwhm, 3),
-            (row.shift, 4),
-            (row.temperature, 2),
-            (row.error, 2),
-        )
-        cells = ["" if math.isnan(value) else f"{value:.{digits}f}" for value, digits in numbers]
-        writer.writerow([row.file, *cells, ";".join(row.flags)])
+    columns = [
+        ["" if math.isnan(value) else f"{value:.{digits}f}" for value in table[name].values]
+        for name, (digits, _, _) in QUANTITIES.items()
+    ]
+    writer.writerows(zip(table.file.values, *columns, table.flags.values, strict=True))
     return out.getvalue()
 
 
@@ -161,17 +122,15 @@ def calibrate_from(
     temperatures: dict[str, float] | None = None,
     progress: Progress | None = None,
     source: str = "hot-plate series",
-) -> tuple[Calibration, list[Line]]:
-    """Calibrate from hot-plate spectra.
+) -> tuple[RamanCalibration, list[Line]]:
+    """Calibrate from hot-plate spectra, each with its temperature by header or file name.
 
     Parameters
     ----------
-    spectra : sequence of Spectrum
-        Each with its temperature by header or file name, unless `temperatures` has it.
-    options : PeakOptions, optional
+    spectra, options, progress
+        See `measure`.
     temperatures : dict, optional
-        Kelvin by file name (see `read_temperatures`); goes before header and name.
-    progress : callable, optional
+        Kelvin by file name (see `read_temperatures`), which goes before header and name.
     source : str
         Named in the calibration file.
 
@@ -181,37 +140,36 @@ def calibrate_from(
         If a spectrum has no temperature, no silicon line, or a clipped one.
     """
     options = options or PeakOptions()
-    table = temperatures or {}
-    stated = []
-    for spectrum in spectra:
-        temperature = table.get(spectrum.name, table.get(Path(spectrum.name).stem))
-        if temperature is None and table:
-            raise unknown_name("spectrum in the temperature table", spectrum.name, table)
-        if temperature is None:
-            temperature = spectrum.temperature
-        if temperature is None:
-            raise InputError(
-                f"{spectrum.name}: no temperature in its header or name; expected e.g. "
-                "'#Temperature (K)=\t295', a name like si_450K.txt, or a table of temperatures"
-            )
-        stated.append(temperature)
+    stated = [_temperature(spectrum, temperatures or {}) for spectrum in spectra]
     lines = measure(spectra, options, progress)
     points = []
     for line, temperature in zip(lines, stated, strict=True):
-        if line.peak is None or "saturated" in line.peak.flags:
-            found = "no silicon line" if line.peak is None else "a saturated line"
-            raise InputError(
-                f"{line.spectrum.name}: {found}, expected a spectrum to calibrate with"
-            )
+        name, peak = line.spectrum.name, line.peak
+        if peak is None or "saturated" in peak.flags:
+            found = "no silicon line" if peak is None else "a saturated line"
+            raise InputError(f"{name}: {found}, expected a spectrum to calibrate with")
         points.append(
             Point(
-                file=line.spectrum.name,
+                file=name,
                 temperature_K=temperature,
-                centre_cm=line.peak.centre,
-                centre_stderr_cm=line.peak.centre_stderr,
+                centre_cm=peak.centre,
+                centre_stderr_cm=peak.centre_stderr,
             )
         )
-    return calibrate(points, options.shape, options.resolution, source), lines
+    return calibrate_raman(points, options.shape, options.resolution, source), lines
+
+
+def _temperature(spectrum: Spectrum, table: dict[str, float]) -> float:
+    name = spectrum.name
+    if not table and spectrum.temperature is None:
+        raise InputError(
+            f"{name}: no temperature in its header or name; expected e.g. "
+            "'#Temperature (K)=\t295', a name like si_450K.txt, or a table of temperatures"
+        )
+    found = table.get(name, table.get(Path(name).stem)) if table else spectrum.temperature
+    if found is None:
+        raise unknown_name("spectrum in the temperature table", name, table)
+    return found
 
 
 def read_temperatures(path: str | os.PathLike[str]) -> dict[str, float]:
@@ -226,33 +184,20 @@ def read_temperatures(path: str | os.PathLike[str]) -> dict[str, float]:
     ...     read_temperatures(table)
     {'a.txt': 298.15, 'b.txt': 373.15}
     """
-    try:
-        text = decode(Path(path).read_bytes(), str(path))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    separator = next((mark for mark in ("\t", ";", ",") if lines and mark in lines[0]), None)
-    unit, table = "K", {}
-    for number, line in enumerate(lines, start=1):
-        cells = [cell.strip(' "') for cell in line.split(separator)]
-        if len(cells) < 2:
-            raise InputError(
-                f"{path}: row {number}: '{line.strip()[:40]}', expected a file name and a "
-                "temperature"
-            )
-        try:
-            value = float(cells[1].replace(",", "."))
-        except ValueError:
-            if number > 1:
-                raise InputError(
-                    f"{path}: row {number}: temperature '{cells[1][:40]}', expected a number"
-                ) from None
-            unit = "C" if "c" in cells[1].lower().split("temp")[-1].replace("erature", "") else "K"
-            continue
-        temperature = kelvin(value, unit)
+    table = read_table(path, "rows of file name and temperature", header=False)
+    if len(table.rows[0]) < 2:
+        raise InputError(
+            f"{table.where(0)}: '{shown(table.rows[0][0])}', expected a file name and a temperature"
+        )
+    # a heading such as T_C has its unit without brackets
+    celsius = table.names and re.search(r"[\W_](C|celsius)\W*$", table.names[1], re.I)
+    kelvin = table.values(1, "K", "temperature", unit="C" if celsius else "K")
+    found: dict[str, float] = {}
+    for row, (cells, value) in enumerate(zip(table.rows, kelvin, strict=True)):
+        temperature = sample_temperature(float(value))
         if temperature is None:
-            raise InputError(f"{path}: row {number}: {value:g} {unit} is no sample temperature")
-        table[Path(cells[0]).name] = temperature
-    if not table:
-        raise InputError(f"{path}: no rows of file name and temperature")
-    return table
+            raise InputError(f"{table.where(row)}: '{shown(cells[1])}' is no sample temperature")
+        name = Path(cells[0]).name
+        if found.setdefault(name, temperature) != temperature:
+            raise InputError(f"{table.where(row)}: '{shown(name)}' has another temperature above")
+    return found

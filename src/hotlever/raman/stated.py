@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 
-from scipy.constants import zero_Celsius
+from hotlever.tables import ZERO_CELSIUS_K, quantity
 
-HOTTEST = 2000.0
-"""K; a higher number with the unit of a temperature is something else."""
+HOTTEST = 2000.0  #: K; a higher number with the unit of a temperature is something else
 
 _NUMBER = r"(-?\d+(?:[.,]\d+)?)"
 _UNIT = r"(K|kelvin|°C|ºC|degC|deg\s?C|C|celsius)"
@@ -31,12 +30,8 @@ def temperature_in_name(stem: str) -> float | None:
     parts = re.split(r"[_\s;()\[\]=]+", stem)
     # a dash may be a minus or stand between words
     parts += [part for pair in parts for part in pair.split("-")]
-    for part in parts:
-        match = _IN_NAME.fullmatch(part)
-        if match:
-            return _to_kelvin(match[1], match[2])
-    match = _SPACED.search(stem)
-    return _to_kelvin(match[1], match[2]) if match else None
+    match = next(filter(None, map(_IN_NAME.fullmatch, parts)), None) or _SPACED.search(stem)
+    return _kelvin(quantity(match[1])[0], match[2]) if match else None
 
 
 def temperature_in_metadata(metadata: dict[str, str]) -> float | None:
@@ -50,28 +45,25 @@ def temperature_in_metadata(metadata: dict[str, str]) -> float | None:
     295.0
     """
     for key, value in metadata.items():
-        match = _KEY.match(key)
-        if not match:
-            continue
-        stated = re.fullmatch(rf"\s*{_NUMBER}\s*{_UNIT}?\s*", value, re.I)
-        unit = (stated[2] if stated else None) or match[1]
-        if stated and unit:
-            return _to_kelvin(stated[1], unit)
+        match = _KEY.match(key[:80])
+        number, unit = quantity(value)
+        if match and (found := _kelvin(number, unit.strip() or match[1] or "")) is not None:
+            return found
     return None
 
 
-def kelvin(value: float, unit: str) -> float | None:
-    """Convert to kelvin; None for what no silicon sample can have.
+def sample_temperature(kelvin: float) -> float | None:
+    """Return a temperature (K), or None for what no silicon sample can have.
 
     Examples
     --------
-    >>> kelvin(25.0, "C"), kelvin(-3.0, "K")
+    >>> sample_temperature(298.15), sample_temperature(-3.0)
     (298.15, None)
     """
-    if not unit.lower().startswith("k"):
-        value += zero_Celsius
-    return round(value, 6) if 0.0 < value < HOTTEST else None
+    return round(kelvin, 6) if 0.0 < kelvin < HOTTEST else None
 
 
-def _to_kelvin(number: str, unit: str) -> float | None:
-    return kelvin(float(number.replace(",", ".")), unit)
+def _kelvin(number: float | None, unit: str) -> float | None:
+    if number is None or not re.fullmatch(_UNIT, unit, re.I):
+        return None
+    return sample_temperature(number if unit[0] in "kK" else number + ZERO_CELSIUS_K)

@@ -10,67 +10,46 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hotlever.errors import InputError, unknown_name
-from hotlever.raman.anharmonic import terms
-from hotlever.raman.calibration import Calibration
-from hotlever.raman.lineshape import Array
+from hotlever.raman import anharmonic
+from hotlever.raman.calibration import RamanCalibration
 from hotlever.raman.peak import Peak
-from hotlever.raman.published import ABSORBED_FRACTION, STRESS_SHIFT
+from hotlever.spieser2017 import ABSORBED_SHARE, STRESS_SHIFT
+from hotlever.types import Array
 
 Law = Literal["linear", "anharmonic"]
 
 
 @dataclass(frozen=True)
 class Reading:
-    """Temperatures of one or more spectra.
+    """Temperatures of n spectra."""
 
-    Attributes
-    ----------
-    shift, shift_stderr : (n,) arrays
-        Against the line at room temperature, cm⁻¹; the error without the reference's.
-    temperature, error : (n,) arrays
-        K; NaN where silicon has no such line.
-    outside : (n,) bool array
-        Whether the temperature lies outside the calibrated range.
-    """
-
-    shift: Array
-    shift_stderr: Array
-    temperature: Array
-    error: Array
-    outside: np.ndarray
+    shift: Array  #: (n,), against the line at room temperature, cm⁻¹
+    temperature: Array  #: (n,), K; NaN where silicon has no such line
+    error: Array  #: (n,), K
+    outside: np.ndarray  #: (n,), whether the temperature lies outside the calibrated range
 
 
 @dataclass(frozen=True)
 class Thermometer:
     """A calibration in use.
 
-    Attributes
-    ----------
-    calibration : Calibration
-    law : {"anharmonic", "linear"}
-    reference, reference_stderr : float, optional
-        Line's place at room temperature (cm⁻¹) on the instrument as it is now; the
-        calibration's own unless given.
-    laser_heating : float
-        Estimated heating by the laser (K), see `laser_heating`; part of the error.
-    stress : float
-        Mechanical stress that is not known (MPa); part of the error.
-
     Examples
     --------
-    >>> from hotlever.raman.calibration import published
-    >>> thermometer = Thermometer(published(), law="linear", reference=520.7)
+    >>> from hotlever.raman.calibration import published_raman_calibration
+    >>> thermometer = Thermometer(published_raman_calibration(), law="linear", reference=520.7)
     >>> reading = thermometer.read([520.7 - 10.0], [0.05])
     >>> reading.temperature.round(1).tolist()
     [709.0]
     """
 
-    calibration: Calibration
+    calibration: RamanCalibration
     law: Law = "anharmonic"
+    #: The line's place at room temperature (cm⁻¹) on the instrument as it is now; the
+    #: calibration's own unless given.
     reference: float | None = None
     reference_stderr: float = 0.0
-    laser_heating: float = 0.0
-    stress: float = 0.0
+    laser_heating: float = 0.0  #: estimated, K, see `laser_heating`; part of the error
+    stress: float = 0.0  #: mechanical and not known, MPa; part of the error
 
     def __post_init__(self) -> None:
         if self.law not in get_args(Law):
@@ -80,10 +59,8 @@ class Thermometer:
                 "this calibration holds no room-temperature line; give a spectrum of the same "
                 "instrument at room temperature as reference"
             )
-        for name in ("laser_heating", "stress"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0.0):
-                raise InputError(f"{name}: found {value:g}, expected a number from 0 up")
+        _check("laser heating", self.laser_heating, 1e3, "K")
+        _check("stress", self.stress, 1e4, "MPa")
 
     def with_reference(self, peaks: Iterable[tuple[Peak, float | None]]) -> Thermometer:
         """Take the room-temperature line from spectra of the instrument as it is now.
@@ -94,15 +71,14 @@ class Thermometer:
             The temperature (K) is the room temperature of the calibration where None.
         """
         room = self.calibration.room_temperature_K
-        places, weights = [], []
-        for peak, temperature in peaks:
-            drift = 0.0
-            if temperature is not None:
-                drift = float(self.calibration.anharmonic.shift(np.array(temperature), room)[0])
-            places.append(peak.centre - drift)
-            weights.append(peak.centre_stderr**-2)
-        if not places:
+        found = [
+            (peak.centre, peak.centre_stderr**-2, room if temperature is None else temperature)
+            for peak, temperature in peaks
+        ]
+        if not found:
             raise InputError("reference: no spectrum with a silicon line")
+        centres, weights, temperatures = np.array(found).T
+        places = centres - self.calibration.anharmonic.shift(temperatures, room)[0]
         return replace(
             self,
             reference=float(np.average(places, weights=weights)),
@@ -127,43 +103,36 @@ class Thermometer:
             paper's band, where the constants are the published ones). Both grow outside the
             calibrated range.
         """
-        calibration = self.calibration
-        room = calibration.room_temperature_K
-        own = self.reference is None
-        reference = calibration.reference_cm if own else self.reference
-        assert reference is not None
+        calibration, room = self.calibration, self.calibration.room_temperature_K
+        linear, law = calibration.linear, calibration.anharmonic
+        covariance = np.array(law.covariance)
+        reference, reference_stderr = calibration.reference_cm, calibration.reference_stderr_cm
+        if self.reference is not None:
+            reference, reference_stderr = self.reference, self.reference_stderr
+            covariance[0, :] = covariance[:, 0] = 0.0
+            covariance[0, 0] = reference_stderr**2
         shift = np.atleast_1d(np.asarray(centre, dtype=float)) - reference
         noise = np.atleast_1d(np.asarray(stderr, dtype=float))
-        law = calibration.anharmonic
-        true = law.temperature(shift, room)
+        temperature = law.temperature(shift, room)
         # where the law has no inverse there is no temperature; any will do to go on with
-        at = np.where(np.isfinite(true), true, room)
+        exists = np.isfinite(temperature)
+        at = np.where(exists, temperature, room)
         _, slope = law.shift(at, room)
         if self.law == "linear":
-            temperature = calibration.linear.temperature(shift, room)
-            variance = (calibration.linear.slope_K_cm**2) * (
-                noise**2 + (calibration.reference_stderr_cm if own else self.reference_stderr) ** 2
-            )
-            band = calibration.linear.band(temperature - room)
-            model = np.maximum(band, np.abs(temperature - at))
-            temperature = np.where(np.isfinite(true), temperature, np.nan)
+            temperature = np.where(exists, linear.temperature(shift, room), np.nan)
+            variance = linear.slope_K_cm**2 * (noise**2 + reference_stderr**2)
+            model = np.maximum(linear.band(temperature - room), np.abs(temperature - at))
         else:
-            temperature = true
-            gradient = _gradient(at, room)
-            covariance = np.array(law.covariance)
-            if not own:
-                covariance[0, :] = covariance[:, 0] = 0.0
-                covariance[0, 0] = self.reference_stderr**2
+            gradient = anharmonic.gradient(at, room)
             spread = np.einsum("ni,ij,nj->n", gradient, covariance, gradient)
             variance = (noise**2 + np.maximum(spread, 0.0)) / slope**2
             model = self._model_error(at, slope)
         variance = variance + model**2 + self.laser_heating**2
         variance = variance + (STRESS_SHIFT * self.stress / slope) ** 2
-        error = np.where(np.isfinite(temperature), np.sqrt(variance), np.nan)
+        error = np.where(exists, np.sqrt(variance), np.nan)
         low, high = calibration.range_K
-        with np.errstate(invalid="ignore"):
-            outside = (temperature < low - 2.0 * error) | (temperature > high)
-        return Reading(shift, noise, temperature, error, outside)
+        outside = (temperature < low - 2.0 * error) | (temperature > high)
+        return Reading(shift, temperature, error, outside)
 
     def _model_error(self, temperature: Array, slope: Array) -> Array:
         """How far the anharmonic law may be off, K: a second law through the same points.
@@ -171,24 +140,17 @@ class Thermometer:
         Constants that no series of this instrument has fixed have no such second law; the
         paper's error band stands in.
         """
-        calibration = self.calibration
-        u = temperature - calibration.room_temperature_K
-        if not calibration.anharmonic.parabola:
-            return calibration.linear.band(u)
-        first, second = calibration.anharmonic.parabola
-        predicted, _ = calibration.anharmonic.shift(temperature, calibration.room_temperature_K)
+        law, room = self.calibration.anharmonic, self.calibration.room_temperature_K
+        u = temperature - room
+        if not law.parabola:
+            return self.calibration.linear.band(u)
+        first, second = law.parabola
+        predicted, _ = law.shift(temperature, room)
         return np.asarray(np.abs((first * u + second * u**2 - predicted) / slope))
 
 
-def _gradient(temperature: Array, room: float) -> Array:
-    """Derivatives of the line's place to reference, three- and four-phonon term, (n, 3)."""
-    a, b, _, _ = terms(temperature)
-    a_room, b_room, _, _ = terms(room)
-    return np.stack([np.ones_like(a), a - a_room, b - b_room], axis=1)
-
-
 def laser_heating(
-    power_mW: float, resistance_K_per_mW: float, absorbed: float = ABSORBED_FRACTION
+    power_mW: float, resistance_K_per_mW: float, absorbed: float = ABSORBED_SHARE
 ) -> float:
     """Estimate the heating by the laser, K.
 
@@ -209,9 +171,13 @@ def laser_heating(
     >>> round(laser_heating(0.1, 215.0), 2)
     2.15
     """
-    for name, value in (("laser power", power_mW), ("thermal resistance", resistance_K_per_mW)):
-        if not (np.isfinite(value) and value >= 0.0):
-            raise InputError(f"{name}: found {value:g}, expected a number from 0 up")
-    if not 0.0 <= absorbed <= 1.0:
-        raise InputError(f"absorbed part: found {absorbed:g}, expected 0 to 1")
+    _check("laser power", power_mW, 1e3, "mW")
+    _check("thermal resistance", resistance_K_per_mW, 1e5, "K/mW")
+    _check("absorbed part", absorbed, 1.0, "of the light")
     return power_mW * absorbed * resistance_K_per_mW
+
+
+def _check(name: str, value: float, highest: float, unit: str) -> None:
+    """Refuse what is negative, no number, or beyond what can be."""
+    if not 0.0 <= value <= highest:
+        raise InputError(f"{name}: found {value:g}, expected 0 to {highest:g} {unit}")

@@ -14,18 +14,13 @@ import jinja2
 from matplotlib.figure import Figure
 
 from hotlever import __version__
+from hotlever.figures import save_figure
 from hotlever.files import output_folder, write_text
-from hotlever.report.style import save_figure
 
 
 @dataclass
 class Page:
-    """A page that is filled from top to bottom and then written.
-
-    Parameters
-    ----------
-    title, summary : str
-    """
+    """A page that is filled from top to bottom and then written."""
 
     title: str
     summary: str = ""
@@ -48,15 +43,8 @@ class Page:
         prose: bool = False,
     ) -> None:
         """Add a table of strings; one of sentences is set flush left."""
-        self.blocks.append(
-            {
-                "kind": "table",
-                "columns": columns,
-                "rows": rows,
-                "caption": caption,
-                "prose": prose,
-            }
-        )
+        block = {"kind": "table", "columns": columns, "rows": rows, "caption": caption}
+        self.blocks.append({**block, "prose": prose})
 
     def figure(self, name: str, made: Figure, caption: str) -> None:
         """Add a figure; `name` is its file name without suffix."""
@@ -75,24 +63,17 @@ class Page:
         for block in self.blocks:
             if block["kind"] == "figure":
                 save_figure(block["figure"], target / f"{block['name']}.pdf")
-                block = {**block, "image": _png(block["figure"])}
+                image = io.BytesIO()
+                block["figure"].savefig(image, format="png", dpi=160)
+                block = {**block, "image": base64.b64encode(image.getvalue()).decode("ascii")}
             blocks.append(block)
+        options: Any = {"undefined": jinja2.StrictUndefined, "autoescape": True}
+        options |= {"trim_blocks": True, "lstrip_blocks": True}
         environment = jinja2.Environment(
-            loader=jinja2.PackageLoader("hotlever", "report"),
-            autoescape=True,
-            undefined=jinja2.StrictUndefined,
-            trim_blocks=True,
-            lstrip_blocks=True,
+            loader=jinja2.PackageLoader("hotlever", "report"), **options
         )
         html = environment.get_template("page.html.j2").render(
             title=self.title, summary=self.summary, blocks=blocks, version=__version__
         )
         write_text(target / name, html)
         return target / name
-
-
-def _png(made: Figure) -> str:
-    """Return a figure as base64 PNG."""
-    buffer = io.BytesIO()
-    made.savefig(buffer, format="png", dpi=160)
-    return base64.b64encode(buffer.getvalue()).decode("ascii")

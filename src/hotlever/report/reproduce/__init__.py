@@ -5,40 +5,40 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hotlever.lever import Lever
-from hotlever.materials.spieser2017 import DOI, published
 from hotlever.probe import Probe
 from hotlever.report.page import Page
 from hotlever.report.reproduce import air, fits, thermometer, vacuum
-from hotlever.report.reproduce.study import Claim, Study
+from hotlever.report.reproduce.findings import Findings
+from hotlever.spieser2017 import published
+from hotlever.studies import each
+from hotlever.types import Progress
 
-__all__ = ["Claim", "Study", "reproduce_page"]
-
-#: In the order of the page.
-SECTIONS: tuple[Callable[[Study], None], ...] = (
-    vacuum.probe_section,
-    vacuum.parameter_section,
-    vacuum.operating_points_section,
-    vacuum.characteristics_section,
-    vacuum.heater_section,
-    vacuum.knee_section,
-    fits.fit_section,
-    fits.options_section,
-    thermometer.thermometer_section,
-    air.disc_section,
-    air.characteristics_section,
-    air.scale_section,
-    air.map_section,
-    vacuum.balance_section,
-)
+#: Headings and sections, in the order of the page.
+SECTIONS: dict[str, Callable[[Findings], None]] = {
+    "The reference probe": vacuum.probe_section,
+    "Published parameters and inversion temperatures (Tables I and II)": vacuum.parameter_section,
+    "Published operating points": vacuum.operating_points_section,
+    "Characteristics in vacuum (Figs. 5 and 6)": vacuum.characteristics_section,
+    "Inside the heater (Fig. 7)": vacuum.heater_section,
+    "Why the knee is not at the inversion temperature": vacuum.knee_section,
+    "Material parameters from a measurement (option III)": fits.fit_section,
+    "What each observable adds (options I to III, Figs. 3 and 4, Table I)": fits.options_section,
+    "The Raman thermometer (Fig. 2)": thermometer.thermometer_section,
+    "Heat into air depends on the surroundings (Fig. 8)": air.disc_section,
+    "Characteristics in air (Figs. 9 and 10)": air.characteristics_section,
+    "Is air one factor of the power? (Fig. 10b)": air.scale_section,
+    "Where the heat goes": air.map_section,
+    "Balances": vacuum.balance_section,
+}
 #: Left out of the quick form.
-LONG_SECTIONS: tuple[Callable[[Study], None], ...] = (
-    air.geometry_section,
-    air.tip_section,
-    vacuum.mesh_section,
-)
+LONG_SECTIONS: dict[str, Callable[[Findings], None]] = {
+    "k by size, gap and pressure": air.geometry_section,
+    "The missing tip": air.tip_section,
+    "Mesh": vacuum.mesh_section,
+}
 
 
-def reproduce_page(quick: bool, progress: Callable[[int, int], None]) -> Page:
+def reproduce_page(quick: bool, progress: Progress) -> Page:
     """Compute everything and return the page, the claims of the paper first.
 
     Parameters
@@ -48,23 +48,18 @@ def reproduce_page(quick: bool, progress: Callable[[int, int], None]) -> Page:
     progress : callable
         Called with the sections done and their number.
     """
-    probe = Probe.reference().with_values(published("option III").material.model_dump())
-    page = Page(
-        "Joule-heated cantilever probes: the published results, computed",
-        f"Spieser et al., J. Appl. Phys. 121, 174503 (2017), doi:{DOI}, with hotlever's reference "
-        "probe, whose dimensions are inferred: no drawing of the published lever exists.",
-    )
-    study = Study(Page(page.title), Lever(probe), quick)
-    sections = SECTIONS if quick else SECTIONS + LONG_SECTIONS
-    for number, section in enumerate(sections, start=1):
-        section(study)
-        progress(number, len(sections))
+    page = Findings(Lever(Probe.reference().with_(**published("option III").material.model_dump())))
+    sections = SECTIONS if quick else SECTIONS | LONG_SECTIONS
+    for heading, section in each(sections.items(), progress):
+        page.heading(heading)
+        section(page)
+    filled, page.blocks = page.blocks, []
     page.heading("What the paper says, and what was found")
     page.table(
         ("where", "claim", "verdict", "found in this run"),
-        [(claim.where, claim.statement, claim.verdict, claim.found) for claim in study.claims],
+        page.claims,
         "Every verdict is computed from the sections below.",
         prose=True,
     )
-    page.blocks.extend(study.page.blocks)
+    page.blocks += filled
     return page

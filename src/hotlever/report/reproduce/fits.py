@@ -7,27 +7,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hotlever.figures import correlation_matrix
 from hotlever.fitting import Fit, Measurement, fit, read_measurement
+from hotlever.fitting.words import parameter_rows
 from hotlever.materials import PARAMETERS
-from hotlever.materials.spieser2017 import NOMINAL_DOPING
-from hotlever.report.figures import correlation_matrix
-from hotlever.report.fit_report import add_fit, value_with_error
-from hotlever.report.reproduce.study import Study
+from hotlever.report.fit_pages import add_fit
+from hotlever.report.reproduce.findings import Findings
 from hotlever.report.reproduce.vacuum import PARAMETER_COLUMNS
+from hotlever.spieser2017 import NOMINAL_DOPING
 
 
-def fit_section(study: Study) -> None:
+def fit_section(page: Findings) -> None:
     """Option III on the virtual lab's first lever."""
-    study.page.heading("Material parameters from a measurement (option III)")
-    study.page.text(
+    page.text(
         "The data set lever-a.csv was made with an independent solver and instrument noise; its "
         "parameters are not known to the fit, which starts from the published option III."
     )
-    result = fit(_example("lever-a.csv"), study.lever.probe)
-    add_fit(study.page, result)
-    study.claim(
+    result = fit(_example("lever-a.csv"), page.lever.probe)
+    add_fit(page, result)
+    page.claim(
         "Section III",
         "one fit takes some 700 simulations of two minutes each, 23 hours",
         f"{result.evaluations} solved sweeps of {result.measurement.bias_V.size} points, "
@@ -37,18 +36,17 @@ def fit_section(study: Study) -> None:
     )
 
 
-def options_section(study: Study) -> None:
+def options_section(page: Findings) -> None:
     """Options I to III on both levers of the virtual lab (Figs. 3 and 4, Table I)."""
-    study.page.heading("What each observable adds (options I to III, Figs. 3 and 4, Table I)")
-    study.page.text(
+    page.text(
         "lever-a.csv follows the model that is fitted. lever-b.csv comes from a richer one, with a "
         "tip on the heater, so that the fit cannot be perfect."
     )
     for name in ("lever-a.csv", "lever-b.csv"):
-        _compare_options(study, _example(name))
+        _compare_options(page, _example(name))
 
 
-def _compare_options(study: Study, measurement: Measurement) -> None:
+def _compare_options(page: Findings, measurement: Measurement) -> None:
     name = Path(measurement.path).stem
     choices: dict[str, dict[str, Any]] = {
         "I": {"observables": ["current"]},
@@ -56,89 +54,73 @@ def _compare_options(study: Study, measurement: Measurement) -> None:
         "III": {},
         "III, n_d fixed": {"fixed": {"n_d": NOMINAL_DOPING}},
     }
-    fits = {
-        option: fit(measurement, study.lever.probe, **choice) for option, choice in choices.items()
-    }
-    study.page.table(
+    probe, rows, coupling = page.lever.probe, [], []
+    fits = {option: fit(measurement, probe, **choice) for option, choice in choices.items()}
+    for option, result in fits.items():
+        cells = [value for _, value, _, _ in parameter_rows(result)]
+        inversion, rms = result.inversion_temperature_K, result.residual_rms["tip_K"]
+        rows.append((f"option {option}", *cells, f"{inversion:.0f}", f"{rms:.1f}"))
+        one_noise, own_noise = _between_groups(result)
+        coupling.append(
+            (option, f"{one_noise:.2f}", f"{own_noise:.2f}", f"{_hot_error(result):.0f}")
+        )
+    page.table(
         (name, *PARAMETER_COLUMNS, "T_i (K)", "rms T_tip (K)"),
-        [
-            (
-                f"option {option}",
-                *(
-                    value_with_error(found.value, found.stderr, PARAMETERS[key].scale)
-                    for key, found in result.parameters.items()
-                ),
-                f"{result.inversion_temperature_K:.0f}",
-                f"{result.residual_rms['tip_K']:.1f}",
-            )
-            for option, result in fits.items()
-        ],
+        rows,
         f"{name}: parameters by what was fitted.",
     )
     for option in ("I", "II", "III"):
         result = fits[option]
-        study.page.figure(
+        page.figure(
             f"{name}_correlation_{option}",
             correlation_matrix(result.names, result.common_noise_correlation),
             f"{name}, option {option}: correlation of the fitted parameters as the paper has it, "
             "from one noise for all observables.",
         )
-    study.page.table(
+    page.table(
         (
             "option",
             "strongest correlation between groups, one noise for all",
             "the same, each observable its own noise",
             "largest T_tip error above 850 K (K)",
         ),
-        [
-            (
-                option,
-                f"{_between_groups(result, result.common_noise_correlation):.2f}",
-                f"{_between_groups(result, result.correlation):.2f}",
-                f"{_hot_error(result):.0f}",
-            )
-            for option, result in fits.items()
-        ],
+        coupling,
         f"{name}: coupling of the groups {{c_κ}}, {{a₀, a₁}} and {{Δ, n_d, p}}, and how far the "
         "predicted temperature is from the measured one.",
     )
-    _option_claims(study, name, fits)
+    _option_claims(page, name, fits)
     free, held = fits["III"].parameters, fits["III, n_d fixed"].parameters
     changes = ", ".join(
         f"{PARAMETERS[key].symbol} {held[key].value / free[key].value - 1:+.1%}"
         for key in PARAMETERS
         if key != "n_d"
     )
-    study.page.text(
+    page.text(
         f"{name}: holding n_d at the nominal {NOMINAL_DOPING:.2g} cm⁻³ changes the other "
         f"parameters by {changes}."
     )
 
 
-def _option_claims(study: Study, name: str, fits: dict[str, Fit]) -> None:
-    between = {
-        option: _between_groups(result, result.common_noise_correlation)
-        for option, result in fits.items()
-    }
-    own = _between_groups(fits["III"], fits["III"].correlation)
-    study.claim(
+def _option_claims(page: Findings, name: str, fits: dict[str, Fit]) -> None:
+    (first, _), (third, own) = _between_groups(fits["I"]), _between_groups(fits["III"])
+    page.claim(
         "Fig. 4d",
         f"with I_h alone the parameters depend strongly on each other ({name})",
-        f"strongest correlation between groups {between['I']:.2f}",
-        holds=between["I"] > 0.8,
+        f"strongest correlation between groups {first:.2f}",
+        holds=first > 0.8,
         because="no pair of different groups is strongly correlated",
     )
-    study.claim(
+    page.claim(
         "Fig. 4f",
         f"with all observables {{c_κ}}, {{a₀, a₁}} and {{Δ, n_d, p}} are decoupled ({name})",
-        f"strongest correlation between groups {between['III']:.2f} with one noise for all "
+        f"strongest correlation between groups {third:.2f} with one noise for all "
         f"observables, as the paper has it; {own:.2f} when each has its own",
-        holds=between["III"] < 0.6,
-        within=f"a correlation of {between['III']:.2f} between groups",
-        because=f"a correlation of {between['III']:.2f} is left between groups",
+        holds=third < 0.6,
+        within=f"a correlation of {third:.2f} between groups",
+        because=f"a correlation of {third:.2f} is left between groups",
     )
     first, third = (_hot_error(fits[option]) for option in ("I", "III"))
-    study.claim(
+    page.claim(
         "Fig. 3",
         f"a fit of I_h alone mispredicts the temperature above 850 K ({name})",
         f"by up to {first:.0f} K, against {third:.0f} K with all observables",
@@ -148,7 +130,7 @@ def _option_claims(study: Study, name: str, fits: dict[str, Fit]) -> None:
     free, held = fits["III"], fits["III, n_d fixed"]
     moved = abs(held.inversion_temperature_K - free.inversion_temperature_K)
     worse = held.residual_rms["tip_K"] - free.residual_rms["tip_K"]
-    study.claim(
+    page.claim(
         "Table I",
         f"n_d may be fixed at the nominal doping concentration at little cost ({name})",
         f"T_i moves by {moved:.0f} K, rms of T_tip by {worse:+.1f} K",
@@ -157,12 +139,16 @@ def _option_claims(study: Study, name: str, fits: dict[str, Fit]) -> None:
     )
 
 
-def _between_groups(result: Fit, correlation: NDArray[np.float64]) -> float:
-    """Largest correlation between parameters of different groups, in absolute value."""
+def _between_groups(result: Fit) -> list[float]:
+    """Largest absolute correlation between parameters of different groups.
+
+    The first number is that from one noise for all observables, the second from one for each.
+    """
     group = {"c_kappa": 0, "a0": 1, "a1": 1, "delta": 2, "n_d": 2, "p": 2}
     groups = np.array([group[name] for name in result.names])
     apart = groups[:, None] != groups[None, :]
-    return float(np.abs(correlation[apart]).max())
+    found = (result.common_noise_correlation, result.correlation)
+    return [float(np.abs(correlation[apart]).max()) for correlation in found]
 
 
 def _hot_error(result: Fit) -> float:

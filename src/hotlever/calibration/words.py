@@ -1,0 +1,102 @@
+"""A calibration in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hotlever.text import aligned, value_with_error
+
+if TYPE_CHECKING:
+    from hotlever.calibration.calibration import Calibration
+
+#: Tip temperatures (K) at which the error budget is printed.
+_SHOWN = (400.0, 600.0, 800.0, 900.0, 1000.0, 1100.0, 1200.0)
+#: What each route rests on, in words.
+_BASIS = {
+    "power law": "a given power law",
+    "probe": "the model of a probe like this lever",
+    "fit in vacuum": "a fit of this lever in vacuum",
+    "fit in air": "a fit of this lever in air",
+}
+#: Errors (K) up to which a calibration is called good, and fair.
+_GOOD, _FAIR = 15.0, 40.0
+
+
+def calibration_text(calibration: Calibration) -> str:
+    """Return the result of a calibration as lines of text."""
+    law, stated = calibration.power_law, calibration.tip_temperature_uncertainty_K
+    lines = [
+        f"based on {_BASIS[calibration.route]}, used in {calibration.medium}",
+        _knee_line(calibration),
+        f"k = {value_with_error(calibration.k, calibration.k_stderr)} times the power of the knee "
+        f"in vacuum, {law.threshold_mW:.3f} mW",
+        f"power law in vacuum: a {law.linear_K_per_mW:.1f} K/mW, b {law.nonlinear_K:.2f} K, "
+        f"m {law.exponent:.3f}, c {law.hot_K_per_mW:.1f} K/mW; jump {law.jump_K:+.0f} K"
+        + (
+            f", within {calibration.law_residual_K:.0f} K of the model"
+            if calibration.law_residual_K
+            else ""
+        ),
+        "",
+        *_budget_lines(calibration),
+        "",
+        f"sure to ± {stated:.0f} K (standard error, largest in the table): {_verdict(calibration)}",
+    ]
+    if np.isfinite(calibration.measured_rms_K):
+        lines.append(
+            f"the measured tip temperatures differ by {calibration.measured_rms_K:.1f} K (rms)"
+        )
+    return "\n".join(lines)
+
+
+def _knee_line(calibration: Calibration) -> str:
+    knee = calibration.knee
+    if not knee.measured:
+        power = value_with_error(knee.power_mW, knee.power_mW_stderr)
+        return f"knee (estimated): {power} mW, tip {calibration.knee_tip_K:.0f} K"
+    return (
+        f"knee: {value_with_error(knee.lever_V, knee.lever_V_stderr)} V, "
+        f"{value_with_error(knee.current_mA, knee.current_mA_stderr)} mA, "
+        f"{value_with_error(knee.power_mW, knee.power_mW_stderr)} mW at a bias of "
+        f"{value_with_error(knee.bias_V, knee.bias_V_stderr)} V, tip {calibration.knee_tip_K:.0f} K"
+    )
+
+
+def _budget_lines(calibration: Calibration) -> list[str]:
+    """Return the standard error by source at some temperatures, and the power there."""
+    table = calibration.table
+    sources = table.source.values.tolist()
+    known = np.isfinite(table.tip_K.values)
+    tip = table.tip_K.values[known]
+    rows = [[head.rjust(7) for head in ("T_tip (K)", "P_l (mW)", "± (K)", *sources)]]
+    errors = [table.tip_stderr_K.values, *table.budget_K.values]
+    for shown in _SHOWN:
+        if tip[0] <= shown <= tip[-1]:
+            power = np.interp(shown, tip, table.power_mW.values[known])
+            kelvins = [f"{np.interp(shown, tip, error[known]):.1f}" for error in errors]
+            rows.append([f"{shown:.0f}", f"{power:.3f}", *kelvins])
+    return aligned(rows, right=True)
+
+
+def _verdict(calibration: Calibration) -> str:
+    stated = calibration.tip_temperature_uncertainty_K
+    word = "good" if stated <= _GOOD else "fair" if stated <= _FAIR else "rough"
+    largest = calibration.table.budget_K.max("bias").idxmax("source").item()
+    better = {
+        "probe": "a fit of this lever (--fit) would know its material",
+        "power law": "a probe (--probe) or a fit (--fit) would know more than a power law",
+        "fit in vacuum": "a fit in air would measure the loss to air instead of modelling it",
+    }
+    advice = {
+        "k": "a finer measurement near the knee would help",
+        "constant k": "--medium air would not assume a constant k",
+        "Raman": "a better thermometer would help",
+        "electronics": "better known meters would help",
+    }
+    text = f"{word}; mostly from {largest}"
+    if largest in advice:
+        return f"{text}: {advice[largest]}"
+    in_vacuum = calibration.route == "fit in vacuum" and calibration.medium == "vacuum"
+    return text if in_vacuum else "; ".join([text, *filter(None, [better.get(calibration.route)])])

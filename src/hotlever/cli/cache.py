@@ -1,0 +1,35 @@
+"""``hotlever cache``: what is kept on disk to save time."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from contextlib import suppress
+
+from typer import Option
+
+from hotlever.cli.application import app
+from hotlever.cli.output import give
+
+
+@app.command("cache")
+def cache_command(clear: bool = Option(False, "--clear", help="Remove all that is kept.")) -> None:
+    """Show what is kept on disk to save time: reduced levers, operators of the air, states."""
+    from hotlever.cache import CACHE_VARIABLE, cache_folder, kept_files, largest_size
+
+    folder = cache_folder()
+    if folder is None:
+        give(f"the cache is switched off: {CACHE_VARIABLE} is empty\n")
+        return
+    if clear:
+        for _, path in kept_files(folder):
+            with suppress(OSError):
+                path.unlink()
+    kept = kept_files(folder)
+    sizes: dict[str, list[int]] = defaultdict(list)
+    for status, path in kept:
+        sizes[path.parent.name].append(status.st_size)
+    sizes["in all"] = [status.st_size for status, _ in kept]
+    lines = [f"{folder} (at most {largest_size() / 1e9:g} GB)"]
+    for kind, found in sizes.items():
+        lines.append(f"{kind:<10} {len(found):>6} files {sum(found) / 1e6:>10.1f} MB")
+    give("\n".join([*lines, ""]))

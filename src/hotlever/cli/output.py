@@ -1,0 +1,109 @@
+"""What a command says: results to standard output, notes and progress to standard error.
+
+Nothing heavy is imported above a bar of progress.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, cast
+
+from hotlever.errors import HotleverError
+
+Update = Callable[[int, int], None]
+
+
+def give(result: str = "") -> None:
+    """Print a result, or what was printed before and waits to be written out."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.write(result)
+            sys.stdout.flush()
+    except OSError as error:
+        # Python would try again at its end
+        sys.stdout = None
+        if isinstance(error, BrokenPipeError):
+            raise
+        raise HotleverError(f"standard output: cannot be written ({error.strerror})") from error
+
+
+class _StandardError:
+    """Standard error as it is now; what cannot be told there is no reason to stop."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(sys.stderr, name)
+
+    def write(self, text: str) -> int:
+        """Write, if somebody reads."""
+        try:
+            if sys.stderr is not None:
+                sys.stderr.write(text)
+        except OSError:
+            sys.stderr = None
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush, if somebody reads."""
+        with suppress(OSError, AttributeError):
+            sys.stderr.flush()
+
+
+_stderr = _StandardError()
+
+
+def tell(text: str) -> None:
+    """Say something in one line on standard error."""
+    # what a file or its name holds must not steer the terminal
+    line = "".join(char if char.isprintable() else " " for char in text)
+    print(" ".join(line.split()), file=cast(Any, _stderr), flush=True)
+
+
+def note(*texts: str) -> None:
+    """Tell the user something beside the result."""
+    for text in texts:
+        tell(f"note: {text}")
+
+
+def fail(message: str) -> None:
+    """Say what went wrong."""
+    if message:
+        tell(f"hotlever: {message}")
+
+
+@contextmanager
+def progress(label: str) -> Iterator[Update]:
+    """Show a progress bar on standard error while the block runs.
+
+    The block gets a function to call with (steps done, steps in all); library functions
+    that can take longer than two seconds accept it as their ``progress`` argument.
+    """
+    with progress_bars(label) as (update,):
+        yield update
+
+
+@contextmanager
+def progress_bars(*labels: str) -> Iterator[tuple[Update, ...]]:
+    """Show several progress bars, each from its first call on."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield tuple(lambda done, total: None for _ in labels)
+        return
+    from rich import progress as rich
+    from rich.console import Console
+
+    columns = (
+        rich.TextColumn("{task.description}"),
+        rich.BarColumn(),
+        rich.MofNCompleteColumn(),
+        rich.TimeElapsedColumn(),
+    )
+    console = Console(file=cast(Any, _stderr))
+    with rich.Progress(*columns, console=console, transient=True) as bar:
+
+        def updater(label: str, visible: bool) -> Update:
+            task = bar.add_task(label, total=None, visible=visible)
+            return lambda done, total: bar.update(task, completed=done, total=total, visible=True)
+
+        # the first is there at once, to show that work has begun
+        yield tuple(updater(label, place == 0) for place, label in enumerate(labels))

@@ -1,0 +1,109 @@
+"""Running a command: however it ends, one line says how, and the exit status.
+
+Nothing heavy is imported above `main`, so that Ctrl-C is answered from the start.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import platform
+import signal
+import sys
+import tempfile
+import traceback
+from contextlib import suppress
+from typing import NoReturn
+
+from hotlever import __version__
+from hotlever.cli.output import fail, give
+from hotlever.errors import HotleverError
+
+#: Signals that end a command as Ctrl-C does.
+_STOPS = ("SIGTERM", "SIGHUP")
+
+
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Run the command line; exit status 0 done, 1 not finished, 2 the input is at fault."""
+    if arguments is None:
+        arguments = sys.argv[1:]
+        _keep_to_ourselves()
+    for name in _STOPS:
+        number = getattr(signal, name, None)
+        # nohup, for one, has a command ignore a signal
+        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # a terminal in Latin-1 has no κ, and a file name need not be text
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        status = _run(arguments or ["--help"])
+    except BaseException as error:
+        status, message = _ended(error, arguments)
+        fail(message)
+    sys.exit(status)
+
+
+def _keep_to_ourselves() -> None:
+    """Keep what compiled libraries print, such as Netgen's warnings, out of the results."""
+    with suppress(OSError, AttributeError):
+        results = os.dup(1)
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+        sys.stdout = os.fdopen(results, "w", encoding=sys.stdout.encoding)
+
+
+def _run(arguments: list[str]) -> int:
+    import typer
+
+    from hotlever.cli import commands
+
+    try:
+        command = typer.main.get_command(commands.app)
+        with command.make_context("hotlever", arguments) as context:
+            command.invoke(context)
+    except typer.Exit as ended:
+        return ended.exit_code
+    except typer.TyperException as error:
+        fail(error.format_message())
+        return error.exit_code
+    finally:
+        give()
+    return 0
+
+
+def _ended(error: BaseException, arguments: list[str]) -> tuple[int, str]:
+    """Return exit status and message for what ended a command."""
+    if isinstance(error, HotleverError):
+        return error.exit_status, str(error)
+    if isinstance(error, KeyboardInterrupt):
+        return 1, "stopped by the user"
+    if isinstance(error, BrokenPipeError):
+        # the reader of our standard output has gone (`| head`): nothing left to say to it
+        return 1, ""
+    if isinstance(error, SystemExit):
+        return error.code if isinstance(error.code, int) else 1, ""
+    what = "out of memory" if isinstance(error, MemoryError) else f"{type(error).__name__}: {error}"
+    return 1, f"internal error: {what} ({_logged(error, arguments)})"
+
+
+def _logged(error: BaseException, arguments: list[str]) -> str:
+    """Keep the traceback in a file, and say where."""
+    import platformdirs
+
+    lines = [
+        f"hotlever {__version__}, Python {platform.python_version()}, {platform.platform()}\n",
+        f"{['hotlever', *arguments]}\n",
+        *traceback.format_exception(error),
+    ]
+    for folder in (platformdirs.user_log_dir("hotlever"), tempfile.gettempdir()):
+        try:
+            os.makedirs(folder, exist_ok=True)
+            handle, path = tempfile.mkstemp(".log", "hotlever-", folder, text=True)
+            with open(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
+                file.writelines(lines)
+        except OSError:
+            continue
+        return f"please report it with {path}"
+    return "no log could be written"

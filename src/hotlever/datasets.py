@@ -1,0 +1,129 @@
+"""What stands in hotlever's datasets: one name, one unit, one meaning for each quantity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from hotlever import __version__
+from hotlever.materials import PARAMETERS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: Name: unit and meaning.
+QUANTITIES: dict[str, tuple[str, str]] = {
+    # what an instrument and a thermometer see
+    "bias": ("V", "bias"),
+    "bias_V": ("V", "bias"),
+    "current_mA": ("mA", "heater current"),
+    "lever_V": ("V", "lever voltage"),
+    "reader_V": ("V", "reader voltage"),
+    "tip_K": ("K", "tip temperature"),
+    "power_mW": ("mW", "power dissipated in the lever"),
+    "tip_error_K": ("K", "standard error of the measured tip temperature"),
+    "current_error_mA": ("mA", "standard error of the measured current"),
+    "reader_error_V": ("V", "standard error of the measured reader voltage"),
+    # inside a lever
+    "heater_ohm": ("ohm", "heater resistance"),
+    "legs_ohm": ("ohm", "resistance of both legs"),
+    "leg1_ohm": ("ohm", "resistance of the leg at the supply"),
+    "leg2_ohm": ("ohm", "resistance of the leg to ground"),
+    "lever_ohm": ("ohm", "resistance of the lever"),
+    "max_K": ("K", "highest temperature in the lever"),
+    "ground_current_mA": ("mA", "current leaving to ground"),
+    "end_heat_mW": ("mW", "heat leaving by the leg ends"),
+    "air_heat_mW": ("mW", "heat leaving into the air"),
+    "sensitivity": ("of the observable by the parameter", "derivative at fixed bias"),
+    # along the heater
+    "position": ("µm", "position along the heater"),
+    "temperature": ("K", "temperature"),
+    "doping": ("cm⁻³", "doping concentration"),
+    "resistivity": ("Ω cm", "resistivity"),
+    "resistivity_slope": ("Ω cm/K", "slope of the resistivity"),
+    # what is sure
+    "tip_stderr_K": ("K", "standard error of the tip temperature"),
+    "tip_at_power_K": ("K", "tip temperature at a power"),
+    "quantile": ("%", "quantile"),
+    "inversion_temperature": ("K", "inversion temperature of the heater's doping"),
+    "log_probability": ("1", "logarithm of the posterior density, up to a constant"),
+    "rhat": ("1", "rank-normalised split R-hat between the ensembles"),
+    "effective_sample_size": ("1", "effective sample size"),
+    "acceptance_fraction": ("1", "share of accepted proposals"),
+    "delta_chi_square": ("1", "rise of chi-square with the other parameters refitted"),
+    "parabola": ("1", "rise of chi-square by the standard error"),
+    "refitted": ("of the parameter", "optimum of the other parameters"),
+    "interval": ("of the parameter", "profile confidence interval"),
+    "level": ("1", "confidence level"),
+    "value": ("of the quantity", "value"),
+    "stderr": ("of the quantity", "standard error"),
+    "mean": ("of the quantity", "mean of the levers"),
+    "scatter": ("of the quantity", "standard deviation between the levers"),
+    "mean_stderr": ("of the quantity", "mean of the standard errors"),
+    "chi_square": ("1", "chi-square of the values about their weighted mean"),
+    "budget_K": ("K", "standard error of the tip temperature by source"),
+    # knee, design and air
+    "knee_K": ("K", "tip temperature at the knee"),
+    "knee_mW": ("mW", "power at the knee"),
+    "knee_V": ("V", "lever voltage at the knee"),
+    "knee_mA": ("mA", "heater current at the knee"),
+    "knee_bias_V": ("V", "bias at the knee"),
+    "resistance_K": ("K", "tip temperature at the highest resistance"),
+    "inversion_K": ("K", "inversion temperature of the heater's doping"),
+    "cold_ohm": ("ohm", "resistance of the lever when cold"),
+    "k": ("1", "power in air over power in vacuum"),
+    "best_k": ("1", "the one factor that leaves the smallest error"),
+    "best_error_K": ("K", "largest error that the best factor leaves"),
+    "unevenness": ("1", "growth of k − 1 from cold to hot"),
+    "loss": ("κ r ΔT", "heat lost by a disc between two planes"),
+    "near": ("κ r ΔT", "the same for planes much nearer than the radius"),
+    "far": ("κ r ΔT", "the same for planes far away"),
+    # tips
+    "height_um": ("µm", "height of the tip"),
+    "half_angle_deg": ("deg", "half-angle of the tip"),
+    "moved_K": ("K", "change of the knee by the tip"),
+    "at_power_K": ("K", "largest change of the tip temperature at the same power"),
+    "fitted_knee_K": ("K", "knee of a tipless lever fitted to the one with the tip"),
+    "missed_K": ("K", "how far the knee lies above that of the fitted tipless lever"),
+    # Raman spectra
+    "temperature_K": ("K", "temperature"),
+    "error": ("K", "line reads less true temperature"),
+    "paper_error": ("K", "error stated in the paper"),
+    **{name: (known.unit, known.meaning) for name, known in PARAMETERS.items()},
+}
+
+
+def labelled(
+    columns: Mapping[str, Any],
+    dimensions: str | Sequence[str] = "bias",
+    coordinates: Mapping[str, Any] | None = None,
+    **attributes: Any,
+) -> xr.Dataset:
+    """Return columns as a dataset with units and meanings.
+
+    Parameters
+    ----------
+    columns : mapping of str to array_like
+        Of `QUANTITIES`; a tuple gives the dimensions of its own before the values.
+    dimensions : str or sequence of str
+        Of the other columns.
+    coordinates : mapping, optional
+        As xarray has them.
+    **attributes
+        Of the dataset, beside the version of the software.
+    """
+    import xarray as xr  # takes half a second, which not every command has to wait for
+
+    data = xr.Dataset(
+        {
+            name: values if isinstance(values, tuple) else (dimensions, values)
+            for name, values in columns.items()
+        },
+        coordinates,
+        {**attributes, "software": f"hotlever {__version__}"},
+    )
+    for name in data.variables:
+        if name in QUANTITIES:
+            unit, meaning = QUANTITIES[str(name)]
+            data[name].attrs = {"units": unit, "long_name": meaning}
+    return data

@@ -1,0 +1,29 @@
+"""All of hotlever's figures on one shelf, each drawn from what the package returns.
+
+Nothing is solved here: datasets and results go in, a matplotlib figure comes out. `save_figure`
+writes one as PNG, SVG or PDF.
+"""
+# ruff: noqa: F401 (what is imported here is what the shelf offers)
+
+from hotlever.figures.air import air_loss, disc_between_planes, scale_factor, temperature_slices
+from hotlever.figures.calibration import calibration_curves, design_sweep
+from hotlever.figures.fit import (
+    correlation_matrix,
+    data_and_model,
+    lever_parameters,
+    posterior_corner,
+    profile_curves,
+    tip_band,
+)
+from hotlever.figures.lever import (
+    doping_profile,
+    field_maps,
+    heater_profiles,
+    iv_curves,
+    probe_drawing,
+    resistances,
+    sweep_overview,
+    temperature_power,
+)
+from hotlever.figures.raman import one_spectrum, raman_check, thermometry
+from hotlever.figures.style import FIGURE_TYPES, save_figure

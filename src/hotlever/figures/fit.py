@@ -1,0 +1,296 @@
+"""Figures of a fit: data and model, what the data determine, and the band of tip temperature."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+from scipy.ndimage import gaussian_filter
+from scipy.special import chdtri, ndtri
+
+from hotlever.figures.style import (
+    BLACK,
+    BLUE,
+    ORANGE,
+    SKY,
+    VERMILION,
+    axis_label,
+    figure,
+    panel_letters,
+)
+from hotlever.materials import PARAMETERS
+from hotlever.types import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+#: Blue over white, as transparent colours cannot be stacked in filled contours.
+_LIGHT, _DARK = "#BFDBEB", "#5DA5CC"
+#: Quantiles of a band, for those that are stated by a standard error.
+_QUANTILES = (0.025, 0.16, 0.5, 0.84, 0.975)
+#: More levers than this are numbered instead of named along an axis.
+_MOST_NAMES = 24
+
+
+def data_and_model(measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str]) -> Figure:
+    """Draw measured and modelled observables, and their difference (paper's Figs. 3 and 4).
+
+    Parameters
+    ----------
+    measured : xarray.Dataset
+        From `Measurement.dataset`.
+    model : xarray.Dataset
+        The sweep of the fitted lever at the measured biases, in the same order.
+    fitted : sequence of str
+        The observables that entered the fit.
+    """
+    panels = (
+        ("current", "heater current I$_h$ (mA)", "current_mA", "µA", 1000.0),
+        ("reader", "reader voltage V$_r$ (V)", "reader_V", "mV", 1000.0),
+        ("tip", "tip temperature (K)", "tip_K", "K", 1.0),
+    )
+    bias = measured.bias.values
+    with figure(8.4, 4.6, 2, 3, sharex=True, height_ratios=(1.8, 1.0)) as (made, grid):
+        for (upper, lower), (name, label, column, unit, factor) in zip(grid.T, panels, strict=True):
+            data, values = measured[column].values, model[column].values
+            upper.plot(bias, values, "-", color=BLUE, label="model")
+            upper.plot(bias, data, "o", mfc="none", color=BLACK, label="measured")
+            lower.axhline(0, color="0.4", lw=0.8)
+            if name == "tip":
+                error = measured.tip_error_K
+                lower.fill_between(bias, -error, error, color="0.9", label="± dT")
+            lower.plot(bias, (data - values) * factor, "o-", color=VERMILION, lw=0.8, ms=3.5)
+            upper.set(ylabel=label)
+            if name not in fitted:
+                where = (0.96, 0.05)
+                upper.annotate("not fitted", where, None, "axes fraction", ha="right", color="0.4")
+            lower.set(xlabel="bias V$_b$ (V)", ylabel=f"data − model ({unit})")
+        panel_letters(grid[0])
+        grid[0, 0].legend(loc="upper left")
+    return made
+
+
+def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
+    """Draw the correlation of fitted parameters (paper's Fig. 4 d-f)."""
+    count = len(names)
+    with figure(1.2 + 0.52 * count, 0.6 + 0.52 * count) as (made, axes):
+        image = axes.imshow(correlation, cmap="PuOr", vmin=-1, vmax=1)
+        symbols = [PARAMETERS[name].symbol for name in names]
+        axes.set_xticks(range(count), symbols)
+        axes.set_yticks(range(count), symbols)
+        axes.grid(False)
+        for (row, column), value in np.ndenumerate(correlation):
+            colour = "white" if abs(value) > 0.7 else "black"
+            place: Any = {"ha": "center", "va": "center", "fontsize": 7.5}
+            axes.text(column, row, f"{value:.2f}", color=colour, **place)
+        made.colorbar(image, label="correlation (1)", shrink=0.9)
+    return made
+
+
+def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
+    """Draw the band of predicted tip temperature against bias and power, and its width.
+
+    Parameters
+    ----------
+    band : xarray.Dataset
+        `Fit.band`, or from `hotlever.fitting.posterior.predictive_band`.
+    measured : xarray.Dataset, optional
+        From `Measurement.dataset`; drawn as points.
+    """
+    if "quantile" in band.coords:
+        by_bias, by_power, middle_name = band.tip_K.values, band.tip_at_power_K.values, "median"
+    else:
+        away = ndtri(_QUANTILES)[:, None] * band.tip_stderr_K.values
+        by_bias = by_power = band.tip_K.values + away
+        middle_name = "prediction"
+    shape: Any = {"sharex": "col", "height_ratios": (1.8, 1.0)}
+    with figure(7.4, 5.0, 2, 2, letters=True, **shape) as (made, grid):
+        for (upper, lower), name, rows, label in (
+            (grid[:, 0], "bias", by_bias, "bias V$_b$ (V)"),
+            (grid[:, 1], "power_mW", by_power, "power P$_l$ (mW)"),
+        ):
+            x = band[name].values
+            low95, low68, middle, high68, high95 = rows
+            upper.plot(x, middle, color=BLUE, label=middle_name)
+            for axes, zero in ((upper, 0.0), (lower, middle)):
+                axes.fill_between(x, low95 - zero, high95 - zero, color=BLUE, alpha=0.25, lw=0)
+                axes.fill_between(x, low68 - zero, high68 - zero, color=BLUE, alpha=0.45, lw=0)
+            upper.fill_between([], [], color=BLUE, alpha=0.55, label="68 %")
+            upper.fill_between([], [], color=BLUE, alpha=0.25, label="95 %")
+            lower.axhline(0, color=BLUE, lw=0.8)
+            if measured is not None:
+                style = {"mfc": "none", "color": BLACK, "ms": 3.5, "label": "measured"}
+                upper.plot(measured[name], measured.tip_K, "o", **style)
+            upper.set(ylabel="tip temperature (K)")
+            lower.set(xlabel=label, ylabel=f"T$_{{tip}}$ − {middle_name} (K)", xlim=(0, None))
+        grid[0, 0].legend(loc="upper left")
+    return made
+
+
+def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
+    """Draw profile likelihoods beside the parabolas of the standard errors.
+
+    Parameters
+    ----------
+    profiles : sequence of xarray.Dataset
+        From `hotlever.fitting.profile.profile_likelihood`.
+    """
+    columns = min(3, len(profiles))
+    rows = math.ceil(len(profiles) / columns)
+    width, height = 2.9 * columns + 0.3, 2.6 * rows + 0.4
+    with figure(width, height, rows, columns, squeeze=False) as (made, grid):
+        panels = grid.ravel()[: len(profiles)]
+        for axes, profile in zip(panels, profiles, strict=True):
+            _profile(axes, profile)
+        for axes in grid.ravel()[len(profiles) :]:
+            axes.remove()
+        panel_letters(panels)
+        grid[0, 0].legend(loc="upper center", frameon=True, facecolor="white", edgecolor="none")
+    return made
+
+
+def _profile(axes: Axes, profile: xr.Dataset) -> None:
+    label, unit = axis_label(profile.attrs["quantity"])
+    value, optimum = profile.value.values / unit, profile.attrs["optimum"] / unit
+    fine = np.linspace(value.min(), value.max(), 200)
+    away = np.abs(value - optimum).argmax()
+    curvature = profile.parabola.values[away] / (value[away] - optimum) ** 2
+    axes.plot(fine, curvature * (fine - optimum) ** 2, "--", color=ORANGE, label="parabola")
+    # the root of a near-parabola is nearly straight on either side of the optimum
+    side = np.where(value < optimum, -1.0, 1.0)
+    root = side * np.sqrt(np.maximum(profile.delta_chi_square.values, 0.0))
+    axes.plot(fine, np.interp(fine, value, root) ** 2, color=BLUE, label="profile")
+    axes.plot(value, root**2, "o", color=BLUE)
+    axes.axvline(optimum, color=VERMILION, lw=0.8)
+    for level in profile.level.values:
+        limit = chdtri(1, 1.0 - level)
+        axes.axhline(limit, color="0.4", lw=0.8, ls=":")
+        where: Any = {"xycoords": ("axes fraction", "data"), "ha": "center", "va": "bottom"}
+        axes.annotate(f"{100 * level:.0f} %", (0.5, limit), color="0.4", fontsize=8, **where)
+    axes.set(xlabel=label, ylabel="Δχ²", ylim=(0, 8))
+    axes.xaxis.set_major_locator(MaxNLocator(4))
+
+
+def posterior_corner(posterior: xr.Dataset, optimum: Mapping[str, float] | None = None) -> Figure:
+    """Draw the posterior of each quantity, and of each pair with its 68 and 95 % regions.
+
+    Parameters
+    ----------
+    posterior : xarray.Dataset
+        From `hotlever.fitting.posterior.sample_posterior`.
+    optimum : mapping of str to float, optional
+        Value of each quantity to mark.
+    """
+    names = posterior.quantity.values.tolist()
+    shown = {name: axis_label(name) for name in names}
+    values = {name: posterior[name].values.ravel() / shown[name][1] for name in names}
+    marks = {name: value / shown[name][1] for name, value in (optimum or {}).items()}
+    size = 1.3 * len(names) + 0.8
+    with figure(size, size, len(names), len(names), squeeze=False) as (made, grid):
+        for (row, column), axes in np.ndenumerate(grid):
+            down, across = names[row], names[column]
+            if column > row:
+                axes.remove()
+                continue
+            if row == column:
+                _histogram(axes, values[across])
+            else:
+                _pair(axes, values[across], values[down])
+                axes.set(xlim=_range(values[across]), ylim=_range(values[down]))
+                axes.yaxis.set_major_locator(MaxNLocator(3))
+            axes.grid(False)
+            axes.xaxis.set_major_locator(MaxNLocator(3))
+            axes.tick_params(axis="x", labelrotation=45)
+            left, bottom = column == 0 and row > 0, row == len(names) - 1
+            axes.tick_params(labelbottom=bottom, labelleft=left)
+            if marks:
+                axes.axvline(marks[across], color=VERMILION, lw=0.8)
+                if row != column:
+                    axes.axhline(marks[down], color=VERMILION, lw=0.8)
+            if bottom:
+                axes.set_xlabel(shown[across][0])
+            if left:
+                axes.set_ylabel(shown[down][0])
+        made.align_labels()
+        handles = [Patch(color=_DARK, label="68 %"), Patch(color=_LIGHT, label="95 %")]
+        if marks:
+            handles.append(Patch(color=VERMILION, label="optimum of the fit"))
+        made.legend(handles=handles, loc="upper right", fontsize=10)
+    return made
+
+
+def _histogram(axes: Axes, values: Array) -> None:
+    axes.hist(values, bins=30, color=SKY)
+    low, middle, high = np.percentile(values, (16, 50, 84))
+    axes.axvspan(low, high, color="0.9", zorder=0)
+    digits = max(0, 1 - math.floor(math.log10(max(high - low, 1e-12))))
+    axes.set_title(f"{middle:.{digits}f} ± {(high - low) / 2:.{digits}f}")
+    axes.set(yticks=[], xlim=_range(values))
+
+
+def _range(values: Array) -> tuple[float, float]:
+    low, high = np.percentile(values, (0.2, 99.8))
+    margin = 0.1 * (high - low)
+    return float(low - margin), float(high + margin)
+
+
+def _pair(axes: Axes, x: Array, y: Array) -> None:
+    """Draw the smallest regions that hold 68 and 95 % of the samples."""
+    counts, x_edges, y_edges = np.histogram2d(x, y, bins=40, range=(_range(x), _range(y)))
+    smooth = gaussian_filter(counts, 1.5)
+    falling = np.sort(smooth.ravel())[::-1]
+    share = np.cumsum(falling) / falling.sum()
+    outer, inner = (falling[np.searchsorted(share, level)] for level in (0.95, 0.68))
+    middles = [(edges[1:] + edges[:-1]) / 2 for edges in (x_edges, y_edges)]
+    if 0.0 < outer < inner < falling[0]:
+        levels = [outer, inner, falling[0]]
+        axes.contourf(*middles, smooth.T, levels=levels, colors=[_LIGHT, _DARK])
+
+
+def lever_parameters(levers: xr.Dataset) -> Figure:
+    """Draw each quantity by lever with its standard error, and mean and scatter of the levers.
+
+    Parameters
+    ----------
+    levers : xarray.Dataset
+        From `hotlever.fitting.levers.compare_levers`. Quantities that were held are left out.
+    """
+    count = levers.sizes["lever"]
+    place = np.arange(1, count + 1)
+    many = count > _MOST_NAMES
+    known = np.isfinite(levers.stderr).any("lever")
+    free = levers.quantity.values[known.values].tolist()
+    height, shape = 1.2 * len(free) + (0.8 if many else 1.2), {"sharex": True, "squeeze": False}
+    with figure(7.4, height, len(free), 1, letters=True, **shape) as (made, grid):
+        column = grid[:, 0]
+        for name, axes in zip(free, column, strict=True):
+            one = levers.sel(quantity=name)
+            label, scale = axis_label(name)
+            mean, scatter = one["mean"].item() / scale, one.scatter.item() / scale
+            if np.isfinite(scatter):
+                low, high = mean - scatter, mean + scatter
+                axes.axhspan(low, high, color="0.9", lw=0, label="mean ± scatter between levers")
+            axes.axhline(mean, color=VERMILION, lw=1.0, label="mean of the levers")
+            style: dict[str, Any] = {"ms": 1.5, "lw": 0.5} if many else {"ms": 4, "lw": 1.0}
+            style |= {"fmt": "o", "color": BLUE, "label": "lever, with standard error"}
+            axes.errorbar(place, one.value / scale, one.stderr / scale, **style)
+            # a unit below the symbol, as the panels are low
+            axes.set_ylabel(label.replace(" (", "\n(", 1))
+            axes.grid(False, axis="x")
+        if many:
+            column[-1].set(xlabel="lever", xlim=(0, count + 1))
+        else:
+            names = levers.lever.values
+            column[-1].set_xticks(place, names, rotation=45, ha="right", parse_math=False)
+            column[-1].set_xlim(0.5, count + 0.5)
+        made.align_ylabels()
+        handles, labels = column[0].get_legend_handles_labels()
+        made.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    return made

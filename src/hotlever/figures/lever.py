@@ -1,0 +1,250 @@
+"""Figures of a lever: its drawing, its fields, and what a sweep gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
+from matplotlib.tri import Triangulation
+
+from hotlever.calibration.power_law import EQ12, PowerLaw
+from hotlever.figures.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREEN,
+    MEASURED,
+    ORANGE,
+    SKY,
+    VERMILION,
+    figure,
+)
+from hotlever.probe import Layout
+from hotlever.spieser2017 import BASE_TEMPERATURE_K
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hotlever.lever.fields import FieldMap
+
+
+def _marker(sweep: xr.Dataset, marker: str = "o") -> str:
+    """Mark the points of a sweep, unless they are so many that they hide the line."""
+    return marker if sweep.sizes["bias"] <= 40 else ""
+
+
+def probe_drawing(layout: Layout, title: str = "") -> Figure:
+    """Draw a probe from above, with heater, reader, terminals and tip marked."""
+    low_doped = {"heater": (VERMILION, "heater (low-doped)"), "reader": (SKY, "reader (low-doped)")}
+    with figure(7.0, 3.4) as (made, axes):
+        handles: dict[str, Patch | Line2D] = {}
+        for region in layout.regions:
+            colour, label = "0.82", "high-doped silicon"
+            if region.taper is not None:
+                colour, label = low_doped["heater" if region.part == "heater" else "reader"]
+            axes.add_patch(Polygon(region.outline, facecolor=colour, edgecolor="0.55", lw=0.6))
+            handles.setdefault(label, Patch(facecolor=colour, edgecolor="0.55", label=label))
+        for terminal in layout.terminals:
+            (x0, y0), (x1, y1) = terminal.start, terminal.end
+            axes.plot([x0, x1], [y0, y1], color=BLUE, lw=4, solid_capstyle="butt")
+            middle = ((x0 + x1) / 2, (y0 + y1) / 2)
+            beside: Any = {"xytext": (-8, 0), "textcoords": "offset points"}
+            axes.annotate(terminal.name, middle, ha="right", va="center", color=BLUE, **beside)
+        handles["terminal"] = Line2D([], [], color=BLUE, lw=4, label="terminal (base temperature)")
+        (tip,) = axes.plot(*layout.tip, marker="^", color=BLACK, ls="none", label="tip")
+        handles["tip"] = tip
+        corners = np.array([point for region in layout.regions for point in region.outline])
+        (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
+        margin = 0.04 * (right - left)
+        axes.set(xlim=(left - 5 * margin, right + margin), ylim=(low - margin, high + margin))
+        axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)", title=title)
+        made.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
+    return made
+
+
+def outlines(axes: Axes, layout: Layout) -> None:
+    """Draw the regions and the tip of a lever over a map of it."""
+    for region in layout.regions:
+        axes.add_patch(Polygon(region.outline, fill=False, edgecolor="0.45", lw=0.4))
+    axes.plot(*layout.tip, marker="^", mfc="white", mec="black", ms=4)
+    axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)")
+    axes.grid(False)
+
+
+def field_maps(fields: FieldMap, layout: Layout, title: str = "") -> Figure:
+    """Draw temperature, potential and current density, whole lever and magnified heater."""
+    mesh = Triangulation(fields.points[:, 0], fields.points[:, 1], fields.triangles)
+    density = np.linalg.norm(fields.current_density, axis=1)
+    strong = max(density.max(), 1e-9)
+    density = np.maximum(density, strong * 1e-3)
+    maps = (
+        ("temperature (K)", fields.temperature, "inferno", None),
+        ("potential (V)", fields.potential, "viridis", None),
+        ("current density (mA/µm²)", density, "cividis", LogNorm(strong * 1e-3, strong)),
+    )
+    heater = np.array(layout.heater.outline)
+    size = np.ptp(heater, axis=0).max()
+    centre = (heater.min(axis=0) + heater.max(axis=0)) / 2
+    with figure(7.0, 6.8, 3, 2, width_ratios=(1.75, 1.0)) as (made, grid):
+        for row, (label, values, colours, norm) in zip(grid, maps, strict=True):
+            shading = "gouraud" if values.size == len(fields.points) else "flat"
+            style: Any = {"cmap": colours, "norm": norm, "shading": shading, "rasterized": True}
+            for axes in row:
+                image = axes.tripcolor(mesh, values, **style)
+                outlines(axes, layout)
+            row[1].set_xlim(centre[0] + np.array([-0.85, 0.85]) * size)
+            row[1].set_ylim(centre[1] + np.array([-0.65, 0.65]) * size)
+            made.colorbar(image, ax=row[1], label=label, extend="min" if norm else "neither")
+        grid[0, 0].set_title(title)
+        grid[0, 1].set_title("heater, magnified")
+    return made
+
+
+def sweep_overview(sweep: xr.Dataset) -> Figure:
+    """Draw what a sweep gives against the bias: current, voltages, tip temperature, I-V."""
+    with figure(7.4, 5.2, 2, 2, letters=True) as (made, grid):
+        current, voltage, tip, iv = grid.ravel()
+        current.plot(sweep.bias_V, sweep.current_mA, "o-", color=BLUE)
+        current.set(ylabel="heater current I$_h$ (mA)")
+        voltage.plot(sweep.bias_V, sweep.lever_V, "o-", color=BLUE, label="lever V$_l$")
+        if sweep.reader_V.notnull().any():
+            voltage.plot(sweep.bias_V, sweep.reader_V, "s-", color=GREEN, label="reader V$_r$")
+        voltage.set(ylabel="voltage (V)")
+        voltage.legend()
+        tip.plot(sweep.bias_V, sweep.tip_K, "o-", color=VERMILION)
+        tip.set(ylabel="tip temperature (K)")
+        iv.plot(sweep.lever_V, sweep.current_mA, "o-", color=BLUE)
+        iv.set(xlabel="lever voltage V$_l$ (V)", ylabel="heater current I$_h$ (mA)")
+        for axes in (current, voltage, tip):
+            axes.set(xlabel="bias V$_b$ (V)")
+    return made
+
+
+def iv_curves(
+    sweeps: Mapping[str, xr.Dataset],
+    knees: Mapping[str, xr.Dataset] | None = None,
+    measured: xr.Dataset | None = None,
+) -> Figure:
+    """Draw heater current against lever voltage (paper's Figs. 6a and 10a), with the knees.
+
+    Parameters
+    ----------
+    sweeps : mapping of str to xarray.Dataset
+        By label; those of more than 40 biases as lines alone.
+    knees : mapping of str to xarray.Dataset, optional
+        By label of a sweep and in their order, the one state returned by `Lever.knee`.
+    measured : xarray.Dataset, optional
+        From `Measurement.dataset`.
+    """
+    with figure(4.8, 3.6) as (made, axes):
+        for (name, sweep), colour in zip(sweeps.items(), COLOURS, strict=False):
+            marker: Any = _marker(sweep) or "-"
+            axes.plot(sweep.lever_V, sweep.current_mA, marker, color=colour, label=name)
+        if measured is not None:
+            axes.plot(measured.lever_V, measured.current_mA, **MEASURED)
+        for (name, knee), colour in zip((knees or {}).items(), COLOURS, strict=False):
+            seen = f"knee{'' if len(sweeps) < 2 else f' in {name}'}: {knee.tip_K.item():.0f} K"
+            seen += f", {knee.lever_V.item():.2f} V, {knee.current_mA.item():.2f} mA"
+            axes.plot(knee.lever_V, knee.current_mA, "D", ms=6, color=colour, label=seen)
+        axes.set(xlabel="lever voltage V$_l$ (V)", ylabel="heater current I$_h$ (mA)")
+        axes.set(xlim=(0, None), ylim=(0, None))
+        axes.legend(loc="upper left")
+    return made
+
+
+def temperature_power(
+    sweep: xr.Dataset,
+    law: PowerLaw = EQ12,
+    measured: xr.Dataset | None = None,
+    base_temperature_K: float = BASE_TEMPERATURE_K,
+) -> Figure:
+    """Draw tip temperature against power beside the power law (paper's Fig. 6b)."""
+
+    def expected(power: Any) -> np.ndarray:
+        return law.tip_temperature(power, base_temperature_K)
+
+    with figure(4.6, 4.6, 2, 1, sharex=True, height_ratios=(2.2, 1.0)) as (made, (axes, below)):
+        power = np.linspace(0, float(sweep.power_mW.max()) * 1.03, 800)
+        jump = np.searchsorted(power, law.threshold_mW)
+        for part, label in ((slice(0, jump), "power law, Eq. 12"), (slice(jump, None), None)):
+            axes.plot(power[part], expected(power[part]), "--", color=ORANGE, label=label)
+        style: Any = {"color": BLUE, "marker": _marker(sweep)}
+        axes.plot(sweep.power_mW, sweep.tip_K, label="model", **style)
+        below.plot(sweep.power_mW, sweep.tip_K - expected(sweep.power_mW), **style)
+        if measured is not None:
+            axes.plot(measured.power_mW, measured.tip_K, **MEASURED)
+            below.plot(measured.power_mW, measured.tip_K - expected(measured.power_mW), **MEASURED)
+        below.axhspan(-25, 25, color="0.92", zorder=0)
+        below.axhline(0, color="0.4", lw=0.8)
+        below.set(xlabel="power P$_l$ (mW)", ylabel="T$_{tip}$ − law (K)", xlim=(0, None))
+        axes.set(ylabel="tip temperature (K)")
+        axes.legend(loc="upper left")
+        below.annotate("±25 K", (0.02, 0.06), xycoords="axes fraction", color="0.4", fontsize=8)
+    return made
+
+
+def resistances(sweep: xr.Dataset) -> Figure:
+    """Draw heater, leg and total resistance against tip temperature (paper's Fig. 5)."""
+    with figure(4.2, 3.4) as (made, axes):
+        for name, label, colour, marker in (
+            ("lever_ohm", "lever, total", BLACK, "s"),
+            ("heater_ohm", "heater R$_h$", VERMILION, "o"),
+            ("legs_ohm", "legs R$_{l1}$ + R$_{l2}$", BLUE, "^"),
+        ):
+            style: Any = {"color": colour, "marker": _marker(sweep, marker), "label": label}
+            axes.plot(sweep.tip_K, sweep[name] / 1000, **style)
+        axes.set(xlabel="tip temperature (K)", ylabel="resistance (kΩ)", ylim=(0, None))
+        axes.legend()
+    return made
+
+
+def doping_profile(profile: xr.Dataset) -> Figure:
+    """Draw doping and local inversion temperature along the heater (paper's Fig. 7a)."""
+    with figure(4.6, 3.4) as (made, axes):
+        axes.semilogy(profile.position, profile.doping, color=BLUE)
+        axes.set(xlabel="position along the heater (µm)")
+        axes.set_ylabel("doping concentration (cm⁻³)", color=BLUE)
+        right = axes.twinx()
+        right.plot(profile.position, profile.inversion_temperature, "--", color=VERMILION)
+        right.set_ylabel("inversion temperature (K)", color=VERMILION)
+        right.spines["right"].set_visible(True)
+        right.grid(False)
+    return made
+
+
+def heater_profiles(profiles: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw local resistivity and temperature along the heater (paper's Fig. 7b).
+
+    Solid where dρ/dT > 0, dashed where it is negative.
+
+    Parameters
+    ----------
+    profiles : mapping of str to xarray.Dataset
+        From `heater_profile`, by the name of the operating point.
+    """
+    with figure(5.2, 5.2, 2, 1, sharex=True) as (made, (upper, lower)):
+        for (name, profile), colour in zip(profiles.items(), COLOURS, strict=False):
+            position, rho = profile.position.values, profile.resistivity.values
+            metallic = profile.resistivity_slope.values > 0
+            upper.plot(position, np.where(metallic, rho, np.nan), color=colour)
+            # let the dashed part reach the solid one
+            inverted = ~metallic | ~np.roll(metallic, 1) | ~np.roll(metallic, -1)
+            if not metallic.all():
+                upper.plot(position, np.where(inverted, rho, np.nan), "--", color=colour)
+            seen = f"{profile.attrs['lever_V']:.2f} V, {profile.attrs['current_mA']:.2f} mA"
+            lower.plot(position, profile.temperature, color=colour, label=f"{name}: {seen}")
+        upper.set(ylabel="resistivity (Ω cm)", ylim=(0, None))
+        solid = Line2D([], [], color="0.3", label="dρ/dT > 0")
+        dashed = Line2D([], [], color="0.3", ls="--", label="dρ/dT < 0")
+        upper.legend(handles=[solid, dashed], loc="upper right")
+        lower.set(xlabel="position along the heater (µm)", ylabel="temperature (K)")
+        low, high = lower.get_ylim()
+        lower.set_ylim(low, high + 0.35 * (high - low))
+        lower.legend(loc="upper left")
+    return made

@@ -1,0 +1,239 @@
+"""Figures of Raman thermometry; none needs a display."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hotlever.figures.style import BLACK, BLUE, GREEN, VERMILION, figure, panel_letters
+from hotlever.raman.calibration import RamanCalibration
+from hotlever.raman.peak import WINDOW, Peak
+from hotlever.raman.series import Line
+from hotlever.studies.raman_check import conclusion
+from hotlever.types import Array
+
+GREY = "0.4"
+STACKED = 9
+#: Scaled intensity at which a line is cut off, as a cosmic ray would hide the next spectrum.
+_HIGHEST = 1.25
+
+
+def thermometry(
+    lines: Sequence[Line],
+    table: xr.Dataset,
+    calibration: RamanCalibration | None = None,
+    series: Sequence[Line] = (),
+) -> Figure:
+    """Spectra stacked by temperature, calibration, residuals: like figure 2 of the paper.
+
+    Parameters
+    ----------
+    lines : sequence of Line
+        The measured spectra.
+    table : xarray.Dataset
+        What was read from them, see `hotlever.raman.series.read_lines`.
+    calibration : RamanCalibration, optional
+        Without one only the spectra are drawn.
+    series : sequence of Line
+        The hot-plate spectra, to be stacked in place of `lines`.
+    """
+    names = [str(name) for name in table.file.values]
+    if calibration is None:
+        with figure(4.2, 5.4) as (made, axes):
+            _stack(axes, list(zip(names, lines, strict=True)))
+        return made
+    if series:
+        stated = {point.file: point.temperature_K for point in calibration.points}
+        known = [(stated[one.spectrum.name], one) for one in series if one.spectrum.name in stated]
+        known.sort(key=lambda pair: pair[0])
+        stacked = [(f"{temperature:.0f} K", line) for temperature, line in known]
+    else:
+        read = zip(names, table.temperature_K.values, lines, strict=True)
+        stacked = [(f"{t:.0f} K" if np.isfinite(t) else name, line) for name, t, line in read]
+    with figure(10.0, 5.4) as (made, alone):
+        alone.remove()  # for a column of one panel beside a column of two
+        grid = made.add_gridspec(2, 2, width_ratios=(1.0, 1.35), height_ratios=(1.5, 1.0))
+        panels = [made.add_subplot(place) for place in (grid[:, 0], grid[0, 1], grid[1, 1])]
+        _stack(panels[0], stacked)
+        _calibration(panels[1], calibration, table)
+        _residuals(panels[2], calibration)
+        panel_letters(panels)
+    return made
+
+
+def _in_window(line: Line) -> tuple[Array, Array]:
+    x, y = line.spectrum.x, line.spectrum.y
+    inside = (x >= WINDOW[0]) & (x <= WINDOW[1])
+    return x[inside], y[inside]
+
+
+def _stack(axes: Axes, stacked: Sequence[tuple[str, Line]]) -> None:
+    """Spectra above each other, each scaled to its line, with the fit."""
+    if len(stacked) > STACKED:
+        chosen = np.unique(np.linspace(0, len(stacked) - 1, STACKED).round().astype(int))
+        stacked = [stacked[place] for place in chosen]
+    for level, (label, line) in enumerate(stacked):
+        x, y = _in_window(line)
+        if not x.size:
+            continue
+        peak = line.peak
+        if peak is None:
+            y = y - np.median(y)
+            top = float(np.ptp(y)) or 1.0
+        else:
+            y = y - peak.baseline(x)
+            height = y if "saturated" in peak.flags else peak.model(x) - peak.baseline(x)
+            top = float(height.max()) or 1.0
+        scaled = level + 0.75 * np.clip(y / top, None, _HIGHEST)
+        axes.plot(x, scaled, ".", ms=1.6, color=GREY, rasterized=x.size > 2000)
+        if peak is not None:
+            fine = np.linspace(x[0], x[-1], 1200)
+            curve = np.clip((peak.model(fine) - peak.baseline(fine)) / top, None, _HIGHEST)
+            axes.plot(fine, level + 0.75 * curve, color=BLUE, lw=1.0)
+        axes.text(WINDOW[1] - 1.0, level + 0.12, _short(label), ha="right", va="bottom", fontsize=8)
+    axes.set(xlabel="Raman shift (cm⁻¹)", ylabel="intensity less background, scaled", yticks=[])
+    axes.set(xlim=WINDOW, ylim=(-0.15, len(stacked) + 0.25))
+    axes.plot([], [], ".", color=GREY, label="counts")
+    axes.plot([], [], color=BLUE, label="fit")
+    axes.legend(loc="upper left")
+
+
+def _short(label: str, limit: int = 22) -> str:
+    if len(label) <= limit:
+        return label
+    return f"{label[: limit // 2 - 1]}…{label[-limit // 2 :]}"
+
+
+def _calibration(axes: Axes, calibration: RamanCalibration, table: xr.Dataset) -> None:
+    found, line = calibration.residuals(), calibration.linear
+    low, high = calibration.range_K
+    room = calibration.room_temperature_K
+    measured = table.isel(spectrum=np.isfinite(table.temperature_K.values))
+    top = max([high, *measured.temperature_K.values]) + 40.0
+    temperature = np.linspace(min(low, room), top, 300)
+    shift, _ = calibration.anharmonic.shift(temperature, room)
+    axes.plot(shift, temperature, color=BLUE, lw=1.6, label="anharmonic law")
+    label = f"line: {line.constant_K:.1f} K − {-line.slope_K_cm:.1f} K cm × shift"
+    axes.plot(shift, line.temperature(shift, room), "--", color=VERMILION, label=label)
+    if found["temperature_K"].size:
+        style: Any = {"mfc": "none", "color": BLACK, "label": "hot plate"}
+        axes.plot(found["shift_cm"], found["temperature_K"], "o", **style)
+    if measured.spectrum.size:
+        points = (measured.shift_per_cm, measured.temperature_K, measured.temperature_error_K)
+        style = {"fmt": "s", "ms": 4, "color": GREEN, "capsize": 2, "lw": 1.0, "label": "measured"}
+        axes.errorbar(*points, **style)
+    axes.axhspan(low, high, color=GREY, alpha=0.12, lw=0, label="calibrated range")
+    axes.set(xlabel="shift against room temperature (cm⁻¹)", ylabel="temperature (K)")
+    axes.set_xlim(float(shift.min()) - 0.5, 1.0)
+    axes.invert_xaxis()
+    axes.legend(loc="upper left")
+
+
+def _residuals(axes: Axes, calibration: RamanCalibration) -> None:
+    found = calibration.residuals()
+    at, linear = found["temperature_K"], found["linear_K"]
+    if not at.size:
+        text = "published laws: no hot-plate series"
+        axes.text(0.5, 0.5, text, ha="center", transform=axes.transAxes)
+        axes.set_axis_off()
+        return
+    grid = np.linspace(*calibration.range_K, 100)
+    band = calibration.linear.band(grid - calibration.room_temperature_K)
+    style: Any = {"color": VERMILION, "alpha": 0.18, "lw": 0}
+    axes.fill_between(grid, -band, band, label="paper: ±(5 K + 0.02 ΔT)", **style)
+    out = np.abs(linear) > found["band_K"]
+    label = f"line (filled: {np.count_nonzero(out)} of {out.size} outside the band)"
+    axes.plot(at, linear, "^", mfc="none", color=VERMILION, ms=5, label=label)
+    axes.plot(at[out], linear[out], "^", color=VERMILION, ms=5)
+    label = f"anharmonic (rms {calibration.anharmonic.residual_rms_K:.1f} K)"
+    axes.plot(at, found["anharmonic_K"], "o", color=BLUE, ms=3.5, label=label)
+    axes.axhline(0.0, color=BLACK, lw=0.8)
+    reach = max(float(np.abs(linear).max()), float(band.max()))
+    axes.set(xlabel="hot-plate temperature (K)", ylabel="law − hot plate (K)")
+    axes.set(ylim=(-1.3 * reach, 2.3 * reach))
+    axes.legend(ncol=2, loc="upper left")
+
+
+def raman_check(check: xr.Dataset) -> Figure:
+    """How far a line calibrated to 900 K is off above, and what that does to the knee."""
+    temperature, band = check.temperature_K.values, check.paper_error.values
+    hottest, predicted = check.hottest_K, check.knee_predicted_K
+    low, high = check.error_at_hottest.min().item(), check.error_at_hottest.max().item()
+    bars = [("as published", check.knee_measured_K - predicted, GREY)]
+    with figure(7.2, 6.4, 2, 1, height_ratios=(1.7, 1.0)) as (made, (upper, lower)):
+        style: Any = {"color": GREY, "alpha": 0.2, "lw": 0}
+        label = "the paper's error, ±(5 K + 0.02 ΔT)"
+        upper.fill_between(temperature, -band, band, label=label, **style)
+        for place, (color, dash) in enumerate(((VERMILION, "--"), (BLUE, "-."))):
+            one = check.isel(line=place)
+            name = str(one.line.item())
+            upper.plot(temperature, one.error, dash, color=color, lw=1.8, label=name)
+            upper.plot([hottest], [one.error_at_hottest.item()], "o", color=color, ms=5)
+            shown = name.split(":")[0] + ",\ncurvature corrected"
+            bars.append((shown, one.discrepancy.item(), color))
+        text = f"{low:.0f} to {high:.0f} K too hot\nat {hottest:.0f} K"
+        upper.text(hottest - 55.0, 0.99 * high, text, ha="right", va="top", fontsize=9)
+        upper.axvline(check.calibrated_to_K, color=BLACK, lw=0.8, ls=":")
+        upper.text(check.calibrated_to_K + 4.0, -0.27 * high, "end of hot plate", fontsize=8)
+        upper.axhline(0.0, color=BLACK, lw=0.8)
+        upper.set(xlabel="true temperature (K), by the anharmonic law")
+        upper.set(ylabel="line reads − true (K)", ylim=(-0.33 * high, 1.15 * high))
+        upper.set(xlim=(temperature[0], temperature[-1]))
+        upper.legend(loc="upper left")
+        for level, (_, value, color) in enumerate(reversed(bars)):
+            lower.barh(level, value, color=color, height=0.6)
+            text = f"{value:.0f} K  ({predicted + value:.0f} − {predicted:.0f} K)"
+            lower.text(value + 0.8, level, text, va="center", fontsize=9)
+        lower.set_yticks(range(len(bars)), [label for label, _, _ in reversed(bars)], fontsize=9)
+        values = [value for _, value, _ in bars]
+        lower.set(xlabel="knee temperature, measured − predicted (K)")
+        lower.set(xlim=(min(0.0, *values), 1.45 * max(values)))
+        made.suptitle("\n".join(textwrap.wrap(conclusion(check), 92)), fontsize=9.5)
+    return made
+
+
+def one_spectrum(line: Line) -> Figure:
+    """One spectrum with its fit and what the fit leaves."""
+    x, y = _in_window(line)
+    residual: Array = y - float(np.median(y))
+    with figure(6.0, 4.6, 2, 1, sharex=True, height_ratios=(3.0, 1.0)) as (made, (upper, lower)):
+        upper.plot(x, y, ".", ms=3, color=GREY, label="counts")
+        if line.peak is not None:
+            residual = _fitted(upper, line.peak, x, y)
+        lower.plot(x, residual, ".", ms=3, color=GREY)
+        lower.axhline(0.0, color=BLACK, lw=0.8)
+        upper.set(ylabel="counts", title=line.spectrum.name)
+        lower.set(xlabel="Raman shift (cm⁻¹)", ylabel="counts − fit", xlim=WINDOW)
+        upper.legend()
+    return made
+
+
+def _fitted(axes: Axes, peak: Peak, x: Array, y: Array) -> Array:
+    """Draw the fit of a spectrum and what it left out; return what it leaves of the rest."""
+    fine = np.linspace(x[0], x[-1], 1500)
+    axes.plot(fine, peak.model(fine), color=BLUE, label="fit")
+    axes.plot(fine, peak.baseline(fine), ":", color=BLACK, lw=1.0, label="background")
+    hit = np.isin(x, peak.spikes)
+    residual = np.where(hit, np.nan, y - peak.model(x))
+    if peak.clipped is not None:
+        low, high = peak.clipped
+        style: Any = {"color": VERMILION, "alpha": 0.2, "lw": 0, "label": "clipped, left out"}
+        axes.axvspan(low, high, **style)
+        residual = np.where((x >= low) & (x <= high), np.nan, residual)
+    label = f"{peak.centre:.3f} ± {peak.centre_stderr:.3f} cm⁻¹"
+    axes.axvline(peak.centre, color=GREEN, lw=0.9, ls="--", label=label)
+    least = float(y.min())
+    reach = float(peak.model(fine).max()) - least
+    top = least + 1.35 * reach
+    axes.set_ylim(least - 0.08 * reach, top)
+    if hit.any():
+        # a spike above the frame is marked at its edge
+        shown = np.minimum(y[hit], top - 0.03 * reach)
+        axes.plot(x[hit], shown, "x", color=VERMILION, ms=7, label="cosmic ray, left out")
+    return residual

@@ -1,0 +1,113 @@
+"""What fit and calibration files have in common: JSON without NaN, and the measurement inside."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, WrapValidator
+
+from hotlever.errors import InputError
+from hotlever.files import read_json
+from hotlever.fitting.measurement import COLUMNS, Measurement
+from hotlever.probe.surroundings import Medium
+from hotlever.records import explained
+from hotlever.types import Array
+
+#: What else is kept of a measurement.
+_NAMED = ("path", "sha256", "series_resistance_ohm", "base_temperature_K", "medium")
+_OR_NOTHING = WrapValidator(lambda found, check: np.nan if found is None else check(found))
+#: A number, and a standard error; NaN where the file has none.
+Number = Annotated[float, _OR_NOTHING]
+Spread = Annotated[float, Field(ge=0), _OR_NOTHING]
+
+
+class Section(BaseModel):
+    """A part of a result file; what is not known is left alone."""
+
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], kind: str) -> Self:
+        """Read a JSON file that must hold such a section.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read or holds something else; the text names the key.
+        """
+        try:
+            return cls.model_validate(read_json(path))
+        except ValidationError as error:
+            raise explained(error, cls, f"{path}: not a {kind} file") from None
+
+
+class EmbeddedMeasurement(Section):
+    """A measurement as fit and calibration files hold it."""
+
+    path: str = ""
+    sha256: str = ""
+    series_resistance_ohm: float | None = None
+    base_temperature_K: float | None = None
+    medium: Medium | None = None
+    columns: dict[str, list[Number]]
+
+    def measurement(self, where: str) -> Measurement:
+        """Return the measurement; `where` names the file in an error.
+
+        Raises
+        ------
+        InputError
+            If its columns do not belong together, or a bias is missing or negative.
+        """
+        if "V_b" not in self.columns:
+            raise InputError(f"{where}: columns: V_b is missing")
+        rows = len(self.columns["V_b"])
+        columns: dict[str, Any] = {
+            attribute: array(self.columns.get(name, [np.nan] * rows), (rows,), f"{where}: {name}")
+            for name, (attribute, _) in COLUMNS.items()
+            if name in self.columns or name not in ("dI_h", "dV_r")
+        }
+        if not np.all(columns["bias_V"] >= 0):
+            raise InputError(f"{where}: V_b: expected biases of 0 or more")
+        return Measurement(**columns, **{name: getattr(self, name) for name in _NAMED})
+
+
+def embed(measurement: Measurement) -> dict[str, Any]:
+    """Return the content of an `EmbeddedMeasurement`."""
+    columns = {name: getattr(measurement, attribute) for name, (attribute, _) in COLUMNS.items()}
+    present = {name: values.tolist() for name, values in columns.items() if values is not None}
+    return {**{name: getattr(measurement, name) for name in _NAMED}, "columns": present}
+
+
+def array(values: Sequence[Any], shape: tuple[int, ...], where: str) -> Array:
+    """Make an array of nested lists, NaN where there is nothing.
+
+    Raises
+    ------
+    InputError
+        If it has another shape.
+    """
+    try:
+        return np.array(values, dtype=float).reshape(shape)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{where}: expected numbers in {' × '.join(map(str, shape))} places"
+        ) from None
+
+
+def without_nan(value: Any) -> Any:
+    """Replace NaN by None in plain values: JSON has no NaN."""
+    if isinstance(value, dict):
+        return {key: without_nan(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [without_nan(entry) for entry in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def json_text(content: dict[str, Any]) -> str:
+    """Return the text of a fit or calibration file."""
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"

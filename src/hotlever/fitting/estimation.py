@@ -1,0 +1,228 @@
+"""Fitting the material parameters of a lever to measured data."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hotlever.errors import ComputationError, InputError, unknown_name
+from hotlever.fitting.least_squares import LeastSquares, Optimum
+from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement
+from hotlever.fitting.models import ForwardModel, forward_model
+from hotlever.fitting.options import FitOptions
+from hotlever.fitting.residuals import Residuals
+from hotlever.fitting.result import Fit, band_dataset, statements
+from hotlever.fitting.start import starting_material
+from hotlever.lever.dataset import OBSERVABLES
+from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.reduced import ReducedLever
+from hotlever.materials import PARAMETERS, Material
+from hotlever.probe import Probe
+from hotlever.types import Array, Progress
+
+
+def fit(
+    measurement: Measurement | str | os.PathLike[str],
+    probe: Probe | str | os.PathLike[str] | None = None,
+    options: FitOptions | None = None,
+    *,
+    model: Callable[[Probe, Array], ForwardModel] | None = None,
+    progress: Progress | None = None,
+    **choices: Any,
+) -> Fit:
+    """Find the material parameters that make the model match a measurement.
+
+    Levenberg-Marquardt with the exact Jacobian.
+
+    Parameters
+    ----------
+    measurement : Measurement or path
+        Data, or a measurement file.
+    probe : Probe or path, optional
+        The reference probe by default. The measurement's series resistance, base temperature
+        and medium win over the probe's. Its material is where the fit starts, unless a material
+        found from the data suits them better (see `hotlever.fitting.start`).
+    options : FitOptions, optional
+    model : callable, optional
+        Makes the forward model of a probe at some biases. By default a lever that is solved fast
+        and confirmed and corrected by the full one.
+    progress : callable, optional
+        Called with solved sweeps and how many there usually are.
+    **choices
+        Fields of `FitOptions`, such as ``fixed={"n_d": 3.3e17}``.
+
+    Raises
+    ------
+    InputError
+        If a name does not exist, an observable has no data, a fixed value is impossible, or
+        there are fewer data than parameters.
+    ComputationError
+        If the lever cannot be solved at the start, or the fit does not converge.
+    """
+    began = time.perf_counter()
+    measurement = Measurement.given(measurement)
+    options = chosen_options(options, choices)
+    given = Probe.reference() if probe is None else Probe.given(probe)
+    probe, notes = with_measured_circuit(given, measurement, options.medium)
+    observables = _observables(options, measurement, probe, notes)
+    material = options.held(probe.material)
+    residuals = Residuals(measurement, observables, options.weights, options.drift)
+    if residuals.size < len(options.varied):
+        raise InputError(
+            f"{measurement.path or 'measurement'}: {residuals.size} data for "
+            f"{len(options.varied)} parameters; fix some or measure more"
+        )
+    forward = (model or forward_model)(probe, residuals.bias)
+    attempts = []
+    if isinstance(forward.fast, ReducedLever):
+        atlas = forward.fast.atlas
+        start = starting_material(atlas, probe.circuit, material, options.varied, residuals)
+        attempts.append((forward, start))
+        # far from the parameters it was made for, a reduced lever may fail where others do not
+        forward = replace(forward, fast=Lever(probe, COARSE), offset=None)
+    attempts.append((forward, material))
+    usual = options.held(Probe.reference().material)
+    if usual != material:
+        # a lever of the given material may melt below the highest bias
+        attempts.append((forward, usual))
+    problem, optimum = _first_found(attempts, residuals, options, progress)
+    found = _found(problem, optimum, probe, measurement, options, time.perf_counter() - began)
+    return replace(found, notes=[*notes, *found.notes, *statements(found)])
+
+
+def _first_found(
+    attempts: list[tuple[ForwardModel, Material]],
+    residuals: Residuals,
+    options: FitOptions,
+    progress: Progress | None,
+) -> tuple[LeastSquares, Optimum]:
+    """Return what the first of some models and starting materials leads to.
+
+    Raises
+    ------
+    ComputationError
+        Of the first attempt, if all fail.
+    """
+    failures: list[ComputationError] = []
+    for forward, start in attempts:
+        residuals.down[:] = 1.0
+        problem = LeastSquares(forward, residuals, start, options.varied, progress)
+        try:
+            return problem, problem.solve_and_confirm(options.robust)
+        except ComputationError as error:
+            failures.append(error)
+    raise failures[0]
+
+
+def _found(
+    problem: LeastSquares,
+    optimum: Optimum,
+    probe: Probe,
+    measurement: Measurement,
+    options: FitOptions,
+    seconds: float,
+) -> Fit:
+    """Put together what a fit found."""
+    residuals, values = problem.residuals, optimum.prediction.values
+    covariance = problem.covariance(optimum)
+    columns = [list(PARAMETERS).index(name) for name in options.varied]
+    slopes = optimum.prediction.slopes[list(OBSERVABLES).index("tip")][:, columns]
+    current, _, tip = values
+    notes = residuals.suspicious(values, options.robust)
+    notes += residuals.zeros(values, optimum.prediction.slopes[:, :, columns])
+    chi_square = residuals.reduced_chi_square(values, len(columns))
+    if chi_square is not None:
+        notes.append(
+            f"the scatter about the fit is {np.sqrt(chi_square):.2f} times the measurement errors; "
+            "standard errors follow the scatter"
+        )
+    weighted = residuals.weighted(values)
+    return Fit(
+        probe=probe.model_copy(update={"material": optimum.material}),
+        measurement=measurement,
+        options=options,
+        names=options.varied,
+        observables=residuals.observables,
+        covariance=covariance,
+        common_noise_covariance=optimum.covariance,
+        data_weights=residuals.data_weights,
+        sum_of_squares=float(weighted @ weighted),
+        residual_rms=residuals.rms(values),
+        band=band_dataset(
+            bias_V=residuals.bias,
+            power_mW=probe.circuit.power(residuals.bias, current),
+            tip_K=tip,
+            tip_stderr_K=np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes)),
+        ),
+        evaluations=problem.evaluations,
+        steps=problem.steps,
+        seconds=seconds,
+        notes=notes,
+    )
+
+
+def chosen_options(options: FitOptions | None, choices: dict[str, Any]) -> FitOptions:
+    """Return options with some of them chosen by name.
+
+    Raises
+    ------
+    InputError
+        If there is no such option; the text gives the nearest one.
+    """
+    known = list(FitOptions.__dataclass_fields__)
+    for name in choices:
+        if name not in known:
+            raise unknown_name("option", name, known, "fit")
+    return replace(options or FitOptions(), **choices)
+
+
+def with_measured_circuit(
+    probe: Probe, measurement: Measurement, medium: str | None = None
+) -> tuple[Probe, list[str]]:
+    """Return the probe in circuit and medium of the measurement, and a note on each difference.
+
+    A `medium` that is asked for wins over both.
+    """
+    notes = []
+    measured_in, assumed_in = measurement.medium, probe.surroundings.medium
+    changes: dict[str, Any] = {"medium": medium or measured_in or assumed_in}
+    if measured_in not in (None, changes["medium"]):
+        notes.append(f"medium: {medium}, as asked, although the data file says {measured_in}")
+    elif medium is None and changes["medium"] != assumed_in:
+        notes.append(f"medium: the data file's {measured_in} is used, not the probe's {assumed_in}")
+    for name in ("series_resistance_ohm", "base_temperature_K"):
+        measured, assumed = getattr(measurement, name), getattr(probe.circuit, name)
+        if measured is not None and not np.isclose(measured, assumed, rtol=1e-9):
+            changes[name] = measured
+            notes.append(
+                f"{name}: the data file's {measured:g} is used, not the probe's {assumed:g}"
+            )
+    return probe.with_(**changes), notes
+
+
+def _observables(
+    options: FitOptions, measurement: Measurement, probe: Probe, notes: list[str]
+) -> tuple[str, ...]:
+    """Return what is to be fitted: by default all that has data and that the probe can show."""
+    where = measurement.path or "measurement"
+    found = measurement.observables
+    if "reader" not in [terminal.name for terminal in probe.layout().terminals]:
+        found = tuple(name for name in found if name != "reader")
+        if "reader" in (options.observables or ()):
+            raise InputError(f"{where}: reader: the probe has no reader; fit {', '.join(found)}")
+        if found != measurement.observables and options.observables is None:
+            notes.append("V_r: the probe has no reader, so that these values are not fitted")
+    if options.observables is None:
+        return found
+    for name in options.observables:
+        if not np.isfinite(measurement.observable(name)).any():
+            raise InputError(
+                f"{where}: no values of {name} (column {OBSERVABLE_SYMBOLS[name]}); it has "
+                f"{', '.join(measurement.observables)}"
+            )
+    return tuple(options.observables)

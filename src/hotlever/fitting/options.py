@@ -1,0 +1,90 @@
+"""What a fit is asked: the one set of options of `fit`, of batches and of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal, get_args
+
+from hotlever.errors import InputError, unknown_name
+from hotlever.lever.dataset import OBSERVABLES
+from hotlever.materials import PARAMETERS, Material, parameter
+from hotlever.probe.surroundings import Medium
+
+Weights = Literal["maximum", "errors"]
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """What a fit is asked.
+
+    Attributes
+    ----------
+    observables : sequence of {"current", "reader", "tip"}, optional
+        Option I of the paper is ``["current"]``, option II ``["current", "reader"]``, option
+        III all three. All that the measurement has, by default.
+    fixed : mapping of str to float or None
+        Parameters to hold, at a value or (None) at the probe's.
+    robust : bool
+        Lessen the weight of points far from the others' fit (Tukey's biweight on the residuals
+        in units of their median absolute deviation), down to nothing beyond 4.7 of them.
+    weights : {"maximum", "errors"}
+        Divide every observable by its largest measured value, as in the paper, or every datum by
+        its measurement error; an observable without errors then takes its scatter about the fit.
+    drift : bool
+        Let the zeros of I_h and V_r lie on straight lines over the order of the rows.
+    medium : {"vacuum", "air"}, optional
+        What the lever was measured in; wins over measurement and probe.
+
+    Raises
+    ------
+    InputError
+        If a name does not exist, with the nearest that does.
+    """
+
+    observables: Sequence[str] | None = None
+    fixed: Mapping[str, float | None] = field(default_factory=dict)
+    robust: bool = False
+    weights: Weights = "maximum"
+    drift: bool = False
+    medium: Medium | None = None
+
+    def __post_init__(self) -> None:
+        for name in self.fixed:
+            parameter(name)
+        if len(self.fixed) >= len(PARAMETERS):
+            raise InputError("all parameters are fixed; nothing is left to fit")
+        asked: list[tuple[str, Any, tuple[str, ...]]] = [
+            ("weights", self.weights, get_args(Weights))
+        ]
+        asked += [("observable", name, tuple(OBSERVABLES)) for name in self.observables or ()]
+        if self.medium is not None:
+            asked.append(("medium", self.medium, get_args(Medium)))
+        for kind, name, known in asked:
+            if name not in known:
+                raise unknown_name(kind, str(name), known)
+        if self.observables is None:
+            return
+        if not self.observables:
+            raise InputError(f"no observables; expected some of {', '.join(OBSERVABLES)}")
+        chosen = tuple(name for name in OBSERVABLES if name in self.observables)
+        object.__setattr__(self, "observables", chosen)
+
+    @property
+    def varied(self) -> list[str]:
+        """The parameters to find."""
+        return [name for name in PARAMETERS if name not in self.fixed]
+
+    def held(self, material: Material) -> Material:
+        """Return a material with the fixed values in place.
+
+        Raises
+        ------
+        InputError
+            If a value is impossible.
+        """
+        return material.with_(**{k: value for k, value in self.fixed.items() if value is not None})
+
+    def values(self) -> dict[str, Any]:
+        """Return the options as plain values."""
+        return asdict(self) | {"fixed": dict(self.fixed)}

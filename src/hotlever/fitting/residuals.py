@@ -1,0 +1,186 @@
+"""Data minus prediction, weighted: what fits, profiles and posteriors have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hotlever.errors import InputError
+from hotlever.fitting.drift import Drift
+from hotlever.fitting.measurement import Measurement
+from hotlever.fitting.options import Weights
+from hotlever.lever.dataset import OBSERVABLES
+from hotlever.types import Array
+
+#: A point is named as suspicious beyond this many standard deviations.
+_SUSPICIOUS = 8.0
+
+
+class Residuals:
+    """The weighted differences of a measurement from predictions.
+
+    Every observable is divided by its largest measured value, or every datum by its standard error.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    observables, weights, drift
+        See `hotlever.fitting.options.FitOptions`. An observable without measurement errors begins
+        with a hundredth of its largest value for one, see `take_scatter`.
+    data_weights : ndarray, shape (observables, rows of the measurement), optional
+        What differences are multiplied by instead, as an earlier fit found it; 0 leaves out.
+
+    Attributes
+    ----------
+    bias : ndarray, shape (n,)
+        Of the rows that have data (V).
+    rows : list of int
+        Places of the observables among `OBSERVABLES`.
+    data, present : ndarray, shape (observables, n)
+        NaN where nothing was measured; which data count.
+    largest : ndarray, shape (observables, 1)
+    down : ndarray, shape (observables, n)
+        By how much a robust fit has lessened the weight of each datum: one where it has not.
+    without_errors : ndarray of bool, shape (observables,)
+        Observables that are to take their scatter for their error.
+
+    Raises
+    ------
+    InputError
+        If all values of an observable are zero, or only some of its data have errors.
+    """
+
+    def __init__(
+        self,
+        measurement: Measurement,
+        observables: Sequence[str],
+        weights: Weights = "maximum",
+        drift: bool = False,
+        data_weights: Array | None = None,
+    ) -> None:
+        self._measurement, self._drift = measurement, drift
+        self._where = measurement.path or "measurement"
+        self.observables = tuple(observables)
+        self.rows = [list(OBSERVABLES).index(name) for name in observables]
+        every = np.stack([measurement.observable(name) for name in observables])
+        self._used = np.isfinite(every).any(axis=0)
+        self.bias, self.data = measurement.bias_V[self._used], every[:, self._used]
+        self.present = np.isfinite(self.data)
+        self.largest = np.nanmax(np.abs(self.data), axis=1, keepdims=True)
+        for name, size in zip(observables, self.largest, strict=True):
+            if size == 0:
+                raise InputError(f"{self._where}: all values of {name} are 0")
+        self.without_errors = np.zeros(len(self.rows), dtype=bool)
+        self.errors_known = weights == "errors" and data_weights is None
+        self._scale = np.broadcast_to(self.largest, self.data.shape).copy()
+        self.down = np.ones(self.data.shape)
+        if self.errors_known:
+            self._scale = self._measured_errors()
+        if data_weights is not None:
+            self._scale, self.down = np.ones(self.data.shape), data_weights[:, self._used]
+            self.present = self.present & (self.down > 0)
+        self._lines = Drift(observables, self.present)
+
+    def _measured_errors(self) -> Array:
+        """Return the standard error of every datum; a hundredth of the largest where unknown."""
+        errors = np.stack([self._measurement.error(n)[self._used] for n in self.observables])
+        usable = errors > 0
+        for place, name in enumerate(self.observables):
+            missing = self.bias[self.present[place] & ~usable[place]]
+            if usable[place].any() and missing.size:
+                raise InputError(
+                    f"{self._where}: {name} has no error above 0 at {missing[0]:g} V, expected "
+                    "one for each of its values or none at all"
+                )
+        self.without_errors = np.all(np.isnan(errors), axis=1)
+        guessed = np.broadcast_to(0.01 * self.largest, errors.shape)
+        return np.where(np.isfinite(errors), errors, guessed)
+
+    @property
+    def size(self) -> int:
+        """How many data count."""
+        return int(self.present.sum())
+
+    @property
+    def by(self) -> Array:
+        """What differences are multiplied by, shape (observables, n)."""
+        return np.asarray(self.down / self._scale)
+
+    @property
+    def data_weights(self) -> Array:
+        """The same in all rows of the measurement; 0 for what is left out."""
+        full = np.zeros((len(self.rows), self._used.size))
+        full[:, self._used] = np.where(self.present, self.by, 0.0)
+        return full
+
+    # --- for predicted values (3, n) and slopes (3, n, p) ---------------------------------------
+
+    def difference(self, values: Array) -> Array:
+        """Return data minus prediction minus drifting zeros, NaN where nothing was measured."""
+        difference: Array = self.data - values[self.rows]
+        return difference - self._lines.line(difference, self.by) if self._drift else difference
+
+    def weighted(self, values: Array) -> Array:
+        """Return the weighted differences, prediction minus data, shape (N,)."""
+        return np.asarray((-self.by * self.difference(values))[self.present])
+
+    def jacobian(self, slopes: Array) -> Array:
+        """Return the derivatives of `weighted`, shape (N, p)."""
+        jacobian = (self.by[:, :, None] * slopes[self.rows])[self.present]
+        return self._lines.removed(jacobian, self.by) if self._drift else jacobian
+
+    def deviations(self, values: Array) -> Array:
+        """Return differences in units of the scatter of their observable; 0 where nothing is."""
+        difference = self.difference(values)
+        scatter = 1.4826 * np.nanmedian(np.abs(difference), axis=1, keepdims=True)
+        # data without noise have no scatter to measure against
+        floor = 1e-4 * self.largest
+        return np.nan_to_num(difference / np.maximum(scatter, floor))
+
+    def take_scatter(self, values: Array) -> None:
+        """Give observables without measurement errors their scatter about a prediction."""
+        rms = np.sqrt(np.nanmean(self.difference(values) ** 2, axis=1, keepdims=True))
+        scatter = np.maximum(rms, 1e-6 * self.largest)
+        self._scale = np.where(self.without_errors[:, None], scatter, self._scale)
+
+    def rms(self, values: Array) -> dict[str, float]:
+        """Return the rms of data minus prediction by column, for every observable with data."""
+        every = [self._measurement.observable(name)[self._used] for name in OBSERVABLES]
+        difference = np.stack(every) - values
+        difference[self.rows] = self.difference(values)
+        return {
+            column: float(np.sqrt(np.nanmean(row**2)))
+            for column, row in zip(OBSERVABLES.values(), difference, strict=True)
+            if np.isfinite(row).any()
+        }
+
+    def reduced_chi_square(self, values: Array, varied: int) -> float | None:
+        """Return that of the observables with measurement errors; None without."""
+        if not self.errors_known or self.without_errors.all():
+            return None
+        known = (self.difference(values) / self._scale)[~self.without_errors]
+        count = np.isfinite(known).sum()
+        return float(np.nansum(known**2) / max(count - varied * count / self.size, 1.0))
+
+    # --- in words -------------------------------------------------------------------------------
+
+    def suspicious(self, values: Array, robust: bool) -> list[str]:
+        """Name the points that lie far outside the scatter of the others."""
+        advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
+        return [
+            f"{name} at {bias:g} V is {abs(deviation):.0f} standard deviations from the fit; "
+            f"{advice}"
+            for name, row in zip(self.observables, self.deviations(values), strict=True)
+            for bias, deviation in zip(self.bias, row, strict=True)
+            if abs(deviation) > _SUSPICIOUS
+        ]
+
+    def zeros(self, values: Array, slopes: Array) -> list[str]:
+        """Say how the zeros drift, or that they seem to."""
+        if self._drift:
+            return self._lines.in_words(self._lines.line(self.data - values[self.rows], self.by))
+        if self.size <= slopes.shape[2] + 2 * len(self.rows):
+            return []
+        noticed = self._lines.noticed(-self.weighted(values), self.jacobian(slopes), self.by)
+        return [f"{text}; --drift would take that out" for text in noticed]

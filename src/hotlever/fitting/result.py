@@ -1,0 +1,338 @@
+"""What a fit found, and the file that holds all of it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+from pydantic import AfterValidator
+
+from hotlever import __version__
+from hotlever.datasets import labelled
+from hotlever.errors import InputError
+from hotlever.files import write_text
+from hotlever.fitting.embedded import (
+    EmbeddedMeasurement,
+    Number,
+    Section,
+    Spread,
+    array,
+    embed,
+    json_text,
+    without_nan,
+)
+from hotlever.fitting.measurement import Measurement
+from hotlever.fitting.options import FitOptions
+from hotlever.fitting.residuals import Residuals
+from hotlever.fitting.words import fit_text
+from hotlever.lever.lever import Lever
+from hotlever.materials import PARAMETERS
+from hotlever.materials.silicon import inversion_temperature
+from hotlever.probe import Probe
+from hotlever.types import Array
+
+#: A parameter is called poorly determined from this relative standard error.
+_POOR = 0.15
+#: Two parameters are called hard to tell apart from this correlation.
+_ENTANGLED = 0.95
+#: What a fit file holds just as a fit does.
+_AS_THEY_ARE = (
+    *("options", "residual_rms", "sum_of_squares"),
+    *("evaluations", "steps", "seconds", "notes"),
+)
+#: Variables of `Fit.band`.
+BAND = ("bias_V", "power_mW", "tip_K", "tip_stderr_K")
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One material parameter after a fit.
+
+    Attributes
+    ----------
+    value : float
+    stderr : float or None
+        Standard error; None if the parameter was fixed or its error could not be estimated.
+    unit : str
+    vary : bool
+    """
+
+    value: float
+    stderr: float | None
+    unit: str
+    vary: bool
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Material parameters found from a measurement.
+
+    Attributes
+    ----------
+    probe : Probe
+        With the fitted material, and the circuit and medium of the measurement.
+    measurement : Measurement
+    options : FitOptions
+    names : list of str
+        The parameters that were varied.
+    observables : tuple of str
+        What was fitted.
+    covariance : ndarray, shape (len(names), len(names))
+        In the parameters' own units, that the standard errors belong to; NaN if it could not be
+        estimated.
+    common_noise_covariance : ndarray, shape (len(names), len(names))
+        What it would be if all weighted data had the same noise: the paper's assumption.
+    data_weights : ndarray, shape (len(observables), n)
+        What the differences of data and model were multiplied by; 0 for data left out.
+    sum_of_squares : float
+        Of the weighted differences.
+    residual_rms : dict of str to float
+        Per column of a sweep (mA, V, K), for every observable with data, fitted or not.
+    band : xarray.Dataset
+        What the fit predicts at the measured biases, and the standard error of the predicted
+        tip temperature that follows from the covariance of the parameters: ``bias_V``,
+        ``power_mW``, ``tip_K``, ``tip_stderr_K``, rising in bias.
+    evaluations, steps : int
+        Solved sweeps, and Levenberg-Marquardt steps among them.
+    seconds : float
+    notes : list of str
+        What the user should know beside the numbers.
+    """
+
+    probe: Probe
+    measurement: Measurement
+    options: FitOptions
+    names: list[str]
+    observables: tuple[str, ...]
+    covariance: Array
+    common_noise_covariance: Array
+    data_weights: Array
+    sum_of_squares: float
+    residual_rms: dict[str, float]
+    band: xr.Dataset
+    evaluations: int
+    steps: int
+    seconds: float
+    notes: list[str] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        return f"<Fit of {self.measurement.path or 'a measurement'}>\n{fit_text(self)}"
+
+    @property
+    def medium(self) -> str:
+        """What was around the lever."""
+        return self.probe.surroundings.medium
+
+    @cached_property
+    def parameters(self) -> dict[str, FittedParameter]:
+        """Value and standard error of every parameter, by name."""
+        spread = dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+        return {
+            name: FittedParameter(
+                value=getattr(self.probe.material, name),
+                stderr=spread[name] if np.isfinite(spread.get(name, np.nan)) else None,
+                unit=known.unit,
+                vary=name in self.names,
+            )
+            for name, known in PARAMETERS.items()
+        }
+
+    @property
+    def correlation(self) -> Array:
+        """The correlation of `covariance`."""
+        return _correlation(self.covariance)
+
+    @property
+    def common_noise_correlation(self) -> Array:
+        """The correlation of `common_noise_covariance`."""
+        return _correlation(self.common_noise_covariance)
+
+    @property
+    def inversion_temperature_K(self) -> float:
+        """Inversion temperature T_i of the heater's doping concentration (K)."""
+        material = self.probe.material
+        return float(inversion_temperature(material.n_d, material.p))
+
+    @cached_property
+    def inversion_temperature_stderr_K(self) -> float:
+        """Its standard error (K), by central differences; NaN if unknown."""
+        at = {name: getattr(self.probe.material, name) for name in ("n_d", "p")}
+        slope = np.zeros(len(self.names))
+        for name in at.keys() & set(self.names):
+            step = 1e-4 * at[name]
+            high, low = (
+                inversion_temperature(*{**at, name: at[name] + sign * step}.values())
+                for sign in (1, -1)
+            )
+            slope[self.names.index(name)] = (high - low) / (2 * step)
+        return float(np.sqrt(slope @ self.covariance @ slope))
+
+    def model(self, bias: ArrayLike | None = None) -> xr.Dataset:
+        """Solve the fitted lever, at the measured biases by default; see `Lever.sweep`."""
+        return Lever(self.probe).sweep(self.measurement.bias_V if bias is None else bias)
+
+    def residuals(self) -> Residuals:
+        """Return the data with the fit's own weights, to be compared with predictions."""
+        return Residuals(
+            self.measurement,
+            self.observables,
+            drift=self.options.drift,
+            data_weights=self.data_weights,
+        )
+
+    # --- the file -------------------------------------------------------------------------------
+
+    def content(self) -> dict[str, Any]:
+        """Return the content of the fit file."""
+        content = {
+            "parameters": {name: vars(p) for name, p in self.parameters.items()},
+            "correlation": {"names": self.names, "matrix": self.correlation.tolist()},
+            "observables": list(self.observables),
+            "inversion_temperature_K": self.inversion_temperature_K,
+            "inversion_temperature_stderr_K": self.inversion_temperature_stderr_K,
+            "residual_rms": self.residual_rms,
+            "evaluations": self.evaluations,
+            "steps": self.steps,
+            "seconds": round(self.seconds, 3),
+            "probe": self.probe.values(),
+            "data": {**embed(self.measurement), "weights": self.data_weights.tolist()},
+            "options": self.options.values(),
+            "common_noise_covariance": self.common_noise_covariance.tolist(),
+            "sum_of_squares": self.sum_of_squares,
+            "band": {name: self.band[name].values.tolist() for name in BAND},
+            "notes": self.notes,
+            "software": f"hotlever {__version__}",
+        }
+        return dict(without_nan(content))
+
+    def to_json(self) -> str:
+        """Return the fit file."""
+        return json_text(self.content())
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the fit file, whole or not at all."""
+        write_text(path, self.to_json())
+
+
+def band_dataset(**columns: Array) -> xr.Dataset:
+    """Return `Fit.band` of its variables, one row per bias, rising."""
+    bias, order = np.unique(columns["bias_V"], return_index=True)
+    return labelled({name: columns[name][order] for name in BAND}, coordinates={"bias": bias})
+
+
+def _known(name: str) -> str:
+    if name not in PARAMETERS:
+        raise ValueError(f"expected some of {', '.join(PARAMETERS)}")
+    return name
+
+
+class _Parameter(Section):
+    value: float
+    stderr: Spread = np.nan
+
+
+class _Correlation(Section):
+    names: list[Annotated[str, AfterValidator(_known)]]
+    matrix: list[list[Number]]
+
+
+class _Data(EmbeddedMeasurement):
+    weights: list[list[float]]
+
+
+class _FitFile(Section):
+    """What a fit file must hold; see `Fit.content`."""
+
+    parameters: dict[str, _Parameter]
+    correlation: _Correlation
+    observables: list[Literal["current", "reader", "tip"]]
+    residual_rms: dict[str, float]
+    evaluations: int
+    steps: int
+    seconds: float
+    probe: dict[str, dict[str, Any]]
+    data: _Data
+    options: FitOptions
+    common_noise_covariance: list[list[Number]]
+    sum_of_squares: float
+    band: dict[str, list[Number]]
+    notes: list[str]
+
+
+def read_fit(path: str | os.PathLike[str]) -> Fit:
+    """Read a fit file: all that the fit found, to go on with as if it had just been made.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or is not a fit file; the text names the key.
+
+    Examples
+    --------
+    >>> read_fit("fit.json").parameters["p"].value  # doctest: +SKIP
+    2.65
+    """
+    found = _FitFile.read(path, "fit")
+    names, rows = found.correlation.names, len(found.observables)
+    if not found.parameters.keys() >= set(names):
+        raise InputError(f"{path}: parameters and correlation do not belong together")
+    stderr = [found.parameters[name].stderr for name in names]
+    size = (len(names), len(names))
+    correlation = array(found.correlation.matrix, size, f"{path}: correlation")
+    noise = array(found.common_noise_covariance, size, f"{path}: common_noise_covariance")
+    measurement = found.data.measurement(f"{path}: data")
+    weights = (rows, measurement.bias_V.size)
+    band = {name: found.band.get(name, []) for name in BAND}
+    length = (len(band["bias_V"]),)
+    return Fit(
+        probe=Probe.from_values(found.probe, f"{path}: probe"),
+        measurement=measurement,
+        names=names,
+        observables=tuple(found.observables),
+        covariance=correlation * np.outer(stderr, stderr),
+        common_noise_covariance=noise,
+        data_weights=array(found.data.weights, weights, f"{path}: data: weights"),
+        band=band_dataset(
+            **{name: array(values, length, f"{path}: band") for name, values in band.items()}
+        ),
+        **{name: getattr(found, name) for name in _AS_THEY_ARE},
+    )
+
+
+def statements(fit: Fit) -> list[str]:
+    """Say in words what the data do not determine, and what that means for the tip temperature."""
+    found = []
+    for name in fit.names:
+        fitted = fit.parameters[name]
+        if fitted.stderr is None:
+            found.append(f"{name}: no standard error could be estimated")
+        elif (share := fitted.stderr / abs(fitted.value)) > _POOR:
+            found.append(
+                f"{name} is poorly determined by these data: its standard error is {share:.0%} of "
+                "its value"
+            )
+    correlation = np.tril(fit.correlation, -1)
+    for first, second in np.argwhere(np.abs(correlation) > _ENTANGLED):
+        found.append(
+            f"{fit.names[second]} and {fit.names[first]} are hardly told apart by these "
+            f"data (correlation {correlation[first, second]:+.2f})"
+        )
+    largest = float(fit.band.tip_stderr_K.max())
+    if found and np.isfinite(largest):
+        found.append(
+            "the tip temperature that follows has nevertheless a standard error of at most "
+            f"{largest:.1f} K from the fitted parameters"
+        )
+    return found
+
+
+def _correlation(covariance: Array) -> Array:
+    spread = np.sqrt(np.diag(covariance))
+    product = np.outer(spread, spread)
+    # data that a model made itself leave no errors that could be correlated
+    return np.divide(covariance, product, out=np.eye(spread.size), where=product != 0)

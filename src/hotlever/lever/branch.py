@@ -1,0 +1,310 @@
+"""A lever as one curve: everything it shows, by its tip temperature.
+
+At a tip temperature a lever has one state, whatever the circuit: current, lever voltage and
+fields follow from the temperature, folds or not. So states are solved at tip temperatures
+(`hotlever.lever.following`), with their exact derivatives along the curve, and smooth curves
+through both give every state between. All curves run over u = √(T_tip − T_base), in which they are
+smooth down to zero power: the potential begins as u, the temperature as u².
+
+A sweep reads the branch in a circuit: a slow ramp of the bias takes the first state whose bias
+V_l + R_s I_h has been reached. The fold of a ramp is a maximum of that bias, the knee of the I-V
+curve the maximum of V_l.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import PPoly
+
+from hotlever.errors import BranchEndError
+from hotlever.lever.curve import smooth_curve
+from hotlever.lever.equations import LAWS, SHOWN, LeverEquations
+from hotlever.materials.silicon import MELTING_POINT
+from hotlever.probe.circuit import Circuit
+from hotlever.types import Array
+
+#: Points between two states at which a bias is first looked for, and steps of Newton's method
+#: from there.
+_SAMPLES, _NEWTON_STEPS = 8, 6
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A state of a lever as an instrument and a thermometer see it.
+
+    Attributes
+    ----------
+    lever_V, current_mA, power_mW, tip_K : float
+        V_l, I_h, P_l = V_l I_h and T_tip.
+    """
+
+    lever_V: float
+    current_mA: float
+    power_mW: float
+    tip_K: float
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Where a slow ramp of the bias finds a lever.
+
+    Attributes
+    ----------
+    u : ndarray, shape (n,)
+        √(T_tip − T_base) at each bias asked for; NaN beyond the last that has a state.
+    jumps : list of tuple of float
+        Bias and tip temperature at each fold that the ramp passes.
+    last_V, last_K : float
+        The highest bias that has a state on the branch, and the tip temperature there.
+    """
+
+    u: Array
+    jumps: list[tuple[float, float]]
+    last_V: float
+    last_K: float
+
+    def notes(self, bias: Array) -> list[str]:
+        """Say where a ramp through some biases (V) leaves the branch for a hotter part of it."""
+        return [
+            f"at a bias of {fold:.4f} V the lever jumps from a tip at {tip:.0f} K to a hotter "
+            "branch"
+            for fold, tip in self.jumps
+            if fold < bias.max(initial=0.0)
+        ]
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far a branch must go: until a bias in a circuit, and one state beyond.
+
+    The curve between two states depends on the next one as well.
+    """
+
+    circuit: Circuit
+    bias_V: float
+
+    def count(self, values: Array) -> int | None:
+        """Return how many states suffice, by their V_l and I_h, (k, 2 or more); None if not all."""
+        above = np.flatnonzero(self.circuit.bias(values[:, 0], values[:, 1]) >= self.bias_V)
+        return int(above[0]) + 2 if above.size and above[0] + 2 <= len(values) else None
+
+    def __call__(self, branch: Branch) -> bool:
+        """Return whether a branch goes far enough."""
+        return self.count(branch.values) is not None
+
+
+@dataclass(frozen=True)
+class Branch:
+    """States of a lever at rising tip temperatures, and the curves through them.
+
+    Attributes
+    ----------
+    equations : LeverEquations
+    u : ndarray, shape (k,)
+        √(T_tip − T_base) (K^½) of the states, the first at zero power.
+    x, slopes : ndarray, shape (size + 1, k)
+        The states, and their derivatives by u.
+    values, value_slopes : ndarray, shape (k, 4)
+        V_l (V), I_h (mA), V_r (V) and the highest rise (K) of each state, and their derivatives
+        by u.
+
+    Examples
+    --------
+    >>> from hotlever import Lever, Probe
+    >>> branch = Lever(Probe.reference()).branch(1000.0)
+    >>> round(branch.knee.tip_K), branch.power([600.0, 800.0]).round(2).tolist()
+    (900, [2.02, 2.6])
+    """
+
+    equations: LeverEquations
+    u: Array
+    x: Array
+    slopes: Array
+    values: Array
+    value_slopes: Array
+
+    # --- the curves -------------------------------------------------------------------------------
+
+    @cached_property
+    def curve(self) -> PPoly:
+        """V_l (V), I_h (mA), V_r (V) and the highest rise (K) by u."""
+        return self.through(self.values, self.value_slopes)
+
+    @property
+    def base_temperature_K(self) -> float:
+        """Temperature without power (K)."""
+        return self.equations.base_temperature_K
+
+    @cached_property
+    def end_u(self) -> float:
+        """Where the branch ends: at its last state, or where the silicon begins to melt."""
+        if not self.melts:
+            return float(self.u[-1])
+        highest = PPoly(self.curve.c[..., 3], self.curve.x)
+        melting = MELTING_POINT - self.base_temperature_K
+        return float(highest.solve(melting, extrapolate=False).min())
+
+    @property
+    def melts(self) -> bool:
+        """Whether the branch ends because silicon melts."""
+        return bool(self.base_temperature_K + self.values[-1, 3] >= MELTING_POINT)
+
+    @property
+    def hottest_K(self) -> float:
+        """Highest tip temperature (K)."""
+        return self.base_temperature_K + self.end_u**2
+
+    def u_at(self, tip_K: ArrayLike) -> Array:
+        """Return u at tip temperatures (K); NaN outside the branch."""
+        rise = np.asarray(tip_K, dtype=float) - self.base_temperature_K
+        inside = (rise >= 0) & (rise <= self.end_u**2 * (1 + 1e-12))
+        return np.sqrt(np.where(inside, np.maximum(rise, 0.0), np.nan))
+
+    def shown(self, u: ArrayLike) -> dict[str, Array]:
+        """Return what an instrument shows, by name: ``lever_V``, ``current_mA``, ``reader_V``."""
+        values = self.curve(np.asarray(u, dtype=float))
+        return {name: values[..., place] for place, name in enumerate(SHOWN)}
+
+    def lever_voltage(self, tip_K: ArrayLike) -> Array:
+        """Return V_l (V) by tip temperature (K); NaN outside the branch."""
+        return self.shown(self.u_at(tip_K))["lever_V"]
+
+    def current(self, tip_K: ArrayLike) -> Array:
+        """Return I_h (mA) by tip temperature (K); NaN outside the branch."""
+        return self.shown(self.u_at(tip_K))["current_mA"]
+
+    def power(self, tip_K: ArrayLike) -> Array:
+        """Return P_l (mW) by tip temperature (K); NaN outside the branch."""
+        return self.lever_voltage(tip_K) * self.current(tip_K)
+
+    def bias(self, tip_K: ArrayLike, circuit: Circuit) -> Array:
+        """Return the bias (V) that heats the tip to a temperature (K) in a circuit.
+
+        Between the folds of a lever with a small or very large series resistance the state at
+        this bias depends on where one comes from.
+        """
+        bias: Array = circuit.bias(self.lever_voltage(tip_K), self.current(tip_K))
+        return bias
+
+    @cached_property
+    def _u_by_root(self) -> PPoly:
+        """u by the root of the power, which is nearly a straight line."""
+        values, slopes = self.values, self.value_slopes
+        power = values[:, 0] * values[:, 1]
+        slope = slopes[:, 0] * values[:, 1] + values[:, 0] * slopes[:, 1]
+        root = np.sqrt(power)
+        # at zero power both begin as u
+        by_u = np.append(np.sqrt(slopes[0, 0] * slopes[0, 1]), slope[1:] / (2.0 * root[1:]))
+        bent = root[np.isin(self.u, steps_of(self.equations))]
+        return smooth_curve(root, self.u, 1.0 / by_u, bent)
+
+    @property
+    def highest_power_mW(self) -> float:
+        """Power at the end of the branch (mW)."""
+        return float(self.power(self.hottest_K))
+
+    def tip_temperature(self, power_mW: ArrayLike) -> Array:
+        """Return the tip temperature (K) by power (mW); NaN beyond the branch."""
+        power = np.asarray(power_mW, dtype=float)
+        u = self._u_by_root(np.sqrt(np.maximum(power, 0.0)))
+        inside = (power >= 0) & (power <= self.highest_power_mW)
+        return np.where(inside, self.base_temperature_K + u**2, np.nan)
+
+    def tip_slope(self, power_mW: ArrayLike) -> Array:
+        """Return dT_tip/dP_l (K/mW) by power (mW), which is not zero."""
+        root = np.sqrt(np.asarray(power_mW, dtype=float))
+        slope: Array = self._u_by_root(root) * self._u_by_root(root, 1) / root
+        return slope
+
+    def _turns(self, quantity: PPoly) -> Array:
+        """Return u where a curve over u is level."""
+        level = np.sort(quantity.derivative().roots(extrapolate=False))
+        return level[(level > 0) & (level < self.end_u)]
+
+    @cached_property
+    def knee(self) -> OperatingPoint | None:
+        """The knee dV_l/dI_h = 0: the highest lever voltage; None if V_l rises to the end."""
+        lever_V = PPoly(self.curve.c[..., 0], self.curve.x)
+        falling = [u for u in self._turns(lever_V).tolist() if lever_V(u, 2) < 0]
+        return self.point(falling[0]) if falling else None
+
+    def point(self, u: float) -> OperatingPoint:
+        """Return the operating point at u."""
+        lever, current, *_ = self.curve(u).tolist()
+        return OperatingPoint(lever, current, lever * current, self.base_temperature_K + u**2)
+
+    @cached_property
+    def _states(self) -> PPoly:
+        return self.through(self.x.T, self.slopes.T)
+
+    def states(self, u: Array) -> Array:
+        """Return the states at some u, shape (size + 1, n)."""
+        return np.asarray(self._states(u)).T
+
+    def through(self, values: Array, slopes: Array) -> PPoly:
+        """Return the curve through some quantities of the states and their slopes, (k, ...)."""
+        return smooth_curve(self.u, values, slopes, steps_of(self.equations))
+
+    # --- in a circuit -----------------------------------------------------------------------------
+
+    def read(self, circuit: Circuit, bias: Array) -> Reading:
+        """Find the states that a slow ramp from zero takes at some biases (V), in any order."""
+        curve = PPoly(circuit.bias(self.curve.c[..., 0], self.curve.c[..., 1]), self.curve.x)
+        u = np.full(bias.shape, np.nan)
+        reading = Reading(u, [], 0.0, self.base_temperature_K)
+        for low, high in pairwise([0.0, *self._turns(curve).tolist(), self.end_u]):
+            highest = float(curve(high))
+            if highest <= reading.last_V:
+                continue  # the bias falls here, or has been as high before
+            fell = float(curve(low)) < reading.last_V
+            jumps = [*reading.jumps, (reading.last_V, reading.last_K)] if fell else reading.jumps
+            here = np.flatnonzero(np.isnan(u) & (bias <= highest))
+            u[here] = _crossing(curve, low, high, bias[here])
+            reading = Reading(u, jumps, highest, self.base_temperature_K + high**2)
+        return reading
+
+    def ended(self, reading: Reading) -> BranchEndError:
+        """Return the error that says where a ramp of the bias ends."""
+        bias, tip = reading.last_V, reading.last_K
+        if self.melts and tip == self.hottest_K:
+            text = f"silicon melts at a bias of {bias:.4f} V, where the tip is at {tip:.1f} K"
+        else:
+            at = self.point(float(np.sqrt(tip - self.base_temperature_K)))
+            text = (
+                f"the branch of a slow bias ramp ends at a bias of {bias:.4f} V (lever "
+                f"{at.lever_V:.4f} V, current {at.current_mA:.4f} mA, tip {tip:.1f} K): above it "
+                "there is no steady state below the melting point of silicon"
+            )
+        return BranchEndError(text, bias_reached=bias)
+
+
+def _samples(curve: PPoly, low: float, high: float) -> Array:
+    """Return points between which a curve is smooth enough for a few steps of Newton's method."""
+    inner = curve.x[(curve.x > low) & (curve.x < high)]
+    ends = np.concatenate([[low], inner, [high]])
+    shares = np.arange(_SAMPLES) / _SAMPLES
+    return np.append((ends[:-1, None] + np.diff(ends)[:, None] * shares).ravel(), high)
+
+
+def _crossing(curve: PPoly, low: float, high: float, values: Array) -> Array:
+    """Return where a curve that rises from `low` to `high` has some values, or begins above."""
+    at = _samples(curve, low, high)
+    known = np.maximum.accumulate(curve(at))
+    place = np.clip(np.searchsorted(known, values) - 1, 0, at.size - 2)
+    left, right = at[place], at[place + 1]
+    u = np.interp(values, known, at)
+    for _ in range(_NEWTON_STEPS):
+        slope = np.maximum(curve(u, 1), 1e-12)
+        u = np.clip(u - (curve(u) - values) / slope, left, right)
+    return np.where(values <= known[0], low, u)
+
+
+def steps_of(equations: LeverEquations) -> Array:
+    """Return u where the tip passes a step of a law, at which the curves bend sharply."""
+    rises = np.array([T for law in LAWS for T in law.steps]) - equations.base_temperature_K
+    return np.sqrt(rises[rises > 0])

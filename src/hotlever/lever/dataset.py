@@ -1,0 +1,151 @@
+"""Sweeps as datasets, and the files they are kept in."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from hotlever.datasets import labelled
+from hotlever.errors import InputError
+from hotlever.files import read_text, whole_file, write_text
+from hotlever.lever.balances import BALANCES
+from hotlever.lever.equations import LAWS
+from hotlever.materials import PARAMETERS
+from hotlever.probe import Probe
+from hotlever.probe.probe import SECTIONS
+from hotlever.types import Array
+
+#: Columns of a sweep file.
+SWEEP_COLUMNS = (
+    *("bias_V", "current_mA", "lever_V", "reader_V"),
+    *("tip_K", "power_mW", "heater_ohm", "legs_ohm"),
+)
+#: Further variables of a sweep.
+_MORE = (
+    *("leg1_ohm", "leg2_ohm", "lever_ohm", "max_K"),
+    *("ground_current_mA", "end_heat_mW", "air_heat_mW"),
+)
+#: What a fit compares, by the name users give it, and its column in a sweep.
+OBSERVABLES = {"current": "current_mA", "reader": "reader_V", "tip": "tip_K"}
+
+
+def sweep_dataset(
+    probe: Probe,
+    shown: Mapping[str, Array],
+    balances: Array,
+    notes: Sequence[str],
+    sensitivities: Array | None = None,
+) -> xr.Dataset:
+    """Return what is observed of n states of a lever.
+
+    Shown are ``lever_V``, ``current_mA``, ``reader_V``, ``tip_K`` and ``max_K``; the balances,
+    (n, 6), are `BALANCES`; sensitivities, (3, n, 6), are of `OBSERVABLES` by `PARAMETERS`.
+    """
+    columns = {**shown, **dict(zip(BALANCES, balances.T, strict=True))}
+    columns["bias_V"] = probe.circuit.bias(shown["lever_V"], shown["current_mA"])
+    columns["power_mW"] = shown["lever_V"] * shown["current_mA"]
+    for part in ("heater", "leg1", "leg2"):
+        columns[f"{part}_ohm"] = _resistance(columns[f"{part}_mW"], shown["current_mA"])
+    columns["legs_ohm"] = columns["leg1_ohm"] + columns["leg2_ohm"]
+    columns["lever_ohm"] = columns["legs_ohm"] + columns["heater_ohm"]
+    variables: dict[str, Any] = {name: columns[name] for name in (*SWEEP_COLUMNS, *_MORE)}
+    coordinates: dict[str, Any] = {"bias": columns["bias_V"]}
+    if sensitivities is not None:
+        variables["sensitivity"] = (("observable", "bias", "parameter"), sensitivities)
+        coordinates |= {"observable": list(OBSERVABLES), "parameter": list(PARAMETERS)}
+    return labelled(
+        variables,
+        coordinates=coordinates,
+        **{name: json.dumps(section) for name, section in probe.values().items()},
+        medium=probe.surroundings.medium,
+        notes="\n".join([*notes, *_range_notes(columns["bias_V"], columns["max_K"])]),
+    )
+
+
+def at_bias(data: xr.Dataset, bias: Array) -> xr.Dataset:
+    """Return a sweep with the biases asked for, to the last digit, not V_l + R_s I_h.
+
+    Rounded sums would be other labels: ``sel`` would miss them, and sweeps of two levers
+    would have no bias in common.
+    """
+    exact = data.assign(bias_V=data.bias_V.copy(data=bias))
+    return exact.assign_coords(bias=data.bias.copy(data=bias))
+
+
+def _resistance(heat_mW: Array, current_mA: Array) -> Array:
+    """Return Joule heat over the square of the current (Ω); NaN without current."""
+    nothing = np.full_like(heat_mW, np.nan)
+    return np.divide(1000.0 * heat_mW, current_mA**2, out=nothing, where=current_mA > 0)
+
+
+def _range_notes(bias_V: Array, max_K: Array) -> list[str]:
+    """Say where the laws are used beyond the temperatures they are meant for."""
+    limit = min(law.temperature_range[1] for law in LAWS)
+    beyond = bias_V[max_K > limit]
+    if not beyond.size:
+        return []
+    return [
+        f"from a bias of {beyond.min():.4g} V part of the lever is above {limit:.0f} K, "
+        "where the material laws are extrapolated"
+    ]
+
+
+def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a sweep as ``.csv`` (the columns of `SWEEP_COLUMNS`) or ``.nc`` (everything).
+
+    Raises
+    ------
+    InputError
+        If the suffix is neither, or the file cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == ".csv":
+        write_text(path, sweep_csv(data))
+    elif suffix == ".nc":
+        with whole_file(path) as temporary:
+            data.to_netcdf(temporary, engine="netcdf4")
+    else:
+        raise InputError(f"{path}: unknown file type '{suffix}', expected .csv or .nc")
+
+
+def sweep_csv(data: xr.Dataset) -> str:
+    """Return a sweep as CSV text, one row per bias; empty where a value does not exist."""
+    columns = [data[name].values for name in SWEEP_COLUMNS]
+    rows = (
+        ",".join("" if np.isnan(value) else f"{value:.10g}" for value in row)
+        for row in zip(*columns, strict=True)
+    )
+    return "\n".join([",".join(SWEEP_COLUMNS), *rows]) + "\n"
+
+
+def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read a sweep written by `write_sweep` as NetCDF.
+
+    Raises
+    ------
+    InputError
+        If the file is not a sweep.
+    """
+    if not Path(path).is_file():
+        read_text(path)  # says why
+    try:
+        with xr.open_dataset(path, engine="netcdf4") as data:
+            loaded = data.load()
+    except OSError as error:
+        raise InputError(f"{path}: not a NetCDF file") from error
+    missing = [name for name in SWEEP_COLUMNS if name not in loaded.variables]
+    if missing:
+        raise InputError(f"{path}: not a sweep: variable '{missing[0]}' is missing")
+    return loaded
+
+
+def probe_of(data: xr.Dataset) -> Probe:
+    """Return the probe that a sweep was made of."""
+    sections = {name: json.loads(data.attrs[name]) for name in SECTIONS if name in data.attrs}
+    return Probe.from_values(sections, "sweep")

@@ -1,0 +1,166 @@
+"""Finite elements: what fields are at the quadrature points, and the matrices of weak forms."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from skfem import CellBasis, Mesh
+from skfem.element import Element, ElementTriP3
+
+from hotlever.errors import InputError
+from hotlever.types import Array, Index
+
+
+def sums_by_index(index: Index, values: Array, size: int) -> Array:
+    """Return the sums of `values` with equal `index`, shape (size,); the arrays match."""
+    # numpy's stubs overlook that weights make the counts floats
+    return np.bincount(index.ravel(), values.ravel(), minlength=size)  # type: ignore[return-value]
+
+
+#: A point this share of an element's size outside it is taken to lie on its edge.
+_BY_ROUNDING = 1e-3
+
+
+class FiniteElements:
+    """Lagrange elements on triangles or tetrahedra with straight edges.
+
+    Quadrature points are counted element by element; ``points`` is their number.
+
+    Parameters
+    ----------
+    mesh : skfem.Mesh
+    element : skfem.element.Element, optional
+        Cubic triangles by default, which reach a given accuracy with fewer unknowns than
+        quadratic ones.
+    quadrature : int or (ndarray, ndarray), optional
+        Polynomial degree integrated exactly, or points (dimension, n) and weights (n,) on the
+        reference element.
+
+    Attributes
+    ----------
+    size : int
+        Number of nodal values of one field.
+    dofs : ndarray of int, shape (elements, nodes)
+        Global number of each element's nodes.
+    nodes : ndarray, shape (dimension, size)
+        Positions of the nodes.
+    weights : ndarray, shape (points,)
+        Quadrature weights, areas or volumes included.
+    positions : ndarray, shape (dimension, points)
+        Quadrature points.
+    sampling : csr_matrix, shape ((1 + dimension) × points, size)
+        From nodal values to the values, then to the slopes along each axis at all points.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        element: Element | None = None,
+        quadrature: int | tuple[Array, Array] = 5,
+    ) -> None:
+        rule = {"intorder" if isinstance(quadrature, int) else "quadrature": quadrature}
+        self.basis = CellBasis(mesh, element or ElementTriP3(), **rule)
+        self.size = int(self.basis.N)
+        self.dofs = np.ascontiguousarray(self.basis.element_dofs.T)
+        self.nodes = self.basis.doflocs
+        elements, self.per_element = self.basis.dx.shape
+        self.weights = np.ascontiguousarray(self.basis.dx).ravel()
+        self.positions = np.asarray(self.basis.global_coordinates()).reshape(
+            -1, elements * self.per_element
+        )
+        # With straight edges every element is an affine image of one, so that element matrices are
+        # sums of a few fixed matrices whose factors differ from element to element.
+        nodes = range(self.dofs.shape[1])
+        shape = [self.basis.elem.lbasis(self.basis.X, node) for node in nodes]
+        # (1 + dimension, points, nodes): values, then slopes on the reference element
+        self._shape = np.stack([np.vstack([value[None], slope]) for value, slope in shape], axis=-1)
+        products = np.einsum("rqi,sqj->rsqij", self._shape, self._shape)
+        self._products = products.reshape(*products.shape[:3], -1)
+        # slopes in space are these combinations of those on the reference element
+        self._inverse = np.moveaxis(np.asarray(self.basis.mapping.invA), -1, 0)
+        self._metric = np.einsum("era,esa->rse", self._inverse, self._inverse)
+        self.sampling = self._sampled()
+
+    def _sampled(self) -> csr_matrix:
+        nodes = self.dofs.shape[1]
+        slopes = np.einsum("era,rqn->aeqn", self._inverse, self._shape[1:])
+        values = np.broadcast_to(self._shape[0], (1, *slopes.shape[1:]))
+        data = np.concatenate([values, slopes])
+        columns = np.broadcast_to(self.dofs[:, None], data.shape)
+        rows = data.size // nodes
+        starts = np.arange(0, data.size + 1, nodes)
+        return csr_matrix((data.ravel(), columns.ravel(), starts), shape=(rows, self.size))
+
+    def matrices(
+        self,
+        value_value: Array | None = None,
+        value_slope: Array | None = None,
+        slope_value: Array | None = None,
+        slope_slope: Array | None = None,
+    ) -> Array:
+        """Return the element matrices, (elements, nodes, nodes), of a bilinear form.
+
+        It is ∫ φ a ψ + φ b·∇ψ + ∇φ·c ψ + d ∇φ·∇ψ with test function φ and trial function ψ. The
+        coefficients come in this order: a and d have shape (points,), b and c (dimension, points).
+        """
+        elements, nodes = self.dofs.shape
+        factors, tables, products = [], [], self._products
+
+        def weighted(coefficient: Array) -> Array:
+            return (self.weights * coefficient).reshape(-1, elements, self.per_element)
+
+        if value_value is not None:
+            factors.append(weighted(value_value))
+            tables.append(products[0, 0])
+        for vector, table in ((value_slope, products[0, 1:]), (slope_value, products[1:, 0])):
+            if vector is not None:
+                factors.append(np.einsum("era,aeq->req", self._inverse, weighted(vector)))
+                tables.append(np.concatenate(table))
+        if slope_slope is not None:
+            for metric, table in zip(self._metric, products[1:, 1:], strict=True):
+                factors.append(metric[:, :, None] * weighted(slope_slope))
+                tables.append(np.concatenate(table))
+        together = np.concatenate(factors).transpose(1, 0, 2).reshape(elements, -1)
+        return np.asarray(together @ np.concatenate(tables)).reshape(elements, nodes, nodes)
+
+    def facet_nodes(self, facets: Index) -> Index:
+        """Return the numbers of the nodes on some facets of the mesh."""
+        return np.asarray(self.basis.get_dofs(facets).flatten(), dtype=np.intp)
+
+    def at_points(self, points: Array) -> tuple[Index, Array]:
+        """Return the element at each point, and its basis functions there.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, dimension)
+            µm. A point outside by rounding is given the nearest element.
+
+        Returns
+        -------
+        elements : ndarray of int, shape (n,)
+        values : ndarray, shape (n, nodes)
+
+        Raises
+        ------
+        InputError
+            If a point lies outside the mesh.
+        """
+        corner = self.basis.mesh.p[:, self.basis.mesh.t[0]]
+        elements = np.empty(len(points), dtype=np.intp)
+        local = np.empty(points.T.shape)
+        for number, point in enumerate(points):
+            # where it lies on the reference element, seen from each element
+            here = np.einsum("era,ae->re", self._inverse, point[:, None] - corner)
+            depth = np.minimum(here.min(axis=0), 1.0 - here.sum(axis=0))
+            elements[number] = nearest = depth.argmax()
+            if depth[nearest] < -_BY_ROUNDING:
+                where = ", ".join(f"{value:g}" for value in point)
+                raise InputError(f"the point ({where}) µm lies outside the lever")
+            local[:, number] = here[:, nearest]
+        nodes = range(self.dofs.shape[1])
+        return elements, np.stack([self.basis.elem.lbasis(local, node)[0] for node in nodes], 1)
+
+    def point_weights(self, point: tuple[float, ...]) -> tuple[Index, Array]:
+        """Return nodes and weights that interpolate a field at a point; see `at_points`."""
+        (element,), (weights,) = self.at_points(np.array([point], dtype=float))
+        return self.dofs[element], weights

@@ -1,0 +1,136 @@
+"""Following a lever from cold to hotter and hotter tips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hotlever.errors import ComputationError, NewtonError
+from hotlever.lever.branch import Branch, steps_of
+from hotlever.lever.curve import hermite_weights
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
+from hotlever.lever.pinned import AtTip
+from hotlever.types import Array
+
+#: Steps between the states of a branch: in u (K^½) where it is cold, in the tip temperature (K)
+#: where it is hot. The smallest step (K) that is tried where those lead nowhere.
+_STEP_U, _STEP_K, _SMALLEST_K = 4.0, 60.0, 0.5
+#: Half the step (K) after a step of a law; and by how much the hottest point must get hotter per
+#: kelvin of the tip, twice over, to shorten the steps.
+_AFTER_STEP_K, _MUCH_FASTER = 5.0, 4.0
+#: A state further than this share of the step from where it was expected (K) may lie elsewhere.
+_ASTRAY = 0.5
+#: Far below what the curves between the states are off by.
+_OPTIONS = NewtonOptions(tolerance=1e-5)
+#: States that the next one is predicted from.
+_BEHIND = 3
+
+
+class Follower:
+    """Follows a lever from cold to hotter and hotter tips, or on from a branch of it."""
+
+    def __init__(self, equations: LeverEquations, start: Branch | None = None) -> None:
+        self._equations, self._step, self._steps = equations, _STEP_K, steps_of(equations)
+        if start is not None:
+            self._branch = start
+            return
+        first, second = equations.cold()
+        self._branch = _cold(equations, first)
+        for u in (0.5 * _STEP_U, _STEP_U):
+            try:
+                found = self._solved(u, u * first + u**2 * second)
+            except NewtonError as error:
+                base = equations.base_temperature_K
+                raise ComputationError(
+                    f"no state was found with a tip at {base + u**2:.0f} K: {error}"
+                ) from error
+            self._branch = _joined(self._branch, found)
+
+    def until(self, enough: Callable[[Branch], bool]) -> Branch:
+        """Go on until the branch is long enough, or silicon melts.
+
+        Raises
+        ------
+        ComputationError
+            If the next state was not found; ``partial`` holds the branch up to there.
+        """
+        while not (self._branch.melts or enough(self._branch)):
+            here = float(self._branch.u[-1])
+            # a leg may get hotter faster than the tip
+            faster = max(1.0, float(self._branch.value_slopes[-1, 3]) / (_MUCH_FASTER * here))
+            step = min((here + _STEP_U) ** 2 - here**2, _STEP_K / faster, 2.0 * self._step)
+            while (found := self._next(_landing(here, step, self._steps), step)) is None:
+                step /= 2.0
+                if step < _SMALLEST_K:
+                    raise ComputationError(
+                        "no state was found with a hotter tip than "
+                        f"{self._equations.base_temperature_K + here**2:.0f} K",
+                        partial=self._branch,
+                    )
+            self._branch, self._step = _joined(self._branch, found), step
+            if self._branch.u[-1] in self._steps:
+                self._step = _AFTER_STEP_K  # where the law settles, the curve bends
+        return self._branch
+
+    def _next(self, u: float, step: float) -> Branch | None:
+        """Find the state at u; None if it could lie on another branch."""
+        known = self._branch
+        weights = hermite_weights(known.u[None, -_BEHIND:], np.array([u]))[0]
+        behind = np.concatenate([known.x[:, -_BEHIND:], known.slopes[:, -_BEHIND:]], axis=1)
+        expected = behind @ weights[:, None]
+        try:
+            found = self._solved(u, expected)
+        except NewtonError:
+            return None
+        astray = np.abs(found.x - expected)[self._equations.space.is_temperature].max()
+        return found if astray <= _ASTRAY * step else None
+
+    def _solved(self, u: float, guess: Array) -> Branch:
+        """Find the state at u near a guess, and its slope."""
+        at = np.array([u])
+        problem = AtTip(self._equations, at**2)
+        return _part(self._equations, at, find_roots(problem, guess, _OPTIONS))
+
+
+def _landing(u: float, step: float, steps: Array) -> float:
+    """Return u after a step (K), or at a step of a law on the way."""
+    after = float(np.sqrt(u**2 + step))
+    between = steps[(steps > u) & (steps < after)]
+    return float(between[0]) if between.size else after
+
+
+def branch_of(equations: LeverEquations, u: Array, found: NewtonResult) -> Branch:
+    """Return the branch of states solved together at some u, after the one without power."""
+    return _joined(_cold(equations, equations.cold()[0]), _part(equations, u, found))
+
+
+def _cold(equations: LeverEquations, slope: Array) -> Branch:
+    """Return the state without power."""
+    return _with_values(equations, np.zeros(1), np.zeros_like(slope), slope)
+
+
+def _part(equations: LeverEquations, u: Array, found: NewtonResult) -> Branch:
+    """Return a part of a branch that was solved."""
+    slopes = 2.0 * u * equations.along(found.x, found.factors)
+    return _with_values(equations, u, found.x, slopes)
+
+
+def _with_values(equations: LeverEquations, u: Array, x: Array, slopes: Array) -> Branch:
+    rises, by_u = equations.space.rises(x), equations.space.rises(slopes)
+    hottest = rises.argmax(axis=0), np.arange(u.size)
+    values = np.vstack([equations.observed(x), rises[hottest]])
+    value_slopes = np.vstack([equations.observed_change(x, slopes), by_u[hottest]])
+    return Branch(equations, u, x, slopes, values.T, value_slopes.T)
+
+
+def _joined(branch: Branch, hotter: Branch) -> Branch:
+    return Branch(
+        branch.equations,
+        np.append(branch.u, hotter.u),
+        np.hstack([branch.x, hotter.x]),
+        np.hstack([branch.slopes, hotter.slopes]),
+        np.vstack([branch.values, hotter.values]),
+        np.vstack([branch.value_slopes, hotter.value_slopes]),
+    )

@@ -1,0 +1,280 @@
+"""The full lever: finite elements on a mesh, sparse Jacobians.
+
+The unknowns are the temperature and the potential at the nodes, without those held at the base
+temperature or at ground; the nodes of the supply contact share one unknown, the lever voltage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from copy import copy
+from typing import Any, get_args
+
+import numpy as np
+from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse.linalg import SuperLU, splu
+
+from hotlever.air.operator import AirOperator
+from hotlever.lever.air_loss import AirLoss, AirSolver
+from hotlever.lever.elements import FiniteElements, sums_by_index
+from hotlever.lever.space import LinearMap, Pin, Space, Tangent, Tapered
+from hotlever.probe.layout import Part
+from hotlever.probe.mesh import ProbeMesh
+from hotlever.probe.solid import SolidMesh
+from hotlever.types import Array, Index
+
+
+class FullSpace(Space):
+    """Unknowns, maps and matrix structure of one meshed layout.
+
+    Parameters
+    ----------
+    mesh : ProbeMesh or SolidMesh
+        Of triangles in the lever's plane, or of tetrahedra.
+    elements : FiniteElements, optional
+        Made on ``mesh.elements`` by default.
+
+    Attributes
+    ----------
+    parts : dict of str to ndarray of int
+        Quadrature points of the regions of each part.
+    end_test : ndarray, shape (1 + dimension, points)
+        Values and slopes of the function that is one at the leg ends.
+    ground_test : ndarray, shape (dimension, points)
+        Slopes of the function that is one at ground.
+    """
+
+    def __init__(self, mesh: ProbeMesh | SolidMesh, elements: FiniteElements | None = None) -> None:
+        self.mesh, self.air = mesh, None
+        self.elements = elements or FiniteElements(mesh.elements)
+        terminal_nodes = {
+            name: self.elements.facet_nodes(facets) for name, facets in mesh.terminal_facets.items()
+        }
+        ends = np.unique(np.concatenate(list(terminal_nodes.values())))
+        ground, supply = terminal_nodes["ground"], terminal_nodes["supply"]
+        self._number_unknowns(ends, ground, supply)
+        # in the middle of the silicon's thickness
+        tip = np.zeros(len(self.elements.positions))
+        tip[:2] = mesh.layout.tip
+        tip_nodes, tip_weights = self.elements.point_weights(tuple(tip))
+        self.tip = (self._T[tip_nodes], tip_weights)
+        self._lay_out_matrix()
+        reader = terminal_nodes.get("reader")
+        self.reader = (
+            None if reader is None else (self._V[reader], np.full(reader.size, 1.0 / reader.size))
+        )
+        sampling, points = self.elements.sampling, self.elements.weights.size
+        kinds = 1 + len(self.elements.positions)
+        self.temperature = LinearMap(sampling @ self._selection(self._T), kinds)
+        self.potential = LinearMap(sampling[points:] @ self._selection(self._V), kinds - 1)
+        self.weights = self.elements.weights[:, None]
+        self.end_test = self._sampled_sum(ends).reshape(kinds, points)
+        self.ground_test = self._sampled_sum(ground).reshape(kinds, points)[1:]
+        self.thickness_um = self._thickness()
+        region = np.repeat(mesh.region, self.elements.per_element)
+        self.tapered = self._tapered_points(region)
+        parts = np.array([one.part for one in mesh.layout.regions])[region]
+        self.parts = {part: np.flatnonzero(parts == part) for part in get_args(Part)}
+
+    # --- where things are -------------------------------------------------------------------------
+
+    def _number_unknowns(self, ends: Index, ground: Index, supply: Index) -> None:
+        """Give every nodal value its unknown, in an order with little fill.
+
+        Values that are held get -1, the potential of the supply V_l.
+        """
+        order = _fill_reducing_order(self.elements.dofs, self.elements.size)
+        free = np.ones((2, self.elements.size), dtype=bool)
+        free[0, ends] = free[1, ground] = free[1, supply] = False
+        number = np.full((self.elements.size, 2), -1, dtype=np.intp)
+        flat = free[:, order].T
+        self.size = int(flat.sum())
+        places = np.full(flat.shape, -1, dtype=np.intp)
+        places[flat] = np.arange(self.size)
+        number[order] = places
+        self._T, self._V = number.T.copy()
+        self._V[supply] = self.size
+        self.is_temperature = np.zeros(self.size + 1, dtype=bool)
+        self.is_temperature[self._T[self._T >= 0]] = True
+
+    def _selection(self, unknowns: Index) -> csr_matrix:
+        """Return the matrix from unknowns to nodal values, those held being zero."""
+        nodes = np.flatnonzero(unknowns >= 0)
+        return csr_matrix(
+            (np.ones(nodes.size), (nodes, unknowns[nodes])), shape=(unknowns.size, self.size + 1)
+        )
+
+    def _sampled_sum(self, nodes: Index) -> Array:
+        """Return values and slopes of the sum of some nodes' functions."""
+        ones = np.zeros(self.elements.size)
+        ones[nodes] = 1.0
+        return np.asarray(self.elements.sampling @ ones)
+
+    def _tapered_points(self, region: Index) -> Tapered:
+        """Find the points in low-doped regions, by the region of each point."""
+        regions = self.mesh.layout.regions
+        points = np.flatnonzero(np.array([one.taper is not None for one in regions])[region])
+        tapers: list[Any] = [regions[index].taper for index in region[points]]
+        offset = self.elements.positions[:2, points].T - _rows(one.centre for one in tapers)
+        along = (offset * _rows(one.axis for one in tapers)).sum(axis=1)
+        lengths = np.array([one.length_um for one in tapers])
+        return Tapered(points, along[:, None], lengths[:, None])
+
+    def _thickness(self) -> float | Array:
+        """Thickness of the silicon (µm); where there is a cone, at the quadrature points.
+
+        One if the elements are solid and have their thickness themselves.
+        """
+        layout, positions = self.mesh.layout, self.elements.positions
+        if len(positions) == 3:
+            return 1.0
+        if layout.cone is None:
+            return float(layout.thickness_um)
+        distance = np.linalg.norm(positions - np.reshape(layout.tip, (2, 1)), axis=0)
+        return np.asarray(layout.thickness_um + layout.cone.thickening_um(distance))[:, None]
+
+    def nodal(self, x: Array, base_temperature_K: float) -> tuple[Array, Array]:
+        """Return temperature (K) and potential (V) of a state at all nodes, each (nodes,)."""
+        T = base_temperature_K + np.where(self._T >= 0, x[self._T], 0.0)
+        return T, np.where(self._V >= 0, x[self._V], 0.0)
+
+    def from_nodal(self, rise: Array, potential: Array, lever_V: float) -> Array:
+        """Return the state with these nodal rises (K) and potentials (V)."""
+        x = np.zeros(self.size + 1)
+        for unknowns, values in ((self._T, rise), (self._V, potential)):
+            free = (unknowns >= 0) & (unknowns < self.size)
+            x[unknowns[free]] = values[free]
+        x[-1] = lever_V
+        return x
+
+    def rises(self, x: Array) -> Array:
+        """Return the nodal rises of the temperature (K), (places, n), of states."""
+        return x[self.is_temperature]
+
+    # --- the air ----------------------------------------------------------------------------------
+
+    def in_air(self, air: AirOperator | None) -> FullSpace:
+        """Return the same space with this air around it, or in vacuum; everything is shared."""
+        space = copy(self)
+        space.air = None
+        if air is not None:
+            element, shares = self.elements.at_points(air.sites)
+            nodes = self.elements.dofs.shape[1]
+            slots = self._slots[element, :nodes, :nodes]
+            unknowns = self._T[self.elements.dofs[element]]
+            space.air = AirLoss(air, unknowns, shares, slots, self.size + 1)
+        return space
+
+    def in_air_at_nodes(self, air: Any, surface: Index) -> FullSpace:
+        """Return the same space in air whose sites are these nodes; everything is shared.
+
+        The air is what has the attributes of an `AirOperator`.
+        """
+        # any element around a node knows where its diagonal entry is
+        _, first = np.unique(self.elements.dofs, return_index=True)
+        element, place = np.divmod(first[surface], self.elements.dofs.shape[1])
+        slots = self._slots[element, place, place][:, None, None]
+        space = copy(self)
+        shares = np.ones((surface.size, 1))
+        space.air = AirLoss(air, self._T[surface, None], shares, slots, self.size + 1)
+        return space
+
+    # --- the matrix -------------------------------------------------------------------------------
+
+    def _lay_out_matrix(self) -> None:
+        """Find the structure of the Jacobian; its last row pins the tip temperature."""
+        count = self.size + 1
+        dofs = self.elements.dofs
+        unknowns = np.concatenate([self._T[dofs], self._V[dofs]], axis=1)
+        keys = np.where(
+            # the row of V_l is the current, which the pin replaces
+            (unknowns[:, :, None] >= 0)
+            & (unknowns[:, :, None] < self.size)
+            & (unknowns[:, None, :] >= 0),
+            unknowns[:, None, :] * count + unknowns[:, :, None],
+            count**2,  # after all others: dropped
+        )
+        pin = np.append(self.tip[0], self.size) * count + self.size
+        unique, slots = np.unique(np.append(keys.ravel(), pin), return_inverse=True)
+        unique = unique[unique < count**2]
+        self._entries = unique.size
+        self._slots = slots[: keys.size].reshape(keys.shape)
+        self._pin_slots = slots[keys.size :]
+        self._rows = (unique % count).astype(np.int32)
+        self._starts = np.searchsorted(unique // count, np.arange(count + 1)).astype(np.int32)
+
+    def factorised(self, tangent: Tangent, kappa_air: Array | None, pin: Pin) -> SparseFactors:
+        """Put the Jacobians of all states together, the row of the pin last, and factorise."""
+        solvers = []
+        for state in range(tangent.sigma.shape[-1]):
+            entries = self._assembled(tangent.of(state))
+            if self.air is None or kappa_air is None:
+                solvers.append(self._lu(entries, pin))
+                continue
+            kappa = kappa_air[:, state]
+            local = entries + self.air.local_entries(kappa, self._entries)
+            solvers.append(AirSolver(self._lu(local, pin), self.air, kappa))
+        return SparseFactors(solvers)
+
+    def _assembled(self, tangent: Tangent) -> Array:
+        """Return the entries of one state's Jacobian, without the pin."""
+        elements, nodes = self.elements.dofs.shape
+        matrices = self.elements.matrices
+        element = np.empty((elements, 2 * nodes, 2 * nodes))
+        element[:, :nodes, :nodes] = matrices(
+            value_value=tangent.heat_source_T,
+            slope_value=tangent.heat_flux_T,
+            slope_slope=tangent.kappa,
+        )
+        element[:, :nodes, nodes:] = matrices(value_slope=tangent.heat_source_V)
+        element[:, nodes:, :nodes] = matrices(slope_value=tangent.charge_flux_T)
+        element[:, nodes:, nodes:] = matrices(slope_slope=tangent.sigma)
+        return sums_by_index(self._slots, element, self._entries + 1)[: self._entries]
+
+    def _lu(self, entries: Array, pin: Pin) -> SuperLU:
+        """Factorise; the unknowns are already ordered for little fill."""
+        entries[self._pin_slots] = np.append(pin.tip * self.tip[1], pin.lever)
+        count = self.size + 1
+        return splu(
+            csc_matrix((entries, self._rows, self._starts), shape=(count, count)),
+            permc_spec="NATURAL",
+            diag_pivot_thresh=0.01,
+            options={"SymmetricMode": True},
+        )
+
+
+class SparseFactors:
+    """The factorised Jacobian of each of some states; see `Factors`."""
+
+    def __init__(self, solvers: list[Any]) -> None:
+        self._solvers = solvers
+
+    def solve(self, right_hand_side: Array, states: Index) -> Array:
+        """Solve for right-hand sides (size + 1, n) or (size + 1, n, k) of these n states."""
+        solution = np.empty_like(right_hand_side)
+        for place, state in enumerate(states):
+            solution[:, place] = self._solvers[state].solve(right_hand_side[:, place])
+        return solution
+
+    def replaced(self, states: Index, other: SparseFactors) -> SparseFactors:
+        """Return the same factors, those of some states taken from others, in their order."""
+        solvers = dict(enumerate(self._solvers)) | dict(zip(states, other._solvers, strict=True))
+        return SparseFactors(list(solvers.values()))
+
+
+def _rows(points: Iterable[tuple[float, float]]) -> Array:
+    return np.array(list(points), dtype=float).reshape(-1, 2)
+
+
+def _fill_reducing_order(dofs: Index, size: int) -> Index:
+    """Order nodes for little fill: SuperLU's minimum degree ordering of the nodes' pattern.
+
+    It is found once, so that each factorisation can take the natural order.
+    """
+    nodes = dofs.shape[1]
+    rows = np.repeat(dofs, nodes, axis=1).ravel()
+    columns = np.tile(dofs, (1, nodes)).ravel()
+    pattern = csc_matrix((np.ones(rows.size), (rows, columns)), shape=(size, size))
+    pattern.data[:] = 1.0
+    pattern.setdiag(size)
+    return np.argsort(splu(pattern, permc_spec="MMD_AT_PLUS_A").perm_c)

@@ -1,0 +1,87 @@
+"""What is around a lever (section ``[surroundings]`` of a probe file).
+
+Everything outside the lever that takes up heat is at the base temperature.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from hotlever.materials.air import ATMOSPHERE, temperature_jump_length
+from hotlever.records import Record
+
+Medium = Literal["vacuum", "air"]
+
+
+class Surroundings(Record):
+    """What is around a lever: vacuum by default, and free space in air. The rest counts in air.
+
+    The surface is isothermal and tilted about the lever's y axis; its gap is the tip's height and
+    what is between tip and surface. The chip is a block behind x = 0 (`hotlever.air.surface`).
+    The jump is that of `hotlever.materials.air.temperature_jump_length`; at other surfaces than
+    the lever's its length is taken at the base temperature.
+    """
+
+    medium: Medium = Field(
+        default="vacuum",
+        description="vacuum or air; the rest counts in air, all of it at the base temperature",
+    )
+    surface_gap_um: float | None = Field(
+        default=None,
+        ge=0.001,
+        le=1e4,
+        description="lower face of the lever to a flat surface below, at the tip",
+    )
+    surface_tilt_deg: float = Field(
+        default=0.0,
+        ge=-45,
+        le=45,
+        description="of that surface; positive: the base is farther away",
+    )
+    chip: bool = Field(
+        default=False,
+        description="whether the chip body behind the legs takes up heat from the air",
+    )
+    accommodation: float | None = Field(
+        default=None,
+        ge=0.01,
+        le=1,
+        description="0.01 to 1: the air's temperature jumps at surfaces; left out: no jump",
+    )
+    pressure_mbar: float = Field(
+        default=ATMOSPHERE,
+        ge=1e-6,
+        le=1e6,
+        description="of the air; matters only with accommodation",
+    )
+    jump_temperature_K: float = Field(
+        default=600.0,
+        ge=250,
+        le=1700,
+        description="of the air at the lever, for the length of the jump",
+    )
+
+    @model_validator(mode="after")
+    def _each_value_counts(self) -> Surroundings:
+        if self.surface_tilt_deg != 0 and self.surface_gap_um is None:
+            raise ValueError("surface_tilt_deg means nothing without surface_gap_um")
+        if self.accommodation is None and self.pressure_mbar != ATMOSPHERE:
+            raise ValueError(
+                "pressure_mbar means nothing without accommodation: the conductivity of dense air "
+                "does not depend on the pressure"
+            )
+        return self
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether what is above the lever's mid-plane mirrors what is below."""
+        return self.surface_gap_um is None and not self.chip
+
+    def jump_length_um(self, temperature_K: float) -> float:
+        """Return the jump length (µm) in air of some temperature; 0 without a jump."""
+        if self.accommodation is None:
+            return 0.0
+        length, _ = temperature_jump_length(temperature_K, self.pressure_mbar, self.accommodation)
+        return float(length)

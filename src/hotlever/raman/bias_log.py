@@ -1,0 +1,150 @@
+"""Join a bias log with tip spectra into the measurement file that ``hotlever fit`` takes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import re
+from collections import defaultdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hotlever.errors import InputError
+from hotlever.tables import Table, name_and_unit, read_table, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+TEMPERATURE, ERROR = "T_tip (K)", "dT_tip (K)"
+_BIAS = re.compile(r"(V_?b|bias)\b", re.I)
+_FILE = re.compile(r"(file|spectrum|spectra)\b", re.I)
+_OLD = re.compile(r"d?T_?tip\b", re.I)
+_IN_NAME = re.compile(r"(?:^|[^0-9A-Za-z.,-])(\d+(?:[.,p]\d+)?)\s?V(?![a-zA-Z0-9])")
+
+
+def read_bias_log(path: str | os.PathLike[str]) -> Table:
+    """Read a bias log: ``#`` comments, a header row, rows of numbers.
+
+    Raises
+    ------
+    InputError
+        If it has no header with a bias or file column, a row does not fit the header, or a bias
+        is no number.
+    """
+    log = read_table(path, "a header row like 'V_b (V),I_h (mA),V_r (mV)'")
+    if _bias(log) is None and _column(log, _FILE) is None:
+        raise InputError(
+            f"{log.where(-1)}: no bias column in '{shown(','.join(log.names))}', expected a header "
+            "like 'V_b (V),I_h (mA),V_r (mV)'"
+        )
+    return log
+
+
+def join(log: Table, spectra: xr.Dataset) -> str:
+    """Measurement CSV: the log with tip temperature and error in two more columns.
+
+    A row finds its spectrum by a ``file`` column of the log; else by the bias in the
+    spectrum's name (``tip_5.25V.txt``); else by order, if there are as many of both. Columns
+    of tip temperatures that the log already had are replaced. Rows without a spectrum, or
+    whose spectrum gave no temperature, get empty cells.
+
+    Parameters
+    ----------
+    log : Table
+        From `read_bias_log`.
+    spectra : xarray.Dataset
+        With temperatures, see `hotlever.raman.series.read_lines`.
+
+    Raises
+    ------
+    InputError
+        If spectra and rows cannot be brought together.
+    """
+    matched = _match(log, [str(name) for name in spectra.file.values])
+    keep = [j for j, name in enumerate(log.names) if not _OLD.match(name)]
+    out = io.StringIO()
+    for _, line in log.comments:
+        out.write(line + "\n")
+    writer = csv.writer(out, delimiter=log.separator or ",", lineterminator="\n")
+    writer.writerow([log.names[j] for j in keep] + [TEMPERATURE, ERROR])
+    temperature, error = spectra.temperature_K.values, spectra.temperature_error_K.values
+    for cells, found in zip(log.rows, matched, strict=True):
+        numbers = ["", ""]
+        if found is not None and np.isfinite(temperature[found]):
+            # an error is never written as 0
+            digits = ".1f" if error[found] >= 0.1 else ".2g"
+            numbers = [f"{temperature[found]:.1f}", f"{error[found]:{digits}}"]
+            if log.decimal_comma:
+                numbers = [number.replace(".", ",") for number in numbers]
+        writer.writerow([cells[j] for j in keep] + numbers)
+    return out.getvalue()
+
+
+def _column(log: Table, pattern: re.Pattern[str]) -> int | None:
+    """Place of the first column whose heading begins so."""
+    return next((j for j, name in enumerate(log.names) if pattern.match(name)), None)
+
+
+def _bias(log: Table) -> np.ndarray | None:
+    """Bias of each row in volts, NaN where blank; None without such a column."""
+    at = _column(log, _BIAS)
+    return None if at is None else log.values(at, "V", name_and_unit(log.names[at])[0], unit="V")
+
+
+def _match(log: Table, names: list[str]) -> list[int | None]:
+    """For each row of the log the place of its spectrum."""
+    at = _column(log, _FILE)
+    if at is not None:
+        return _by_name(log, at, names)
+    bias = _bias(log)
+    stated = [_IN_NAME.search(Path(name).stem) for name in names]
+    if bias is not None and None not in stated:
+        written = [match[1].replace(",", ".").replace("p", ".") for match in stated if match]
+        return _by_bias(log, bias, list(map(float, written)), names)
+    if len(names) == len(log.rows):
+        return list(range(len(names)))
+    raise InputError(
+        f"{log.path}: {len(log.rows)} rows and {len(names)} spectra; expected as many of both, a "
+        "column 'file' that names the spectra, or names with the bias such as tip_5.25V.txt"
+    )
+
+
+def _by_name(log: Table, at: int, names: list[str]) -> list[int | None]:
+    stems, files = defaultdict[str, list[int]](list), defaultdict[str, list[int]](list)
+    for place, path in enumerate(map(Path, names)):
+        stems[path.stem].append(place)
+        files[path.name].append(place)
+    matched: list[int | None] = []
+    for row, cells in enumerate(log.rows):
+        name = Path(cells[at]).name
+        found = files.get(name) or stems.get(name, [])
+        if name and len(found) != 1:
+            problem = f"names {len(found)} of them" if found else "is not among those given"
+            raise InputError(f"{log.where(row)}: spectrum '{shown(cells[at])}' {problem}")
+        matched.append(found[0] if found else None)
+    return matched
+
+
+def _by_bias(
+    log: Table, bias: np.ndarray, stated: list[float], names: list[str]
+) -> list[int | None]:
+    matched: list[int | None] = [None] * bias.size
+    for place, (value, name) in enumerate(zip(stated, names, strict=True)):
+        distance = np.abs(np.where(np.isnan(bias), np.inf, bias) - value)
+        nearest = int(np.argmin(distance))
+        # a name is rounded: 5.25V for 5.2500 V
+        if not distance[nearest] <= 0.006 * max(abs(value), 1.0):
+            raise InputError(
+                f"{log.path}: no row at the bias of {name} ({value:g} V); the nearest is "
+                f"{bias[nearest]:g} V"
+            )
+        other = matched[nearest]
+        if other is not None:
+            raise InputError(
+                f"{log.path}: two spectra at {bias[nearest]:g} V: {names[other]} and {name}"
+            )
+        matched[nearest] = place
+    return matched

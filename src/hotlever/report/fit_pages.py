@@ -1,0 +1,136 @@
+"""The report pages of fits: of one, with how sure it is, and of many levers (Table II)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hotlever import figures
+from hotlever.fitting.batch import Batch
+from hotlever.fitting.levers import INVERSION, compare_levers, statements
+from hotlever.fitting.result import Fit
+from hotlever.fitting.uncertainty import Uncertainty
+from hotlever.fitting.words import lever_rows, outcome, parameter_rows, uncertainty_tables
+from hotlever.report.page import Page
+from hotlever.text import sentence
+
+#: Points of a curve without visible corners.
+_POINTS = 110
+
+
+def fit_page(fit: Fit, found: Uncertainty | None = None) -> Page:
+    """Return the report page of one fit, and of what was sampled and profiled of it."""
+    page = Page(
+        f"Fit of {fit.measurement.path}",
+        f"Material parameters of a {fit.probe.shape.shape} lever from its measured "
+        f"{', '.join(fit.observables)}.",
+    )
+    add_fit(page, fit)
+    if found is not None:
+        _add_uncertainty(page, found)
+    return page
+
+
+def add_fit(page: Page, fit: Fit) -> None:
+    """Add tables and figures of a fit to a page."""
+    measured = fit.measurement.dataset(fit.probe.circuit)
+    model = fit.model(measured.bias.values)
+    low, high = measured.bias.values[[0, -1]].tolist()
+    curve = fit.model(np.linspace(low, high, _POINTS))
+    page.table(
+        ("parameter", "value", "unit", ""),
+        parameter_rows(fit),
+        "Material parameters; standard errors in units of the last digits.",
+    )
+    for text in fit.notes:
+        page.text(sentence(text))
+    page.text(f"{'; '.join(outcome(fit))}.")
+    page.figure(
+        "fit_data_and_model",
+        figures.data_and_model(measured, model, fit.observables),
+        "Measured and modelled observables against bias, and their difference. "
+        "Grey: the stated error of the measured temperature.",
+    )
+    page.figure(
+        "fit_correlation",
+        figures.correlation_matrix(fit.names, fit.correlation),
+        "Correlation of the fitted parameters.",
+    )
+    page.figure(
+        "fit_tip_band",
+        figures.tip_band(fit.band, measured),
+        "The tip temperature that the fit predicts, with the band that follows from the "
+        "covariance of the parameters (model errors not included).",
+    )
+    page.figure(
+        "fit_iv",
+        figures.iv_curves({"model": curve}, measured=measured),
+        "Heater current against lever voltage.",
+    )
+    base = fit.probe.circuit.base_temperature_K
+    page.figure(
+        "fit_temperature_power",
+        figures.temperature_power(curve, measured=measured, base_temperature_K=base),
+        "Tip temperature against the power dissipated in the lever, beside the published law.",
+    )
+
+
+def _add_uncertainty(page: Page, found: Uncertainty) -> None:
+    page.heading("How sure")
+    for text in found.statements():
+        page.text(sentence(text))
+    for caption, columns, rows in uncertainty_tables(found):
+        page.table(columns, rows, caption)
+    fit = found.fit
+    if found.profiles:
+        page.figure(
+            "profiles",
+            figures.profile_curves(list(found.profiles.values())),
+            "Profile likelihoods: how much worse the fit gets with one parameter held and the "
+            "others fitted again, beside the parabola of the standard error.",
+        )
+    if found.posterior is not None:
+        optimum = {name: fit.parameters[name].value for name in fit.names}
+        page.figure(
+            "posterior",
+            figures.posterior_corner(
+                found.posterior, {**optimum, INVERSION: fit.inversion_temperature_K}
+            ),
+            "Posterior of each quantity and pair. Above each histogram: its median and half of "
+            "its 68 % interval.",
+        )
+    if found.band is not None:
+        page.figure(
+            "tip_band_posterior",
+            figures.tip_band(found.band, fit.measurement.dataset(fit.probe.circuit)),
+            "Tip temperature that follows from the posterior, against bias and power (model "
+            "errors not included).",
+        )
+
+
+def levers_page(batch: Batch) -> Page:
+    """Return the report page of many levers, of which one is fitted or more."""
+    levers = compare_levers({name: one.content for name, one in batch.fits.items()})
+    observables = {tuple(one.content["observables"]) for one in batch.fits.values()}
+    page = Page(
+        f"Fits of {levers.sizes['lever']} levers",
+        "Material parameters of levers from their measured "
+        f"{' or '.join(', '.join(names) for names in sorted(observables))}.",
+    )
+    for text in statements(levers):
+        page.text(sentence(text))
+    page.figure(
+        "lever_parameters",
+        figures.lever_parameters(levers),
+        "Each fitted parameter by lever, and the inversion temperature that follows.",
+    )
+    columns, *rows = lever_rows(levers)
+    page.table(columns, rows, "Standard errors in units of the last digits.")
+    noted = [(name, text) for name, one in batch.fits.items() for text in one.content["notes"]]
+    if noted:
+        page.heading("What single fits say")
+        page.table(("lever", "note"), noted)
+    if batch.failures:
+        page.heading("Not fitted")
+        reasons = [(path, str(error)) for path, error in batch.failures.items()]
+        page.table(("file", "reason"), reasons)
+    return page

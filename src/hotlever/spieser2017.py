@@ -1,0 +1,159 @@
+"""Every number that Spieser et al. published and that this package uses, each once.
+
+M. Spieser, C. Rawlings, E. Lörtscher, U. Duerig, A. W. Knoll, "Comprehensive modeling of
+Joule heated cantilever probes", J. Appl. Phys. 121, 174503 (2017), doi:10.1063/1.4981883,
+arXiv:1711.09582: Tables I and II, the operating points, Eq. 12 and k, the Raman thermometer, and
+how the measurements were made. The laws of Eqs. 4 to 11 and 13 are in `hotlever.materials`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hotlever.errors import unknown_name
+from hotlever.materials.material import Material
+
+DOI = "10.1063/1.4981883"
+
+# --- the measurement ----------------------------------------------------------------------------
+
+#: Doping concentration of the wafer (cm⁻³), to which the "n_d fixed" rows are held.
+NOMINAL_DOPING = 3.3e17
+#: The ramp of the bias (V).
+RAMP = np.linspace(1.0, 11.0, 25)
+#: Temperature of the leg ends, and room temperature of the thermometer (K).
+BASE_TEMPERATURE_K = 293.0
+#: Annealing that makes the diffusion length: temperature (K) and time (s).
+ANNEALING_K, ANNEALING_S = 1150.0 + 273.15, 1800.0
+
+# --- what follows from it: knees, Eq. 12, k ------------------------------------------------------
+
+#: Tip temperature of the knee (K), measured by Raman with the linear law.
+KNEE_MEASURED_K = 943.0
+#: Hottest tip (K).
+HOTTEST_TIP_K = 1150.0
+#: Coefficients a (K/mW), b (K with P in mW), m, c (K/mW) and P_th (mW) of the power law, Eq. 12.
+POWER_LAW = {
+    "linear_K_per_mW": 103.0,
+    "nonlinear_K": 11.2,
+    "exponent": 3.1,
+    "hot_K_per_mW": 213.0,
+    "threshold_mW": 2.95,
+}
+#: How closely T_tip is said to follow it (K), in vacuum and, with P/k, in air.
+POWER_LAW_SPREAD_K = 25.0
+#: Power in air over the power in vacuum at the same tip temperature.
+K_IN_AIR = 1.29
+
+# --- the Raman thermometer (section III) ---------------------------------------------------------
+
+#: T − T_RT = constant (K) + slope (K cm) · shift.
+RAMAN_CONSTANT_K, RAMAN_SLOPE_K_CM = 5.0, -41.1
+#: Its error: a constant (K), and a share of T − T_RT.
+RAMAN_ERROR_K, RAMAN_ERROR_SHARE = 5.0, 0.02
+#: Highest temperature of the hot plate (K).
+RAMAN_CALIBRATED_TO_K = 900.0
+#: Shift by stress (cm⁻¹ MPa⁻¹), an order of magnitude, after Ganesan et al. (1970).
+STRESS_SHIFT = 1e-3
+#: Upper bound of the stress in the heater (MPa), from thermo-mechanical simulation.
+HEATER_STRESS_MPA = 20.0
+#: Share of the laser light that the cantilever absorbs.
+ABSORBED_SHARE = 0.10
+
+# --- Tables I and II ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PublishedSet:
+    """One row of a published table."""
+
+    name: str
+    observables: tuple[str, ...]  #: that were fitted, of ``current``, ``reader``, ``tip``
+    material: Material
+    standard_error: Mapping[str, float]  #: by parameter; empty where the table prints none
+    inversion_temperature_K: float | None  #: as printed, where the table has it
+
+
+#: c_κ, Δ (µm), n_d (10¹⁷ cm⁻³), p, a₀ (10⁻⁴ Ω cm) and a₁ (10⁻⁶ Ω cm K⁻¹) as printed.
+_UNITS = {"c_kappa": 1.0, "delta": 1.0, "n_d": 1e17, "p": 1.0, "a0": 1e-4, "a1": 1e-6}
+_VALUES = {
+    "option I": (0.744, 0.681, 4.10, 2.64, 5.87, 1.67),
+    "option II": (0.675, 0.649, 6.87, 2.80, 9.32, 1.08),
+    "option III": (0.686, 0.647, 5.75, 2.65, 9.34, 1.11),
+    "lever 1": (0.686, 0.647, 5.75, 2.65, 9.34, 1.11),
+    "lever 1, n_d fixed": (0.692, 0.763, 3.30, 2.74, 9.30, 1.12),
+    "lever 2": (0.687, 0.719, 3.64, 2.80, 10.2, 1.25),
+    "lever 2, n_d fixed": (0.688, 0.735, 3.30, 2.81, 10.2, 1.26),
+    "lever 3": (0.688, 0.646, 3.50, 2.85, 10.3, 1.26),
+    "lever 3, n_d fixed": (0.690, 0.659, 3.30, 2.86, 10.3, 1.26),
+    "lever 4": (0.613, 0.544, 5.93, 2.86, 10.7, 1.23),
+    "lever 4, n_d fixed": (0.686, 0.716, 3.30, 2.99, 10.7, 1.26),
+}
+#: Of Table I: number of observables fitted, inversion temperature (K), standard errors.
+_OPTIONS = {
+    "option I": (1, 805.0, (0.007, 0.030, 0.62, 0.02, 0.21, 0.10)),
+    "option II": (2, 851.0, (0.008, 0.053, 1.40, 0.02, 0.06, 0.03)),
+    "option III": (3, 831.0, (0.005, 0.051, 0.94, 0.05, 0.15, 0.05)),
+}
+
+
+def _row(name: str) -> PublishedSet:
+    def in_units(printed: tuple[float, ...]) -> dict[str, float]:
+        pairs = zip(_UNITS.items(), printed, strict=bool(printed))
+        return {name: value * unit for (name, unit), value in pairs}
+
+    count, inversion_temperature_K, errors = _OPTIONS.get(name, (3, None, ()))
+    return PublishedSet(
+        name,
+        ("current", "reader", "tip")[:count],
+        Material(**in_units(_VALUES[name])),
+        in_units(errors),
+        inversion_temperature_K,
+    )
+
+
+#: Table I (lever 1, by the observables fitted) and Table II (option III, by lever).
+PUBLISHED: dict[str, PublishedSet] = {name: _row(name) for name in _VALUES}
+
+
+@dataclass(frozen=True)
+class PublishedPoint:
+    """A published state of lever 1 with the option-III parameters (caption of Fig. 7)."""
+
+    name: str
+    lever_V: float
+    current_mA: float
+    tip_K: float | None = None  #: predicted, where it is given
+
+
+#: In the order of rising temperature.
+OPERATING_POINTS = (
+    PublishedPoint("plateau", 1.90, 0.95),
+    PublishedPoint("knee", 3.06, 0.93, 893.0),
+    PublishedPoint("hot", 2.74, 1.43),
+)
+#: Tip temperature of the simulated knee (K).
+[KNEE_PREDICTED_K] = [point.tip_K for point in OPERATING_POINTS if point.tip_K is not None]
+
+
+def published(name: str) -> PublishedSet:
+    """Return a published parameter set, such as ``option III`` or ``lever 1, n_d fixed``.
+
+    Raises
+    ------
+    InputError
+        If there is no such set; the text gives the nearest name.
+
+    Examples
+    --------
+    >>> published("option III").material.c_kappa
+    0.686
+    >>> published("option III").standard_error["c_kappa"]
+    0.005
+    """
+    if name not in PUBLISHED:
+        raise unknown_name("published parameter set", name, PUBLISHED)
+    return PUBLISHED[name]

@@ -1,0 +1,242 @@
+"""What a change of design does: knee, tip temperature and loss to air against any dimension."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from hotlever.datasets import labelled
+from hotlever.errors import ComputationError, unknown_name
+from hotlever.lever import Lever
+from hotlever.materials import PARAMETERS
+from hotlever.materials.doping import diffusion_length
+from hotlever.materials.silicon import inversion_temperature
+from hotlever.probe import MeshOptions, Probe
+from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
+from hotlever.studies import each
+from hotlever.types import Progress
+
+#: What follows from a design; k is the power of the knee in air over that in vacuum.
+QUANTITIES = (
+    *("knee_K", "inversion_K", "knee_mW", "knee_V", "knee_mA"),
+    *("knee_bias_V", "tip_K", "cold_ohm", "k"),
+)
+#: Names beside those of a probe file, and what they are.
+ANNEALING = {
+    "annealing_K": "temperature of the annealing",
+    "annealing_min": "time of the annealing",
+}
+#: What a designer asks for first.
+USUAL = ("heater_length_um", "heater_width_um", "thickness_um", "n_d", *ANNEALING)
+#: Of these, what the table of sensitivities shows.
+_SHOWN = ("knee_K", "knee_mW", "knee_V", "knee_bias_V", "tip_K", "cold_ohm", "k")
+#: Relative change by which a sensitivity is found; for the annealing temperature far smaller.
+_STEP = 0.02
+#: Between the coarse and the default mesh, for differences between levers.
+DESIGN_MESH = MeshOptions(corner=0.1, heater=0.35, lever=0.15, panels=0.6)
+#: √(T_tip − T_base) (K^½) of a lever that is called cold.
+_COLD_U = 0.5
+
+
+@dataclass(frozen=True)
+class Design:
+    """A probe, and how it was annealed.
+
+    Attributes
+    ----------
+    probe : Probe
+    annealing_K, annealing_min : float
+        Of the probe's Δ, so that a change of either scales it.
+    """
+
+    probe: Probe
+    annealing_K: float = ANNEALING_K
+    annealing_min: float = ANNEALING_S / 60.0
+
+    def value(self, name: str) -> float:
+        """Return a value by its name.
+
+        Raises
+        ------
+        InputError
+            If there is none; the text gives the nearest one.
+        """
+        if name in ANNEALING:
+            return float(getattr(self, name))
+        known = {
+            key: entry
+            for section in self.probe.values().values()
+            for key, entry in section.items()
+            if type(entry) in (int, float)
+        }
+        if name not in known:
+            raise unknown_name("name", name, [*known, *ANNEALING])
+        return float(known[name])
+
+    def changed(self, name: str, value: float) -> Probe:
+        """Return the probe with one value changed.
+
+        The diffusion length follows the annealing as Δ = 2 √(D t_a) does, from the probe's Δ at
+        the design's own annealing: the law's ± 40 % in D does not enter.
+        """
+        self.value(name)
+        if name not in ANNEALING:
+            return self.probe.with_(**{name: value})
+        annealing: Any = {name: value}
+        other = replace(self, **annealing)
+        before, after = (
+            diffusion_length(one.annealing_K, 60.0 * one.annealing_min) for one in (self, other)
+        )
+        return self.probe.with_(delta=self.probe.material.delta * float(after / before))
+
+
+def quantities(probe: Probe, power_mW: float, air: bool = True) -> dict[str, float]:
+    """Return the `QUANTITIES` of a probe; k is NaN without air, the knee's where there is none.
+
+    Parameters
+    ----------
+    probe : Probe
+    power_mW : float
+        Power (mW) in vacuum at which the tip temperature is given.
+    air : bool
+        Solve the lever in air too, for k.
+    """
+    lever = Lever(probe.in_medium("vacuum"), DESIGN_MESH)
+    vacuum = lever.branch_past_knee()
+    if vacuum.highest_power_mW < power_mW:
+        vacuum = lever.branch()
+    material, knee = probe.material, vacuum.knee
+    cold = vacuum.point(_COLD_U)
+    found = dict.fromkeys(QUANTITIES, float("nan"))
+    found["inversion_K"] = float(inversion_temperature(material.n_d, material.p))
+    found["tip_K"] = float(vacuum.tip_temperature(power_mW))
+    found["cold_ohm"] = 1000.0 * cold.lever_V / cold.current_mA
+    if knee is None:
+        return found
+    found |= {"knee_K": knee.tip_K, "knee_mW": knee.power_mW}
+    found |= {"knee_V": knee.lever_V, "knee_mA": knee.current_mA}
+    found["knee_bias_V"] = probe.circuit.bias(knee.lever_V, knee.current_mA)
+    in_air = lever.in_medium("air").branch_past_knee().knee if air else None
+    if in_air is not None:
+        found["k"] = in_air.power_mW / knee.power_mW
+    return found
+
+
+def vary(
+    design: Design,
+    name: str,
+    values: Sequence[float] | NDArray[np.float64],
+    *,
+    power_mW: float = 2.0,
+    air: bool = True,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Solve a design for several values of one of its numbers.
+
+    Returns
+    -------
+    xarray.Dataset
+        `QUANTITIES` on the dimension `name`, which is a probe file's key or of `ANNEALING`.
+
+    Raises
+    ------
+    InputError
+        If the name does not exist or a value is impossible.
+    """
+    probes = [design.changed(name, float(value)) for value in values]
+    rows = [quantities(probe, power_mW, air) for probe in each(probes, progress)]
+    return labelled(
+        {key: [row[key] for row in rows] for key in QUANTITIES},
+        name,
+        {name: np.asarray(values, dtype=float)},
+        **{key: json.dumps(section) for key, section in design.probe.values().items()},
+        power_mW=power_mW,
+        base_value=design.value(name),
+    )
+
+
+def sensitivities(
+    design: Design,
+    names: Sequence[str] = USUAL,
+    *,
+    power_mW: float = 2.0,
+    air: bool = True,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Return the quantities of a design, and how each changes with some of its numbers.
+
+    Returns
+    -------
+    xarray.Dataset
+        `QUANTITIES` of the design; and on ``name`` its ``value`` and, as ``by_`` each quantity,
+        the change for one per cent more of it, in K for temperatures and in per cent for
+        everything else; central differences.
+
+    Raises
+    ------
+    ComputationError
+        If the design has no knee.
+    """
+    base = quantities(design.probe, power_mW, air)
+    if np.isnan(base["knee_K"]):
+        raise ComputationError("the design has no knee below the highest temperature of the laws")
+    columns: dict[str, list[float]] = {f"by_{key}": [] for key in QUANTITIES}
+    value = [design.value(name) for name in names]
+    for name, here in each(list(zip(names, value, strict=True)), progress):
+        step = 0.1 * _STEP if name == "annealing_K" else _STEP
+        high, low = (
+            quantities(design.changed(name, here * factor), power_mW, air)
+            for factor in (1.0 + step, 1.0 - step)
+        )
+        for key in QUANTITIES:
+            change = (high[key] - low[key]) / (200.0 * step)
+            change *= 1.0 if key.endswith("_K") else 100.0 / base[key]
+            columns[f"by_{key}"].append(change)
+    alone = {key: ((), number) for key, number in base.items()}
+    return labelled(
+        {**alone, **columns, "value": value}, "name", {"name": list(names)}, power_mW=power_mW
+    )
+
+
+def sensitivity_text(data: xr.Dataset) -> str:
+    """Return the sensitivities of a design, see `sensitivities`, as lines of text."""
+    base = {key: data[key].item() for key in QUANTITIES}
+    shown = [key for key in _SHOWN if np.isfinite(base[key])]
+    width = max(map(len, data.name.values))
+    lines = [
+        f"knee at {base['knee_K']:.0f} K, {base['knee_V']:.3f} V, {base['knee_mA']:.3f} mA, "
+        f"{base['knee_mW']:.3f} mW (bias {base['knee_bias_V']:.2f} V), inversion temperature "
+        f"{base['inversion_K']:.0f} K; tip at {base['tip_K']:.0f} K with "
+        f"{data.attrs['power_mW']:g} mW; {base['cold_ohm']:.0f} ohm when cold"
+        + ("" if np.isnan(base["k"]) else f"; k = {base['k']:.3f} in air"),
+        "change for 1 % more of each (K for temperatures, % for the others):",
+        "",
+        "  ".join([" " * width, f"{'at':>9}", *(f"{key:>11}" for key in shown)]),
+    ]
+    for name in data.name.values:
+        row = data.sel(name=name)
+        cells = [f"{row[f'by_{key}'].item():+11.3f}" for key in shown]
+        lines.append("  ".join([f"{name:<{width}}", f"{row.value.item():9.4g}", *cells]))
+    return "\n".join(lines)
+
+
+def design_csv(data: xr.Dataset) -> str:
+    """Return a sweep of a design as CSV, one row per value; empty where nothing is known."""
+    return data[list(QUANTITIES)].to_dataframe().to_csv(float_format="%.6g")
+
+
+def label_of(name: str) -> str:
+    """Return the label of an axis along which a number of a design runs."""
+    if name in ANNEALING:
+        return f"{ANNEALING[name]} ({name.rpartition('_')[2]})"
+    if name in PARAMETERS:
+        known = PARAMETERS[name]
+        return known.symbol if known.unit == "1" else f"{known.symbol} ({known.unit})"
+    words, _, unit = name.rpartition("_")
+    return f"{words.replace('_', ' ')} ({unit.replace('um', 'µm').replace('ohm', 'Ω')})"

@@ -1,0 +1,100 @@
+"""Figures are made of datasets, say what they show, and are written whole."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever import figures
+from hotlever.errors import InputError
+from hotlever.figures import save_figure
+from hotlever.fitting import Measurement
+from hotlever.lever.fields import FieldMapper, heater_profile
+from hotlever.probe import Probe
+from hotlever.report.page import Page
+
+
+@pytest.fixture(scope="module")
+def made(coarse):
+    sweep = coarse.sweep(np.linspace(1, 11, 9))
+    states = coarse.solve([7.2, 8.3])
+    profiles = {
+        name: heater_profile(state) for name, state in zip(("plateau", "knee"), states, strict=True)
+    }
+    layout = coarse.space.mesh.layout
+    data = Measurement.of_sweep(sweep).dataset(coarse.circuit)
+    data = data.assign(current_mA=1.01 * data.current_mA, tip_error_K=5.0 + 0 * data.tip_K)
+    return {
+        "probe": figures.probe_drawing(layout),
+        "u_shape": figures.probe_drawing(Probe.u_shape().layout()),
+        "overview": figures.sweep_overview(sweep),
+        "iv": figures.iv_curves({"model": sweep}, {"model": coarse.knee()}, data),
+        "temperature_power": figures.temperature_power(sweep, measured=data),
+        "resistances": figures.resistances(sweep),
+        "doping": figures.doping_profile(profiles["knee"]),
+        "profiles": figures.heater_profiles(profiles),
+        "maps": figures.field_maps(FieldMapper(coarse).map(states[1]), layout),
+        "fit": figures.data_and_model(data, sweep, ("current", "tip")),
+        "correlation": figures.correlation_matrix(
+            ["c_kappa", "p"], np.array([[1, -0.9], [-0.9, 1]])
+        ),
+        "band": figures.tip_band(sweep.assign(tip_stderr_K=0.01 * sweep.tip_K), data),
+    }
+
+
+NAMES = ["probe", "u_shape", "overview", "iv", "temperature_power", "resistances"]
+NAMES += ["doping", "profiles", "maps", "fit", "correlation", "band"]
+
+
+def texts(figure):
+    return " ".join(text.get_text() for text in figure.findobj(lambda a: hasattr(a, "get_text")))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_axis_carries_a_unit(made, name):
+    for axes in made[name].axes:
+        labels = [axes.get_xlabel(), axes.get_ylabel()]
+        # the correlation matrix carries symbols instead
+        assert any(labels) or (name == "correlation" and axes.get_xticklabels())
+        for label in filter(None, labels):
+            assert "(" in label, (name, label)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_figures_are_written_in_every_type(made, name, suffix, tmp_path):
+    path = tmp_path / f"{name}{suffix}"
+    save_figure(made[name], path)
+    assert path.stat().st_size > 5000
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_probe_drawing_marks_all_named_parts(made):
+    text = texts(made["probe"])
+    for word in ("supply", "ground", "reader", "heater", "tip", "high-doped"):
+        assert word in text
+
+
+def test_iv_curve_names_the_knee(made):
+    assert "knee" in texts(made["iv"])
+
+
+def test_unknown_figure_types_are_refused(made, tmp_path):
+    with pytest.raises(InputError, match=r"unknown figure type '.bmp'"):
+        save_figure(made["iv"], tmp_path / "a.bmp")
+    with pytest.raises(InputError, match="does not exist"):
+        save_figure(made["iv"], tmp_path / "no" / "a.png")
+
+
+def test_page_is_self_contained(made, tmp_path):
+    page = Page("Title", "Summary & more")
+    page.heading("Section")
+    page.text("1 < 2")
+    page.table(("a", "b"), [("1", "2")], "caption")
+    page.figure("iv", made["iv"], "what it shows")
+    written = page.write(tmp_path / "new" / "folder")
+    html = written.read_text(encoding="utf-8")
+    assert "1 &lt; 2" in html
+    assert "data:image/png;base64," in html
+    assert "http" not in html
+    assert (written.parent / "iv.pdf").exists()

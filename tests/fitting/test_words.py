@@ -1,0 +1,88 @@
+"""Tables of fits in words, from made-up fits and datasets."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from hotlever.fitting.levers import compare_levers
+from hotlever.fitting.uncertainty import Uncertainty
+from hotlever.fitting.words import lever_rows, levers_text, uncertainty_text
+from hotlever.materials import PARAMETERS
+
+
+def levers(count: int, held: tuple[str, ...] = ()):
+    rng = np.random.default_rng(0)
+    return compare_levers(
+        {
+            f"lever-{number}": {
+                "parameters": {
+                    name: {
+                        "value": known.scale * (2 + 0.1 * rng.normal()),
+                        "stderr": None if name in held else 0.05 * known.scale,
+                    }
+                    for name, known in PARAMETERS.items()
+                },
+                "inversion_temperature_K": 830.0 + 5 * rng.normal(),
+                "inversion_temperature_stderr_K": 3.0,
+            }
+            for number in range(count)
+        }
+    )
+
+
+def test_table_has_units_and_ends_with_mean_and_scatter():
+    columns, *rows = lever_rows(levers(3))
+    assert columns == [
+        "lever",
+        "c_kappa",
+        "delta (µm)",
+        "n_d (1e17 cm⁻³)",
+        "p",
+        "a0 (1e-04 Ω cm)",
+        "a1 (1e-06 Ω cm K⁻¹)",
+        "T_i (K)",
+    ]
+    assert [row[0] for row in rows] == [
+        "lever-0",
+        "lever-1",
+        "lever-2",
+        "mean",
+        "scatter between levers",
+        "mean standard error",
+        "scatter, relative",
+    ]
+    assert rows[5][1] == "0.05"
+    assert rows[5][3] == "0.05"
+    text = levers_text(levers(3)).splitlines()
+    assert set(text[4]) == {"-"}
+
+
+def found() -> Uncertainty:
+    profile = xr.Dataset(
+        {
+            "delta_chi_square": ("point", [4.0, 0.0, 1.0]),
+            "parabola": ("point", [4.0, 0.0, 1.0]),
+            "interval": (("level", "side"), [[4.0e17, 5.0e17], [3.0e17, np.nan]]),
+        },
+        coords={"value": ("point", [3e17, 4.5e17, 5e17]), "level": [0.68, 0.95]},
+        attrs={"quantity": "n_d", "optimum": 4.5e17, "notes": "n_d: open on the upper side"},
+    )
+    return Uncertainty(None, None, None, {"n_d": profile})  # type: ignore[arg-type]
+
+
+def test_intervals_are_in_the_unit_of_the_table_and_open_ones_are_said():
+    first, second = uncertainty_text(found()).splitlines()
+    assert first.split() == [
+        "profile",
+        "likelihood",
+        "68",
+        "%",
+        "from",
+        "to",
+        "95",
+        "%",
+        "from",
+        "to",
+    ]
+    assert second.split() == ["n_d", "(1e17", "cm⁻³)", "4", "5", "3", "open"]

@@ -1,0 +1,213 @@
+"""A lever as one curve by tip temperature, and how a circuit reads it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever.errors import BranchEndError, ComputationError, InputError
+from hotlever.lever import Branch, Lever
+from hotlever.lever.following import Follower
+
+
+def with_series(lever: Lever, ohm: float) -> Lever:
+    return lever.with_probe(lever.probe.with_(series_resistance_ohm=ohm))
+
+
+# --- the curve between the states -----------------------------------------------------------------
+
+
+def test_what_is_read_between_states_is_what_is_solved_there(lever):
+    """The reading of a sweep against states solved by themselves."""
+    bias = [0.3, 1.7, 5.0, 7.3, 7.9, 8.268, 8.4, 9.7, 10.9]
+    read, solved = lever.sweep(bias), lever.dataset(lever.solve(bias))
+    np.testing.assert_allclose(read.current_mA, solved.current_mA, rtol=2e-5)
+    np.testing.assert_allclose(read.lever_V, solved.lever_V, rtol=2e-5)
+    np.testing.assert_allclose(read.reader_V, solved.reader_V, rtol=2e-5)
+    np.testing.assert_allclose(read.tip_K, solved.tip_K, rtol=0, atol=0.02)
+    np.testing.assert_allclose(read.max_K, solved.max_K, rtol=0, atol=0.05)
+    np.testing.assert_allclose(read.end_heat_mW, solved.end_heat_mW, rtol=5e-5, atol=1e-6)
+    np.testing.assert_allclose(solved.bias_V, bias, rtol=1e-10)
+
+
+def test_the_curve_converges_with_the_spacing_of_the_states(coarse):
+    """Every second state is left out: the error grows as the sixth power, or little less."""
+    branch = coarse.branch(1000.0)
+    some = np.r_[0, 1 : branch.u.size : 2]
+    from hotlever.lever.curve import smooth_curve
+
+    sparse = smooth_curve(branch.u[some], branch.values[some], branch.value_slopes[some])
+    middle = branch.u[3:-1:2]
+    dense = Follower(coarse.equations, branch).until(lambda _: True).curve(middle)
+    away = np.abs(sparse(middle) - dense)[:, 1] / dense[:, 1]
+    assert away.max() < 3e-3
+
+
+def test_fields_between_states_nearly_solve_the_equations(coarse):
+    branch = coarse.branch(1000.0)
+    u = 0.5 * (branch.u[2:-1] + branch.u[3:])
+    x = branch.states(u)
+    rest = branch.equations.balance(x)
+    rest[-1] = 0.0
+    away = branch.equations.factorised(x).solve(rest, np.arange(u.size))
+    hot = branch.equations.space.is_temperature
+    assert np.abs(away[hot]).max() < 0.1
+    assert np.abs(away[~hot]).max() < 1e-3
+
+
+def test_power_and_temperature_are_inverse(reference):
+    tip = np.array([293.5, 400.0, 700.0, 899.0, 950.0, 1200.0])
+    np.testing.assert_allclose(reference.tip_temperature(reference.power(tip)), tip, atol=0.02)
+    power, step = np.array([0.5, 2.0, 2.9, 3.8]), 1e-4
+    by_difference = (
+        reference.tip_temperature(power + step) - reference.tip_temperature(power - step)
+    ) / (2 * step)
+    np.testing.assert_allclose(reference.tip_slope(power), by_difference, rtol=1e-5)
+
+
+def test_the_bias_of_a_temperature_heats_to_it(lever, reference):
+    tip = np.array([350.0, 600.0, 1100.0])
+    sweep = lever.sweep(reference.bias(tip, lever.circuit))
+    np.testing.assert_allclose(sweep.tip_K, tip, atol=1e-6)
+
+
+def test_nothing_is_said_beyond_the_hottest_state_or_below_the_base(reference):
+    assert np.isnan(reference.tip_temperature(reference.highest_power_mW + 0.1))
+    assert np.isnan(reference.power([280.0, reference.hottest_K + 1.0])).all()
+    assert reference.power(293.0) == 0.0
+
+
+def test_a_branch_goes_on_where_it_was(coarse):
+    short = Follower(coarse.equations).until(lambda branch: branch.u[-1] ** 2 > 300)
+    longer = Follower(coarse.equations, short).until(lambda branch: branch.u[-1] ** 2 > 700)
+    whole = Follower(coarse.equations).until(lambda branch: branch.u[-1] ** 2 > 700)
+    np.testing.assert_array_equal(longer.u[: short.u.size], short.u)
+    u = np.linspace(0.0, min(longer.u[-1], whole.u[-1]), 50)
+    np.testing.assert_allclose(longer.curve(u), whole.curve(u), rtol=1e-4, atol=1e-6)
+
+
+# --- the knee -------------------------------------------------------------------------------------
+
+
+def test_the_knee_is_where_the_lever_voltage_is_highest(lever, reference):
+    knee = lever.knee()
+    bias = knee.bias_V.item() + np.array([-0.02, 0.0, 0.02])
+    around = lever.sweep(bias)
+    assert around.lever_V.values[1] == pytest.approx(knee.lever_V.item(), abs=1e-7)
+    assert around.lever_V.values.argmax() == 1
+    # one knee, wherever it is read
+    assert reference.knee.tip_K == pytest.approx(knee.tip_K.item(), abs=1e-9)
+    assert reference.knee.power_mW == pytest.approx(knee.power_mW.item(), rel=1e-12)
+
+
+def test_the_knee_does_not_depend_on_the_circuit(coarse):
+    knees = [with_series(coarse, ohm).knee() for ohm in (0.0, 5600.0, 20000.0)]
+    for name in ("lever_V", "current_mA", "tip_K"):
+        values = [knee[name].item() for knee in knees]
+        np.testing.assert_allclose(values, values[0], rtol=1e-9)
+
+
+def test_a_lever_too_cold_has_no_knee_yet(coarse):
+    branch = Follower(coarse.equations).until(lambda branch: branch.u[-1] ** 2 > 400)
+    assert branch.knee is None
+
+
+# --- in circuits ----------------------------------------------------------------------------------
+
+
+def test_without_a_series_resistor_the_ramp_ends_at_the_knee(coarse):
+    knee = coarse.knee()
+    with pytest.raises(BranchEndError, match="branch of a slow bias ramp ends") as caught:
+        with_series(coarse, 0.0).sweep(np.linspace(0.5, 5, 10))
+    error = caught.value
+    assert error.bias_reached == pytest.approx(knee.lever_V.item(), abs=1e-9)
+    assert error.partial.bias_V.values.tolist() == [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
+    assert error.partial.tip_K.values[-1] < knee.tip_K.item()
+    with pytest.raises(BranchEndError) as solved:
+        with_series(coarse, 0.0).solve(np.linspace(0.5, 5, 10))
+    assert len(solved.value.partial) == 6
+
+
+def test_what_was_reached_before_a_failure_is_kept(coarse, monkeypatch):
+    short = Follower(coarse.equations).until(lambda branch: branch.u[-1] ** 2 > 300)
+
+    def fails(*_):
+        raise ComputationError("no state was found", partial=short)
+
+    monkeypatch.setattr(Lever, "branch_to", fails)
+    with pytest.raises(ComputationError, match="no state was found") as solved:
+        coarse.solve([1.0, 4.0, 9.0])
+    assert [round(state.bias_V, 9) for state in solved.value.partial] == [1.0, 4.0]
+    with pytest.raises(ComputationError, match="no state was found") as read:
+        coarse.sweep([9.0, 1.0, 4.0])
+    assert read.value.partial.bias_V.values.tolist() == [1.0, 4.0]
+
+
+def test_the_end_with_no_resistance_is_the_limit_of_small_ones(coarse):
+    ends = []
+    for ohm in (0.0, 100.0, 200.0):
+        with pytest.raises(BranchEndError) as caught:
+            with_series(coarse, ohm).sweep([6.0])
+        ends.append(caught.value.bias_reached)
+    assert ends[1] - ends[0] == pytest.approx(ends[2] - ends[1], rel=0.05)
+
+
+def test_a_large_resistor_makes_the_lever_jump_and_the_sweep_says_so(coarse):
+    lever = with_series(coarse, 30000.0)
+    sweep = lever.sweep(np.linspace(25, 36, 23))
+    assert "jumps from a tip at" in sweep.attrs["notes"]
+    rise = np.diff(sweep.tip_K)
+    assert rise.max() > 80  # the jump
+    assert (rise > 0).all()
+    np.testing.assert_allclose(sweep.lever_V + 30.0 * sweep.current_mA, sweep.bias_V, rtol=1e-9)
+
+
+def test_without_a_jump_nothing_is_noted(coarse):
+    assert coarse.sweep([1.0, 5.0]).attrs["notes"] == ""
+
+
+def test_other_biases_asked_for_do_not_change_a_state(coarse):
+    alone = coarse.with_probe(coarse.probe).sweep([9.0])
+    among = coarse.with_probe(coarse.probe).sweep(np.linspace(0.5, 9.0, 60)).isel(bias=-1)
+    assert alone.tip_K.item() == pytest.approx(among.tip_K.item(), abs=1e-9)
+
+
+def test_biases_may_come_in_any_order_and_twice(coarse):
+    sweep = coarse.sweep([5.0, 1.0, 5.0])
+    assert sweep.bias_V.values.tolist() == [5.0, 1.0, 5.0]
+    assert sweep.tip_K[0] == sweep.tip_K[2] > sweep.tip_K[1]
+
+
+def test_zero_bias_is_the_base_temperature(coarse):
+    sweep = coarse.sweep([0.0])
+    assert sweep.tip_K.item() == 293.0
+    assert sweep.current_mA.item() == 0.0
+    assert np.isnan(sweep.heater_ohm.item())
+    (state,) = coarse.solve([0.0])
+    assert (state.tip_K, state.current_mA, state.bias_V) == (293.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("bias", [[-1.0], [np.nan], [np.inf], []])
+def test_impossible_biases_are_refused(coarse, bias):
+    with pytest.raises(InputError, match="expected"):
+        coarse.sweep(bias)
+
+
+def test_a_melting_lever_ends_the_ramp(coarse):
+    with pytest.raises(BranchEndError, match="silicon melts") as caught:
+        coarse.sweep([10.0, 40.0])
+    assert caught.value.partial.bias_V.values.tolist() == [10.0]
+    assert 11.0 < caught.value.bias_reached < 40.0
+
+
+def test_extrapolated_laws_are_noted(coarse):
+    notes = coarse.sweep([13.0]).attrs["notes"]
+    assert "above 1300 K, where the material laws are extrapolated" in notes
+
+
+def test_a_thousand_biases_cost_no_more_states(coarse):
+    few, many = (coarse.with_probe(coarse.probe) for _ in range(2))
+    few.sweep(np.linspace(1, 11, 25))
+    many.sweep(np.linspace(1, 11, 1000))
+    states: list[Branch] = [lever.branch_to(11.0) for lever in (few, many)]
+    assert states[0].u.size == states[1].u.size < 25

@@ -1,0 +1,225 @@
+"""What must hold of every lever: flat, solid and reduced, in vacuum and in air.
+
+The same cases run through all of them: ordinary circuits, none, one so small that the ramp ends at
+the fold, one so large that it jumps; no power; a lever without a reader.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from taylor import remainder_orders
+
+from hotlever.errors import BranchEndError
+from hotlever.fitting.models import ForwardModel
+from hotlever.lever import Branch, Lever
+from hotlever.lever.balances import BALANCES, balance_columns
+from hotlever.lever.branch import Reach
+from hotlever.lever.lever import COARSE
+from hotlever.lever.reduced import ReducedLever
+from hotlever.lever.reduction import cached_reduction
+from hotlever.lever.sensitivities import Linearised, by_material
+from hotlever.lever.space import LEVER, TIP
+from hotlever.lever3d import SolidLever
+from hotlever.materials import PARAMETERS
+from hotlever.probe import Circuit, Probe
+from hotlever.probe.solid import SolidMeshOptions
+from hotlever.spieser2017 import published
+
+MATERIAL = published("option III").material
+#: Biases (V) of a ramp that reaches the hot branch, and the circuit it runs in.
+RAMP = np.array([0.0, 0.5, 4.0, 7.5, 8.3, 9.5])
+NORMAL = Circuit()
+
+
+@dataclass(frozen=True)
+class One:
+    """One kind of lever, and how far its ramps go."""
+
+    lever: Lever | ReducedLever
+    hottest_V: float
+
+    def branch(self, circuit: Circuit = NORMAL, bias: float | None = None) -> Branch:
+        """Its branch with option III until a bias."""
+        bias = self.hottest_V if bias is None else bias
+        return self.lever.linearised(MATERIAL, Reach(circuit, bias)).branch
+
+
+SOLID = SolidMeshOptions(refinement=0.4, grading=0.7)
+KINDS: dict[str, Callable[[pytest.FixtureRequest], One]] = {
+    "flat": lambda request: One(request.getfixturevalue("coarse"), 9.5),
+    "flat, in air": lambda request: One(request.getfixturevalue("in_air"), 9.5),
+    "reduced": lambda request: One(request.getfixturevalue("reduced"), 9.5),
+    "reduced, in air": lambda request: One(request.getfixturevalue("reduced_in_air"), 9.5),
+    "no reader": lambda _: One(Lever(Probe.u_shape(), COARSE), 9.5),
+    "no reader, reduced": lambda _: One(cached_reduction(Lever(Probe.u_shape(), COARSE)), 9.5),
+    "solid": lambda _: One(SolidLever(Probe.reference(), SOLID), 4.0),
+}
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def one(request) -> One:
+    return KINDS[request.param](request)
+
+
+@pytest.fixture(scope="module")
+def branch(one) -> Branch:
+    return one.branch()
+
+
+def hot(branch: Branch) -> np.ndarray:
+    """States with power."""
+    return branch.x[:, 1:]
+
+
+def test_states_solve_the_equations_at_their_tip_temperatures(branch):
+    equations, x = branch.equations, hot(branch)
+    rest = equations.balance(x)
+    current = rest[-1].copy()
+    np.testing.assert_allclose(equations.space.tip_rise(x), branch.u[1:] ** 2, rtol=1e-7)
+    # one step of Newton's method would move no state by a millikelvin
+    rest[-1] = 0.0
+    step = equations.factorised(x).solve(rest, np.arange(x.shape[1])) / equations.scale
+    assert np.abs(step).max() < 2e-3
+    np.testing.assert_allclose(current, branch.values[1:, 1])
+
+
+def test_charge_and_energy_are_conserved(one, branch):
+    if isinstance(one.lever, ReducedLever):
+        pytest.skip("its modes are no test functions of the terminals")
+    columns = dict(zip(BALANCES, balance_columns(branch.equations, hot(branch)).T, strict=True))
+    power = branch.values[1:, 0] * branch.values[1:, 1]
+    np.testing.assert_allclose(columns["ground_current_mA"], branch.values[1:, 1], rtol=1e-7)
+    np.testing.assert_allclose(columns["end_heat_mW"] + columns["air_heat_mW"], power, rtol=1e-6)
+
+
+def test_the_jacobian_passes_a_taylor_test(branch):
+    x = hot(branch)[:, -1:]
+    orders = remainder_orders(branch.equations, x, seed=1, steps=(0.2, 0.1, 0.05))
+    np.testing.assert_allclose(orders, 2.0, atol=0.1)
+
+
+@pytest.mark.parametrize("pin", [TIP, LEVER], ids=["tip", "lever voltage"])
+def test_linear_systems_are_solved(branch, pin):
+    equations, x = branch.equations, hot(branch)[:, -2:]
+    wanted = np.random.default_rng(0).normal(size=(*x.shape, 3)) * equations.scale[..., None]
+    right = equations.balance_change(x, wanted)
+    right[-1] = pin.of(equations.space, wanted)
+    found = equations.solve_linear(x, equations.factorised(x, pin), right, pin)
+    np.testing.assert_allclose(
+        found / equations.scale[..., None], wanted / equations.scale[..., None], atol=1e-4
+    )
+
+
+def test_slopes_along_the_branch_are_those_of_the_curve(branch):
+    """Half way between two states the curve meets a state that is solved by itself."""
+    u = branch.u[-3:-1].mean()
+    guess = branch.states(np.array([u]))
+    equations = branch.equations
+    residual = equations.balance(guess)
+    residual[-1] = 0.0
+    away = equations.factorised(guess).solve(residual, np.array([0])) / equations.scale
+    assert np.abs(away).max() < 0.05
+
+
+@pytest.fixture(scope="module")
+def start(one) -> Linearised:
+    return one.lever.linearised(MATERIAL, Reach(NORMAL, 4.0))
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_derivatives_by_the_material_have_taylor_order_two(one, start, name):
+    """At fixed tip temperatures, of everything an instrument shows."""
+    if isinstance(one.lever, SolidLever) and name != "c_kappa":
+        pytest.skip("one parameter is enough where every solve takes seconds")
+    reach = Reach(NORMAL, 4.0)
+    u = start.branch.u[1:]
+    value, rest = getattr(MATERIAL, name), []
+    _, slope = by_material(start.branch.equations, hot(start.branch), names=[name])
+    for step in (0.02, 0.01):
+        moved = MATERIAL.model_copy(update={name: value * (1 + step)})
+        other = one.lever.linearised(moved, reach, start).branch
+        np.testing.assert_allclose(other.u[1 : u.size + 1], u)
+        change = (other.values[: u.size + 1] - start.branch.values)[1:, :3].T
+        rest.append(np.abs(change - step * value * slope[..., 0].T))
+    size = np.abs(start.branch.values[1:, :3].T)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        orders = np.log2(rest[0] / rest[1])
+    # a straight line leaves no remainder to measure an order of
+    linear = ~(rest[0] > 2e-6 * size)
+    assert orders[~linear].min(initial=2.0) > 1.7
+
+
+# --- in circuits ------------------------------------------------------------------------------
+
+
+def ohm(value: float) -> Circuit:
+    return Circuit(series_resistance_ohm=value)
+
+
+def test_a_ramp_takes_states_of_its_biases_and_none_at_zero(one, branch):
+    bias = RAMP[one.hottest_V >= RAMP]
+    reading = branch.read(NORMAL, bias)
+    shown = branch.shown(reading.u)
+    assert reading.u[0] == 0.0
+    assert reading.jumps == []
+    np.testing.assert_allclose(
+        NORMAL.bias(shown["lever_V"], shown["current_mA"]), bias, rtol=1e-12, atol=1e-12
+    )
+    assert np.all(np.diff(reading.u) > 0)
+
+
+@pytest.mark.parametrize("resistance", [0.0, 50.0])
+def test_with_little_resistance_the_ramp_ends_at_the_fold_or_jumps_there(one, resistance):
+    """In air the lever voltage rises again beyond the fold, so that a ramp jumps and goes on."""
+    if one.hottest_V < 9.0:
+        pytest.skip("its ramps do not reach the knee")
+    circuit = ohm(resistance)
+    branch = one.branch(circuit, 20.0)
+    reading = branch.read(circuit, np.array([0.0, 1.0, 2.0, 20.0]))
+    assert np.isfinite(reading.u[:3]).all()
+    assert np.isnan(reading.u[3])
+    shown = branch.shown(np.linspace(0.0, branch.end_u, 4001))
+    bias = circuit.bias(shown["lever_V"], shown["current_mA"])
+    ended = branch.ended(reading)
+    assert isinstance(ended, BranchEndError)
+    assert ended.bias_reached == pytest.approx(bias.max(), abs=1e-5)
+    assert f"at a bias of {bias.max():.4f} V" in str(ended)
+    if reading.jumps:
+        fold = bias[np.flatnonzero(np.diff(bias) < 0)[0]]
+        assert reading.jumps[0][0] == pytest.approx(fold, abs=1e-5)
+    assert ("silicon melts" in str(ended)) == bool(reading.jumps)
+
+
+@pytest.mark.parametrize("resistance", [0.0, 50.0])
+def test_a_model_of_it_refuses_a_bias_beyond_the_fold_in_one_line(one, resistance):
+    if one.hottest_V < 9.0:
+        pytest.skip("its ramps do not reach the knee")
+    model = ForwardModel(one.lever, None, ohm(resistance), np.array([0.0, 1.0, 20.0]))
+    with pytest.raises(BranchEndError, match=r"no steady state|silicon melts"):
+        model.predict(MATERIAL)
+    # with biases below it all is well, the row at zero bias included
+    values = (
+        ForwardModel(one.lever, None, ohm(resistance), np.array([1.0, 0.0]))
+        .predict(MATERIAL)
+        .values
+    )
+    assert values[0, 1] == 0.0
+    assert values[2].tolist()[1] == pytest.approx(293.0)
+    assert values[2, 0] > 293.0
+
+
+def test_with_a_large_resistance_the_ramp_jumps(one):
+    if one.hottest_V < 9.0:
+        pytest.skip("its ramps do not reach the knee")
+    circuit = ohm(30e3)
+    branch = one.branch(circuit, 40.0)
+    bias = np.linspace(25.0, 40.0, 61)
+    reading = branch.read(circuit, bias)
+    ((fold, tip),) = reading.jumps
+    assert "jumps from a tip at" in reading.notes(bias)[0]
+    before, after = reading.u[bias <= fold].max(), reading.u[bias > fold].min()
+    assert before**2 <= tip - branch.base_temperature_K < after**2 - 50.0

@@ -1,0 +1,220 @@
+"""However a command ends: one line says how, outputs are whole, nothing is left behind."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from hotlever.cli import commands, main
+from hotlever.cli.output import note, progress
+
+COMMAND = [sys.executable, "-c", "from hotlever.cli import main; main()"]
+LONG = ("sweep", "--bias", "1:11:10000", "-o", "a.csv")
+
+
+def start(folder: Path, *arguments: str, **options) -> subprocess.Popen:
+    return subprocess.Popen(
+        [*COMMAND, *arguments], cwd=folder, stderr=subprocess.PIPE, text=True, **options
+    )
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_stopped_by_a_signal(tmp_path, number):
+    (tmp_path / "a.csv").write_text("mine")
+    with start(tmp_path, *LONG, stdout=subprocess.PIPE) as process:
+        time.sleep(1.0)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (1, "", "hotlever: stopped by the user\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+    assert (tmp_path / "a.csv").read_text() == "mine"
+
+
+def test_an_ignored_signal_stays_ignored(tmp_path):
+    with start(
+        tmp_path,
+        *("probe", "show"),
+        stdout=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN),
+    ) as process:
+        time.sleep(0.5)
+        process.send_signal(signal.SIGHUP)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (0, "")
+    assert "three-leg" in out
+
+
+def test_a_full_standard_output_is_said_after_the_files_are_written(tmp_path):
+    arguments = ("probe", "show", "--plot", "a.svg")
+    with open("/dev/full", "w") as full, start(tmp_path, *arguments, stdout=full) as process:
+        err = process.communicate(timeout=60)[1]
+    assert process.returncode == 1
+    assert err == "hotlever: standard output: cannot be written (No space left on device)\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.svg"]
+
+
+def test_a_reader_that_has_gone_is_told_nothing(tmp_path):
+    reading, writing = os.pipe()
+    os.close(reading)
+    arguments = ("probe", "show", "--plot", "a.svg")
+    with start(tmp_path, *arguments, stdout=writing) as process:
+        os.close(writing)
+        err = process.communicate(timeout=60)[1]
+    assert (process.returncode, err) == (1, "")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.svg"]
+
+
+def test_nobody_reads_the_notes_and_the_command_goes_on(monkeypatch):
+    class Gone(io.StringIO):
+        def write(self, text: str) -> int:
+            raise BrokenPipeError
+
+    monkeypatch.setattr("sys.stderr", Gone())
+    note("the file says so")
+    with progress("work") as update:
+        update(1, 2)
+    note("and again")
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "ascii"])
+def test_a_terminal_of_few_characters_gets_escapes(tmp_path, encoding):
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    done = subprocess.run([*COMMAND, "probe", "new"], capture_output=True, env=environment)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert rb"c_\u03ba" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (ZeroDivisionError("some bug"), "internal error: ZeroDivisionError: some bug"),
+        (MemoryError(), "internal error: out of memory"),
+        (RecursionError("too deep"), "internal error: RecursionError: too deep"),
+    ],
+)
+def test_what_escapes_is_one_line_that_names_a_log(monkeypatch, tmp_path, run, error, words):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+    def fails(*_):
+        raise error
+
+    monkeypatch.setattr("hotlever.cli.probe.load_probe", fails)
+    status, out, err = run("probe", "show")
+    assert (status, out, len(err.splitlines())) == (1, "", 1)
+    assert words in err
+    [log] = (tmp_path / "state").rglob("*.log")
+    assert str(log) in err
+    assert f"in fails\n    raise error\n{type(error).__name__}" in log.read_text()
+    assert "['hotlever', 'probe', 'show']" in log.read_text()
+
+
+def test_the_log_goes_where_it_can(monkeypatch, tmp_path, run):
+    (tmp_path / "state").write_text("a file")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("hotlever.cli.probe.load_probe", lambda _: 1 / 0)
+    status, _, err = run("probe", "show")
+    assert status == 1
+    [log] = tmp_path.glob("hotlever-*.log")
+    assert str(log) in err
+
+
+def test_control_characters_do_not_reach_the_terminal(run):
+    status, _, err = run("probe", "show", "\x1b[2Jred\nline\r.toml")
+    assert status == 2
+    assert err == "hotlever: [2Jred line .toml: no such file\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("sweep", "--bias", "1:2:2", "--bias", "1:3:3"), "--bias: given twice"),
+        (("sweep", "-o", "a.csv", "--output", "b.csv"), "--output: given twice"),
+        (("design", "--air", "--no-air"), "--air: given twice"),
+        (("sweep", "--set", "p=2", "--set", "p=3"), "--set p: given twice"),
+        (("fit", "a.csv", "--fix", "p", "--fix", "p=3"), "--fix p: given twice"),
+        (("sweep", "--bias", "0:11:100000"), "COUNT is '100000', expected .* from 1 to 10000"),
+        (("sweep", "--bias", "0:11:1e8"), "COUNT is '1e8', expected"),
+        (("sweep", "--bias", "0:11:" + "9" * 9000), "COUNT is '9999.*, expected"),
+        (("sweep", "--bias", "0:1e999:2"), "found '1e999', expected a number"),
+        (("sweep", "--bias", "1e-300:1:2"), "expected biases of 0, or from 1e-06 to 10000 V"),
+        (("sweep", "--bias", "0:1e300:3"), "expected biases of 0, or from 1e-06 to 10000 V"),
+        (("sweep", "--set", "gap_um=inf"), "found 'inf', expected a number"),
+        (("sweep", "--set", "gap_um=1e30"), "gap_um = 1e[+]30: .* less than or equal to 1000"),
+        (("design", "--vary", "gap_um=2:3:99999"), "expected a whole number from 1 to 1000"),
+        (("design", "--vary", "gap_um=2:3:1"), "expected two values or more"),
+        (("design", "--vary", "gap_um"), "expected NAME=START:STOP:COUNT"),
+        (("design", "--power", "inf"), "--power inf: expected a number from 0.001 to 1000"),
+        (("design", "--annealing-K", "1e9"), "--annealing-K 1e[+]09: expected a number"),
+        (("fit", "a.csv", "--samples", "10000000"), "--samples 1e[+]07: expected a number from 1"),
+        (("fit", "a.csv", "--processes", "100000"), "--processes 100000: expected a number from 1"),
+    ],
+)
+def test_numbers_beyond_reason_and_options_given_twice(run, tmp_path, arguments, message):
+    status, out, err = run(*arguments)
+    assert (status, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert re.search(message, err), err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("sweep", "p.toml", "-o", "a.csv", "--plot", "gone/a.svg"), "the folder gone does not"),
+        (("sweep", "p.toml", "-o", "a.csv", "--fields", "p.toml"), "cannot be made a folder"),
+        (("sweep", "p.toml", "-o", "a.csv", "--fields", "a.csv"), "cannot be made a folder"),
+        (("sweep", "p.toml", "-o", "link.csv"), "link.csv: is an input of this command"),
+        (("sweep", "p.toml", "-o", "pipe.csv"), "is a pipe, expected a file name to write to"),
+        (("probe", "show", "p.toml", "--plot", "folder.png"), "is a folder, expected a file"),
+        (("fit", "data.csv", "-o", "data.csv"), "data.csv: is an input of this command"),
+        (("fit", "data.csv", "-o", "/dev/null"), "/dev/null: is a device, expected a file"),
+        (("fit", "data.csv", "-o", "a.json", "--report", "a.json"), "two outputs of this name"),
+        (("calibrate", "data.csv", "--table", "./data.csv"), "data.csv: is an input of this"),
+        (("calibrate", "data.csv", "-o", "x.csv", "--table", "x.csv"), "two outputs of this name"),
+        (("design", "p.toml", "--vary", "gap_um=2:3:2", "-o", "link.csv"), "is an input of this"),
+        (("reproduce", "-o", "p.toml"), "p.toml: cannot be made a folder"),
+    ],
+)
+def test_outputs_are_checked_before_any_work(run, tmp_path, monkeypatch, arguments, message):
+    (tmp_path / "p.toml").write_text("[probe]\nnothing is read before the outputs are known")
+    (tmp_path / "link.csv").symlink_to("p.toml")
+    (tmp_path / "data.csv").write_text("V_b (V),I_h (mA)\n1,0.1\n")
+    (tmp_path / "a.csv").write_text("mine")
+    (tmp_path / "folder.png").mkdir()
+    os.mkfifo(tmp_path / "pipe.csv")
+    before = sorted(tmp_path.iterdir())
+    status, out, err = run(*arguments)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert len(err.splitlines()) == 1
+    assert sorted(tmp_path.iterdir()) == before
+    assert (tmp_path / "a.csv").read_text() == "mine"
+
+
+def test_a_second_output_that_fails_leaves_the_first_as_it_was(run, tmp_path, monkeypatch):
+    def fails(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", fails)
+    (tmp_path / "a.csv").write_text("mine")
+    status, out, err = run("sweep", "--bias", "1:2:2", "-o", "a.csv", "--plot", "a.png")
+    assert (status, out) == (1, "")
+    assert err == "hotlever: a.png: cannot be written (No space left on device)\n"
+    assert (tmp_path / "a.csv").read_text() == "mine"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_every_command_is_registered():
+    assert commands.app.registered_commands
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
