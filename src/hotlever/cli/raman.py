@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import deque
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +12,7 @@ import typer.core
 from typer import Argument, Option
 
 from hotlever.cli.application import app
-from hotlever.cli.options import File, options_of
+from hotlever.cli.options import File, check_plot, options_of
 from hotlever.cli.output import give, note, tell
 from hotlever.cli.thermometer import CalibrationOption, Setup, calibration_of, set_up
 from hotlever.errors import InputError
@@ -85,7 +85,7 @@ Spectra = Annotated[
 @options_of(set_up, "thermometer")
 def raman_command(
     spectra: Spectra,
-    thermometer: Callable[[], Setup],
+    thermometer: partial[Setup],
     save_calibration: File = Option(
         None, metavar="CAL.json", help="Write the calibration to this file."
     ),
@@ -97,11 +97,15 @@ def raman_command(
     """Find the silicon line in Raman spectra and, calibrated, the temperature."""
     from hotlever.raman.series import to_csv
 
+    outputs = Outputs(*spectra, *_read_by(thermometer))
+    check_plot(outputs, plot)
+    outputs.file(save_calibration)
+    outputs.file(output)
     setup = thermometer()
     if save_calibration is not None and setup.calibration is None:
         raise InputError("--save-calibration: there is no calibration; give --calibrate-from")
     lines, table = setup.measure(spectra)
-    with Outputs().together():
+    with outputs.together():
         if plot is not None:
             from hotlever import figures
 
@@ -122,7 +126,7 @@ def raman_command(
 def join_command(
     bias_log: Annotated[Path, Argument(metavar="BIAS_LOG.csv", help="The bias sweep.")],
     spectra: Spectra,
-    thermometer: Callable[[], Setup],
+    thermometer: partial[Setup],
     output: File = Option(None, "--output", "-o", metavar="DATA.csv", help="Left out: print."),
 ) -> None:
     """Join a bias log with tip spectra into the file that `hotlever fit` takes.
@@ -132,6 +136,8 @@ def join_command(
     """
     from hotlever.raman.bias_log import join, read_bias_log
 
+    outputs = Outputs(bias_log, *spectra, *_read_by(thermometer))
+    outputs.file(output)
     log = read_bias_log(bias_log)
     setup = thermometer()
     if setup.thermometer is None:
@@ -142,7 +148,8 @@ def join_command(
         note(f"no temperature from {', '.join(missing)}: empty cells")
     text = join(log, table)
     if output is not None:
-        write_text(output, text)
+        with outputs.together():
+            write_text(output, text)
     _answer(text, output)
 
 
@@ -155,9 +162,12 @@ def raman_check_command(
     """How far the paper's linear law is off above 900 K, and what that does to the knee."""
     from hotlever.studies.raman_check import conclusion, paper_check
 
+    outputs = Outputs(calibration)
+    check_plot(outputs, plot)
+    outputs.file(output)
     check = paper_check(calibration_of(calibration))
     said = conclusion(check)
-    with Outputs().together():
+    with outputs.together():
         if plot is not None:
             from hotlever import figures
 
@@ -168,6 +178,13 @@ def raman_check_command(
             numbers |= {"lines": lines.reset_index().to_dict("records"), "conclusion": said}
             write_text(output, json.dumps(numbers, indent=2, ensure_ascii=False) + "\n")
     give(f"{said}\n")
+
+
+def _read_by(thermometer: partial[Setup]) -> list[Any]:
+    """Return the files that a thermometer is set up from."""
+    given = thermometer.keywords
+    several = (given["calibrate_from"] or []) + (given["reference"] or [])
+    return [*several, given["temperatures"], given["calibration"]]
 
 
 def _answer(text: str, output: Path | None) -> None:
