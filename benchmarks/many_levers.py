@@ -1,6 +1,10 @@
 """A wafer of synthetic levers on one and on two processes: levers per second, and efficiency.
 
     python benchmarks/many_levers.py [LEVERS] [RUNS]      (24 levers, 3 runs by default)
+    python benchmarks/many_levers.py LEVERS killed
+
+With `killed` all levers are fitted on two processes, one of which is killed after a third of them,
+and one process fits a tenth of them.
 
 The efficiency is t(1) / (2 t(2)); the seconds run from the call to the last fit file, with the
 start and end of the processes, without reducing the geometry, which is in the cache by then. The
@@ -21,6 +25,7 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
+import psutil
 
 from hotlever.fitting.batch import fit_many
 from hotlever.fitting.models import forward_model
@@ -54,18 +59,41 @@ def write_levers(folder: Path, count: int, seed: int = 0) -> list[Path]:
     return paths
 
 
-def seconds(paths: list[Path], processes: int) -> tuple[float, float]:
+def seconds(paths: list[Path], processes: int, kill_at: int = -1) -> tuple[float, float]:
     """Fit all levers into an empty folder; return wall and processor time."""
+
+    def kill_one(done: int, total: int) -> None:
+        if done == kill_at:
+            children = psutil.Process().children(recursive=True)
+            next(one for one in children if "spawn_main" in " ".join(one.cmdline())).kill()
+
     with tempfile.TemporaryDirectory() as folder:
         began, used = time.perf_counter(), processor_time()
-        batch = fit_many(paths, folder, processes=processes)
+        batch = fit_many(paths, folder, processes=processes, progress=kill_one)
         elapsed = time.perf_counter() - began, processor_time() - used
     if batch.failures:
         sys.exit(f"{len(batch.failures)} levers failed: {next(iter(batch.failures.values()))}")
     return elapsed
 
 
+def with_one_killed(count: int) -> None:
+    """Fit many levers on two processes, one of which is killed on the way."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = write_levers(Path(folder), count)
+        some = paths[: max(1, count // 10)]
+        one, _ = seconds(some, 1)
+        two, _ = seconds(paths, 2, kill_at=count // 3)
+    share = 100 * one / len(some) / (2 * two / count)
+    print(
+        f"{len(some)} levers on 1 process {one:.1f} s; {count} on 2, one killed on the way, "
+        f"{two:.1f} s: efficiency {share:.0f} % (target: 90 %), {count / two:.2f} levers per second"
+    )
+
+
 def main() -> None:
+    if sys.argv[2:] == ["killed"]:
+        with_one_killed(int(sys.argv[1]))
+        return
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 24
     runs = int(sys.argv[2]) if len(sys.argv) > 2 else 3
     rows = []
