@@ -25,9 +25,9 @@ from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.threads import single_threaded_children
 
 T = TypeVar("T")
-#: Number and arguments.
+# Number and arguments.
 Task = tuple[int, tuple[Any, ...]]
-#: Applies a function to each of many arguments; gives number and result of each as it is done.
+# Applies a function to each of many arguments; gives number and result of each as it is done.
 Run = Callable[[Callable[..., Any], list[tuple[Any, ...]]], Iterator[tuple[int, Any]]]
 
 #: Tasks at the scheduler for each worker: one at work, one to go on with. The others wait here.

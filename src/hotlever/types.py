@@ -9,5 +9,5 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-#: Told the steps done and their number.
+# Told the steps done and their number.
 Progress = Callable[[int, int], None]

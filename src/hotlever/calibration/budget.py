@@ -66,7 +66,7 @@ class Tolerances:
 class Variation:
     """A lever that might be the true one: what is changed (`name`), and which source it counts to.
 
-    Its squared effect has the weight `share` in the variance.
+    Its squared effect has the weight ``share`` in the variance.
     """
 
     source: str

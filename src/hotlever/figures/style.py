@@ -61,7 +61,7 @@ def figure(
     letters : bool
         Put letters above them.
     **subplots
-        As `matplotlib.figure.Figure.subplots` has them.
+        As matplotlib's ``Figure.subplots`` has them.
     """
     with mpl.rc_context(_STYLE):
         made = Figure(figsize=(width, height), layout="constrained")

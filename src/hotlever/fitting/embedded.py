@@ -20,7 +20,7 @@ from hotlever.types import Array
 #: What else is kept of a measurement.
 _NAMED = ("path", "sha256", "series_resistance_ohm", "base_temperature_K", "medium")
 _OR_NOTHING = WrapValidator(lambda found, check: np.nan if found is None else check(found))
-#: A number, and a standard error; NaN where the file has none.
+# A number, and a standard error; NaN where the file has none.
 Number = Annotated[float, _OR_NOTHING]
 Spread = Annotated[float, Field(ge=0), _OR_NOTHING]
 

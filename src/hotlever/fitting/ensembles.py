@@ -14,7 +14,7 @@ from hotlever.cluster import local_processes
 from hotlever.errors import ComputationError, InputError
 from hotlever.types import Array, Progress
 
-#: The logarithm of a density, up to a constant; −∞ where it vanishes.
+# The logarithm of a density, up to a constant; −∞ where it vanishes.
 LogDensity = Callable[[Array], float]
 
 #: Ensembles that know nothing of each other, so that R̂ compares independent runs.

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hotlever.fitting.result import Fit
     from hotlever.fitting.uncertainty import Uncertainty
 
-#: Caption, columns and rows.
+# Caption, columns and rows.
 Table = tuple[str, list[str], list[list[str]]]
 
 

@@ -37,7 +37,7 @@ _NEARLY = NewtonOptions(tolerance=1e-2, keep_while=0.2, max_iterations=12)
 _DONE = NewtonOptions(tolerance=1e-3, keep_while=0.5, max_iterations=12)
 
 
-#: Equations on the few points, and what Newton's method found.
+# Equations on the few points, and what Newton's method found.
 Solved = tuple[LeverEquations, NewtonResult]
 
 

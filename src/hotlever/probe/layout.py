@@ -17,8 +17,8 @@ from hotlever.types import Array
 
 Point = tuple[float, float]
 
-#: What a region is to the measuring circuit: R_h, R_l1, R_l2 of the paper's Fig. 1(c), or
-#: the reader branch, which carries no current.
+# What a region is to the measuring circuit: R_h, R_l1, R_l2 of the paper's Fig. 1(c), or
+# the reader branch, which carries no current.
 Part = Literal["heater", "leg 1", "leg 2", "reader branch"]
 
 

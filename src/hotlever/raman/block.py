@@ -20,7 +20,7 @@ from hotlever.types import Array
 
 MOST_NUMBERS = 10_000_000
 
-#: The separator (None is any run of blanks), and whether the decimal sign is a comma.
+# The separator (None is any run of blanks), and whether the decimal sign is a comma.
 Dialect = tuple[str | None, bool]
 _DIALECTS: list[Dialect] = [
     (separator, comma)
