@@ -27,6 +27,7 @@ from hotlever.threads import single_threaded_children
 T = TypeVar("T")
 # Number and arguments.
 Task = tuple[int, tuple[Any, ...]]
+Share = Callable[[Any], Any]
 # Applies a function to each of many arguments; gives number and result of each as it is done.
 Run = Callable[[Callable[..., Any], list[tuple[Any, ...]]], Iterator[tuple[int, Any]]]
 
@@ -92,8 +93,10 @@ def run_all(
 
 
 @contextmanager
-def local_processes(processes: int) -> Iterator[Run]:
+def local_processes(processes: int) -> Iterator[tuple[Run, Share]]:
     """Start local processes that do tasks, and raise what these raise; one would be this one.
+
+    The second thing given shares what is large between tasks: it is sent to each process once.
 
     Raises
     ------
@@ -101,10 +104,16 @@ def local_processes(processes: int) -> Iterator[Run]:
         If they cannot be started, or die again and again.
     """
     if processes == 1:
-        yield lambda function, tasks: ((n, function(*task)) for n, task in enumerate(tasks))
+        yield (
+            lambda function, tasks: ((n, function(*task)) for n, task in enumerate(tasks)),
+            lambda value: value,
+        )
         return
     with local_client(processes) as client:
-        yield lambda function, tasks: map(_raised, run_all(client, function, tasks))
+        yield (
+            lambda function, tasks: map(_raised, run_all(client, function, tasks)),
+            lambda value: client.scatter(value, broadcast=True),
+        )
 
 
 def _raised(done: tuple[int, Any]) -> tuple[int, Any]:

@@ -95,11 +95,12 @@ def sample(
     ]
     points, logs, accepted, done = [], [], 0.0, 0
     seeds = np.random.SeedSequence(seed).generate_state(ENSEMBLES).tolist()
-    with local_processes(min(processes, ENSEMBLES)) as run:
-        tasks = [(log_density, approximation, walkers, number) for number in seeds]
+    with local_processes(min(processes, ENSEMBLES)) as (run, share):
+        density = share(log_density)
+        tasks = [(density, approximation, walkers, number) for number in seeds]
         states = _in_order(run(_started, tasks))
         for steps in blocks:
-            tasks = [(log_density, approximation, state, steps) for state in states]
+            tasks = [(density, approximation, state, steps) for state in states]
             moved = _in_order(run(_advanced, tasks))
             states = [state for state, *_ in moved]
             done += steps

@@ -133,7 +133,7 @@ def _profiles(fit: Fit, processes: int, progress: Progress | None) -> dict[str, 
     tell = progress or (lambda done, total: None)
     names, found = fit.names, {}
     tell(0, len(names))
-    with local_processes(min(processes, len(names))) as run:
+    with local_processes(min(processes, len(names))) as (run, _):
         for number, result in run(profile_likelihood, [(fit, name) for name in names]):
             found[names[number]] = result
             tell(len(found), len(names))
