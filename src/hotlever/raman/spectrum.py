@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from hotlever.raman.peak import in_window
 from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
 from hotlever.raman.vendor import KINDS, read_vendor
 from hotlever.tables import text_lines
-from hotlever.types import Array
+from hotlever.types import Array, Progress
 
 SKIPPED_SUFFIXES = {".md", ".json", ".toml", ".yaml", ".yml", ".py", ".ipynb", ".html", ".pdf"}
 SKIPPED_SUFFIXES |= {".png", ".jpg", ".jpeg", ".svg", ".tif", ".tiff", ".bmp", ".log", ".zip"}
@@ -157,7 +157,7 @@ def _natural_key(path: Path) -> list[str | int]:
 def read_spectra(
     paths: Iterable[str | os.PathLike[str]],
     skipped: list[str] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> list[Spectrum]:
     """Read files and folders of spectra, folders in natural order.
 

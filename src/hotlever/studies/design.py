@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, unknown_name
@@ -20,7 +19,7 @@ from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import MeshOptions, Probe
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.studies import each
-from hotlever.types import Progress
+from hotlever.types import Array, Progress
 
 #: What follows from a design; k is the power of the knee in air over that in vacuum.
 QUANTITIES = (
@@ -131,7 +130,7 @@ def quantities(probe: Probe, power_mW: float, air: bool = True) -> dict[str, flo
 def vary(
     design: Design,
     name: str,
-    values: Sequence[float] | NDArray[np.float64],
+    values: Sequence[float] | Array,
     *,
     power_mW: float = 2.0,
     air: bool = True,
