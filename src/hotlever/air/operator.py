@@ -15,7 +15,6 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from hotlever import __version__
 from hotlever.air.panels import Mirror, Panels, mirror_group
 from hotlever.air.single_layer import layer_potential, single_layer_matrix
 from hotlever.air.surface import PanelOptions, chip_panels, lever_surface
@@ -85,7 +84,6 @@ def air_operator(
     """
     surroundings, options = surroundings or Surroundings(), options or PanelOptions()
     facts = {
-        "version": __version__,
         "layout": asdict(replace(layout, cone=None)),
         "cone": layout.cone and layout.cone.model_dump(),
         "surroundings": surroundings.model_dump(exclude={"medium"}),

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_matrix
 from skfem.element import ElementTetP2
 
-from hotlever import __version__
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.dataset import at_bias
@@ -181,7 +180,6 @@ class SolidLever(Lever):
     def _file(self, bias: float) -> Path | None:
         air = None if self.space.air is None else self.space.air.operator
         facts = {
-            "version": __version__,
             "probe": self.probe.values(),
             "nodes": self.space.elements.nodes,
             "air": None if air is None else [air.radius_um, air.order, air.size],
