@@ -15,8 +15,8 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import chdtri, ndtri
 
 from hotlever.figures.style import (
-    BLACK,
     BLUE,
+    MEASURED,
     ORANGE,
     SKY,
     VERMILION,
@@ -61,7 +61,7 @@ def data_and_model(measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str
         for (upper, lower), (name, label, column, unit, factor) in zip(grid.T, panels, strict=True):
             data, values = measured[column].values, model[column].values
             upper.plot(bias, values, "-", color=BLUE, label="model")
-            upper.plot(bias, data, "o", mfc="none", color=BLACK, label="measured")
+            upper.plot(bias, data, **MEASURED)
             lower.axhline(0, color="0.4", lw=0.8)
             if name == "tip":
                 error = measured.tip_error_K
@@ -126,8 +126,7 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
             upper.fill_between([], [], color=BLUE, alpha=0.25, label="95 %")
             lower.axhline(0, color=BLUE, lw=0.8)
             if measured is not None:
-                style = {"mfc": "none", "color": BLACK, "ms": 3.5, "label": "measured"}
-                upper.plot(measured[name], measured.tip_K, "o", **style)
+                upper.plot(measured[name], measured.tip_K, **MEASURED, ms=3.5)
             upper.set(ylabel="tip temperature (K)")
             lower.set(xlabel=label, ylabel=f"T$_{{tip}}$ − {middle_name} (K)", xlim=(0, None))
         grid[0, 0].legend(loc="upper left")

@@ -26,7 +26,7 @@ from hotlever.figures.style import (
     figure,
 )
 from hotlever.probe import Layout
-from hotlever.spieser2017 import BASE_TEMPERATURE_K
+from hotlever.spieser2017 import BASE_TEMPERATURE_K, POWER_LAW_SPREAD_K
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,8 +59,7 @@ def probe_drawing(layout: Layout, title: str = "") -> Figure:
         handles["terminal"] = Line2D([], [], color=BLUE, lw=4, label="terminal (base temperature)")
         (tip,) = axes.plot(*layout.tip, marker="^", color=BLACK, ls="none", label="tip")
         handles["tip"] = tip
-        corners = np.array([point for region in layout.regions for point in region.outline])
-        (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
+        (left, low), (right, high) = layout.box
         margin = 0.04 * (right - left)
         axes.set(xlim=(left - 5 * margin, right + margin), ylim=(low - margin, high + margin))
         axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)", title=title)
@@ -88,9 +87,7 @@ def field_maps(fields: FieldMap, layout: Layout, title: str = "") -> Figure:
         ("potential (V)", fields.potential, "viridis", None),
         ("current density (mA/µm²)", density, "cividis", LogNorm(strong * 1e-3, strong)),
     )
-    heater = np.array(layout.heater.outline)
-    size = np.ptp(heater, axis=0).max()
-    centre = (heater.min(axis=0) + heater.max(axis=0)) / 2
+    size, centre = layout.heater.sides.max(), layout.heater.box.mean(axis=0)
     with figure(7.0, 6.8, 3, 2, width_ratios=(1.75, 1.0)) as (made, grid):
         for row, (label, values, colours, norm) in zip(grid, maps, strict=True):
             shading = "gouraud" if values.size == len(fields.points) else "flat"
@@ -180,12 +177,13 @@ def temperature_power(
         if measured is not None:
             axes.plot(measured.power_mW, measured.tip_K, **MEASURED)
             below.plot(measured.power_mW, measured.tip_K - expected(measured.power_mW), **MEASURED)
-        below.axhspan(-25, 25, color="0.92", zorder=0)
+        below.axhspan(-POWER_LAW_SPREAD_K, POWER_LAW_SPREAD_K, color="0.92", zorder=0)
         below.axhline(0, color="0.4", lw=0.8)
         below.set(xlabel="power P$_l$ (mW)", ylabel="T$_{tip}$ − law (K)", xlim=(0, None))
         axes.set(ylabel="tip temperature (K)")
         axes.legend(loc="upper left")
-        below.annotate("±25 K", (0.02, 0.06), xycoords="axes fraction", color="0.4", fontsize=8)
+        where: Any = {"xycoords": "axes fraction", "color": "0.4", "fontsize": 8}
+        below.annotate(f"±{POWER_LAW_SPREAD_K:.0f} K", (0.02, 0.06), **where)
     return made
 
 

@@ -15,6 +15,7 @@ from hotlever.figures.style import BLACK, BLUE, GREEN, VERMILION, figure, panel_
 from hotlever.raman.calibration import RamanCalibration
 from hotlever.raman.peak import WINDOW, Peak
 from hotlever.raman.series import Line
+from hotlever.spieser2017 import RAMAN_ERROR_K, RAMAN_ERROR_SHARE
 from hotlever.studies.raman_check import conclusion
 from hotlever.types import Array
 
@@ -22,6 +23,8 @@ GREY = "0.4"
 STACKED = 9
 #: Scaled intensity at which a line is cut off, as a cosmic ray would hide the next spectrum.
 _HIGHEST = 1.25
+#: The paper's error of a temperature.
+_BAND = f"±({RAMAN_ERROR_K:g} K + {RAMAN_ERROR_SHARE:g} ΔT)"
 
 
 def thermometry(
@@ -146,7 +149,7 @@ def _residuals(axes: Axes, calibration: RamanCalibration) -> None:
     grid = np.linspace(*calibration.range_K, 100)
     band = calibration.linear.band(grid - calibration.room_temperature_K)
     style: Any = {"color": VERMILION, "alpha": 0.18, "lw": 0}
-    axes.fill_between(grid, -band, band, label="paper: ±(5 K + 0.02 ΔT)", **style)
+    axes.fill_between(grid, -band, band, label=f"paper: {_BAND}", **style)
     out = np.abs(linear) > found["band_K"]
     label = f"line (filled: {np.count_nonzero(out)} of {out.size} outside the band)"
     axes.plot(at, linear, "^", mfc="none", color=VERMILION, ms=5, label=label)
@@ -168,8 +171,7 @@ def raman_check(check: xr.Dataset) -> Figure:
     bars = [("as published", check.knee_measured_K - predicted, GREY)]
     with figure(7.2, 6.4, 2, 1, height_ratios=(1.7, 1.0)) as (made, (upper, lower)):
         style: Any = {"color": GREY, "alpha": 0.2, "lw": 0}
-        label = "the paper's error, ±(5 K + 0.02 ΔT)"
-        upper.fill_between(temperature, -band, band, label=label, **style)
+        upper.fill_between(temperature, -band, band, label=f"the paper's error, {_BAND}", **style)
         for place, (color, dash) in enumerate(((VERMILION, "--"), (BLUE, "-."))):
             one = check.isel(line=place)
             name = str(one.line.item())

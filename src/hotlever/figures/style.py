@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from hotlever.errors import InputError
 from hotlever.files import whole_file
 from hotlever.materials import PARAMETERS
+from hotlever.text import INVERSION
 
 #: Okabe and Ito's colours, safe for colour-blind readers.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -98,7 +99,7 @@ def panel_letters(panels: Iterable[Axes]) -> None:
 
 def axis_label(name: str) -> tuple[str, float]:
     """Return a quantity's axis label and the unit (of its own) that it is drawn in."""
-    if name == "inversion_temperature":
+    if name == INVERSION:
         return "T$_i$ (K)", 1.0
     known = PARAMETERS[name]
     unit = "" if known.unit == "1" else known.unit

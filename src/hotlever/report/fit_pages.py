@@ -6,12 +6,12 @@ import numpy as np
 
 from hotlever import figures
 from hotlever.fitting.batch import Batch
-from hotlever.fitting.levers import INVERSION, compare_levers, statements
+from hotlever.fitting.levers import compare_levers, statements
 from hotlever.fitting.result import Fit
 from hotlever.fitting.uncertainty import Uncertainty
 from hotlever.fitting.words import lever_rows, outcome, parameter_rows, uncertainty_tables
 from hotlever.report.page import Page
-from hotlever.text import sentence
+from hotlever.text import INVERSION, sentence
 
 #: Points of a curve without visible corners.
 _POINTS = 110
