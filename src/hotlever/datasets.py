@@ -86,7 +86,12 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "fitted_knee_K": ("K", "knee of a tipless lever fitted to the one with the tip"),
     "missed_K": ("K", "how far the knee lies above that of the fitted tipless lever"),
     # Raman spectra
-    "temperature_K": ("K", "temperature"),
+    "center_per_cm": ("cm-1", "place of the silicon line"),
+    "center_stderr_per_cm": ("cm-1", "standard error of the line's place"),
+    "fwhm_per_cm": ("cm-1", "full width of the line at half maximum"),
+    "shift_per_cm": ("cm-1", "shift of the line against room temperature"),
+    "temperature_K": ("K", "tip temperature"),
+    "temperature_error_K": ("K", "standard error of the tip temperature"),
     "error": ("K", "line reads less true temperature"),
     "paper_error": ("K", "error stated in the paper"),
     **{name: (known.unit, known.meaning) for name, known in PARAMETERS.items()},

@@ -57,8 +57,8 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
     """
     reports = error.errors(include_url=False)
     first = min(reports, key=lambda report: report["type"] != "extra_forbidden")
-    key = str(first["loc"][-1]) if first["loc"] else ""
-    if first["type"] == "extra_forbidden":
+    key = ".".join(map(str, first["loc"]))
+    if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
         return unknown_name("key", key, record.model_fields, where)
     if first["type"] == "missing":
         return InputError(f"{where}: {key} is missing")

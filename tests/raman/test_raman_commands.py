@@ -22,7 +22,7 @@ from hotlever.raman.bias_log import join, read_bias_log
 from hotlever.raman.calibration import published_raman_calibration
 from hotlever.raman.series import (
     COLUMNS,
-    QUANTITIES,
+    DIGITS,
     calibrate_from,
     measure,
     read_lines,
@@ -108,11 +108,11 @@ def test_a_table_of_spectra_is_a_dataset_with_units_and_what_the_csv_holds(
     lines = measure([*read_spectra([examples / "tip"]), Spectrum(x, noise, "none.txt")])
     made = read_lines(lines, Thermometer(found))
     assert made.sizes == {"spectrum": 5}
-    assert {name: made[name].attrs["units"] for name in QUANTITIES} == {
-        name: "K" if name.endswith("_K") else "cm-1" for name in QUANTITIES
+    assert {name: made[name].attrs["units"] for name in DIGITS} == {
+        name: "K" if name.endswith("_K") else "cm-1" for name in DIGITS
     }
     rows = table(to_csv(made))
-    for name, (digits, _, _) in QUANTITIES.items():
+    for name, digits in DIGITS.items():
         cells = [float(row[name.replace("_per_cm", "_cm-1")] or "nan") for row in rows]
         np.testing.assert_allclose(cells, made[name], atol=0.51 * 10.0**-digits)
     assert [row["file"] for row in rows] == made.file.values.tolist()

@@ -22,7 +22,7 @@ from hotlever.materials.silicon import MELTING_POINT
 from hotlever.raman import anharmonic
 from hotlever.raman.anharmonic import BALKANSKI1983
 from hotlever.raman.peak import LineShape
-from hotlever.records import Record
+from hotlever.records import Record, explained
 from hotlever.spieser2017 import (
     BASE_TEMPERATURE_K,
     DOI,
@@ -327,7 +327,4 @@ def read_raman_calibration(path: str | os.PathLike[str]) -> RamanCalibration:
     try:
         return RamanCalibration.model_validate_json(read_text(path))
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        reason = f"{key}: {first['msg']}" if key else first["msg"]
-        raise InputError(f"{path}: not a Raman calibration: {reason}") from error
+        raise explained(error, RamanCalibration, f"{path}: not a Raman calibration") from None

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hotlever.datasets import labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.raman.calibration import Point, RamanCalibration, calibrate_raman
 from hotlever.raman.fit import fit_peak
@@ -27,17 +28,17 @@ from hotlever.types import Progress
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Numbers of a Raman table: decimal places in the CSV, unit, meaning.
-QUANTITIES = {
-    "center_per_cm": (4, "cm-1", "place of the silicon line"),
-    "center_stderr_per_cm": (4, "cm-1", "standard error of the line's place"),
-    "fwhm_per_cm": (3, "cm-1", "full width of the line at half maximum"),
-    "shift_per_cm": (4, "cm-1", "shift of the line against room temperature"),
-    "temperature_K": (2, "K", "tip temperature"),
-    "temperature_error_K": (2, "K", "standard error of the tip temperature"),
+#: Numbers of a Raman table, and their decimal places in the CSV.
+DIGITS = {
+    "center_per_cm": 4,
+    "center_stderr_per_cm": 4,
+    "fwhm_per_cm": 3,
+    "shift_per_cm": 4,
+    "temperature_K": 2,
+    "temperature_error_K": 2,
 }
 #: Header of the Raman CSV.
-COLUMNS = ("file", *(name.replace("_per_cm", "_cm-1") for name in QUANTITIES), "flags")
+COLUMNS = ("file", *(name.replace("_per_cm", "_cm-1") for name in DIGITS), "flags")
 
 
 @dataclass(frozen=True)
@@ -72,16 +73,14 @@ def read_lines(lines: Sequence[Line], thermometer: Thermometer | None) -> xr.Dat
     Returns
     -------
     xarray.Dataset
-        On dimension ``spectrum``: ``file``, the `QUANTITIES` (NaN where there is no number), and
+        On dimension ``spectrum``: ``file``, the numbers of `DIGITS` (NaN where there is none), and
         ``flags``, separated by semicolons.
     """
-    import xarray as xr  # takes half a second, which not every command has to wait for
-
     names = [line.spectrum.name for line in lines]
     if len(set(names)) < len(names):
         # whole paths, where two folders hold the same name
         names = [str(Path(line.spectrum.folder) / line.spectrum.name) for line in lines]
-    numbers = np.full((len(QUANTITIES), len(lines)), np.nan)
+    numbers = np.full((len(DIGITS), len(lines)), np.nan)
     flags = [["no-line"] if line.peak is None else list(line.peak.flags) for line in lines]
     for place, peak in enumerate(line.peak for line in lines):
         if peak is not None:
@@ -93,14 +92,13 @@ def read_lines(lines: Sequence[Line], thermometer: Thermometer | None) -> xr.Dat
         for flag, where in (("no-temperature", missing), ("extrapolated", reading.outside)):
             for place in where.nonzero()[0].tolist():
                 flags[place].append(flag)
-    columns: dict[str, tuple[str, np.ndarray, dict[str, str]]] = {
-        "file": ("spectrum", np.array(names, dtype=str), {"long_name": "file"})
-    }
-    for (name, (_, unit, meaning)), values in zip(QUANTITIES.items(), numbers, strict=True):
-        columns[name] = ("spectrum", values, {"units": unit, "long_name": meaning})
     joined = np.array([";".join(each) for each in flags], dtype=str)
-    columns["flags"] = ("spectrum", joined, {"long_name": "what was noticed"})
-    return xr.Dataset(columns)
+    columns = {
+        "file": ("spectrum", np.array(names, dtype=str), {"long_name": "file"}),
+        **dict(zip(DIGITS, numbers, strict=True)),
+        "flags": ("spectrum", joined, {"long_name": "what was noticed"}),
+    }
+    return labelled(columns, "spectrum")
 
 
 def to_csv(table: xr.Dataset) -> str:
@@ -110,7 +108,7 @@ def to_csv(table: xr.Dataset) -> str:
     writer.writerow(COLUMNS)
     columns = [
         ["" if math.isnan(value) else f"{value:.{digits}f}" for value in table[name].values]
-        for name, (digits, _, _) in QUANTITIES.items()
+        for name, digits in DIGITS.items()
     ]
     writer.writerows(zip(table.file.values, *columns, table.flags.values, strict=True))
     return out.getvalue()

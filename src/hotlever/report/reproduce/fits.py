@@ -32,8 +32,8 @@ def fit_section(page: Findings) -> None:
         f"{result.evaluations} solved sweeps of {result.measurement.bias_V.size} points, "
         f"{result.seconds:.1f} s",
         holds=result.seconds > 3600.0,
-        because="exact derivatives replace differences, and a coarse mesh (a reduced lever where the "
-        "geometry has been reduced before) most of the solves",
+        because="exact derivatives replace differences, and a coarse mesh, or a reduced lever "
+        "where the geometry has been reduced before, most of the solves",
     )
 
 
