@@ -13,7 +13,7 @@ import sys
 
 import numpy as np
 
-from hotlever.lever import Lever
+from hotlever.lever import Lever, State
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe, Tip
 from hotlever.spieser2017 import KNEE_MEASURED_K, KNEE_PREDICTED_K
@@ -76,6 +76,16 @@ def solid() -> None:
     table(("height (µm)", "half-angle (°)", "model", *columns, "I_h (relative)"), rows)
 
 
+def apex_temperature(lever: SolidLever, state: State) -> float:
+    """Return the temperature (K) of the tip's apex."""
+    points, (tip_x, tip_y) = lever.solid.elements.p, lever.solid.layout.tip
+    away = np.hypot(points[0] - tip_x, points[1] - tip_y)
+    lowest = points[2] + 1e-3 * away
+    near = away < lever.solid.layout.thickness_um
+    vertex = int(np.argmin(np.where(near, lowest, np.inf)))
+    return float(state.nodal[0][lever.space.elements.basis.nodal_dofs[0, vertex]])
+
+
 def air() -> None:
     """Print what the cone changes in air, as a real body in the full 3-D simulation."""
     bias = [7.22, 8.268, 10.748]
@@ -92,7 +102,7 @@ def air() -> None:
                     name,
                     f"{state.bias_V:g}",
                     f"{sweep.tip_K.values[row]:.2f}",
-                    "" if tip is None else f"{lever.apex_temperature(state):.2f}",
+                    "" if tip is None else f"{apex_temperature(lever, state):.2f}",
                     f"{sweep.power_mW.values[row]:.4f}",
                     f"{sweep.air_heat_mW.values[row] / sweep.power_mW.values[row]:.4f}",
                 )

@@ -155,7 +155,7 @@ def heat_by_region(state: State) -> dict[str, float]:
     heat = np.zeros(lever.space.elements.size)
     lost = lever.in_the_air(state)[1]
     mesh, basis = lever.solid.elements, lever.space.elements.basis
-    heat[surface_nodes(lever.solid, lever.space.elements, lever.space.air.operator)] = lost
+    heat[surface_nodes(lever.space.elements, lever.space.air.operator)] = lost
     facets = mesh.boundary_facets()
     a, b, c = np.moveaxis(mesh.p[:, mesh.facets[:, facets]], 1, 0)
     area = np.linalg.norm(np.cross((b - a).T, (c - a).T), axis=1) / 2

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
 from skfem.element import ElementTetP2
 
 from hotlever.cache import cache_file, store_arrays, stored
@@ -29,6 +30,8 @@ from hotlever.types import Array, Index, Progress
 
 #: Radius of the sphere of air in the paper (µm).
 SPHERE_RADIUS = 60.0
+#: Nodes nearer than this (µm) are the same.
+_SAME_UM = 1e-6
 
 
 class SolidLever(Lever):
@@ -92,7 +95,7 @@ class SolidLever(Lever):
         if not in_air:
             return space
         air = OpenAir(solid.netgen, solid.centre, radius, order=self._air_order)
-        return space.in_air_at_nodes(air, surface_nodes(solid, space.elements, air))
+        return space.in_air_at_nodes(air, surface_nodes(space.elements, air))
 
     def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
         """Return the space in the probe's surroundings; air needs a mesh of its own."""
@@ -196,15 +199,6 @@ class SolidLever(Lever):
         assert isinstance(mesh, SolidMesh)
         return mesh
 
-    def apex_temperature(self, state: State) -> float:
-        """Return the temperature (K) of the tip's apex; without a tip that of the lever there."""
-        points, (tip_x, tip_y) = self.solid.elements.p, self.solid.layout.tip
-        away = np.hypot(points[0] - tip_x, points[1] - tip_y)
-        lowest = points[2] + 1e-3 * away
-        near = away < self.solid.layout.thickness_um
-        vertex = int(np.argmin(np.where(near, lowest, np.inf)))
-        return float(state.nodal[0][self.space.elements.basis.nodal_dofs[0, vertex]])
-
     def in_the_air(self, state: State) -> tuple[Array, Array]:
         """Return what a state gives to the air.
 
@@ -229,7 +223,7 @@ class SolidLever(Lever):
         return coefficients, heat
 
 
-def surface_nodes(mesh: SolidMesh, of_silicon: FiniteElements, air: OpenAir) -> Index:
+def surface_nodes(of_silicon: FiniteElements, air: OpenAir) -> Index:
     """Return the numbers of the silicon's nodes on its surface, in the order of the air's.
 
     Raises
@@ -237,18 +231,7 @@ def surface_nodes(mesh: SolidMesh, of_silicon: FiniteElements, air: OpenAir) -> 
     ComputationError
         If the two meshes do not match.
     """
-    basis = of_silicon.basis
-    vertices = np.searchsorted(mesh.vertices, air.vertices)
-    edges = np.sort(np.searchsorted(mesh.vertices, air.edges), axis=1)
-    count = len(mesh.vertices)
-    keys = np.sort(mesh.elements.edges, axis=0)
-    known = keys[0] * count + keys[1]
-    order = np.argsort(known)
-    wanted = edges[:, 0] * count + edges[:, 1]
-    place = order[np.searchsorted(known[order], wanted).clip(max=order.size - 1)]
-    if not (
-        np.array_equal(mesh.vertices[vertices.clip(max=count - 1)], air.vertices)
-        and np.array_equal(known[place], wanted)
-    ):
+    away, nodes = cKDTree(of_silicon.nodes.T).query(air.sites)
+    if away.max() > _SAME_UM:
         raise ComputationError("the air does not touch the silicon node by node")
-    return np.concatenate([basis.nodal_dofs[0, vertices], basis.edge_dofs[0, place]])
+    return np.asarray(nodes)

@@ -103,13 +103,9 @@ class OpenAir:
 
         Returns the degrees of freedom on the body, which θ there determines.
         """
-        vertices: set[int] = set()
-        edges: dict[int, Any] = {}
-        dofs: set[int] = set()
-        for element in self.mesh.Boundaries(LEVER_SURFACE).Elements():
-            vertices.update(vertex.nr for vertex in element.vertices)
-            edges.update({edge.nr: edge for edge in element.edges if edge.nr not in edges})
-            dofs.update(self.space.GetDofNrs(element))
+        surface = self.mesh.Boundaries(LEVER_SURFACE)
+        vertices = {vertex.nr for face in surface.Elements() for vertex in face.vertices}
+        edges = {edge.nr: edge for face in surface.Elements() for edge in face.edges}
         ordered = [edges[number] for number in sorted(edges)]
         ends = [sorted(vertex.nr for vertex in self.mesh[edge].vertices) for edge in ordered]
         self.vertices = np.array(sorted(vertices), dtype=np.intp)
@@ -126,7 +122,7 @@ class OpenAir:
         self._to_coefficients = csr_matrix(
             (values, (rows, columns)), shape=(self.space.ndof, count + more)
         )
-        return np.array(sorted(dofs), dtype=np.intp)
+        return np.flatnonzero(list(self.space.GetDofs(surface)))
 
     def _vertex_dofs(self, ng: Any, vertices: Iterable[int]) -> Index:
         """Return the degree of freedom of each of some vertices, negative where there is no air."""
