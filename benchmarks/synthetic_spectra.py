@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.raman import anharmonic, lineshape
-from hotlever.raman.anharmonic import BALKANSKI1983
 from hotlever.types import Array
 
 
@@ -36,7 +35,7 @@ class Instrument:
 
 def line_centre(temperature: float) -> float:
     """Centre of silicon's line, cm⁻¹, by the published constants of Balkanski's law."""
-    zero = BALKANSKI1983.bare + BALKANSKI1983.three_phonon + BALKANSKI1983.four_phonon
+    zero = anharmonic.BARE + anharmonic.THREE_PHONON + anharmonic.FOUR_PHONON
     return zero + float(anharmonic.shift(temperature, 0.0)[0])
 
 

@@ -69,7 +69,7 @@ def spread_option(args: list[str], option: str, takes_value: set[str]) -> list[s
         del last[2:]
     out: list[str] = []
     for part in parts:
-        if any(part is group for group in groups):
+        if part in groups:
             out += [word for value in part[1:] for word in (option, value)]
         else:
             out += part

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from hotlever.figures.style import BLACK, BLUE, GREEN, VERMILION, figure, panel_letters
 from hotlever.raman.calibration import RamanCalibration
-from hotlever.raman.peak import WINDOW, Peak
+from hotlever.raman.peak import WINDOW, Peak, in_window
 from hotlever.raman.series import Line
 from hotlever.spieser2017 import RAMAN_ERROR_K, RAMAN_ERROR_SHARE
 from hotlever.studies.raman_check import conclusion
@@ -71,9 +71,8 @@ def thermometry(
 
 
 def _in_window(line: Line) -> tuple[Array, Array]:
-    x, y = line.spectrum.x, line.spectrum.y
-    inside = (x >= WINDOW[0]) & (x <= WINDOW[1])
-    return x[inside], y[inside]
+    inside = in_window(line.spectrum.x, line.spectrum.name)
+    return line.spectrum.x[inside], line.spectrum.y[inside]
 
 
 def _stack(axes: Axes, stacked: Sequence[tuple[str, Line]]) -> None:
@@ -83,8 +82,6 @@ def _stack(axes: Axes, stacked: Sequence[tuple[str, Line]]) -> None:
         stacked = [stacked[place] for place in chosen]
     for level, (label, line) in enumerate(stacked):
         x, y = _in_window(line)
-        if not x.size:
-            continue
         peak = line.peak
         if peak is None:
             y = y - np.median(y)

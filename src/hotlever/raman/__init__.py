@@ -4,6 +4,7 @@ Section III of Spieser et al. 2017. A spectrum (`spectrum`) is fitted for its li
 `peak`); a hot-plate series gives a calibration (`calibration`); a thermometer (`thermometer`)
 turns line positions into temperatures.
 """
+# ruff: noqa: F401 (what is imported here is what the package offers)
 
 from hotlever.raman.calibration import (
     Point,
@@ -17,23 +18,3 @@ from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.series import calibrate_from, measure, read_lines
 from hotlever.raman.spectrum import Spectrum, read_spectra, read_spectrum
 from hotlever.raman.thermometer import Thermometer, laser_heating
-
-__all__ = [
-    "NoSiliconLine",
-    "Peak",
-    "PeakOptions",
-    "Point",
-    "RamanCalibration",
-    "Spectrum",
-    "Thermometer",
-    "calibrate_from",
-    "calibrate_raman",
-    "fit_peak",
-    "laser_heating",
-    "measure",
-    "published_raman_calibration",
-    "read_lines",
-    "read_raman_calibration",
-    "read_spectra",
-    "read_spectrum",
-]

@@ -13,39 +13,22 @@ fitted below 900 K reads too hot above.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.constants import Boltzmann, Planck, speed_of_light
 
 from hotlever.types import Array
 
-
-@dataclass(frozen=True)
-class AnharmonicConstants:
-    """Constants of Balkanski's law, cm⁻¹: bare phonon, three-phonon and four-phonon term."""
-
-    bare: float
-    three_phonon: float
-    four_phonon: float
-    source: str
-
-
-BALKANSKI1983 = AnharmonicConstants(
-    bare=528.0,
-    three_phonon=-2.96,
-    four_phonon=-0.174,
-    source="Balkanski, Wallis and Haro, Phys. Rev. B 28, 1928 (1983), doi:10.1103/PhysRevB.28.1928",
-)
-
+#: Bare phonon, three-phonon and four-phonon term (cm⁻¹).
+BARE, THREE_PHONON, FOUR_PHONON = 528.0, -2.96, -0.174
+SOURCE = "Balkanski, Wallis and Haro, Phys. Rev. B 28, 1928 (1983), doi:10.1103/PhysRevB.28.1928"
 SECOND_RADIATION = Planck * speed_of_light / Boltzmann * 100.0  #: hc/k, K cm
 
 
 def terms(temperature: ArrayLike) -> tuple[Array, Array, Array, Array]:
     """Temperature factors of A and of B, 1 + 2·n2 and 1 + 3·n3 + 3·n3², and their derivatives."""
-    n2, dn2 = _occupation(BALKANSKI1983.bare / 2.0, temperature)
-    n3, dn3 = _occupation(BALKANSKI1983.bare / 3.0, temperature)
+    n2, dn2 = _occupation(BARE / 2.0, temperature)
+    n3, dn3 = _occupation(BARE / 3.0, temperature)
     return 1.0 + 2.0 * n2, 1.0 + 3.0 * n3 + 3.0 * n3**2, 2.0 * dn2, (3.0 + 6.0 * n3) * dn3
 
 
@@ -67,8 +50,8 @@ def gradient(temperature: ArrayLike, reference: float) -> Array:
 def shift(
     temperature: ArrayLike,
     reference: float,
-    three_phonon: float = BALKANSKI1983.three_phonon,
-    four_phonon: float = BALKANSKI1983.four_phonon,
+    three_phonon: float = THREE_PHONON,
+    four_phonon: float = FOUR_PHONON,
 ) -> tuple[Array, Array]:
     """Shift of the line against its place at the reference temperature, and d(shift)/dT.
 

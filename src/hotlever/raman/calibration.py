@@ -20,7 +20,6 @@ from hotlever.errors import InputError
 from hotlever.files import read_text, write_text
 from hotlever.materials.silicon import MELTING_POINT
 from hotlever.raman import anharmonic
-from hotlever.raman.anharmonic import BALKANSKI1983
 from hotlever.raman.peak import LineShape
 from hotlever.records import Record, explained
 from hotlever.spieser2017 import (
@@ -173,13 +172,13 @@ def published_raman_calibration() -> RamanCalibration:
     (5.0, -41.1)
     """
     return RamanCalibration(
-        source=f"Spieser et al. (2017), section III, doi:{DOI}; {BALKANSKI1983.source}",
+        source=f"Spieser et al. (2017), section III, doi:{DOI}; {anharmonic.SOURCE}",
         room_temperature_K=BASE_TEMPERATURE_K,
         range_K=(BASE_TEMPERATURE_K, RAMAN_CALIBRATED_TO_K),
         linear=LinearFit(constant_K=RAMAN_CONSTANT_K, slope_K_cm=RAMAN_SLOPE_K_CM),
         anharmonic=AnharmonicFit(
-            three_phonon_cm=BALKANSKI1983.three_phonon,
-            four_phonon_cm=BALKANSKI1983.four_phonon,
+            three_phonon_cm=anharmonic.THREE_PHONON,
+            four_phonon_cm=anharmonic.FOUR_PHONON,
             covariance=[[0.0] * 3] * 3,
         ),
     )
@@ -278,7 +277,7 @@ def _fit_anharmonic(
     columns = anharmonic.gradient(temperature, room)
     distinct = np.unique(np.round(temperature, 1)).size
     free = distinct >= FREE_FIT_POINTS and np.ptp(temperature) >= FREE_FIT_SPAN
-    ratio = BALKANSKI1983.four_phonon / BALKANSKI1983.three_phonon
+    ratio = anharmonic.FOUR_PHONON / anharmonic.THREE_PHONON
     basis = np.eye(3) if free else np.array([[1.0, 0.0], [0.0, 1.0], [0.0, ratio]])
     reduced, covariance, chi_square = _least_squares(columns @ basis, centre, stderr)
     # the residuals may scale errors up, never down

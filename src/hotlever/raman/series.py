@@ -22,6 +22,7 @@ from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.stated import sample_temperature
 from hotlever.raman.thermometer import Thermometer
+from hotlever.steps import each
 from hotlever.tables import read_table, shown
 from hotlever.types import Progress
 
@@ -56,14 +57,12 @@ def measure(
 ) -> list[Line]:
     """Fit the silicon line of each spectrum; calls ``progress`` with (spectra done, in all)."""
     lines = []
-    for done, spectrum in enumerate(spectra, start=1):
+    for spectrum in each(spectra, progress):
         try:
             peak = fit_peak(spectrum.x, spectrum.y, options, spectrum.name)
         except NoSiliconLine:
             peak = None
         lines.append(Line(spectrum, peak))
-        if progress is not None:
-            progress(done, len(spectra))
     return lines
 
 

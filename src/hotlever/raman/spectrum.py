@@ -17,6 +17,7 @@ from hotlever.raman.columns import pick_spectra, require_line
 from hotlever.raman.peak import in_window
 from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
 from hotlever.raman.vendor import KINDS, read_vendor
+from hotlever.steps import each
 from hotlever.tables import text_lines
 from hotlever.types import Array, Progress
 
@@ -178,7 +179,7 @@ def read_spectra(
     files = spectrum_files(paths)
     spectra: list[Spectrum] = []
     passed_over: list[str] = []
-    for done, (file, from_folder) in enumerate(files, start=1):
+    for file, from_folder in each(files, progress):
         try:
             if from_folder and not file.is_file():
                 raise InputError(f"{file}: is a pipe or a device")
@@ -187,8 +188,6 @@ def read_spectra(
             if not from_folder:
                 raise
             passed_over.append(str(error))
-        if progress is not None:
-            progress(done, len(files))
     if not spectra:
         raise InputError(f"none of {len(files)} files is a spectrum; the last: {passed_over[-1]}")
     if skipped is not None:

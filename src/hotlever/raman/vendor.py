@@ -19,15 +19,13 @@ import numpy as np
 from hotlever.errors import InputError
 from hotlever.types import Array
 
-Parts = list[tuple[Array, Array]]
-
 _MOST_BLOCKS = 10_000
 _NPOINTS = re.compile(r"NPOINTS\s*=\s*(\d+)", re.I)
 _XYDATA = re.compile(r"##\s*XYDATA\s*=[^\n]*([^#]*)", re.I)
 _REPEATED_TWICE = re.compile(r"^[^$\n]*[S-Zs][^%J-Rj-r\n]*[S-Zs]", re.M)
 
 
-def read_vendor(kind: str, file: Path, raw: bytes) -> Parts:
+def read_vendor(kind: str, file: Path, raw: bytes) -> list[tuple[Array, Array]]:
     """Read a file of one of the `KINDS`: Raman shift (cm⁻¹) and intensity of each spectrum.
 
     Raises

@@ -9,8 +9,6 @@ from scipy.optimize import minimize_scalar
 from hotlever.datasets import labelled
 from hotlever.lever import Branch, Lever
 from hotlever.probe import Probe
-from hotlever.studies import each
-from hotlever.types import Progress
 
 #: Tip temperatures (K) at which k is compared.
 COLD, HOT = 330.0, 1006.0
@@ -57,7 +55,7 @@ def unevenness(factor: xr.Dataset) -> float:
     return float(hot / cold)
 
 
-def surroundings_study(probe: Probe, progress: Progress | None = None) -> xr.Dataset:
+def surroundings_study(probe: Probe) -> xr.Dataset:
     """Return k for other sizes of a lever, gaps to a surface and pressures of the air.
 
     Returns
@@ -76,7 +74,7 @@ def surroundings_study(probe: Probe, progress: Progress | None = None) -> xr.Dat
         thin = probe.with_(accommodation=0.9, pressure_mbar=pressure)
         cases[f"{pressure:g} mbar, accommodation 0.9"] = thin
     found = []
-    for changed in each(cases.values(), progress):
+    for changed in cases.values():
         lever = Lever(changed.in_medium("vacuum"))
         found.append(find_scale_factor(lever.branch(), Lever(changed.in_medium("air")).branch()))
     data = xr.concat(found, "case", combine_attrs="override").assign_coords(case=list(cases))

@@ -18,7 +18,7 @@ from hotlever.materials.doping import diffusion_length
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import MeshOptions, Probe
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
-from hotlever.studies import each
+from hotlever.steps import each
 from hotlever.types import Array, Progress
 
 #: What follows from a design; k is the power of the knee in air over that in vacuum.

@@ -8,8 +8,6 @@ last one compares with the paper, whose parameters are fitted.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import xarray as xr
 
@@ -19,26 +17,18 @@ from hotlever.fitting import Measurement, fit
 from hotlever.lever import Branch, Lever, OperatingPoint
 from hotlever.probe import Probe, Tip
 from hotlever.spieser2017 import RAMP
-from hotlever.studies import each
-from hotlever.types import Progress
 
-#: Plausible tips of lithography probes: height (µm) and half-angle (degrees).
+#: Plausible tips of lithography probes, cones: height (µm) and half-angle (degrees).
 SIZES = ((0.5, 15.0), (0.5, 30.0), (0.7, 20.0), (1.0, 15.0), (1.0, 30.0))
 
 
-def tip_effects(
-    probe: Probe, sizes: Sequence[tuple[float, float]] = SIZES, progress: Progress | None = None
-) -> xr.Dataset:
-    """Compute what tips change on a lever, in the flat model and in the probe's medium.
+def tip_effects(probe: Probe) -> xr.Dataset:
+    """Compute what tips of `SIZES` change on a lever, in the flat model and the probe's medium.
 
     Parameters
     ----------
     probe : Probe
         Without a tip.
-    sizes : sequence of (float, float)
-        Heights (µm) and half-angles (degrees) of cones.
-    progress : callable, optional
-        Called with tips done and their number.
 
     Returns
     -------
@@ -57,7 +47,7 @@ def tip_effects(
     bare = Lever(probe).branch()
     without = _knee(bare)
     rows = []
-    for height, angle in each(sizes, progress):
+    for height, angle in SIZES:
         tip = Tip(height_um=height, half_angle_deg=angle)
         lever = Lever(probe.model_copy(update={"tip": tip}))
         data = Measurement.of_sweep(lever.sweep(RAMP))

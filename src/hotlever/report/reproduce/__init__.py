@@ -10,7 +10,7 @@ from hotlever.report.page import Page
 from hotlever.report.reproduce import air, fits, thermometer, vacuum
 from hotlever.report.reproduce.findings import Findings
 from hotlever.spieser2017 import published
-from hotlever.studies import each
+from hotlever.steps import each
 from hotlever.types import Progress
 
 #: Headings and sections, in the order of the page.

@@ -1,0 +1,18 @@
+"""Work in steps, told as they are done."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import TypeVar
+
+from hotlever.types import Progress
+
+T = TypeVar("T")
+
+
+def each(items: Collection[T], progress: Progress | None) -> Iterator[T]:
+    """Give items one after the other, and tell how many are done."""
+    for done, item in enumerate(items, start=1):
+        yield item
+        if progress is not None:
+            progress(done, len(items))
