@@ -137,7 +137,8 @@ class PanelledAir:
                 "surroundings: the surface below crosses the lever or its chip; expected a larger "
                 "surface_gap_um or another surface_tilt_deg"
             )
-        mid_plane = [Mirror.in_plane((0, 0, 0), (0, 0, 1), +1.0)] if self.surface.mirrored else []
+        mid_plane = [Mirror.in_plane((0, 0, 0), (0, 0, 1), +1.0)] if surroundings.symmetric else []
+        self._halves = 1.0 + len(mid_plane)
         self.mirrors = mirror_group([*mid_plane, *below])
         layer = single_layer_matrix(self.panels, self.mirrors, progress)
         own = np.arange(len(self.surface.panels))
@@ -160,8 +161,7 @@ class PanelledAir:
     def operator(self) -> AirOperator:
         """Return the matrix from θ at the sites to heat, and how full of air the lever seems."""
         flux = cho_solve(self._factors, self._moments)
-        halves = 2.0 if self.surface.mirrored else 1.0
-        heat = halves * (self._moments.T @ flux)
+        heat = self._halves * (self._moments.T @ flux)
         # of a lever of one temperature: θ of the air at the surface as a share of the lever's; the
         # energy of the air inside goes with its square
         own = len(self.surface.panels)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -66,13 +65,9 @@ IDENTITY = Mirror(np.eye(3), np.zeros(3), 1.0)
 
 def mirror_group(mirrors: Sequence[Mirror]) -> list[Mirror]:
     """Return all products of reflections in planes at right angles, the identity first."""
-    group = []
-    for count in range(len(mirrors) + 1):
-        for chosen in combinations(mirrors, count):
-            product = IDENTITY
-            for mirror in chosen:
-                product = mirror.after(product)
-            group.append(product)
+    group = [IDENTITY]
+    for mirror in mirrors:
+        group += [mirror.after(product) for product in group]
     return group
 
 
@@ -147,14 +142,10 @@ class Panels:
     def points(self, order: int) -> tuple[Array, Array]:
         """Return Gauss points (n, order², 3) and weights (n, order²) on each panel."""
         nodes, weights = np.polynomial.legendre.leggauss(order)
-        s, t = (grid.ravel() for grid in np.meshgrid(nodes, nodes, indexing="ij"))
-        signs_s, signs_t = np.array([-1, 1, 1, -1]), np.array([-1, -1, 1, 1])
-        shape = 0.25 * (1 + np.outer(s, signs_s)) * (1 + np.outer(t, signs_t))
-        by_s = 0.25 * signs_s * (1 + np.outer(t, signs_t))
-        by_t = 0.25 * signs_t * (1 + np.outer(s, signs_s))
-        at = np.einsum("qk,nkd->nqd", shape, self.corners)
-        jacobian = np.cross(
-            np.einsum("qk,nkd->nqd", by_s, self.corners),
-            np.einsum("qk,nkd->nqd", by_t, self.corners),
-        )
-        return at, np.linalg.norm(jacobian, axis=2) * np.outer(weights, weights).ravel()
+        s, t = np.stack(np.meshgrid(nodes, nodes, indexing="ij")).reshape(2, -1, 1) / 2 + 0.5
+        a, b, c, d = np.moveaxis(self.corners, 1, 0)[:, :, None]
+        # a bilinear map of the unit square, from the side a b to the side d c
+        near, far = a + s * (b - a), d + s * (c - d)
+        along, across = (b - a) + t * (c - d - b + a), far - near
+        areas = np.linalg.norm(np.cross(along, across), axis=2)
+        return near + t * across, areas * np.outer(weights, weights).ravel() / 4

@@ -26,6 +26,9 @@ _Side = tuple[int, int]
 
 #: Extent of the chip in lever lengths; four times as much changes the loss by less than 2e-4.
 REACH = 8.0
+#: Largest panels, as a share of the lever's length, and growth of the size with the distance from
+#: edges and from the heater.
+_LARGEST, _GROWTH = 0.03, 1.2
 #: Panels of the chip at the lever's root, as a share of its width, and their growth with distance.
 _ROOT, _ROOT_GROWTH = 0.1, 0.5
 _ON_LINE = 1e-6  # µm
@@ -43,17 +46,11 @@ class PanelOptions:
         At an edge of the lever, as a share of its thickness.
     heater : float
         In the heater, as a share of its narrow side.
-    largest : float
-        As a share of the lever's length.
-    growth : float
-        Growth of the size with the distance from edges and from the heater.
     """
 
     refinement: float = 1.0
     edge: float = 0.15
     heater: float = 0.3
-    largest: float = 0.03
-    growth: float = 1.2
 
 
 @dataclass(frozen=True)
@@ -68,14 +65,11 @@ class LeverSurface:
         Places in the plane of the lever (µm); the temperature does not depend on z.
     site : ndarray of int, shape (len(panels),)
         The site of each panel.
-    mirrored : bool
-        Whether these are the panels above the mid-plane only.
     """
 
     panels: Panels
     sites: Array
     site: Index
-    mirrored: bool
 
 
 def lever_surface(
@@ -119,7 +113,7 @@ def lever_surface(
     panels = Panels(np.concatenate(corners))
     places = panels.corners.mean(axis=1)[:, :2].round(9)
     sites, site = np.unique(places, axis=0, return_inverse=True)
-    return LeverSurface(panels, sites, site.ravel(), mirrored)
+    return LeverSurface(panels, sites, site.ravel())
 
 
 def chip_panels(layout: Layout, options: PanelOptions) -> Panels:
@@ -144,10 +138,10 @@ class _Sizes:
     def __init__(self, layout: Layout, options: PanelOptions) -> None:
         self._heater = layout.heater.box
         fine = 1.0 / options.refinement
-        self._growth = fine * options.growth
+        self._growth = fine * _GROWTH
         self._edge = fine * options.edge * layout.thickness_um
         self._narrow = fine * options.heater * float(layout.heater.sides.min())
-        self._largest = fine * options.largest * float(np.ptp(layout.box, axis=0).max())
+        self._largest = fine * _LARGEST * float(np.ptp(layout.box, axis=0).max())
 
     def breaks(self, low: float, high: float, axis: int, edges: Sequence[bool]) -> Array:
         """Divide an interval along an axis; `edges` says which ends are edges of the lever."""
