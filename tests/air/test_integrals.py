@@ -114,4 +114,3 @@ def test_mirrors_at_right_angles_form_a_group():
     assert images == pytest.approx(
         np.array([[0.2, 0.3, 0.5], [1.8, 0.3, 0.5], [0.2, 0.3, 3.5], [1.8, 0.3, 3.5]])
     )
-    assert planes[1].height(point) == pytest.approx(-1.5)

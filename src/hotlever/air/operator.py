@@ -131,12 +131,7 @@ class PanelledAir:
                 f"air: this lever takes {len(self.panels)} panels, more than {most}; are its "
                 "thickness and heater too small for its other dimensions?"
             )
-        below = _mirrors_below(layout, surroundings, base_temperature_K)
-        if any(mirror.height(self.panels.corners).min() <= 0 for mirror in below):
-            raise InputError(
-                "surroundings: the surface below crosses the lever or its chip; expected a larger "
-                "surface_gap_um or another surface_tilt_deg"
-            )
+        below = _mirrors_below(layout, surroundings, base_temperature_K, self.panels)
         mid_plane = [Mirror.in_plane((0, 0, 0), (0, 0, 1), +1.0)] if surroundings.symmetric else []
         self._halves = 1.0 + len(mid_plane)
         self.mirrors = mirror_group([*mid_plane, *below])
@@ -177,9 +172,9 @@ class PanelledAir:
 
 
 def _mirrors_below(
-    layout: Layout, surroundings: Surroundings, base_temperature_K: float
+    layout: Layout, surroundings: Surroundings, base_temperature_K: float, panels: Panels
 ) -> list[Mirror]:
-    """Return the mirror of the flat surface below, where θ = 0; none in free space.
+    """Return the mirror of the flat surface below the panels, where θ = 0; none in free space.
 
     Every panel has a mirror panel of opposite density behind the surface. A jump length g at the
     surface moves the mirror back by g: θ falls to zero there.
@@ -190,4 +185,9 @@ def _mirrors_below(
     normal = np.array([-math.sin(tilt), 0.0, math.cos(tilt)])
     below_tip = np.array([*layout.tip, -layout.thickness_um / 2 - surroundings.surface_gap_um])
     point = below_tip - surroundings.jump_length_um(base_temperature_K) * normal
+    if ((panels.corners - point) @ normal).min() <= 0:
+        raise InputError(
+            "surroundings: the surface below crosses the lever or its chip; expected a larger "
+            "surface_gap_um or another surface_tilt_deg"
+        )
     return [Mirror.in_plane(point, normal, -1.0)]

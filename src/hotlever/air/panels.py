@@ -42,15 +42,6 @@ class Mirror:
         offset = 2.0 * (direction @ np.asarray(point, dtype=float)) * direction
         return cls(np.eye(3) - 2.0 * np.outer(direction, direction), offset, sign)
 
-    def height(self, points: Array) -> Array:
-        """Return the distances (µm) of points (..., 3) from the plane of a single reflection.
-
-        Positive on the side of +z, or of the plane's own normal where that is horizontal.
-        """
-        normal = np.linalg.eigh(self.matrix)[1][:, 0]
-        normal = normal * np.copysign(1.0, normal[2])
-        return points @ normal - 0.5 * self.shift @ normal
-
     def after(self, other: Mirror) -> Mirror:
         """Return `other` followed by this one."""
         return Mirror(

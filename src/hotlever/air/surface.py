@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from hotlever.air.panels import Panels
 from hotlever.errors import InputError
@@ -124,7 +125,8 @@ def chip_panels(layout: Layout, options: PanelOptions) -> Panels:
 
     def breaks(start: float, stop: float, near: tuple[float, float]) -> Array:
         at = np.linspace(start, stop, 20001)
-        return divided(at, smallest + _ROOT_GROWTH / options.refinement * _away(at, *near))
+        away = np.abs(at - at.clip(*near))
+        return divided(at, smallest + _ROOT_GROWTH / options.refinement * away)
 
     across = breaks(low - reach, high + reach, (low, high))
     up = breaks(half, half + reach, (half, half))
@@ -146,7 +148,7 @@ class _Sizes:
     def breaks(self, low: float, high: float, axis: int, edges: Sequence[bool]) -> Array:
         """Divide an interval along an axis; `edges` says which ends are edges of the lever."""
         at = np.linspace(low, high, 2001)
-        away = _away(at, *self._heater[:, axis])
+        away = np.abs(at - at.clip(*self._heater[:, axis]))
         size = np.minimum(self._largest, self._narrow + self._growth * away)
         for end, is_edge in zip((low, high), edges, strict=True):
             if is_edge:
@@ -159,15 +161,9 @@ class _Sizes:
         return divided(at, self._edge + self._growth * (half - np.abs(at)))
 
 
-def _away(at: Array, start: float, stop: float) -> Array:
-    """Return how far places are from an interval."""
-    return np.maximum(np.maximum(start - at, at - stop), 0.0)
-
-
 def divided(at: Array, size: Array) -> Array:
     """Return break points between the ends of `at` whose distances follow `size`."""
-    density = 1.0 / size
-    counted = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(at))])
+    counted = cumulative_trapezoid(1.0 / size, at, initial=0.0)
     pieces = max(1, int(np.ceil(counted[-1] - 1e-6)))
     breaks = np.interp(np.linspace(0.0, counted[-1], pieces + 1), counted, at)
     breaks[[0, -1]] = at[[0, -1]]

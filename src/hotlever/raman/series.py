@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 import os
 import re
 from collections.abc import Sequence
@@ -102,15 +99,10 @@ def read_lines(lines: Sequence[Line], thermometer: Thermometer | None) -> xr.Dat
 
 def to_csv(table: xr.Dataset) -> str:
     """The Raman CSV of a table from `read_lines`."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    columns = [
-        ["" if math.isnan(value) else f"{value:.{digits}f}" for value in table[name].values]
-        for name, digits in DIGITS.items()
-    ]
-    writer.writerows(zip(table.file.values, *columns, table.flags.values, strict=True))
-    return out.getvalue()
+    frame = table.to_dataframe()
+    for name, digits in DIGITS.items():
+        frame[name] = frame[name].map(f"{{:.{digits}f}}".format, na_action="ignore")
+    return str(frame.to_csv(index=False, header=COLUMNS, lineterminator="\n"))
 
 
 def calibrate_from(
