@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -21,9 +22,6 @@ from hotlever.air.panels import Panels
 from hotlever.errors import InputError
 from hotlever.probe.layout import Layout, Region
 from hotlever.types import Array, Index
-
-#: The axis (0 or 1) that a side of a box is normal to, and at which end of it (0 low, 1 high).
-_Side = tuple[int, int]
 
 #: Extent of the chip in lever lengths; four times as much changes the loss by less than 2e-4.
 REACH = 8.0
@@ -96,11 +94,8 @@ def lever_surface(
     upright = sizes.upright(half, mirrored)
     corners = []
     for box in boxes:
-        exposed = {
-            (axis, end): _exposed(box, (axis, end), boxes, layout)
-            for axis in (0, 1)
-            for end in (0, 1)
-        }
+        # by the axis (0 or 1) that a side is normal to, and at which end of it (0 low, 1 high)
+        exposed = {side: _exposed(box, *side, boxes, layout) for side in product((0, 1), (0, 1))}
         # an edge that is shared along its whole length is no edge of the lever
         x, y = (
             sizes.breaks(box[0, axis], box[1, axis], axis, [bool(exposed[axis, n]) for n in (0, 1)])
@@ -194,10 +189,9 @@ def _rectangle(region: Region) -> Array:
 
 
 def _exposed(
-    box: Array, side: _Side, boxes: list[Array], layout: Layout
+    box: Array, axis: int, end: int, boxes: list[Array], layout: Layout
 ) -> list[tuple[float, float]]:
     """Return the parts of a side that touch neither another region nor a terminal."""
-    axis, end = side
     other, line = 1 - axis, box[end, axis]
     covered = [
         (neighbour[0, other], neighbour[1, other])

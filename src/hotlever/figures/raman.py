@@ -71,7 +71,7 @@ def thermometry(
 
 
 def _in_window(line: Line) -> tuple[Array, Array]:
-    inside = in_window(line.spectrum.x, line.spectrum.name)
+    inside = in_window(line.spectrum.x, f"{line.spectrum.name}: ")
     return line.spectrum.x[inside], line.spectrum.y[inside]
 
 

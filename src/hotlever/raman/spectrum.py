@@ -178,7 +178,7 @@ def read_spectra(
     """
     files = spectrum_files(paths)
     spectra: list[Spectrum] = []
-    passed_over: list[str] = []
+    skipped = [] if skipped is None else skipped
     for file, from_folder in each(files, progress):
         try:
             if from_folder and not file.is_file():
@@ -187,9 +187,7 @@ def read_spectra(
         except InputError as error:
             if not from_folder:
                 raise
-            passed_over.append(str(error))
+            skipped.append(str(error))
     if not spectra:
-        raise InputError(f"none of {len(files)} files is a spectrum; the last: {passed_over[-1]}")
-    if skipped is not None:
-        skipped += passed_over
+        raise InputError(f"none of {len(files)} files is a spectrum; the last: {skipped[-1]}")
     return spectra

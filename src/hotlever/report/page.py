@@ -50,7 +50,7 @@ class Page:
         """Add a figure; `name` is its file name without suffix."""
         self.blocks.append({"kind": "figure", "name": name, "figure": made, "caption": caption})
 
-    def write(self, folder: str | os.PathLike[str], name: str = "index.html") -> Path:
+    def write(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page, and each figure as PDF beside it; return the page's path.
 
         Raises
@@ -75,5 +75,5 @@ class Page:
         html = environment.get_template("page.html.j2").render(
             title=self.title, summary=self.summary, blocks=blocks, version=__version__
         )
-        write_text(target / name, html)
-        return target / name
+        write_text(target / "index.html", html)
+        return target / "index.html"
