@@ -18,8 +18,6 @@ from hotlever.cli.thermometer import CalibrationOption, Setup, calibration_of, s
 from hotlever.errors import InputError
 from hotlever.files import Outputs, write_text
 
-_MANY = "--calibrate-from"
-
 
 class SeveralFiles(typer.core.TyperCommand):
     """A command whose ``--calibrate-from`` takes all paths up to the next option.
@@ -30,11 +28,9 @@ class SeveralFiles(typer.core.TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Repeat the option before each of its paths, then parse as usual."""
-        return super().parse_args(ctx, spread_option(args, _MANY, self._takes_value()))
-
-    def _takes_value(self) -> set[str]:
         options = (one for one in self.params if one.param_type_name == "option")
-        return {name for one in options if not getattr(one, "is_flag", False) for name in one.opts}
+        valued = {n for one in options if not getattr(one, "is_flag", False) for n in one.opts}
+        return super().parse_args(ctx, spread_option(args, "--calibrate-from", valued))
 
 
 def spread_option(args: list[str], option: str, takes_value: set[str]) -> list[str]:
