@@ -110,6 +110,11 @@ def read_json(path: Name) -> dict[str, Any]:
     return content
 
 
+def json_text(content: dict[str, Any]) -> str:
+    """Return the text of a JSON file that people may read."""
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
 # --- writing ------------------------------------------------------------------------------------
 
 

@@ -15,14 +15,13 @@ from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.words import calibration_text
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
-from hotlever.files import write_text
+from hotlever.files import json_text, write_text
 from hotlever.fitting.embedded import (
     EmbeddedMeasurement,
     Number,
     Section,
     array,
     embed,
-    json_text,
     without_nan,
 )
 from hotlever.fitting.measurement import Measurement

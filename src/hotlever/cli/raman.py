@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import deque
 from functools import partial
 from pathlib import Path
@@ -16,7 +15,7 @@ from hotlever.cli.options import File, check_plot, options_of
 from hotlever.cli.output import give, note, tell
 from hotlever.cli.thermometer import CalibrationOption, Setup, calibration_of, set_up
 from hotlever.errors import InputError
-from hotlever.files import Outputs, write_text
+from hotlever.files import Outputs, json_text, write_text
 
 
 class SeveralFiles(typer.core.TyperCommand):
@@ -172,7 +171,7 @@ def raman_check_command(
             lines = check.drop_dims("temperature_K").to_dataframe().rename_axis("name")
             numbers = {"truth": check.truth, "hottest_K": check.hottest_K}
             numbers |= {"lines": lines.reset_index().to_dict("records"), "conclusion": said}
-            write_text(output, json.dumps(numbers, indent=2, ensure_ascii=False) + "\n")
+            write_text(output, json_text(numbers))
     give(f"{said}\n")
 
 

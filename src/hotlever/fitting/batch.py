@@ -16,7 +16,7 @@ from dask.system import CPU_COUNT
 from hotlever import __version__
 from hotlever.cluster import guarded, local_client, remote_client, run_all
 from hotlever.errors import HotleverError, InputError
-from hotlever.files import Outputs, output_folder, read_json, write_text
+from hotlever.files import Outputs, json_text, output_folder, read_json, write_text
 from hotlever.fitting.estimation import fit, with_measured_circuit
 from hotlever.fitting.measurement import Measurement, read_measurement
 from hotlever.fitting.options import FitOptions
@@ -156,7 +156,7 @@ def fit_many(
                         raise result
                     content = {**result, "request": _request(measurement, probe, options)}
                     output_folder(target)
-                    _write(content, files[name])
+                    write_text(files[name], json_text(content))
                     batch.fits[name] = LeverFit(name, files[name], content)
                 except HotleverError as error:
                     failed(measurement.path, error)
@@ -199,10 +199,6 @@ def _identity(path: Path) -> object:
     except OSError:
         return os.path.realpath(path)
     return found.st_dev, found.st_ino
-
-
-def _write(content: dict[str, Any], file: Path) -> None:
-    write_text(file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
 
 def _written_before(file: Path, record: dict[str, Any]) -> dict[str, Any] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from typing import Annotated, Any, Self
@@ -106,8 +105,3 @@ def without_nan(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [without_nan(entry) for entry in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-def json_text(content: dict[str, Any]) -> str:
-    """Return the text of a fit or calibration file."""
-    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"

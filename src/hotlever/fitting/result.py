@@ -15,7 +15,7 @@ from pydantic import AfterValidator
 from hotlever import __version__
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
-from hotlever.files import write_text
+from hotlever.files import json_text, write_text
 from hotlever.fitting.embedded import (
     EmbeddedMeasurement,
     Number,
@@ -23,7 +23,6 @@ from hotlever.fitting.embedded import (
     Spread,
     array,
     embed,
-    json_text,
     without_nan,
 )
 from hotlever.fitting.measurement import Measurement

@@ -13,7 +13,8 @@ import xarray as xr
 from dask.system import CPU_COUNT
 
 from hotlever.cluster import local_processes
-from hotlever.fitting.embedded import json_text, without_nan
+from hotlever.files import json_text
+from hotlever.fitting.embedded import without_nan
 from hotlever.fitting.posterior import BAND_QUANTILES, predictive_band, sample_posterior
 from hotlever.fitting.profile import profile_likelihood
 from hotlever.fitting.result import Fit
