@@ -48,12 +48,12 @@ class BranchEndError(ComputationError):
         self.bias_reached = bias_reached
 
 
-def shown(found: object) -> str:
+def quoted(found: object) -> str:
     """Return what was found as an error quotes it: the beginning of what is long.
 
     Examples
     --------
-    >>> shown("a" * 80)
+    >>> quoted("a" * 80)
     "'aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa…"
     """
     try:
@@ -76,5 +76,5 @@ def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") 
     hint = f"did you mean '{near[0]}'? " if near else ""
     prefix = f"{where}: " if where else ""
     return InputError(
-        f"{prefix}unknown {kind} {shown(name)}: {hint}(expected one of: {', '.join(known)})"
+        f"{prefix}unknown {kind} {quoted(name)}: {hint}(expected one of: {', '.join(known)})"
     )

@@ -7,7 +7,7 @@ from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from hotlever.errors import InputError, shown, unknown_name
+from hotlever.errors import InputError, quoted, unknown_name
 
 
 class Record(BaseModel):
@@ -66,5 +66,5 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
     if not key:
         return InputError(f"{where}: {message}")
     return InputError(
-        f"{where}: {key} = {shown(first['input'])}: {message[0].lower()}{message[1:]}"
+        f"{where}: {key} = {quoted(first['input'])}: {message[0].lower()}{message[1:]}"
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from typer import Argument, Option
 
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, quoted
 from hotlever.files import Outputs
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def _parse_range(
     readable = parts[2].isdecimal() and len(parts[2]) <= len(str(most))
     if not readable or not 1 <= int(parts[2]) <= most:
         raise InputError(
-            f"{where}: COUNT is {shown(parts[2])}, expected a whole number from 1 to {most}"
+            f"{where}: COUNT is {quoted(parts[2])}, expected a whole number from 1 to {most}"
         )
     return start, stop, np.linspace(start, stop, int(parts[2]))
 
@@ -144,7 +144,7 @@ def parse_number(text: str, where: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f"{where}: found {shown(text)}, expected a number")
+        raise InputError(f"{where}: found {quoted(text)}, expected a number")
     return value
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import model_validator
 
-from hotlever.errors import InputError, shown, unknown_name
+from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_text, write_text
 from hotlever.materials import Material
 from hotlever.probe.circuit import Circuit
@@ -129,7 +129,7 @@ class Probe(Record):
             if name not in SECTIONS:
                 raise unknown_name("section", name, SECTIONS, where)
             if not isinstance(section, dict):
-                raise InputError(f"{where}: [{name}] must be a section, found {shown(section)}")
+                raise InputError(f"{where}: [{name}] must be a section, found {quoted(section)}")
         if "probe" not in values:
             raise InputError(f"{where}: section [probe] is missing")
         given = {name: values[name] for name in _PARTS if name in values}
