@@ -15,10 +15,8 @@ from hotlever.errors import InputError, quoted
 from hotlever.files import Outputs
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from hotlever.probe import Probe
+    from hotlever.types import Array
 
 #: Between these (V) a lever has a current that can be told from none, and no spark.
 LEAST_BIAS, MOST_BIAS = 1e-6, 1e4
@@ -79,7 +77,7 @@ def check_medium(medium: str | None) -> None:
         raise InputError(f"--medium {medium}: expected {' or '.join(get_args(Medium))}")
 
 
-def parse_bias(text: str) -> NDArray[np.float64]:
+def parse_bias(text: str) -> Array:
     """Parse ``START:STOP:COUNT`` in volts, ends included.
 
     Examples
@@ -100,7 +98,7 @@ def parse_bias(text: str) -> NDArray[np.float64]:
     return biases
 
 
-def parse_vary(text: str) -> tuple[str, NDArray[np.float64]]:
+def parse_vary(text: str) -> tuple[str, Array]:
     """Parse ``NAME=START:STOP:COUNT``, ends included.
 
     Examples
@@ -119,9 +117,7 @@ def parse_vary(text: str) -> tuple[str, NDArray[np.float64]]:
     return name.strip(), values
 
 
-def _parse_range(
-    text: str, where: str, example: str, most: int
-) -> tuple[float, float, NDArray[np.float64]]:
+def _parse_range(text: str, where: str, example: str, most: int) -> tuple[float, float, Array]:
     import numpy as np
 
     parts = text.split(":")

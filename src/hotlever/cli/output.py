@@ -6,13 +6,14 @@ Nothing heavy is imported above a bar of progress.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from hotlever.errors import HotleverError
 
-Update = Callable[[int, int], None]
+if TYPE_CHECKING:
+    from hotlever.types import Progress
 
 
 def give(result: str = "") -> None:
@@ -73,7 +74,7 @@ def fail(message: str) -> None:
 
 
 @contextmanager
-def progress(label: str) -> Iterator[Update]:
+def progress(label: str) -> Iterator[Progress]:
     """Show a progress bar on standard error while the block runs.
 
     The block gets a function to call with (steps done, steps in all); library functions
@@ -84,7 +85,7 @@ def progress(label: str) -> Iterator[Update]:
 
 
 @contextmanager
-def progress_bars(*labels: str) -> Iterator[tuple[Update, ...]]:
+def progress_bars(*labels: str) -> Iterator[tuple[Progress, ...]]:
     """Show several progress bars, each from its first call on."""
     if sys.stderr is None or not sys.stderr.isatty():
         yield tuple(lambda done, total: None for _ in labels)
@@ -101,7 +102,7 @@ def progress_bars(*labels: str) -> Iterator[tuple[Update, ...]]:
     console = Console(file=cast(Any, _stderr))
     with rich.Progress(*columns, console=console, transient=True) as bar:
 
-        def updater(label: str, visible: bool) -> Update:
+        def updater(label: str, visible: bool) -> Progress:
             task = bar.add_task(label, total=None, visible=visible)
             return lambda done, total: bar.update(task, completed=done, total=total, visible=True)
 

@@ -107,7 +107,7 @@ def sample(
             if done > _WARM_UP:
                 points.append([chain for _, chain, _, _ in moved])
                 logs.append([log for _, _, log, _ in moved])
-                accepted += steps * np.mean([share for *_, share in moved])
+                accepted += steps * np.mean([rate for *_, rate in moved])
             if progress is not None:
                 progress(done, _WARM_UP + draws)
     chains, densities = (np.concatenate(kept, axis=1).swapaxes(1, 2) for kept in (points, logs))

@@ -13,7 +13,7 @@ from skfem import MeshTet, MeshTri
 
 from hotlever.errors import ComputationError
 from hotlever.probe.layout import Layout, Region, Terminal
-from hotlever.types import Array
+from hotlever.types import Array, Index
 
 _ON_LINE = 1e-6  # µm
 _NOT_MESHED = "Netgen could not mesh this layout; are its parts of too different a size?"
@@ -77,8 +77,8 @@ class ProbeMesh:
 
     layout: Layout
     elements: MeshTri | MeshTet
-    region: NDArray[np.intp]
-    terminal_facets: Mapping[str, NDArray[np.intp]]
+    region: Index
+    terminal_facets: Mapping[str, Index]
 
 
 def mesh_layout(layout: Layout, options: MeshOptions | None = None) -> ProbeMesh:
@@ -107,7 +107,7 @@ def _area(corners: Array) -> float:
     return float(np.abs(twice).sum()) / 2
 
 
-def _netgen(layout: Layout, options: MeshOptions) -> tuple[MeshTri, NDArray[np.intp]]:
+def _netgen(layout: Layout, options: MeshOptions) -> tuple[MeshTri, Index]:
     # imported here: OpenCASCADE takes a quarter of a second to load, and a saved sweep can be
     # read and drawn without it
     from netgen.occ import Glue, OCCGeometry, WorkPlane
@@ -148,7 +148,7 @@ def face_of(region: Region, plane: Any) -> Any:
     return plane.Close().Face()
 
 
-def terminal_facets(mesh: MeshTri | MeshTet, layout: Layout) -> dict[str, NDArray[np.intp]]:
+def terminal_facets(mesh: MeshTri | MeshTet, layout: Layout) -> dict[str, Index]:
     """Return the boundary facets on, above or below the line of each terminal, by its name.
 
     Raises

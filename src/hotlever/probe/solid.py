@@ -19,6 +19,7 @@ from skfem import MeshTet
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout
 from hotlever.probe.mesh import MeshSizes, ProbeMesh, face_of, terminal_facets
+from hotlever.types import Index
 
 _ON_LINE = 1e-6  # µm
 #: Largest edge on the sphere, as a share of its radius: with longer ones Netgen fails to pair
@@ -70,7 +71,7 @@ class SolidMesh(ProbeMesh):
     """
 
     netgen: Any
-    vertices: NDArray[np.intp]
+    vertices: Index
     centre: tuple[float, float, float]
 
 

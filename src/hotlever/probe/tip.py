@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from hotlever.records import Record
+from hotlever.types import Array
 
 #: First zero of J₁', the slope of the Bessel function: the slowest sideways mode of a cylinder
 #: of radius a dies out as exp(−1.841 z/a) along its axis.
@@ -42,7 +43,7 @@ class Tip(Record):
         """Radius where the cone meets the lever (µm)."""
         return self.apex_radius_um + self.height_um * self.slope
 
-    def thickening_um(self, distance: ArrayLike) -> NDArray[np.float64]:
+    def thickening_um(self, distance: ArrayLike) -> Array:
         """Return what the lever must be thicker to conduct along its plane as with the cone.
 
         A current along the lever enters the cone only near its base. In a slice of radius a
@@ -63,7 +64,5 @@ class Tip(Record):
         """
         base, power = self.base_radius_um, 1.0 + SIDEWAYS_MODE / self.slope
         radius = np.clip(np.asarray(distance, dtype=float), self.apex_radius_um, base)
-        thickening: NDArray[np.float64] = (
-            base / (self.slope * power) * (1.0 - (radius / base) ** power)
-        )
+        thickening: Array = base / (self.slope * power) * (1.0 - (radius / base) ** power)
         return thickening
