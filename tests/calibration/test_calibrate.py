@@ -29,6 +29,7 @@ from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Circuit, Probe
 from hotlever.spieser2017 import published
+from made_up import GONE, damaged
 from synthetic_curves import measured_curve
 
 #: Leave out what needs other levers to be solved.
@@ -234,23 +235,10 @@ def test_a_fit_as_object_or_file_and_data_as_object_or_file_are_one(shared_fit, 
     np.testing.assert_allclose(by_path.table.tip_K, by_object.table.tip_K)
 
 
-def damaged(content, *keys, value=None):
-    """A copy with one entry, found by its keys, replaced; or left out without a value."""
-    content = json.loads(json.dumps(content))
-    part = content
-    for key in keys[:-1]:
-        part = part[key]
-    if value is None:
-        del part[keys[-1]]
-    else:
-        part[keys[-1]] = value
-    return content
-
-
 @pytest.mark.parametrize(
     ("keys", "value", "message"),
     [
-        (("probe",), None, "not a calibration file: probe is missing"),
+        (("probe",), GONE, "not a calibration file: probe is missing"),
         (("data",), 3, "data = 3"),
         (("data", "columns"), {"I_h": [1.0]}, "columns: V_b is missing"),
         (("data", "columns", "I_h"), [1.0, 2.0], "I_h: expected numbers in 40 places"),

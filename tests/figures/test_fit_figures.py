@@ -13,8 +13,7 @@ from hotlever.figures import (
     save_figure,
     tip_band,
 )
-from hotlever.fitting.levers import compare_levers
-from hotlever.materials import PARAMETERS
+from made_up import levers
 
 
 def test_corner_has_units_on_its_axes(tmp_path):
@@ -63,26 +62,6 @@ def test_band_shows_bias_and_power(tmp_path):
     )
     assert widest == pytest.approx(20.0)
     save_figure(made, tmp_path / "band.png")
-
-
-def levers(count: int, held: tuple[str, ...] = ()):
-    rng = np.random.default_rng(0)
-    return compare_levers(
-        {
-            f"lever-{number}": {
-                "parameters": {
-                    name: {
-                        "value": known.scale * (2 + 0.1 * rng.normal()),
-                        "stderr": None if name in held else 0.05 * known.scale,
-                    }
-                    for name, known in PARAMETERS.items()
-                },
-                "inversion_temperature_K": 830.0 + 5 * rng.normal(),
-                "inversion_temperature_stderr_K": 3.0,
-            }
-            for number in range(count)
-        }
-    )
 
 
 @pytest.mark.parametrize(("count", "held", "panels"), [(4, (), 7), (200, ("n_d", "p"), 5)])

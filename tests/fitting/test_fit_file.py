@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 
 import numpy as np
@@ -11,9 +10,7 @@ import pytest
 from hotlever.errors import InputError
 from hotlever.fitting import FitOptions, fit, read_fit
 from hotlever.fitting.measurement import Measurement
-
-#: Not there, which is something else than null.
-GONE = object()
+from made_up import GONE, damaged
 
 
 @pytest.fixture(scope="module")
@@ -26,18 +23,6 @@ def found(lever):
 @pytest.fixture(scope="module")
 def content(found):
     return json.loads(json.dumps(found.content()))
-
-
-def damaged(content, *keys, value):
-    changed = copy.deepcopy(content)
-    at = changed
-    for key in keys[:-1]:
-        at = at[key]
-    if value is GONE:
-        del at[keys[-1]]
-    else:
-        at[keys[-1]] = value
-    return changed
 
 
 def nested(depth):

@@ -5,30 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from hotlever.fitting.levers import compare_levers
 from hotlever.fitting.uncertainty import Uncertainty
 from hotlever.fitting.words import lever_rows, levers_text, uncertainty_text
-from hotlever.materials import PARAMETERS
-
-
-def levers(count: int, held: tuple[str, ...] = ()):
-    rng = np.random.default_rng(0)
-    return compare_levers(
-        {
-            f"lever-{number}": {
-                "parameters": {
-                    name: {
-                        "value": known.scale * (2 + 0.1 * rng.normal()),
-                        "stderr": None if name in held else 0.05 * known.scale,
-                    }
-                    for name, known in PARAMETERS.items()
-                },
-                "inversion_temperature_K": 830.0 + 5 * rng.normal(),
-                "inversion_temperature_stderr_K": 3.0,
-            }
-            for number in range(count)
-        }
-    )
+from made_up import levers
 
 
 def test_table_has_units_and_ends_with_mean_and_scatter():
