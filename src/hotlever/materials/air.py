@@ -14,44 +14,32 @@ from numpy.typing import ArrayLike
 from hotlever.materials.laws import FORMULA_FROM, FORMULA_TO, Evaluated, law
 from hotlever.types import Array
 
-#: Coefficient and exponent of T (K) of each term of Eq. 13, in W cm⁻¹ K⁻¹.
-_TERMS = (
-    (2.60e-4, 0.0),
-    (4.70e-7, 1.0),
-    (1.48e-7, 0.5),
-    (-6.63e-2, -1.0),
-    (9.14, -2.0),
-    (-6.50e2, -3.0),
-)
+#: Coefficients of T⁰, T, T^½, T⁻¹, T⁻² and T⁻³ (K) in Eq. 13, in W cm⁻¹ K⁻¹.
+_A, _B, _C, _D, _E, _F = 2.60e-4, 4.70e-7, 1.48e-7, -6.63e-2, 9.14, -6.50e2
 #: Specific gas constant (J kg⁻¹ K⁻¹) and ratio of specific heats of air.
 GAS_CONSTANT, HEAT_RATIO = 287.05, 1.4
 #: Standard pressure (mbar).
 ATMOSPHERE = 1013.25
 
 
-def _sum(T: Array, order: int) -> Array:
-    """Return Eq. 13 (order 0), its derivative (1) or an antiderivative (−1)."""
-    total = np.zeros_like(T)
-    inverse, root = 1.0 / T, np.sqrt(T)
+def _conductivity(T: Array) -> Array:
+    """Eq. 13; in products, since general powers are ten times slower."""
+    inverse = 1.0 / T
+    return _A + _B * T + _C * np.sqrt(T) + inverse * (_D + inverse * (_E + inverse * _F))
 
-    def raised(power: float) -> Array:
-        # products: general powers are ten times slower, and sweeps in air take many
-        whole = int(np.floor(power))
-        result = root if power != whole else np.ones_like(T)
-        for _ in range(abs(whole)):
-            result = result * (T if whole > 0 else inverse)
-        return result
 
-    for coefficient, power in _TERMS:
-        if order == 1:
-            total += coefficient * power * raised(power - 1.0)
-        elif order == 0:
-            total += coefficient * raised(power)
-        elif power == -1.0:
-            total += coefficient * np.log(T)
-        else:
-            total += coefficient / (power + 1.0) * raised(power + 1.0)
-    return total
+def _slope(T: Array) -> Array:
+    """Return the derivative of Eq. 13."""
+    inverse = 1.0 / T
+    falling = inverse**2 * (_D + inverse * (2.0 * _E + inverse * 3.0 * _F))
+    return _B + 0.5 * _C * np.sqrt(inverse) - falling
+
+
+def _integral(T: Array) -> Array:
+    """Return an antiderivative of Eq. 13."""
+    inverse = 1.0 / T
+    rising = T * (_A + 0.5 * _B * T + 2.0 / 3.0 * _C * np.sqrt(T))
+    return rising + _D * np.log(T) - inverse * (_E + inverse * 0.5 * _F)
 
 
 @law(meant_for=(290.0, 1300.0), source="Eq. 13; Kadoya et al., JPCRD 14, 947 (1985)")
@@ -65,7 +53,7 @@ def thermal_conductivity_of_air(T: ArrayLike) -> Evaluated:
     [0.02546, 0.026, 0.05703, 0.07287]
     """
     T = np.asarray(T, dtype=float)
-    return _sum(T, 0), {"T": _sum(T, 1)}
+    return _conductivity(T), {"T": _slope(T)}
 
 
 @law(
@@ -103,7 +91,7 @@ def temperature_jump_length(T: ArrayLike, pressure_mbar: float, accommodation: f
         / ((HEAT_RATIO + 1.0) * c_v * 100.0 * pressure_mbar)
     )
     per_kappa *= 1e8  # W cm⁻¹ K⁻¹ to W m⁻¹ K⁻¹, and m to µm
-    kappa, slope = _sum(T, 0), _sum(T, 1)
+    kappa, slope = _conductivity(T), _slope(T)
     return per_kappa * kappa, {"T": per_kappa * (slope + 0.5 * kappa / T)}
 
 
@@ -121,9 +109,9 @@ def kirchhoff_variable(T: ArrayLike, base_temperature_K: float) -> Evaluated:
     """
     T = np.asarray(T, dtype=float)
     inside = np.clip(T, FORMULA_FROM, FORMULA_TO)
-    kappa = _sum(inside, 0)
-    start = _sum(np.asarray(base_temperature_K, dtype=float), -1)
-    return _sum(inside, -1) - start + kappa * (T - inside), {"T": kappa}
+    kappa = _conductivity(inside)
+    start = _integral(np.asarray(base_temperature_K, dtype=float))
+    return _integral(inside) - start + kappa * (T - inside), {"T": kappa}
 
 
 def temperature_from_kirchhoff(theta: ArrayLike, base_temperature_K: float) -> Array:
