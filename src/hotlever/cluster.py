@@ -22,7 +22,6 @@ from distributed.diagnostics.plugin import WorkerPlugin
 from hotlever import __version__
 from hotlever.cache import CACHE_VARIABLE, cache_folder
 from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.threads import single_threaded_children
 
 T = TypeVar("T")
 # Number and arguments.
@@ -43,6 +42,8 @@ _ANSWER_S = 30
 _SILENT_S = 20
 #: Seconds between two looks at the workers.
 _LOOK_S = 5.0
+#: Variables that keep the linear algebra of a new process on one thread.
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: Those that Dask gives levels of their own.
 _LOGGERS = ("distributed", "distributed.client")
 _KILLED = ComputationError("every process that tried it died; too little memory?")
@@ -200,10 +201,9 @@ def local_client(processes: int) -> Iterator[Client]:
     }
     security = Security.temporary()
     with (
-        single_threaded_children(),
         _folder_of_this_process() as folder,
         dask.config.set({**settings, "temporary-directory": folder}),
-        _shared_cache(folder),
+        _environment(folder),
     ):
         try:
             with _without_interrupts():
@@ -238,16 +238,21 @@ def _folder_of_this_process() -> Iterator[str]:
 
 
 @contextmanager
-def _shared_cache(folder: str) -> Iterator[None]:
-    """Let workers find reduced levers on disk, even if the user's cache is switched off."""
-    if cache_folder() is not None:
-        yield
-        return
-    os.environ[CACHE_VARIABLE] = folder
+def _environment(folder: str) -> Iterator[None]:
+    """Give workers one BLAS thread, and a cache to share even if the user's is switched off."""
+    changes = dict.fromkeys(_THREADS, "1")
+    if cache_folder() is None:
+        changes[CACHE_VARIABLE] = folder
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
     try:
         yield
     finally:
-        os.environ[CACHE_VARIABLE] = ""
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 @contextmanager
@@ -317,6 +322,4 @@ def _silence() -> dict[str, int]:
 
 
 def _version() -> str:
-    from hotlever import __version__ as version
-
-    return version
+    return __version__
