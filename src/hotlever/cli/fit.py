@@ -176,7 +176,7 @@ def _fit_several(
         count = len(batch.fits) + len(batch.failures)
         note(f"{batch.reused} of {count} levers were fitted before, from the same data")
     if batch.fits:
-        table = compare_levers({name: one.content for name, one in batch.fits.items()})
+        table = compare_levers(batch.fits)
         texts = [levers_text(table)]
         with outputs.together():
             write_text(folder / _TABLE, levers_csv(table))

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,39 +25,21 @@ from hotlever.probe import Probe
 from hotlever.types import Progress
 
 
-@dataclass(frozen=True)
-class LeverFit:
-    """One lever of many, fitted.
-
-    Attributes
-    ----------
-    name : str
-    path : Path
-        The fit file.
-    content : dict
-        What stands in it.
-    """
-
-    name: str
-    path: Path
-    content: dict[str, Any]
-
-
 @dataclass
 class Batch:
     """What became of many data files.
 
     Attributes
     ----------
-    fits : dict of str to LeverFit
-        By the name of the lever, in the order of the data files.
+    fits : dict of str to dict
+        Contents of the fit files, by the name of the lever, in the order of the data files.
     failures : dict of str to HotleverError
         By data file: why it could not be read or fitted.
     reused : int
         Fits that had been written before from the same data, probe, options and version.
     """
 
-    fits: dict[str, LeverFit] = field(default_factory=dict)
+    fits: dict[str, dict[str, Any]] = field(default_factory=dict)
     failures: dict[str, HotleverError] = field(default_factory=dict)
     reused: int = 0
 
@@ -140,11 +121,12 @@ def fit_many(
         if content is None:
             waiting[name] = measurement
         else:
-            batch.fits[name] = LeverFit(name, files[name], content)
+            batch.fits[name] = content
             batch.reused += 1
     tell()
-    with _client(min(processes or CPU_COUNT, len(waiting)), scheduler) as client:
-        if client is not None:
+    if waiting:
+        local = min(processes or CPU_COUNT, len(waiting))
+        with local_client(local) if scheduler is None else remote_client(scheduler) as client:
             for name, reason in _reduced(probe, options, waiting, reducing).items():
                 failed(waiting.pop(name).path, reason)
             names = list(waiting)
@@ -157,7 +139,7 @@ def fit_many(
                     content = {**result, "request": _request(measurement, probe, options)}
                     output_folder(target)
                     write_text(files[name], json_text(content))
-                    batch.fits[name] = LeverFit(name, files[name], content)
+                    batch.fits[name] = content
                 except HotleverError as error:
                     failed(measurement.path, error)
                 tell()
@@ -208,16 +190,6 @@ def _written_before(file: Path, record: dict[str, Any]) -> dict[str, Any] | None
     except InputError:
         return None
     return content if content.get("request") == record else None
-
-
-@contextmanager
-def _client(processes: int, scheduler: str | None) -> Iterator[Any]:
-    """Give a Dask client; None where there is nothing to do."""
-    if not processes:
-        yield None
-        return
-    with local_client(processes) if scheduler is None else remote_client(scheduler) as client:
-        yield client
 
 
 def _request(measurement: Measurement, probe: Probe, options: FitOptions) -> dict[str, Any]:

@@ -109,8 +109,8 @@ def _add_uncertainty(page: Page, found: Uncertainty) -> None:
 
 def levers_page(batch: Batch) -> Page:
     """Return the report page of many levers, of which one is fitted or more."""
-    levers = compare_levers({name: one.content for name, one in batch.fits.items()})
-    observables = {tuple(one.content["observables"]) for one in batch.fits.values()}
+    levers = compare_levers(batch.fits)
+    observables = {tuple(one["observables"]) for one in batch.fits.values()}
     page = Page(
         f"Fits of {levers.sizes['lever']} levers",
         "Material parameters of levers from their measured "
@@ -125,7 +125,7 @@ def levers_page(batch: Batch) -> Page:
     )
     columns, *rows = lever_rows(levers)
     page.table(columns, rows, "Standard errors in units of the last digits.")
-    noted = [(name, text) for name, one in batch.fits.items() for text in one.content["notes"]]
+    noted = [(name, text) for name, one in batch.fits.items() for text in one["notes"]]
     if noted:
         page.heading("What single fits say")
         page.table(("lever", "note"), noted)
