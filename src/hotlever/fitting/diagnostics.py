@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.special import ndtri
+from scipy.stats import rankdata
 
 from hotlever.types import Array
 
@@ -72,10 +73,7 @@ def _rhat(chains: Array) -> float:
 
 def _normal_ranks(values: Array) -> Array:
     """Replace values by the normal scores of their ranks."""
-    _, place, count = np.unique(values.ravel(), return_inverse=True, return_counts=True)
-    # equal values share their mean rank
-    ranks = (np.cumsum(count) - 0.5 * (count - 1))[place].reshape(values.shape)
-    scores: Array = ndtri((ranks - 0.375) / (values.size + 0.25))
+    scores: Array = ndtri((rankdata(values).reshape(values.shape) - 0.375) / (values.size + 0.25))
     return scores
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -132,15 +130,13 @@ def _listed(names: Sequence[str]) -> str:
 
 def levers_csv(data: xr.Dataset) -> str:
     """Return a table with one row for each lever: value and standard error of each quantity."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    header = (
-        f"{name}{kind}{'_K' if name == INVERSION else ''}"
+    columns = {
+        f"{name}{kind}{'_K' if name == INVERSION else ''}": (
+            "lever",
+            values.sel(quantity=name).data,
+        )
         for name in data.quantity.values
-        for kind in ("", "_stderr")
-    )
-    writer.writerow(["lever", *header])
-    pairs = np.stack([data.value.values, data.stderr.values], axis=-1)
-    for lever, row in zip(data.lever.values, pairs.reshape(len(pairs), -1), strict=True):
-        writer.writerow([lever, *("" if np.isnan(cell) else f"{cell:.8g}" for cell in row)])
-    return text.getvalue()
+        for kind, values in (("", data.value), ("_stderr", data.stderr))
+    }
+    table = xr.Dataset(columns, {"lever": data.lever.data})
+    return str(table.to_dataframe().to_csv(float_format="%.8g"))

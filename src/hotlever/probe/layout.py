@@ -111,10 +111,6 @@ class Layout:
         boxes = np.array([region.box for region in self.regions])
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
-    def terminal(self, name: str) -> Terminal | None:
-        """Return the terminal of this name, or None if the layout has none."""
-        return next((terminal for terminal in self.terminals if terminal.name == name), None)
-
     def reentrant_corners(self) -> list[Point]:
         """Corners where the silicon spans more than 180°, at which fields are singular."""
         corners = {(round(x, 6), round(y, 6)) for region in self.regions for x, y in region.outline}

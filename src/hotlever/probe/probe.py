@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tomllib
 from dataclasses import replace
@@ -132,15 +133,12 @@ class Probe(Record):
                 raise InputError(f"{where}: [{name}] must be a section, found {quoted(section)}")
         if "probe" not in values:
             raise InputError(f"{where}: section [probe] is missing")
-        given = {name: values[name] for name in _PARTS if name in values}
-        if "material" in given:
-            given["material"] = {
-                **published("option III").material.model_dump(),
-                **given["material"],
-            }
         parts: dict[str, Any] = {"shape": shape_of(values["probe"], f"{where}: [probe]")}
-        for name, section in given.items():
-            parts[name] = _PARTS[name].of(section, f"{where}: [{name}]")
+        usual = {"material": published("option III").material.model_dump()}
+        for name, part in _PARTS.items():
+            if name in values:
+                section = {**usual.get(name, {}), **values[name]}
+                parts[name] = part.of(section, f"{where}: [{name}]")
         return cls.of(parts, where)
 
     @classmethod
@@ -244,12 +242,8 @@ def _entries(part: Record, start: str = "") -> list[str]:
     """Return the lines of a section, each with what its value is."""
     meaning, lines = part.description(), []
     for key, value in part.model_dump(exclude_none=isinstance(part, Shape)).items():
-        entry = f"# {key} =" if value is None else f"{start}{key} = {_toml(value)}"
+        # JSON writes texts and truth as TOML does
+        written = f"{value:.12g}" if isinstance(value, float) else json.dumps(value)
+        entry = f"# {key} =" if value is None else f"{start}{key} = {written}"
         lines.append(f"{entry:<32}# {meaning[key]}" if key in meaning else entry)
     return lines
-
-
-def _toml(value: str | float) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return f'"{value}"' if isinstance(value, str) else f"{value:.12g}"

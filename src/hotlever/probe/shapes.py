@@ -106,9 +106,7 @@ class ThreeLeg(Shape):
 
     @property
     def _reader_centre(self) -> float:
-        if self.reader_centre_um is not None:
-            return self.reader_centre_um
-        return 2 / 3 * self.length_um
+        return self.reader_centre_um or 2 / 3 * self.length_um
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
