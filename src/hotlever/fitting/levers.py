@@ -131,12 +131,9 @@ def _listed(names: Sequence[str]) -> str:
 def levers_csv(data: xr.Dataset) -> str:
     """Return a table with one row for each lever: value and standard error of each quantity."""
     columns = {
-        f"{name}{kind}{'_K' if name == INVERSION else ''}": (
-            "lever",
-            values.sel(quantity=name).data,
-        )
+        f"{name}{kind}{'_K' if name == INVERSION else ''}": ("lever", of.sel(quantity=name).data)
         for name in data.quantity.values
-        for kind, values in (("", data.value), ("_stderr", data.stderr))
+        for kind, of in (("", data.value), ("_stderr", data.stderr))
     }
     table = xr.Dataset(columns, {"lever": data.lever.data})
     return str(table.to_dataframe().to_csv(float_format="%.8g"))
