@@ -10,8 +10,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
-from itertools import islice
+from contextlib import contextmanager, nullcontext, suppress
+from functools import partial
+from itertools import islice, starmap
 from typing import Any, TypeVar
 
 import dask
@@ -22,13 +23,14 @@ from distributed.diagnostics.plugin import WorkerPlugin
 from hotlever import __version__
 from hotlever.cache import CACHE_VARIABLE, cache_folder
 from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.types import Progress
 
 T = TypeVar("T")
 # Number and arguments.
 Task = tuple[int, tuple[Any, ...]]
 Share = Callable[[Any], Any]
-# Applies a function to each of many arguments; gives number and result of each as it is done.
-Run = Callable[[Callable[..., Any], list[tuple[Any, ...]]], Iterator[tuple[int, Any]]]
+# Applies a function to each of many arguments, telling how many are done; gives the results.
+Run = Callable[..., list[Any]]
 
 #: Tasks at the scheduler for each worker: one at work, one to go on with. The others wait here.
 _AHEAD = 2
@@ -104,23 +106,25 @@ def local_processes(processes: int) -> Iterator[tuple[Run, Share]]:
     ComputationError
         If they cannot be started, or die again and again.
     """
-    if processes == 1:
-        yield (
-            lambda function, tasks: ((n, function(*task)) for n, task in enumerate(tasks)),
-            lambda value: value,
-        )
-        return
-    with local_client(processes) as client:
-        yield (
-            lambda function, tasks: map(_raised, run_all(client, function, tasks)),
-            lambda value: client.scatter(value, broadcast=True),
-        )
+    with nullcontext() if processes == 1 else local_client(processes) as client:
 
+        def run(
+            function: Callable[..., Any],
+            tasks: list[tuple[Any, ...]],
+            progress: Progress | None = None,
+        ) -> list[Any]:
+            tell, results = progress or (lambda done, total: None), {}
+            tell(0, len(tasks))
+            here = enumerate(starmap(function, tasks))
+            for number, result in here if client is None else run_all(client, function, tasks):
+                if isinstance(result, HotleverError):
+                    raise result
+                results[number] = result
+                tell(len(results), len(tasks))
+            return [results[number] for number in range(len(tasks))]
 
-def _raised(done: tuple[int, Any]) -> tuple[int, Any]:
-    if isinstance(done[1], HotleverError):
-        raise done[1]
-    return done
+        share = (lambda value: value) if client is None else partial(client.scatter, broadcast=True)
+        yield run, share
 
 
 def _threads(client: Client) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -98,10 +98,10 @@ def sample(
     with local_processes(min(processes, ENSEMBLES)) as (run, share):
         density = share(log_density)
         tasks = [(density, approximation, walkers, number) for number in seeds]
-        states = _in_order(run(_started, tasks))
+        states = run(_started, tasks)
         for steps in blocks:
             tasks = [(density, approximation, state, steps) for state in states]
-            moved = _in_order(run(_advanced, tasks))
+            moved = run(_advanced, tasks)
             states = [state for state, *_ in moved]
             done += steps
             if done > _WARM_UP:
@@ -112,10 +112,6 @@ def sample(
                 progress(done, _WARM_UP + draws)
     chains, densities = (np.concatenate(kept, axis=1).swapaxes(1, 2) for kept in (points, logs))
     return Chains(chains, densities, float(accepted / draws))
-
-
-def _in_order(results: Iterable[tuple[int, Any]]) -> list[Any]:
-    return [result for _, result in sorted(results, key=lambda numbered: numbered[0])]
 
 
 def _started(

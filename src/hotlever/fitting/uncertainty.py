@@ -121,24 +121,17 @@ def examine(
         If no start for sampling is found, a worker process dies, or the lever cannot be solved.
     """
     processes = processes or CPU_COUNT
-    curves = _profiles(fit, processes, profiling) if profiles else {}
-    posterior = band = None
+    curves, posterior, band = {}, None, None
+    if profiles:
+        tasks = [(fit, name) for name in fit.names]
+        # some at a time, in processes of their own
+        with local_processes(min(processes, len(tasks))) as (run, _):
+            found = run(profile_likelihood, tasks, profiling)
+        curves = dict(zip(fit.names, found, strict=True))
     if samples is not None:
         posterior = sample_posterior(fit, samples=samples, processes=processes, progress=sampling)
         band = predictive_band(fit, posterior, progress=banding)
     return Uncertainty(fit, posterior, band, curves)
-
-
-def _profiles(fit: Fit, processes: int, progress: Progress | None) -> dict[str, xr.Dataset]:
-    """Profile each varied parameter; some at a time in processes of their own."""
-    tell = progress or (lambda done, total: None)
-    names, found = fit.names, {}
-    tell(0, len(names))
-    with local_processes(min(processes, len(names))) as (run, _):
-        for number, result in run(profile_likelihood, [(fit, name) for name in names]):
-            found[names[number]] = result
-            tell(len(found), len(names))
-    return {name: found[name] for name in names}
 
 
 def _unsettled(posterior: xr.Dataset) -> list[str]:
