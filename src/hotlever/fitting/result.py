@@ -52,13 +52,7 @@ BAND = ("bias_V", "power_mW", "tip_K", "tip_stderr_K")
 class FittedParameter:
     """One material parameter after a fit.
 
-    Attributes
-    ----------
-    value : float
-    stderr : float or None
-        Standard error; None if the parameter was fixed or its error could not be estimated.
-    unit : str
-    vary : bool
+    `stderr` is None if the parameter was fixed or its error could not be estimated.
     """
 
     value: float

@@ -40,7 +40,7 @@ PARAMETERS: dict[str, Parameter] = {
 }
 
 
-def parameter(name: str, where: str = "") -> Parameter:
+def parameter(name: str) -> Parameter:
     """Return the fit parameter of this name.
 
     Raises
@@ -54,7 +54,7 @@ def parameter(name: str, where: str = "") -> Parameter:
     'Ω cm'
     """
     if name not in PARAMETERS:
-        raise unknown_name("parameter", name, PARAMETERS, where)
+        raise unknown_name("parameter", name, PARAMETERS)
     return PARAMETERS[name]
 
 

@@ -15,7 +15,8 @@ from hotlever.errors import ComputationError
 from hotlever.probe.layout import Layout, Region, Terminal
 from hotlever.types import Array, Index
 
-_ON_LINE = 1e-6  # µm
+#: How far off (µm) a point is still on a line.
+ON_LINE = 1e-6
 _NOT_MESHED = "Netgen could not mesh this layout; are its parts of too different a size?"
 
 
@@ -124,7 +125,7 @@ def _netgen(layout: Layout, options: MeshOptions) -> tuple[MeshTri, Index]:
     shape = Glue(faces)
     corners = layout.reentrant_corners()
     for vertex in shape.vertices:
-        if any(math.dist((vertex.p[0], vertex.p[1]), corner) < _ON_LINE for corner in corners):
+        if any(math.dist((vertex.p[0], vertex.p[1]), corner) < ON_LINE for corner in corners):
             vertex.maxh = options.corner * narrow
     # gluing keeps the faces' names but not their order
     names = np.array([int(face.name) for face in shape.faces])
@@ -173,5 +174,5 @@ def _on(terminal: Terminal, corners: Array) -> NDArray[np.bool_]:
     length = np.linalg.norm(line)
     x, y = corners - start[:, None, None]
     along, across = (line[0] * x + line[1] * y) / length, (line[0] * y - line[1] * x) / length
-    on = (np.abs(across) < _ON_LINE) & (along > -_ON_LINE) & (along < length + _ON_LINE)
+    on = (np.abs(across) < ON_LINE) & (along > -ON_LINE) & (along < length + ON_LINE)
     return np.asarray(on.all(axis=0))

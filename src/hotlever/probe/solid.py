@@ -18,10 +18,9 @@ from skfem import MeshTet
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout
-from hotlever.probe.mesh import MeshSizes, ProbeMesh, face_of, terminal_facets
+from hotlever.probe.mesh import ON_LINE, MeshSizes, ProbeMesh, face_of, terminal_facets
 from hotlever.types import Index
 
-_ON_LINE = 1e-6  # µm
 #: Largest edge on the sphere, as a share of its radius: with longer ones Netgen fails to pair
 #: the sphere with the image ball.
 _COARSEST_SPHERE = 0.25
@@ -171,7 +170,7 @@ def _silicon(layout: Layout, options: SolidMeshOptions) -> Any:
     for edge in silicon.edges:
         edge.maxh = min(edge.maxh, rim)
         ends = [(vertex.p[0], vertex.p[1]) for vertex in edge.vertices]
-        if any(max(math.dist(end, corner) for end in ends) < _ON_LINE for corner in reentrant):
+        if any(max(math.dist(end, corner) for end in ends) < ON_LINE for corner in reentrant):
             edge.maxh = options.corner * narrow
     return silicon
 

@@ -52,15 +52,7 @@ class Tip(Record):
         is this share, integrated over the height of the cone above the point. A flat cone
         counts in full, a steep one with at most 0.54 base radii.
 
-        Parameters
-        ----------
-        distance : array_like
-            Distance from the cone's axis (µm).
-
-        Returns
-        -------
-        ndarray
-            µm; zero beyond the base.
+        All in µm: by the distance from the cone's axis, and zero beyond the base.
         """
         base, power = self.base_radius_um, 1.0 + SIDEWAYS_MODE / self.slope
         radius = np.clip(np.asarray(distance, dtype=float), self.apex_radius_um, base)
