@@ -45,12 +45,10 @@ class FitPosterior:
         self._model, self._material, self._names = model, fit.probe.material, fit.names
         known = [PARAMETERS[name] for name in fit.names]
         optimum = [getattr(self._material, name) for name in fit.names]
-        ends = [(one.lower, one.upper) for one in known]
         self.scale = np.array([one.scale for one in known])
-        self.optimum, (self.lower, self.upper) = (
-            optimum / self.scale,
-            np.transpose(ends) / self.scale,
-        )
+        self.optimum = np.array(optimum) / self.scale
+        self.lower = np.array([one.lower for one in known]) / self.scale
+        self.upper = np.array([one.upper for one in known]) / self.scale
         self._residuals = fit.residuals()
         # the data that share a noise scale
         self._group = np.nonzero(self._residuals.present)[0] * (noise == "each")

@@ -55,7 +55,13 @@ class Uncertainty:
         """Say in words what the data leave open, and what that means for the tip temperature."""
         found = []
         if self.posterior is not None:
-            found += _unsettled(self.posterior) + _unreduced(self.posterior)
+            found += _unsettled(self.posterior)
+            error = self.posterior.attrs["reduced_error_K"]
+            if error > _REDUCED_ERROR_K:
+                found.append(
+                    f"the reduced lever is off by up to {error:.1f} K at the outermost samples of "
+                    "the posterior"
+                )
             for name in self.fit.names:
                 found += _about(self.fit, name, self.posterior[name].values.ravel())
         for profile in self.profiles.values():
@@ -146,15 +152,6 @@ def _unsettled(posterior: xr.Dataset) -> list[str]:
         f"{effective.min():.0f} effective samples (expected at least {_EFFECTIVE}); take more "
         "samples"
     ]
-
-
-def _unreduced(posterior: xr.Dataset) -> list[str]:
-    """Say whether the posterior reaches where the reduced lever is not to be trusted."""
-    error = posterior.attrs["reduced_error_K"]
-    text = (
-        f"the reduced lever is off by up to {error:.1f} K at the outermost samples of the posterior"
-    )
-    return [text] if error > _REDUCED_ERROR_K else []
 
 
 def _about(fit: Fit, name: str, values: Array) -> list[str]:

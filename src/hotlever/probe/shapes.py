@@ -119,7 +119,9 @@ class ThreeLeg(Shape):
         reader_to = reader_from + self.reader_length_um
         along_x = (1.0, 0.0)
         tip = (heater_from + self.heater_length_um / 2, 0.0)
+        taper = Taper(tip, along_x, self.heater_length_um)
         reader_middle = (self._reader_centre, -(inner + outer) / 2)
+        reader_taper = Taper(reader_middle, along_x, self.reader_length_um)
 
         def right_leg(name: str, x0: float, x1: float, taper: Taper | None = None) -> Region:
             return Region(name, "reader branch", rectangle(x0, -outer, x1, -inner), taper)
@@ -127,21 +129,11 @@ class ThreeLeg(Shape):
         return Layout(
             regions=(
                 Region("centre leg", "leg 1", rectangle(0, -centre, heater_from, centre)),
-                Region(
-                    "heater",
-                    "heater",
-                    rectangle(heater_from, -heater, front, heater),
-                    Taper(tip, along_x, self.heater_length_um),
-                ),
+                Region("heater", "heater", rectangle(heater_from, -heater, front, heater), taper),
                 Region("bridge", "leg 2", rectangle(front, -outer, self.length_um, outer)),
                 Region("left leg", "leg 2", rectangle(0, inner, front, outer)),
                 right_leg("right leg", 0, reader_from),
-                right_leg(
-                    "reader",
-                    reader_from,
-                    reader_to,
-                    Taper(reader_middle, along_x, self.reader_length_um),
-                ),
+                right_leg("reader", reader_from, reader_to, reader_taper),
                 right_leg("right leg front", reader_to, front),
             ),
             terminals=(
@@ -195,9 +187,10 @@ class UShape(Shape):
         inner, heater = self.gap_um / 2, self.heater_length_um / 2
         outer = inner + self.leg_width_um
         back = self.length_um - self.bridge_width_um
-        middle = back + self.bridge_width_um / 2
-        half_width = self.heater_width_um / 2
+        middle, half = back + self.bridge_width_um / 2, self.heater_width_um / 2
         tip = (middle, 0.0)
+        taper = Taper(tip, (0.0, 1.0), self.heater_length_um)
+        across = rectangle(middle - half, -heater, middle + half, heater)
 
         def side(name: str, part: Part, sign: int) -> list[Region]:
             leg = rectangle(0, sign * inner, self.length_um, sign * outer)
@@ -208,12 +201,7 @@ class UShape(Shape):
         return Layout(
             regions=(
                 *side("right", "leg 1", -1),
-                Region(
-                    "heater",
-                    "heater",
-                    rectangle(middle - half_width, -heater, middle + half_width, heater),
-                    Taper(tip, (0.0, 1.0), self.heater_length_um),
-                ),
+                Region("heater", "heater", across, taper),
                 *side("left", "leg 2", +1),
             ),
             terminals=(
