@@ -130,10 +130,8 @@ class Measurement:
         >>> Measurement.of_sweep(sweep(Probe.reference(), [1.0, 2.0])).observables
         ('current', 'reader', 'tip')
         """
-        columns: dict[str, Any] = {
-            name: sweep[name].values for name in ("bias_V", *OBSERVABLES.values())
-        }
-        probe = probe_of(sweep)
+        probe, names = probe_of(sweep), ("bias_V", *OBSERVABLES.values())
+        columns: dict[str, Any] = {name: sweep[name].values for name in names}
         return cls(
             **columns,
             tip_error_K=np.full(sweep.bias_V.size, np.nan),
@@ -157,9 +155,9 @@ class Measurement:
         InputError
             If there is no observable of this name.
         """
-        if name not in OBSERVABLE_SYMBOLS:
-            raise unknown_name("observable", name, OBSERVABLE_SYMBOLS)
-        values: Array = getattr(self, COLUMNS[OBSERVABLE_SYMBOLS[name]][0])
+        if name not in OBSERVABLES:
+            raise unknown_name("observable", name, OBSERVABLES)
+        values: Array = getattr(self, OBSERVABLES[name])
         return values
 
     def error(self, name: str) -> Array:
@@ -171,9 +169,7 @@ class Measurement:
     @property
     def observables(self) -> tuple[str, ...]:
         """Names of the observables that have any data."""
-        return tuple(
-            name for name in OBSERVABLE_SYMBOLS if np.isfinite(self.observable(name)).any()
-        )
+        return tuple(name for name in OBSERVABLES if np.isfinite(self.observable(name)).any())
 
 
 def read_measurement(path: str | os.PathLike[str]) -> Measurement:

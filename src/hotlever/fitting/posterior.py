@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Literal
 
 import emcee
@@ -273,17 +274,13 @@ def predictive_band(
         powers.append(fit.probe.circuit.power(grid, current))
         if progress is not None:
             progress(done, len(chosen))
-    power = np.linspace(
-        max(row.min() for row in powers), min(row.max() for row in powers), grid.size
-    )
+    power = np.linspace(np.min(powers, axis=1).max(), np.max(powers, axis=1).min(), grid.size)
     at_power = [_against(power, x, tip) for x, tip in zip(powers, tips, strict=True)]
+    quantiles = partial(np.percentile, q=BAND_QUANTILES, axis=0)
     return labelled(
         {
-            "tip_K": (("quantile", "bias"), np.percentile(tips, BAND_QUANTILES, axis=0)),
-            "tip_at_power_K": (
-                ("quantile", "power_mW"),
-                np.percentile(at_power, BAND_QUANTILES, axis=0),
-            ),
+            "tip_K": (("quantile", "bias"), quantiles(tips)),
+            "tip_at_power_K": (("quantile", "power_mW"), quantiles(at_power)),
         },
         coordinates={"quantile": list(BAND_QUANTILES), "bias": grid, "power_mW": power},
         samples=len(chosen),

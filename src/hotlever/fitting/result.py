@@ -154,15 +154,12 @@ class Fit:
     @cached_property
     def inversion_temperature_stderr_K(self) -> float:
         """Its standard error (K), by central differences; NaN if unknown."""
-        at = {name: getattr(self.probe.material, name) for name in ("n_d", "p")}
-        slope = np.zeros(len(self.names))
-        for name in at.keys() & set(self.names):
-            step = 1e-4 * at[name]
-            high, low = (
-                inversion_temperature(*{**at, name: at[name] + sign * step}.values())
-                for sign in (1, -1)
-            )
-            slope[self.names.index(name)] = (high - low) / (2 * step)
+        material, slope = self.probe.material, np.zeros(len(self.names))
+        for name in {"n_d", "p"} & set(self.names):
+            ends = getattr(material, name) * np.array([1 - 1e-4, 1 + 1e-4])
+            at = {"n_d": material.n_d, "p": material.p, name: ends}
+            rise = np.diff(inversion_temperature(at["n_d"], at["p"])).item()
+            slope[self.names.index(name)] = rise / np.ptp(ends)
         return float(np.sqrt(slope @ self.covariance @ slope))
 
     def model(self, bias: ArrayLike | None = None) -> xr.Dataset:

@@ -181,15 +181,11 @@ def _about(fit: Fit, name: str, values: Array) -> list[str]:
 def _posterior_content(posterior: xr.Dataset) -> dict[str, Any]:
     quantities = {}
     for name in posterior.quantity.values.tolist():
-        one = posterior.sel(quantity=name)
-        values = posterior[name].values
+        one, values = posterior.sel(quantity=name), posterior[name].values
         quantities[name] = {
             "mean": float(values.mean()),
             "standard_deviation": float(values.std()),
-            "quantiles": {
-                f"{quantile:g}": float(np.percentile(values, quantile))
-                for quantile in BAND_QUANTILES
-            },
+            "quantiles": {f"{q:g}": float(np.percentile(values, q)) for q in BAND_QUANTILES},
             "effective_sample_size": round(one.effective_sample_size.item(), 1),
             "rhat": round(one.rhat.item(), 5),
             "unit": posterior[name].attrs["units"],

@@ -22,15 +22,11 @@ Table = tuple[str, list[str], list[list[str]]]
 
 def parameter_rows(fit: Fit) -> list[tuple[str, str, str, str]]:
     """Return name, value with error, unit and a remark for each parameter of a fit."""
-    return [
-        (
-            name,
-            value_with_error(fitted.value, fitted.stderr, scale_of(name)),
-            scaled_unit(name),
-            "" if fitted.vary else "fixed",
-        )
-        for name, fitted in fit.parameters.items()
-    ]
+    rows = []
+    for name, fitted in fit.parameters.items():
+        value = value_with_error(fitted.value, fitted.stderr, scale_of(name))
+        rows.append((name, value, scaled_unit(name), "" if fitted.vary else "fixed"))
+    return rows
 
 
 def outcome(fit: Fit) -> list[str]:
@@ -68,9 +64,8 @@ def lever_rows(levers: xr.Dataset) -> list[list[str]]:
         ("mean standard error", levers.mean_stderr.values / scales, ".3g"),
         ("scatter, relative", scatter / np.abs(mean), ".1%"),
     ):
-        rows.append(
-            [label, *("" if np.isnan(number) else f"{number:{form}}" for number in numbers)]
-        )
+        cells = ("" if np.isnan(number) else f"{number:{form}}" for number in numbers)
+        rows.append([label, *cells])
     return rows
 
 
@@ -97,15 +92,11 @@ def uncertainty_tables(found: Uncertainty) -> Iterator[Table]:
         posterior, quantiles = found.posterior, found.band["quantile"].values
         columns = ["posterior", *(f"{quantile:g} %" for quantile in quantiles)]
         columns += ["effective samples", "R̂"]
-        rows = [
-            [
-                heading(name),
-                *_cells(np.percentile(posterior[name], quantiles), name),
-                f"{posterior.effective_sample_size.sel(quantity=name).item():.0f}",
-                f"{posterior.rhat.sel(quantity=name).item():.3f}",
-            ]
-            for name in posterior.quantity.values.tolist()
-        ]
+        rows = []
+        for name in posterior.quantity.values.tolist():
+            one, cells = posterior.sel(quantity=name), np.percentile(posterior[name], quantiles)
+            settled = f"{one.effective_sample_size.item():.0f}", f"{one.rhat.item():.3f}"
+            rows.append([heading(name), *_cells(cells, name), *settled])
         count = posterior.sizes["chain"] * posterior.sizes["draw"]
         yield f"Quantiles of {count} posterior samples.", columns, rows
 
