@@ -247,16 +247,14 @@ def _environment(folder: str) -> Iterator[None]:
     changes = dict.fromkeys(_THREADS, "1")
     if cache_folder() is None:
         changes[CACHE_VARIABLE] = folder
-    before = {name: os.environ.get(name) for name in changes}
+    before = {name: os.environ[name] for name in changes if name in os.environ}
     os.environ.update(changes)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in changes:
+            os.environ.pop(name, None)
+        os.environ.update(before)
 
 
 @contextmanager
