@@ -75,7 +75,7 @@ def speed(vacuum, air):
         "full, with sensitivities": lambda name: (
             levers[name].with_material(material).sweep(BIAS, sensitivities=True)
         ),
-        "reduced, with sensitivities": lambda name: models[name].predict(material),
+        "reduced, with sensitivities": lambda name: models[name].predict(levers[name].probe),
     }
     rows = []
     for kind, action in kinds.items():
@@ -97,7 +97,7 @@ def accuracy(air, model, count=8):
         material = material_in_box(air.probe.material, rng.random(len(BOX)))
         material = material.with_(c_kappa=rng.uniform(0.6, 0.76))
         full = air.with_material(material).sweep(BIAS)
-        current, reader, tip = model.predict(material).values
+        current, reader, tip = model.predict(air.with_material(material).probe).values
         rows.append(
             (
                 np.abs(current / full.current_mA.values - 1).max(),

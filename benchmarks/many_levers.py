@@ -42,15 +42,15 @@ NOISE = np.array([2e-3, 2e-3, 5e-3])
 def write_levers(folder: Path, count: int, seed: int = 0) -> list[Path]:
     """Write measurement files of levers that differ, and are measured with noise."""
     rng = np.random.default_rng(seed)
-    material = PUBLISHED["option III"].material
-    model = forward_model(Probe.reference(), BIAS, reduce=True)
+    probe = Probe.reference().model_copy(update={"material": PUBLISHED["option III"].material})
+    model = forward_model(probe, BIAS, reduce=True)
     paths = []
     for number in range(count):
         changed = {
-            name: getattr(material, name) * (1 + share * rng.normal())
+            name: getattr(probe.material, name) * (1 + share * rng.normal())
             for name, share in SCATTER.items()
         }
-        values = model.predict(material.with_(**changed)).values
+        values = model.predict(probe.with_(**changed)).values
         values += NOISE[:, None] * values.max(axis=1, keepdims=True) * rng.normal(size=values.shape)
         rows = [",".join(f"{cell:.6g}" for cell in row) for row in np.vstack([BIAS, values]).T]
         text = ["# R_s (kOhm): 5.6", "V_b (V),I_h (mA),V_r (V),T_tip (K)", *rows]

@@ -48,10 +48,10 @@ def accuracy(lever, reduced, cases):
     for _ in range(cases):
         material = random_material(lever, rng)
         bias = np.sort(rng.uniform(1.0, 11.0, BIASES))
-        branch = reduced.linearised(material, Reach(circuit, bias[-1])).branch
+        same = lever.with_material(material)
+        branch = reduced.linearised(same.probe, Reach(circuit, bias[-1])).branch
         u, shown = shown_at_bias(branch, circuit, bias)
         guesses = reduced.all_points.expanded(branch.states(u))
-        same = lever.with_material(material)
         exact = same.dataset(
             [same.polished(x[:, None], v) for x, v in zip(guesses.T, bias, strict=True)]
         )
@@ -92,9 +92,11 @@ def main():
         warm_command = processor_seconds(lambda: fit_command(folder), 3)
     accuracy(lever, reduced, cases)
     rng, model = np.random.default_rng(5), reduced_model(lever, reduced, BIAS)
-    anywhere = processor_seconds(lambda: model.predict(random_material(lever, rng)), 25)
-    near = model.predict(probe.material)
-    step = probe.material.with_(n_d=1.05 * probe.material.n_d, delta=1.02 * probe.material.delta)
+    anywhere = processor_seconds(
+        lambda: model.predict(lever.with_material(random_material(lever, rng)).probe), 25
+    )
+    near = model.predict(probe)
+    step = probe.with_(n_d=1.05 * probe.material.n_d, delta=1.02 * probe.material.delta)
     nearby = processor_seconds(lambda: model.predict(step, near), 25)
     full = processor_seconds(
         # made anew each time: a lever keeps its branch

@@ -22,7 +22,8 @@ def poor(coarse):
 def test_the_estimate_bounds_the_true_error_without_exaggeration(coarse, poor, seed):
     shares = np.random.default_rng(seed).uniform(-0.3, 1.3, len(BOX))
     material = material_in_box(coarse.probe.material, shares)
-    branch = poor.linearised(material, Reach(coarse.circuit, 11.0)).branch
+    there = coarse.with_material(material).probe
+    branch = poor.linearised(there, Reach(coarse.circuit, 11.0)).branch
     u = np.linspace(3.0, 0.98 * branch.end_u, 7)
     full = coarse.with_material(material).branch(293.0 + u[-1] ** 2 + 50.0)
     away = (full.curve(u) - branch.curve(u))[:, :3]

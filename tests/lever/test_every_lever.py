@@ -21,7 +21,7 @@ from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced import ReducedLever
 from hotlever.lever.reduction import cached_reduction
-from hotlever.lever.sensitivities import Linearised, by_material
+from hotlever.lever.sensitivities import Linearised, by_parameter
 from hotlever.lever.space import LEVER, TIP
 from hotlever.lever3d import SolidLever
 from hotlever.materials import PARAMETERS
@@ -42,10 +42,16 @@ class One:
     lever: Lever | ReducedLever
     hottest_V: float
 
+    @property
+    def probe(self) -> Probe:
+        """Its probe, or one that differs from it in nothing that matters, with option III."""
+        probe = getattr(self.lever, "probe", Probe.reference())
+        return probe.model_copy(update={"material": MATERIAL})
+
     def branch(self, circuit: Circuit = NORMAL, bias: float | None = None) -> Branch:
         """Its branch with option III until a bias."""
         bias = self.hottest_V if bias is None else bias
-        return self.lever.linearised(MATERIAL, Reach(circuit, bias)).branch
+        return self.lever.linearised(self.probe, Reach(circuit, bias)).branch
 
 
 SOLID = SolidMeshOptions(refinement=0.4, grading=0.7)
@@ -127,7 +133,7 @@ def test_slopes_along_the_branch_are_those_of_the_curve(branch):
 
 @pytest.fixture(scope="module")
 def start(one) -> Linearised:
-    return one.lever.linearised(MATERIAL, Reach(NORMAL, 4.0))
+    return one.lever.linearised(one.probe, Reach(NORMAL, 4.0))
 
 
 @pytest.mark.parametrize("name", PARAMETERS)
@@ -138,9 +144,9 @@ def test_derivatives_by_the_material_have_taylor_order_two(one, start, name):
     reach = Reach(NORMAL, 4.0)
     u = start.branch.u[1:]
     value, rest = getattr(MATERIAL, name), []
-    _, slope = by_material(start.branch.equations, hot(start.branch), names=[name])
+    _, slope = by_parameter(start.branch.equations, hot(start.branch), names=[name])
     for step in (0.02, 0.01):
-        moved = MATERIAL.model_copy(update={name: value * (1 + step)})
+        moved = one.probe.moved({name: value * (1 + step)})
         other = one.lever.linearised(moved, reach, start).branch
         np.testing.assert_allclose(other.u[1 : u.size + 1], u)
         change = (other.values[: u.size + 1] - start.branch.values)[1:, :3].T
@@ -198,15 +204,12 @@ def test_with_little_resistance_the_ramp_ends_at_the_fold_or_jumps_there(one, re
 def test_a_model_of_it_refuses_a_bias_beyond_the_fold_in_one_line(one, resistance):
     if one.hottest_V < 9.0:
         pytest.skip("its ramps do not reach the knee")
-    model = ForwardModel(one.lever, None, ohm(resistance), np.array([0.0, 1.0, 20.0]))
+    probe = one.probe.with_(series_resistance_ohm=resistance)
+    model = ForwardModel(one.lever, None, np.array([0.0, 1.0, 20.0]))
     with pytest.raises(BranchEndError, match=r"no steady state|silicon melts"):
-        model.predict(MATERIAL)
+        model.predict(probe)
     # with biases below it all is well, the row at zero bias included
-    values = (
-        ForwardModel(one.lever, None, ohm(resistance), np.array([1.0, 0.0]))
-        .predict(MATERIAL)
-        .values
-    )
+    values = ForwardModel(one.lever, None, np.array([1.0, 0.0])).predict(probe).values
     assert values[0, 1] == 0.0
     assert values[2].tolist()[1] == pytest.approx(293.0)
     assert values[2, 0] > 293.0

@@ -79,11 +79,13 @@ def test_refinement_divides_the_sizes():
 
 
 def test_the_tip_lies_in_the_heater_and_outside_points_are_refused(coarse):
-    nodes, weights = coarse.space.elements.point_weights(coarse.space.mesh.layout.tip)
-    x = coarse.space.elements.nodes
-    np.testing.assert_allclose(x[:, nodes] @ weights, (48.58, 0.0), atol=1e-9)
+    elements, tip = coarse.space.elements, np.array([coarse.space.mesh.layout.tip])
+    (element,), (weights,), slopes = elements.at_points(tip)
+    x = elements.nodes[:, elements.dofs[element]]
+    np.testing.assert_allclose(x @ weights, (48.58, 0.0), atol=1e-9)
+    np.testing.assert_allclose(x @ slopes[:, 0].T, np.eye(2), atol=1e-9)
     with pytest.raises(InputError, match="outside the lever"):
-        coarse.space.elements.point_weights((0.0, 100.0))
+        elements.at_points(np.array([[0.0, 100.0]]))
 
 
 @settings(max_examples=15, deadline=None)

@@ -86,7 +86,7 @@ def air_operator(
     facts = {
         "layout": asdict(replace(layout, cone=None)),
         "cone": layout.cone and layout.cone.model_dump(),
-        "surroundings": surroundings.model_dump(exclude={"medium"}),
+        "surroundings": surroundings.model_dump(exclude={"medium", "gas_conductivity"}),
         "jump_um": surroundings.jump_length_um(base_temperature_K),
         "options": asdict(options),
     }

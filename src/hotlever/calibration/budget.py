@@ -134,12 +134,12 @@ def refitted(fit: Fit, changed: Probe) -> Probe:
     def model(probe: Probe) -> ForwardModel:
         return full_model(Lever(probe.in_medium(fit.medium), COARSE), bias)
 
-    target = model(fit.probe).predict(fit.probe.material).values[rows]
+    target = model(fit.probe).predict(fit.probe).values[rows]
     of_changed, material = model(changed), changed.material
     scale = np.abs(target).max(axis=1)[:, None]
     seen = None
     for _ in range(2):
-        seen = of_changed.predict(material, seen)
+        seen = of_changed.predict(changed.model_copy(update={"material": material}), seen)
         size = np.array([getattr(material, name) for name in fit.names])
         slopes = seen.slopes[rows][:, :, columns] * size / scale[:, :, None]
         missing = ((target - seen.values[rows]) / scale).ravel()

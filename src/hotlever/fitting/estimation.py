@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from hotlever.errors import ComputationError, InputError, unknown_name
 from hotlever.fitting.least_squares import LeastSquares, Optimum
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement
-from hotlever.fitting.models import ForwardModel, forward_model
+from hotlever.fitting.models import ForwardModel, Prediction, forward_model
 from hotlever.fitting.options import FitOptions
 from hotlever.fitting.residuals import Residuals
 from hotlever.fitting.result import Fit, band_dataset, statements
@@ -21,8 +22,9 @@ from hotlever.fitting.start import starting_material
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.reduced import ReducedLever
-from hotlever.materials import PARAMETERS, Material
+from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
+from hotlever.probe.priors import JointPrior
 from hotlever.types import Array, Progress
 
 
@@ -64,44 +66,112 @@ def fit(
     ComputationError
         If the lever cannot be solved at the start, or the fit does not converge.
     """
+    options = chosen_options(options, choices)
+    return estimate(measurement, probe, options, model=model, progress=progress).fit()
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What was found, with the problem that it solves; `fit` gives the result for users."""
+
+    problem: LeastSquares
+    optimum: Optimum
+    measurement: Measurement
+    options: FitOptions
+    seconds: float
+    notes: list[str]
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the varied parameters in their own units."""
+        return self.problem.covariance(self.optimum)
+
+    def slopes(self, prediction: Prediction) -> Array:
+        """Return the derivatives of a prediction by the varied parameters, (3, n, p)."""
+        known = self.problem.model.names
+        return prediction.slopes[:, :, [known.index(name) for name in self.options.varied]]
+
+    def predicted(self, bias: Array) -> Prediction:
+        """Return what is predicted at other biases (V), as far as the measured ones reach."""
+        model = replace(self.problem.model, bias=bias)
+        return model.predict(self.optimum.probe, self.optimum.prediction)
+
+    def fit(self) -> Fit:
+        """Return the result."""
+        found = _found(self)
+        return replace(found, notes=[*self.notes, *found.notes, *statements(found)])
+
+
+def estimate(
+    measurement: Measurement | str | os.PathLike[str],
+    probe: Probe | str | os.PathLike[str] | None,
+    options: FitOptions,
+    *,
+    joint: JointPrior | None = None,
+    shared: Mapping[str, Array] | None = None,
+    model: Callable[[Probe, Array], ForwardModel] | None = None,
+    progress: Progress | None = None,
+) -> Estimate:
+    """Find the parameters that priors and a measurement make most likely; see `fit`.
+
+    A joint prior of several parameters takes the place of priors of their own; for errors that
+    data share see `Residuals`.
+    """
     began = time.perf_counter()
     measurement = Measurement.given(measurement)
-    options = chosen_options(options, choices)
     given = Probe.reference() if probe is None else Probe.given(probe)
     probe, notes = with_measured_circuit(given, measurement, options.medium)
     observables = _observables(options, measurement, probe, notes)
-    material = options.held(probe.material)
-    residuals = Residuals(measurement, observables, options.weights, options.drift)
-    if residuals.size < len(options.varied):
+    # priors are in standard deviations, so the data must be too
+    known = bool(options.priors) or joint is not None
+    weights = "errors" if known else options.weights
+    residuals = Residuals(
+        measurement, observables, weights, options.drift, shared=_wanted(shared, observables)
+    )
+    if not known and residuals.size < len(options.varied):
         raise InputError(
             f"{measurement.path or 'measurement'}: {residuals.size} data for "
             f"{len(options.varied)} parameters; fix some or measure more"
         )
     forward = (model or forward_model)(probe, residuals.bias)
-    attempts = []
+    # with priors errors are a matter of standard deviations, to which the fast lever's slopes do
+    names = (*PARAMETERS, *(name for name in options.varied if name not in PARAMETERS))
+    forward = replace(forward, names=names, first_order=not known)
+    attempts = _attempts(forward, options.held(probe), options, residuals)
+    problem, optimum = _first_found(attempts, residuals, options, joint, progress)
+    seconds = time.perf_counter() - began
+    return Estimate(problem, optimum, measurement, options, seconds, notes)
+
+
+def _wanted(shared: Mapping[str, Array] | None, observables: Sequence[str]) -> dict[str, Array]:
+    return {name: error for name, error in (shared or {}).items() if name in observables}
+
+
+def _attempts(
+    forward: ForwardModel, probe: Probe, options: FitOptions, residuals: Residuals
+) -> Iterator[tuple[ForwardModel, Probe]]:
+    """Yield the models and places to start from, each made when the last has failed."""
     if isinstance(forward.fast, ReducedLever):
         atlas = forward.fast.atlas
-        start = starting_material(atlas, probe.circuit, material, options.varied, residuals)
-        attempts.append((forward, start))
+        start = starting_material(atlas, probe.circuit, probe.material, options.material, residuals)
+        yield forward, probe.model_copy(update={"material": start})
         # far from the parameters it was made for, a reduced lever may fail where others do not
         forward = replace(forward, fast=Lever(probe, COARSE), offset=None)
-    attempts.append((forward, material))
-    usual = options.held(Probe.reference().material)
-    if usual != material:
+    yield forward, probe
+    usual = options.held(probe.model_copy(update={"material": Probe.reference().material}))
+    if usual != probe:
         # a lever of the given material may melt below the highest bias
-        attempts.append((forward, usual))
-    problem, optimum = _first_found(attempts, residuals, options, progress)
-    found = _found(problem, optimum, probe, measurement, options, time.perf_counter() - began)
-    return replace(found, notes=[*notes, *found.notes, *statements(found)])
+        yield forward, usual
 
 
 def _first_found(
-    attempts: list[tuple[ForwardModel, Material]],
+    attempts: Iterable[tuple[ForwardModel, Probe]],
     residuals: Residuals,
     options: FitOptions,
+    joint: JointPrior | None,
     progress: Progress | None,
 ) -> tuple[LeastSquares, Optimum]:
-    """Return what the first of some models and starting materials leads to.
+    """Return what the first of some models and starts leads to.
 
     Raises
     ------
@@ -111,7 +181,9 @@ def _first_found(
     failures: list[ComputationError] = []
     for forward, start in attempts:
         residuals.down[:] = 1.0
-        problem = LeastSquares(forward, residuals, start, options.varied, progress)
+        problem = LeastSquares(
+            forward, residuals, start, options.varied, progress, None, options.priors, joint
+        )
         try:
             return problem, problem.solve_and_confirm(options.robust)
         except ComputationError as error:
@@ -119,23 +191,15 @@ def _first_found(
     raise failures[0]
 
 
-def _found(
-    problem: LeastSquares,
-    optimum: Optimum,
-    probe: Probe,
-    measurement: Measurement,
-    options: FitOptions,
-    seconds: float,
-) -> Fit:
+def _found(estimate: Estimate) -> Fit:
     """Put together what a fit found."""
+    problem, optimum, options = estimate.problem, estimate.optimum, estimate.options
     residuals, values = problem.residuals, optimum.prediction.values
-    covariance = problem.covariance(optimum)
-    columns = [list(PARAMETERS).index(name) for name in options.varied]
-    slopes = optimum.prediction.slopes[list(OBSERVABLES).index("tip")][:, columns]
+    every, covariance = estimate.slopes(optimum.prediction), estimate.covariance
+    slopes = every[list(OBSERVABLES).index("tip")]
     current, _, tip = values
-    notes = residuals.suspicious(values, options.robust)
-    notes += residuals.zeros(values, optimum.prediction.slopes[:, :, columns])
-    chi_square = residuals.reduced_chi_square(values, len(columns))
+    notes = residuals.suspicious(values, options.robust) + residuals.zeros(values, every)
+    chi_square = residuals.reduced_chi_square(values, len(options.varied))
     if chi_square is not None:
         notes.append(
             f"the scatter about the fit is {np.sqrt(chi_square):.2f} times the measurement errors; "
@@ -143,8 +207,8 @@ def _found(
         )
     weighted = residuals.weighted(values)
     return Fit(
-        probe=probe.model_copy(update={"material": optimum.material}),
-        measurement=measurement,
+        probe=optimum.probe,
+        measurement=estimate.measurement,
         options=options,
         names=options.varied,
         observables=residuals.observables,
@@ -155,13 +219,13 @@ def _found(
         residual_rms=residuals.rms(values),
         band=band_dataset(
             bias_V=residuals.bias,
-            power_mW=probe.circuit.power(residuals.bias, current),
+            power_mW=optimum.probe.circuit.power(residuals.bias, current),
             tip_K=tip,
             tip_stderr_K=np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes)),
         ),
         evaluations=problem.evaluations,
         steps=problem.steps,
-        seconds=seconds,
+        seconds=estimate.seconds,
         notes=notes,
     )
 

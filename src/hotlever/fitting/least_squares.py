@@ -1,13 +1,13 @@
 """The least-squares problem of a fit: Levenberg-Marquardt, robust weights, confirmation.
 
-A fit goes in rounds. In each, Levenberg-Marquardt finds the optimum among materials near
-one whose branch was solved with its exact derivatives; there the branch is solved anew. Since
+A fit goes in rounds. In each, Levenberg-Marquardt finds the optimum among parameters near
+those whose branch was solved with its exact derivatives; there the branch is solved anew. Since
 voltages at a given tip temperature are nearly powers of the parameters, a few rounds suffice.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -17,8 +17,10 @@ from scipy import optimize
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting.models import ForwardModel, Prediction
 from hotlever.fitting.residuals import Residuals
-from hotlever.materials import PARAMETERS, Material
-from hotlever.types import Array
+from hotlever.probe import Probe
+from hotlever.probe.parameters import parameters_of
+from hotlever.probe.priors import JointPrior, Prior
+from hotlever.types import Array, Progress
 
 #: Scaled residual given to trial parameters for which the lever has no state: far beyond any
 #: real one, so that Levenberg-Marquardt turns back.
@@ -32,6 +34,9 @@ _EXACT = 1e-10
 _AT_HAND = 3
 #: Most rounds, and as many as most fits need, for a progress bar to fill.
 _MOST_ROUNDS, _USUAL_ROUNDS = 60, 8
+#: With priors, whose squares count standard deviations, a round that gains no more is the last.
+#: So is one that promises a little more and does not keep it.
+_LITTLE, _DOUBTFUL = 1e-2, 0.2
 #: The optimum is found when a round moves no parameter by more than this share of its standard
 #: error.
 _FOUND = 0.01
@@ -55,27 +60,30 @@ class Optimum:
 
     Attributes
     ----------
-    material : Material
+    probe : Probe
     prediction : Prediction
     stderr : ndarray, shape (p,)
         From `covariance`; infinite where there is none.
     covariance : ndarray, shape (p, p)
         If all weighted data had the same noise: the paper's assumption. NaN if it
         could not be estimated.
+    squares : float
+        Sum of squares that the nearby predictions have there.
     """
 
-    material: Material
+    probe: Probe
     prediction: Prediction
     stderr: Array
     covariance: Array
+    squares: float
 
 
 class LeastSquares:
-    """Finds the material whose prediction is nearest to a measurement.
+    """Finds the parameters whose prediction is nearest to a measurement.
 
-    It begins at the material `start`, where parameters that are not varied stay, or from a
-    prediction for a similar one, `near`; `progress` is called with the branches solved and how
-    many there usually are.
+    It begins at the probe `start`, where what is not varied stays, or from a prediction for a
+    similar one, `near`; priors by name, or a joint one of all that is varied, count as further
+    data. `progress` is called with the branches solved and how many there usually are.
 
     Attributes
     ----------
@@ -89,18 +97,24 @@ class LeastSquares:
         self,
         model: ForwardModel,
         residuals: Residuals,
-        start: Material,
+        start: Probe,
         varied: list[str],
-        progress: Callable[[int, int], None] | None = None,
+        progress: Progress | None = None,
         near: Prediction | None = None,
+        priors: Mapping[str, Prior] | None = None,
+        joint: JointPrior | None = None,
     ) -> None:
         self.model, self.residuals, self._varied = model, residuals, varied
         self._start, self._progress = start, progress
-        self._columns = [list(PARAMETERS).index(name) for name in varied]
-        known = [PARAMETERS[name] for name in varied]
+        self._columns = [model.names.index(name) for name in varied]
+        self._known = parameters_of(start)
+        self._priors = {varied.index(name): prior for name, prior in (priors or {}).items()}
+        self._joint, self._informed = joint, bool(priors) or joint is not None
+        self._of_joint = [] if joint is None else [varied.index(name) for name in joint.names]
+        known = [self._known[name] for name in varied]
         self._scale = np.array([one.scale for one in known])
         self._bounds = np.array([[one.lower, one.upper] for one in known]).T / self._scale
-        self._known = {} if near is None else {near.linearised.branch.equations.material: near}
+        self._at_hand = {} if near is None else {near.probe: near}
         self.evaluations, self.steps = 0, 0
 
     def solve_and_confirm(self, robust: bool) -> Optimum:
@@ -113,8 +127,8 @@ class LeastSquares:
         """
         found = self.solve(self._start)
         for _ in range(_SCATTER_TURNS if self.residuals.without_errors.any() else 0):
-            self.residuals.take_scatter(found.prediction.values)
-            found = self.solve(found.material)
+            self.residuals.take_scatter(found.prediction.values, self._used_up(found))
+            found = self.solve(found.probe)
         if robust:
             found = self._reweighted(found)
         for _ in range(_MOST_CONFIRMATIONS):
@@ -122,8 +136,8 @@ class LeastSquares:
             if confirmed is self.model:
                 return found
             self.model = confirmed
-            self._known = {found.material: confirmed.predict(found.material, found.prediction)}
-            previous, found = found, self.solve(found.material)
+            self._at_hand = {found.probe: confirmed.predict(found.probe, found.prediction)}
+            previous, found = found, self.solve(found.probe)
             if self._settled(previous, found):
                 return found
         raise ComputationError(
@@ -143,7 +157,7 @@ class LeastSquares:
                 else np.clip(1.0 - (size / _TUKEY) ** 2, 0.0, None)
             )
             # outliers can drive the first fit onto a bound, where it would stay
-            origin = self._start if at_first else found.material
+            origin = self._start if at_first else found.probe
             previous, found = found, self.solve(origin)
             if not at_first and self._settled(previous, found):
                 break
@@ -151,13 +165,13 @@ class LeastSquares:
 
     def _settled(self, previous: Optimum, found: Optimum) -> bool:
         """Whether the parameters have moved too little for another confirmation to matter."""
-        now, size = self._values(found.material), np.abs(self._values(found.material))
+        now, size = self._values(found.probe), np.abs(self._values(found.probe))
         least = np.minimum(
             _SETTLED * found.stderr, _SETTLED_RELATIVE * np.maximum(size, self._scale)
         )
-        return bool(np.all(np.abs(now - self._values(previous.material)) <= least))
+        return bool(np.all(np.abs(now - self._values(previous.probe)) <= least))
 
-    def solve(self, start: Material) -> Optimum:
+    def solve(self, start: Probe) -> Optimum:
         """Find the optimum of the present model and weights.
 
         Raises
@@ -168,52 +182,65 @@ class LeastSquares:
             See `solve_and_confirm`.
         """
         for name in self._varied:
-            known, value = PARAMETERS[name], getattr(start, name)
+            known, (value,) = self._known[name], start.at([name])
             if not known.lower < value < known.upper:
                 raise InputError(
                     f"{name} = {value:g} to start from, expected a value between "
                     f"{known.lower:g} and {known.upper:g} {known.unit}"
                 )
-        material, prediction, far = start, self._predict(start), _FAR
-        squares = self._squares(prediction.values)
+        probe, prediction, far = start, self._predict(start), _FAR
+        squares = self._squares(prediction)
         for _ in range(_MOST_ROUNDS):
-            found = self._round(material, prediction, far)
-            here = self._values(material)
+            found = self._round(prediction, far)
+            here = self._values(probe)
             near = np.maximum(_FOUND * found.stderr, _NEAR * np.abs(here))
+            gain = squares - found.squares if self._informed else np.inf
+            if gain < _LITTLE:
+                return replace(found, probe=probe, prediction=prediction)
             # the optimum is where the branch was solved
-            if far < _NEAR or np.all(np.abs(self._values(found.material) - here) <= near):
-                return replace(found, material=material, prediction=prediction)
+            if far < _NEAR or np.all(np.abs(self._values(found.probe) - here) <= near):
+                return replace(found, probe=probe, prediction=prediction)
             try:
-                trial = self._predict(found.material)
-                better = self._squares(trial.values)
+                trial = self._predict(found.probe)
+                better = self._squares(trial)
             except ComputationError:
                 better = np.inf
             if better > squares * (1.0 + _NEAR):
+                if gain < _DOUBTFUL:
+                    return replace(found, probe=probe, prediction=prediction)
                 far /= 4.0
                 continue
             self.steps += 1
-            material, prediction, squares = found.material, trial, better
+            probe, prediction, squares = found.probe, trial, better
             far = min(_FAR, 2.0 * far)
         raise ComputationError(f"the fit did not converge in {_MOST_ROUNDS} rounds")
 
-    def _round(self, origin: Material, at: Prediction, far: float) -> Optimum:
-        """Run Levenberg-Marquardt among materials near the one of a prediction."""
-        value, (lower, upper) = self._values(origin) / self._scale, self._bounds
+    def _round(self, at: Prediction, far: float) -> Optimum:
+        """Run Levenberg-Marquardt among parameters near those of a prediction."""
+        value, (lower, upper) = self._values(at.probe) / self._scale, self._bounds
+        every = at.probe.at(self.model.names)
         room = far * np.maximum(np.abs(value), 0.1)
         low, high = np.maximum(lower, value - room), np.minimum(upper, value + room)
         # the search begins within its bounds
         inside = np.clip(value, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
-        # asked for twice, for the residuals and their derivatives
-        predicted = lru_cache(maxsize=1)(at.nearby.predict)
+
+        @lru_cache(maxsize=1)
+        def predicted(trial: bytes) -> tuple[Array, Array]:
+            # asked for twice, for the residuals and their derivatives
+            values = every.copy()
+            values[self._columns] = np.frombuffer(trial) * self._scale
+            return at.nearby.predict(values)
 
         def residual(trial: Array) -> Array:
             try:
-                return self.residuals.weighted(predicted(self._material(trial))[0])
+                known = self.residuals.weighted(predicted(trial.tobytes())[0])
             except ComputationError:
-                return np.full(self.residuals.size, _UNSOLVED)
+                known = np.full(self.residuals.size, _UNSOLVED)
+            return np.concatenate([known, self._from_priors(trial)])
 
         def jacobian(trial: Array) -> Array:
-            return self._jacobian(predicted(self._material(trial))[1])
+            known = self._jacobian(predicted(trial.tobytes())[1])
+            return np.concatenate([known, self._of_priors(trial)])
 
         found = optimize.least_squares(
             residual,
@@ -226,28 +253,47 @@ class LeastSquares:
             gtol=None,
             max_nfev=200,
         )
-        free = self.residuals.size - value.size
+        free = self.residuals.size + len(self._from_priors(value)) - value.size
         covariance = _inverse(found.jac.T @ found.jac) * (2.0 * found.cost / max(free, 1))
         covariance = covariance if free > 0 else np.full_like(covariance, np.nan)
         variance = np.diag(covariance)
         stderr = np.sqrt(np.where(variance > 0, variance, np.inf))
         return Optimum(
-            self._material(found.x),
+            at.probe.moved(dict(zip(self._varied, (found.x * self._scale).tolist(), strict=True))),
             at,
             stderr * self._scale,
             covariance * np.outer(self._scale, self._scale),
+            2.0 * float(found.cost),
         )
+
+    def _used_up(self, optimum: Optimum) -> Array | float:
+        """Return how many degrees of freedom of each observable a fit with priors uses up."""
+        if not self._informed:
+            return 0.0
+        jacobian = self._jacobian(optimum.prediction.slopes)
+        leverage = np.zeros(self.residuals.data.shape)
+        leverage[self.residuals.present] = np.einsum(
+            "ij,jk,ik->i", jacobian, self._posterior(optimum, jacobian), jacobian
+        )
+        return np.asarray(leverage.sum(axis=1, keepdims=True))
+
+    def _posterior(self, optimum: Optimum, jacobian: Array) -> Array:
+        """Return the covariance of the scaled parameters that data and priors leave."""
+        prior = self._of_priors(self._values(optimum.probe) / self._scale)
+        return _inverse(jacobian.T @ jacobian + prior.T @ prior)
 
     def covariance(self, optimum: Optimum) -> Array:
         """Return the covariance of the varied parameters in their own units; NaN if singular.
 
-        Noise differs between observables and along each of them by more than the weights know,
-        so every datum's variance is taken from its own residual, enlarged by its leverage h
-        (MacKinnon and White's HC3, J. Econometrics 29, 305 (1985)): C = A⁻¹ Jᵀ V J A⁻¹ with
-        A = JᵀJ and V = r² / (1 − h)².
+        With priors it is that of the posterior, linearised. Without, noise differs between
+        observables and along each of them by more than the weights know, so every datum's variance
+        is taken from its own residual, enlarged by its leverage h (MacKinnon and White's HC3,
+        J. Econometrics 29, 305 (1985)): C = A⁻¹ Jᵀ V J A⁻¹ with A = JᵀJ and V = r² / (1 − h)².
         """
         residual = self.residuals.weighted(optimum.prediction.values)
         jacobian = self._jacobian(optimum.prediction.slopes)
+        if self._informed:
+            return self._posterior(optimum, jacobian) * np.outer(self._scale, self._scale)
         inverse = _inverse(jacobian.T @ jacobian)
         if residual.size <= self._scale.size:
             return np.full_like(inverse, np.nan)
@@ -255,39 +301,70 @@ class LeastSquares:
         influence = inverse @ jacobian.T * (residual / np.maximum(1.0 - leverage, _LEAST_FREE))
         return np.asarray(influence @ influence.T * np.outer(self._scale, self._scale))
 
-    def _values(self, material: Material) -> Array:
-        return np.array([getattr(material, name) for name in self._varied])
+    def shares(self, optimum: Optimum) -> dict[str, Array]:
+        """Return what adds up to the covariance that priors and data leave.
 
-    def _material(self, scaled: Array) -> Material:
-        values = (scaled * self._scale).tolist()
-        return self._start.model_copy(update=dict(zip(self._varied, values, strict=True)))
+        By the name of each prior, and of the data as ``measurement``: the estimate is, to first
+        order, a weighted sum of all of them, each with an error of its own.
+        """
+        jacobian = self._jacobian(optimum.prediction.slopes)
+        prior = self._of_priors(self._values(optimum.probe) / self._scale)
+        names = [*(self._varied[place] for place in self._priors), *["fit"] * len(self._of_joint)]
+        left = self._posterior(optimum, jacobian) * self._scale[:, None]
+        found = {"measurement": left @ (jacobian.T @ jacobian) @ left.T}
+        for name, row in zip(names, prior, strict=True):
+            found[name] = found.get(name, 0.0) + np.outer(left @ row, left @ row)
+        return found
+
+    def _values(self, probe: Probe) -> Array:
+        return probe.at(self._varied)
+
+    def _from_priors(self, scaled: Array) -> Array:
+        """Return how far parameters are from their priors, in standard deviations."""
+        values = scaled * self._scale
+        own = [prior.deviation(values[place]) for place, prior in self._priors.items()]
+        if self._joint is not None:
+            own = [*own, *self._joint.deviations(values[self._of_joint])]
+        return np.array(own)
+
+    def _of_priors(self, scaled: Array) -> Array:
+        """Return the derivatives of `_from_priors` by the scaled parameters."""
+        rows, values = np.zeros((len(self._priors), scaled.size)), scaled * self._scale
+        for row, (place, prior) in zip(rows, self._priors.items(), strict=True):
+            row[place] = prior.slope(values[place]) * self._scale[place]
+        if self._joint is not None:
+            joint = np.zeros((len(self._of_joint), scaled.size))
+            joint[:, self._of_joint] = self._joint.slopes(values[self._of_joint])
+            rows = np.concatenate([rows, joint * self._scale])
+        return rows
 
     def _jacobian(self, slopes: Array) -> Array:
         """Return the derivatives of the weighted residuals by the scaled parameters."""
         return self.residuals.jacobian(slopes[:, :, self._columns] * self._scale)
 
-    def _squares(self, values: Array) -> float:
-        """Return the sum of squares of the weighted residuals."""
-        residual = self.residuals.weighted(values)
-        return float(residual @ residual)
+    def _squares(self, at: Prediction) -> float:
+        """Return the sum of squares of the weighted residuals and of the distance from priors."""
+        residual = self.residuals.weighted(at.values)
+        prior = self._from_priors(self._values(at.probe) / self._scale)
+        return float(residual @ residual + prior @ prior)
 
-    def _predict(self, material: Material) -> Prediction:
+    def _predict(self, probe: Probe) -> Prediction:
         """Predict with the model, from the latest prediction; what was asked before is at hand."""
-        known = self._known.get(material)
+        known = self._at_hand.get(probe)
         if known is not None:
             return known
-        near = next(reversed(self._known.values()), None)
+        near = next(reversed(self._at_hand.values()), None)
         self.evaluations += 1
         try:
-            prediction = self.model.predict(material, near)
+            prediction = self.model.predict(probe, near)
         except ComputationError:
             if near is None:
                 raise
             # a step too far to be followed from there
-            prediction = self.model.predict(material)
-        self._known[material] = prediction
-        if len(self._known) > _AT_HAND:
-            del self._known[next(iter(self._known))]
+            prediction = self.model.predict(probe)
+        self._at_hand[probe] = prediction
+        if len(self._at_hand) > _AT_HAND:
+            del self._at_hand[next(iter(self._at_hand))]
         if self._progress is not None:
             self._progress(self.evaluations, max(_USUAL_ROUNDS, self.evaluations))
         return prediction

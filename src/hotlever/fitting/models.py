@@ -2,7 +2,8 @@
 
 The fast lever is a reduced one where the geometry has been reduced before, or else the same lever
 on a coarse mesh. At a material where the full lever is solved too, the difference of the two
-branches is added to the fast one's from then on.
+branches is added to the fast one's from then on. Parameters are what
+`hotlever.probe.parameters` names: of the material, dimensions, the series resistance.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.pinned import AtTip
 from hotlever.lever.reduced import ReducedLever, ReducedSpace
 from hotlever.lever.reduction import cached_reduction, known_reduction
-from hotlever.lever.sensitivities import Linearised, at_fixed_bias
-from hotlever.lever.sensitivities import by_material as of_material
-from hotlever.materials import PARAMETERS, Material
+from hotlever.lever.sensitivities import Linearised, at_fixed_bias, by_parameter
+from hotlever.materials import PARAMETERS
 from hotlever.probe import Circuit, Probe
+from hotlever.probe.parameters import parameters_of
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -33,12 +34,16 @@ _CORRECTED_AT = 10
 
 
 class BranchSolver(Protocol):
-    """A lever that is solved for any material: full, coarse or reduced."""
+    """A lever that is solved for any similar probe: full, coarse or reduced."""
 
     def linearised(
-        self, material: Material, reach: Reach, near: Linearised | None = None
+        self,
+        probe: Probe,
+        reach: Reach,
+        near: Linearised | None = None,
+        names: tuple[str, ...] = ...,
     ) -> Linearised:
-        """Return the branch of a material, with its derivatives by the material."""
+        """Return the branch of a probe, with its derivatives by some parameters."""
         ...
 
 
@@ -50,12 +55,12 @@ class Prediction:
     ----------
     values : ndarray, shape (3, n)
         I_h (mA), V_r (V) and T_tip (K) at the biases.
-    slopes : ndarray, shape (3, n, 6)
-        Derivatives by the parameters at fixed bias.
+    slopes : ndarray, shape (3, n, p)
+        Derivatives by the model's parameters at fixed bias.
     linearised : Linearised
         What they were read from, but for its offset.
     nearby : Nearby
-        Predictions for similar materials.
+        Predictions for similar probes.
     """
 
     values: Array
@@ -63,42 +68,58 @@ class Prediction:
     linearised: Linearised
     nearby: Nearby
 
+    @property
+    def probe(self) -> Probe:
+        """The probe it is for."""
+        return self.linearised.probe
+
 
 class Nearby:
-    """Predictions for materials near one whose branch is known: a branch costs nothing there.
+    """Predictions for probes near one whose branch is known: a branch costs nothing there.
 
     At a fixed tip temperature, voltages and currents are nearly powers of the parameters, much
     more so than anything is at a fixed bias. What they change by at the branch's states,
-    `by_material`, has the shape (k, 3, 6).
+    `by_parameter`, has the shape (k, 3, p).
     """
 
-    def __init__(self, branch: Branch, by_material: Array, circuit: Circuit, bias: Array) -> None:
-        self._branch, self._circuit, self._bias = branch, circuit, bias
-        self._origin = _parameters(branch.equations.material)
-        scale = np.array([known.scale for known in PARAMETERS.values()])
+    def __init__(
+        self,
+        probe: Probe,
+        names: tuple[str, ...],
+        branch: Branch,
+        by_parameter: Array,
+        bias: Array,
+    ) -> None:
+        self._probe, self._names, self._branch, self._bias = probe, names, branch, bias
+        self._origin = probe.at(names)
+        known = parameters_of(probe)
+        scale = np.array([known[name].scale for name in names])
         self._unit = np.maximum(np.abs(self._origin), 0.1 * scale)
-        powers = by_material[1:] * self._unit / branch.values[1:, :3, None]
+        powers = by_parameter[1:] * self._unit / branch.values[1:, :3, None]
         # without power everything is zero; its ratios are those of a barely warm lever
         self._powers = np.concatenate([powers[:1], powers])
         self._slopes = spline_through(branch.u, self._powers)(branch.u, 1)
 
-    def predict(self, material: Material) -> tuple[Array, Array]:
-        """Return I_h, V_r and T_tip (3, n), and their derivatives by the parameters (3, n, 6).
+    def branch_at(self, values: Array) -> Branch:
+        """Return the branch of some values of the parameters (p,)."""
+        away = (values - self._origin) / self._unit
+        return multiplied(self._branch, np.exp(self._powers @ away), self._slopes @ away)
+
+    def predict(self, values: Array) -> tuple[Array, Array]:
+        """Return I_h, V_r and T_tip (3, n), and their derivatives (3, n, p), for some values (p,).
 
         Raises
         ------
         BranchEndError
             If the lever has no state below the melting point at one of the biases.
         """
-        away = (_parameters(material) - self._origin) / self._unit
-        factor = np.exp(self._powers @ away)
-        branch = multiplied(self._branch, factor, self._slopes @ away)
-        by_material = branch.values[:, :3, None] * self._powers / self._unit
-        return _with_slopes(branch, by_material, self._circuit, self._bias)
-
-
-def _parameters(material: Material) -> Array:
-    return np.array([getattr(material, name) for name in PARAMETERS])
+        branch = self.branch_at(values)
+        by_parameter = branch.values[:, :3, None] * self._powers / self._unit
+        circuit = self._probe.circuit
+        if "series_resistance_ohm" in self._names:
+            series = float(values[self._names.index("series_resistance_ohm")])
+            circuit = circuit.model_copy(update={"series_resistance_ohm": series})
+        return _with_slopes(branch, by_parameter, circuit, self._bias, self._names)
 
 
 def multiplied(branch: Branch, factor: Array, growth: Array) -> Branch:
@@ -128,39 +149,40 @@ def shown_at_bias(branch: Branch, circuit: Circuit, bias: Array) -> tuple[Array,
 
 
 def _with_slopes(
-    branch: Branch, by_material: Array, circuit: Circuit, bias: Array
+    branch: Branch, by_parameter: Array, circuit: Circuit, bias: Array, names: tuple[str, ...]
 ) -> tuple[Array, Array]:
-    """Return I_h, V_r and T_tip at some biases, and their derivatives by the parameters."""
+    """Return I_h, V_r and T_tip at some biases, and their derivatives by parameters."""
     u, values = shown_at_bias(branch, circuit, bias)
-    slopes = spline_through(branch.u, by_material)(u)
-    return values, at_fixed_bias(branch.curve(u, 1), u, circuit, slopes)
+    slopes = spline_through(branch.u, by_parameter)(u)
+    of_circuit = np.stack([circuit.bias_by(name, values[0]) for name in names], axis=1)
+    return values, at_fixed_bias(branch.curve(u, 1), u, circuit, slopes, of_circuit)
 
 
 @dataclass(frozen=True)
 class Offset:
-    """What a fast lever lacks, exact to first order at one material.
+    """What a fast lever lacks, exact to first order at one place among the parameters.
 
     `values` are those of V_l (V), I_h (mA) and V_r (V), by u; `slopes` of their derivatives by the
     parameters.
     """
 
-    material: Material
+    at: Array
     values: BSpline
     slopes: BSpline
 
     @classmethod
-    def at(cls, material: Material, u: Array, values: Array, slopes: Array) -> Offset:
+    def through(cls, at: Array, u: Array, values: Array, slopes: Array) -> Offset:
         """Make curves through what is lacking at some u; without power nothing is."""
         nodes = np.append(0.0, u)
 
         def curve(known: Array) -> BSpline:
             return spline_through(nodes, np.concatenate([np.zeros_like(known[:1]), known]))
 
-        return cls(material, curve(values), curve(slopes))
+        return cls(at, curve(values), curve(slopes))
 
-    def added(self, branch: Branch) -> Branch:
-        """Return a branch of the fast lever with what it lacks."""
-        moved = _parameters(branch.equations.material) - _parameters(self.material)
+    def added(self, branch: Branch, at: Array) -> Branch:
+        """Return a branch of the fast lever with what it lacks, for some values of parameters."""
+        moved = at - self.at
         values, slopes = branch.values.copy(), branch.value_slopes.copy()
         for derivative, known in enumerate((values, slopes)):
             known[:, :3] += self.values(branch.u, derivative)
@@ -173,23 +195,24 @@ class ForwardModel:
     """Predicts a measurement at some biases (V, in any order) with a lever that is solved fast.
 
     The full lever corrects the fast one, unless it is None. What is predicted depends on the
-    material alone: correcting the model makes another one.
+    probe alone: correcting the model makes another one. Derivatives are by `names`, and are
+    corrected too if `first_order`.
     """
 
     fast: BranchSolver
     full: Lever | None
-    circuit: Circuit
     bias: Array
+    names: tuple[str, ...] = tuple(PARAMETERS)
+    first_order: bool = True
     offset: Offset | None = None
 
-    @property
-    def reach(self) -> Reach:
-        """How far a branch must go."""
-        return Reach(self.circuit, float(self.bias.max()))
+    def reach(self, probe: Probe) -> Reach:
+        """Return how far the branch of a probe must go."""
+        return Reach(probe.circuit, float(self.bias.max()))
 
     @one_blas_thread
-    def predict(self, material: Material, near: Prediction | None = None) -> Prediction:
-        """Predict the measurement of a lever of some material, starting from a similar one's.
+    def predict(self, probe: Probe, near: Prediction | None = None) -> Prediction:
+        """Predict the measurement of a probe, starting from a similar one's.
 
         Raises
         ------
@@ -197,18 +220,19 @@ class ForwardModel:
             If the lever has no state below the melting point at one of the biases.
         """
         found = None if near is None else near.linearised
-        if found is None or found.branch.equations.material != material:
-            found = self.fast.linearised(material, self.reach, found)
-        branch, by_material = found.branch, found.shown
+        if found is None or found.probe != probe:
+            found = self.fast.linearised(probe, self.reach(probe), found, self.names)
+        branch, by_parameter = found.branch, found.shown
         if self.offset:
-            branch = self.offset.added(branch)
-            by_material = by_material + self.offset.slopes(branch.u)
-        known = branch, by_material, self.circuit, self.bias
-        return Prediction(*_with_slopes(*known), found, Nearby(*known))
+            branch = self.offset.added(branch, probe.at(self.names))
+            by_parameter = by_parameter + self.offset.slopes(branch.u)
+        shown = _with_slopes(branch, by_parameter, probe.circuit, self.bias, self.names)
+        nearby = Nearby(probe, self.names, branch, by_parameter, self.bias)
+        return Prediction(*shown, found, nearby)
 
     @one_blas_thread
     def confirmed(self, at: Prediction) -> ForwardModel:
-        """Return a model that is exact to first order at the material of a prediction.
+        """Return a model that is exact at the probe of a prediction, if so wanted to first order.
 
         Raises
         ------
@@ -217,9 +241,8 @@ class ForwardModel:
         """
         if self.full is None:
             return self
-        fast = at.linearised.branch
-        material = fast.equations.material
-        equations = self.full.with_material(material).equations
+        fast, probe = at.linearised.branch, at.probe
+        equations = self.full.equations_of(probe, self.names)
         space = fast.equations.space
         if isinstance(space, ReducedSpace):
             some = np.unique(np.linspace(1, fast.u.size - 1, _CORRECTED_AT).astype(int))
@@ -227,22 +250,24 @@ class ForwardModel:
             found = find_roots(AtTip(equations, u**2), guess, NewtonOptions(tolerance=1e-5))
             x, factors = found.x, found.factors
         else:
-            branch = Follower(equations).until(self.reach)
+            branch = Follower(equations).until(self.reach(probe))
             u, x, factors = branch.u[1:], branch.x[:, 1:], None
-        _, by_material = of_material(equations, x, factors)
         values = equations.observed(x).T - fast.curve(u)[:, :3]
-        slopes = by_material - at.linearised.shown_at(u)
-        return replace(self, offset=Offset.at(material, u, values, slopes))
+        lacking = np.zeros((u.size, 3, len(self.names)))
+        if self.first_order:
+            _, slopes = by_parameter(equations, x, factors, self.names)
+            lacking = slopes - at.linearised.shown_at(u)
+        return replace(self, offset=Offset.through(probe.at(self.names), u, values, lacking))
 
 
 def full_model(lever: Lever, bias: Array) -> ForwardModel:
     """Return a lever as forward model, just as it is."""
-    return ForwardModel(lever, None, lever.circuit, bias)
+    return ForwardModel(lever, None, bias)
 
 
 def reduced_model(lever: Lever, reduced: ReducedLever, bias: Array) -> ForwardModel:
     """Return a reduced lever, corrected by the full one, as forward model."""
-    return ForwardModel(reduced, lever, lever.circuit, bias)
+    return ForwardModel(reduced, lever, bias)
 
 
 def forward_model(
@@ -264,4 +289,4 @@ def forward_model(
     lever = Lever(probe)
     reduced = cached_reduction(lever) if reduce else known_reduction(lever)
     fast: BranchSolver = Lever(probe, COARSE) if reduced is None else reduced
-    return ForwardModel(fast, lever, probe.circuit, bias)
+    return ForwardModel(fast, lever, bias)

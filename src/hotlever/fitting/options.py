@@ -8,7 +8,9 @@ from typing import Any, Literal, get_args
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.lever.dataset import OBSERVABLES
-from hotlever.materials import PARAMETERS, Material, parameter
+from hotlever.materials import PARAMETERS, parameter
+from hotlever.probe import Probe
+from hotlever.probe.priors import Prior
 from hotlever.probe.surroundings import Medium
 
 Weights = Literal["maximum", "errors"]
@@ -35,6 +37,9 @@ class FitOptions:
         Let the zeros of I_h and V_r lie on straight lines over the order of the rows.
     medium : {"vacuum", "air"}, optional
         What the lever was measured in; wins over measurement and probe.
+    priors : mapping of str to Prior
+        What is known before, of parameters of the material, dimensions or the series resistance;
+        dimensions and the series resistance are varied if they have a prior.
 
     Raises
     ------
@@ -48,6 +53,7 @@ class FitOptions:
     weights: Weights = "maximum"
     drift: bool = False
     medium: Medium | None = None
+    priors: Mapping[str, Prior] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in self.fixed:
@@ -71,19 +77,25 @@ class FitOptions:
         object.__setattr__(self, "observables", chosen)
 
     @property
-    def varied(self) -> list[str]:
-        """The parameters to find."""
+    def material(self) -> list[str]:
+        """The parameters of the material to find."""
         return [name for name in PARAMETERS if name not in self.fixed]
 
-    def held(self, material: Material) -> Material:
-        """Return a material with the fixed values in place.
+    @property
+    def varied(self) -> list[str]:
+        """All parameters to find."""
+        return [*self.material, *(name for name in self.priors if name not in PARAMETERS)]
+
+    def held(self, probe: Probe) -> Probe:
+        """Return a probe with the fixed values in place.
 
         Raises
         ------
         InputError
             If a value is impossible.
         """
-        return material.with_(**{k: value for k, value in self.fixed.items() if value is not None})
+        values = {name: value for name, value in self.fixed.items() if value is not None}
+        return probe.with_(**values) if values else probe
 
     def values(self) -> dict[str, Any]:
         """Return the options as plain values."""

@@ -162,7 +162,10 @@ def sample_posterior(
     points = chains.points.reshape(-1, target.scale.size)
     outermost = [points[place] for place in _outermost(points)]
     reach = Reach(lever.circuit, float(bias.max()))
-    error = max(_reduced_error(lever, reduced, target.material(one), reach) for one in outermost)
+    error = max(
+        _reduced_error(lever.with_material(target.material(one)), reduced, reach)
+        for one in outermost
+    )
     data.attrs |= {"seed": seed, "noise": noise, "reduced_error_K": error}
     return data
 
@@ -174,9 +177,9 @@ def _outermost(points: Array) -> list[int]:
     return [int(np.argmin(along)), int(np.argmax(along))]
 
 
-def _reduced_error(lever: Lever, reduced: ReducedLever, material: Material, reach: Reach) -> float:
-    """Return how far the reduced lever's tip temperature may be off with some material (K)."""
-    branch = reduced.linearised(material, reach).branch
+def _reduced_error(lever: Lever, reduced: ReducedLever, reach: Reach) -> float:
+    """Return how far the reduced lever's tip temperature may be off for a lever (K)."""
+    branch = reduced.linearised(lever.probe, reach).branch
     u = branch.u[np.linspace(1, branch.u.size - 1, 4).astype(int)]
     return float(estimated_error(lever, branch, u)[2].max())
 

@@ -15,7 +15,8 @@ from hotlever.fitting.residuals import Residuals
 from hotlever.fitting.result import Fit
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduction import cached_reduction
-from hotlever.materials import Material, parameter
+from hotlever.materials import parameter
+from hotlever.probe import Probe
 from hotlever.types import Array
 
 #: Confidence levels whose intervals are read off a profile.
@@ -72,27 +73,27 @@ def profile_likelihood(
     optimum, residuals = result.parameters[name], result.residuals()
     others = [other for other in result.names if other != name]
     model = _model(result, residuals)
-    near = model.predict(result.probe.material)
+    near = model.predict(result.probe)
     variance = _noise_variance(result, name, residuals.size)
 
-    def refit(value: float, start: Material) -> tuple[float, Material]:
+    def refit(value: float, start: Probe) -> tuple[float, Probe]:
         """Fit the others with the parameter at `value`; return Δχ² and where."""
         nonlocal near
         held = start.with_(**{name: value})
         found = LeastSquares(model, residuals, held, others, near=near).solve(held)
         near = found.prediction
         residual = residuals.weighted(near.values)
-        return (float(residual @ residual) - result.sum_of_squares) / variance, found.material
+        return (float(residual @ residual) - result.sum_of_squares) / variance, found.probe
 
     # without a standard error, a tenth of the bounds' distance is a step as good as any
     step = (optimum.stderr or 0.1 * (known.upper - known.lower)) * _REACH / (points // 2)
-    rows = {optimum.value: (0.0, result.probe.material)}
+    rows = {optimum.value: (0.0, result.probe)}
     reasons: dict[str, str] = {}
     for side, sign, way, bound in (
         ("lower", -1.0, "down", known.lower),
         ("upper", 1.0, "up", known.upper),
     ):
-        material, distance = result.probe.material, 0.0
+        probe, distance = result.probe, 0.0
         for count in range(1, points // 2 + _MORE_STEPS + 1):
             distance += step * 2.0 ** max(0, count - points // 2)
             value = optimum.value + sign * distance
@@ -100,11 +101,11 @@ def profile_likelihood(
                 reasons[side] = f"{way} to its bound {bound:g}"
                 break
             try:
-                delta, material = refit(value, material)
+                delta, probe = refit(value, probe)
             except ComputationError:
                 reasons[side] = f"as far as the lever can be solved ({value:.4g} cannot)"
                 break
-            rows[value] = (delta, material)
+            rows[value] = (delta, probe)
             if count >= points // 2 and delta > chdtri(1, 1.0 - LEVELS[-1]):
                 break
         else:
@@ -116,7 +117,7 @@ def _model(result: Fit, residuals: Residuals) -> ForwardModel:
     """Return a model that is exact to first order at the optimum, and used as it is from there."""
     lever = Lever(result.probe)
     model = reduced_model(lever, cached_reduction(lever), residuals.bias)
-    return model.confirmed(model.predict(result.probe.material))
+    return model.confirmed(model.predict(result.probe))
 
 
 def _noise_variance(result: Fit, name: str, size: int) -> float:
@@ -130,7 +131,7 @@ def _noise_variance(result: Fit, name: str, size: int) -> float:
 def _dataset(
     result: Fit,
     name: str,
-    rows: dict[float, tuple[float, Material]],
+    rows: dict[float, tuple[float, Probe]],
     reasons: dict[str, str],
 ) -> xr.Dataset:
     optimum = result.parameters[name]
@@ -147,7 +148,7 @@ def _dataset(
     ]
     stderr = np.nan if optimum.stderr is None else optimum.stderr
     others = [other for other in result.names if other != name]
-    refitted = [[getattr(material, other) for _, material in rows.values()] for other in others]
+    refitted = np.transpose([probe.at(others) for _, probe in rows.values()])
     return labelled(
         {
             "delta_chi_square": delta,

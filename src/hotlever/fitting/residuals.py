@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -30,6 +30,9 @@ class Residuals:
         with a hundredth of its largest value for one, see `take_scatter`.
     data_weights : ndarray, shape (observables, rows of the measurement), optional
         What differences are multiplied by instead, as an earlier fit found it; 0 leaves out.
+    shared : mapping of str to ndarray, optional
+        Errors (standard deviations) that all data of an observable have in common, (n,), such as
+        that of a thermometer's scale.
 
     Attributes
     ----------
@@ -58,6 +61,7 @@ class Residuals:
         weights: Weights = "maximum",
         drift: bool = False,
         data_weights: Array | None = None,
+        shared: Mapping[str, Array] | None = None,
     ) -> None:
         self._measurement, self._drift = measurement, drift
         self._where = measurement.path or "measurement"
@@ -81,6 +85,9 @@ class Residuals:
             self._scale, self.down = np.ones(self.data.shape), data_weights[:, self._used]
             self.present = self.present & (self.down > 0)
         self._lines = Drift(observables, self.present)
+        self._shared = np.zeros((*self.data.shape, len(shared or {})))
+        for number, (name, error) in enumerate((shared or {}).items()):
+            self._shared[self.observables.index(name), :, number] = error[self._used]
 
     def _measured_errors(self) -> Array:
         """Return the standard error of every datum; a hundredth of the largest where unknown."""
@@ -123,12 +130,25 @@ class Residuals:
 
     def weighted(self, values: Array) -> Array:
         """Return the weighted differences, prediction minus data, shape (N,)."""
-        return np.asarray((-self.by * self.difference(values))[self.present])
+        return self._decorrelated((-self.by * self.difference(values))[self.present])
 
     def jacobian(self, slopes: Array) -> Array:
         """Return the derivatives of `weighted`, shape (N, p)."""
         jacobian = (self.by[:, :, None] * slopes[self.rows])[self.present]
-        return self._lines.removed(jacobian, self.by) if self._drift else jacobian
+        jacobian = self._lines.removed(jacobian, self.by) if self._drift else jacobian
+        return self._decorrelated(jacobian)
+
+    def _decorrelated(self, rows: Array) -> Array:
+        """Return weighted rows (N, ...) less what errors that data share explain.
+
+        With unit variances beside them the covariance is 1 + A Aᵀ; this is its inverse root.
+        """
+        if not self._shared.size:
+            return np.asarray(rows)
+        pattern = (self.by[..., None] * self._shared)[self.present]
+        along, size, _ = np.linalg.svd(np.nan_to_num(pattern), full_matrices=False)
+        kept = 1.0 / np.sqrt(1.0 + size**2) - 1.0
+        return np.asarray(rows + along @ (kept * (along.T @ rows).T).T)
 
     def deviations(self, values: Array) -> Array:
         """Return differences in units of the scatter of their observable; 0 where nothing is."""
@@ -138,9 +158,14 @@ class Residuals:
         floor = 1e-4 * self.largest
         return np.nan_to_num(difference / np.maximum(scatter, floor))
 
-    def take_scatter(self, values: Array) -> None:
-        """Give observables without measurement errors their scatter about a prediction."""
-        rms = np.sqrt(np.nanmean(self.difference(values) ** 2, axis=1, keepdims=True))
+    def take_scatter(self, values: Array, used_up: Array | float = 0.0) -> None:
+        """Give observables without measurement errors their scatter about a prediction.
+
+        Of their degrees of freedom a fit has used up some, (observables, 1).
+        """
+        squares = np.nansum(self.difference(values) ** 2, axis=1, keepdims=True)
+        count = self.present.sum(axis=1, keepdims=True)
+        rms = np.sqrt(squares / np.maximum(count - used_up, 1.0))
         scatter = np.maximum(rms, 1e-6 * self.largest)
         self._scale = np.where(self.without_errors[:, None], scatter, self._scale)
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator
 
 from hotlever import __version__
 from hotlever.datasets import labelled
@@ -33,6 +32,7 @@ from hotlever.lever.lever import Lever
 from hotlever.materials import PARAMETERS
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import Probe
+from hotlever.probe.parameters import parameter_of, parameters_of
 from hotlever.types import Array
 
 #: A parameter is called poorly determined from this relative standard error.
@@ -123,16 +123,17 @@ class Fit:
 
     @cached_property
     def parameters(self) -> dict[str, FittedParameter]:
-        """Value and standard error of every parameter, by name."""
+        """Value and standard error of the material's parameters and what else was varied."""
         spread = dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+        known, names = parameters_of(self.probe), dict.fromkeys([*PARAMETERS, *self.names])
         return {
             name: FittedParameter(
-                value=getattr(self.probe.material, name),
+                value=value,
                 stderr=spread[name] if np.isfinite(spread.get(name, np.nan)) else None,
-                unit=known.unit,
+                unit=known[name].unit,
                 vary=name in self.names,
             )
-            for name, known in PARAMETERS.items()
+            for name, value in zip(names, self.probe.at(list(names)).tolist(), strict=True)
         }
 
     @property
@@ -215,19 +216,13 @@ def band_dataset(**columns: Array) -> xr.Dataset:
     return labelled({name: columns[name][order] for name in BAND}, coordinates={"bias": bias})
 
 
-def _known(name: str) -> str:
-    if name not in PARAMETERS:
-        raise ValueError(f"expected some of {', '.join(PARAMETERS)}")
-    return name
-
-
 class _Parameter(Section):
     value: float
     stderr: Spread = np.nan
 
 
 class _Correlation(Section):
-    names: list[Annotated[str, AfterValidator(_known)]]
+    names: list[str]
     matrix: list[list[Number]]
 
 
@@ -271,6 +266,9 @@ def read_fit(path: str | os.PathLike[str]) -> Fit:
     names, rows = found.correlation.names, len(found.observables)
     if not found.parameters.keys() >= set(names):
         raise InputError(f"{path}: parameters and correlation do not belong together")
+    probe = Probe.from_values(found.probe, f"{path}: probe")
+    for name in names:
+        parameter_of(probe, name, f"{path}: correlation")
     stderr = [found.parameters[name].stderr for name in names]
     size = (len(names), len(names))
     correlation = array(found.correlation.matrix, size, f"{path}: correlation")
@@ -280,7 +278,7 @@ def read_fit(path: str | os.PathLike[str]) -> Fit:
     band = {name: found.band.get(name, []) for name in BAND}
     length = (len(band["bias_V"]),)
     return Fit(
-        probe=Probe.from_values(found.probe, f"{path}: probe"),
+        probe=probe,
         measurement=measurement,
         names=names,
         observables=tuple(found.observables),

@@ -28,19 +28,18 @@ class RoughModel:
     """
 
     def __init__(self, lever: Lever, reduced: ReducedLever, bias: Array) -> None:
-        model = ForwardModel(reduced, lever, lever.circuit, bias)
-        material = lever.probe.material
-        first = model.predict(material)
+        model, probe = ForwardModel(reduced, lever, bias), lever.probe
+        first = model.predict(probe)
         exact = model.confirmed(first)
-        at = exact.predict(material, first)
+        at = exact.predict(probe, first)
         assert exact.offset is not None
         self.slopes = at.slopes
-        self._bias, self._circuit, self._reduced = bias, lever.circuit, reduced
+        self._probe, self._bias, self._reduced = probe, bias, reduced
         self._near = at.linearised
-        self._branch = exact.offset.added(at.linearised.branch)
+        self._branch = exact.offset.added(at.linearised.branch, probe.at(exact.names))
         self._u = self._branch.u[1:]
         few, found = reduced.solved(
-            material, self._u, at.linearised.branch.x[:, 1:], at.linearised.factors
+            probe.material, self._u, at.linearised.branch.x[:, 1:], at.linearised.factors
         )
         self._shown = few.observed(found.x).T
 
@@ -53,11 +52,12 @@ class RoughModel:
         ComputationError
             If the lever has no state below the melting point at one of them.
         """
-        guess = self._near.states(material)[:, 1:]
+        moved = self._probe.model_copy(update={"material": material})
+        guess = self._near.states(moved)[:, 1:]
         few, found = self._reduced.solved(material, self._u, guess, self._near.factors)
         ratio = few.observed(found.x).T / self._shown
         # without power the ratio is that of a barely warm lever
         ratio = np.concatenate([ratio[:1], ratio])
         bend = spline_through(self._branch.u, ratio)(self._branch.u, 1)
         branch = multiplied(self._branch, ratio, bend / ratio)
-        return shown_at_bias(branch, self._circuit, self._bias)[1]
+        return shown_at_bias(branch, self._probe.circuit, self._bias)[1]

@@ -40,6 +40,7 @@ class AirFields:
             raise InputError("the lever is in vacuum, expected one in air")
         self._lever, self._air = lever, lever.space.air
         self._base = lever.circuit.base_temperature_K
+        self._unit = PER_CM_TO_MILLI_PER_UM * self._air.gas_conductivity
 
     @cached_property
     def _panelled(self) -> PanelledAir:
@@ -66,7 +67,7 @@ class AirFields:
             µm; the lever's mid-plane is z = 0. Inside the lever the result is its surface's.
         """
         theta = self._panelled.theta(points, self._densities(state))
-        return temperature_from_kirchhoff(theta / PER_CM_TO_MILLI_PER_UM, self._base)
+        return temperature_from_kirchhoff(theta / self._unit, self._base)
 
     def heat_by_region(self, state: State) -> dict[str, float]:
         """Return the heat (mW) that each region of the layout loses to the air."""

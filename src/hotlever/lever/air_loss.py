@@ -40,7 +40,14 @@ class AirLoss:
         Where products of two of them go among the entries of the sparse Jacobian.
     size : int
         Number of unknowns, V_l included.
+
+    Attributes
+    ----------
+    gas_conductivity : float
+        Of the gas, over that of air.
     """
+
+    gas_conductivity = 1.0
 
     def __init__(
         self, operator: Any, unknowns: Index, shares: Array, slots: Index, size: int

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.sparse import csr_matrix
 from skfem import CellBasis, Mesh
@@ -48,6 +50,8 @@ class FiniteElements:
         Quadrature weights, areas or volumes included.
     positions : ndarray, shape (dimension, points)
         Quadrature points.
+    inverse : ndarray, shape (elements, dimension, dimension)
+        Of each element's map from the reference element.
     sampling : csr_matrix, shape ((1 + dimension) × points, size)
         From nodal values to the values, then to the slopes along each axis at all points.
     """
@@ -77,13 +81,13 @@ class FiniteElements:
         products = np.einsum("rqi,sqj->rsqij", self._shape, self._shape)
         self._products = products.reshape(*products.shape[:3], -1)
         # slopes in space are these combinations of those on the reference element
-        self._inverse = np.moveaxis(np.asarray(self.basis.mapping.invA), -1, 0)
-        self._metric = np.einsum("era,esa->rse", self._inverse, self._inverse)
+        self.inverse = np.moveaxis(np.asarray(self.basis.mapping.invA), -1, 0)
+        self._metric = np.einsum("era,esa->rse", self.inverse, self.inverse)
         self.sampling = self._sampled()
 
     def _sampled(self) -> csr_matrix:
         nodes = self.dofs.shape[1]
-        slopes = np.einsum("era,rqn->aeqn", self._inverse, self._shape[1:])
+        slopes = np.einsum("era,rqn->aeqn", self.inverse, self._shape[1:])
         values = np.broadcast_to(self._shape[0], (1, *slopes.shape[1:]))
         data = np.concatenate([values, slopes])
         columns = np.broadcast_to(self.dofs[:, None], data.shape)
@@ -114,7 +118,7 @@ class FiniteElements:
             tables.append(products[0, 0])
         for vector, table in ((value_slope, products[0, 1:]), (slope_value, products[1:, 0])):
             if vector is not None:
-                factors.append(np.einsum("era,aeq->req", self._inverse, weighted(vector)))
+                factors.append(np.einsum("era,aeq->req", self.inverse, weighted(vector)))
                 tables.append(np.concatenate(table))
         if slope_slope is not None:
             for metric, table in zip(self._metric, products[1:, 1:], strict=True):
@@ -123,12 +127,17 @@ class FiniteElements:
         together = np.concatenate(factors).transpose(1, 0, 2).reshape(elements, -1)
         return np.asarray(together @ np.concatenate(tables)).reshape(elements, nodes, nodes)
 
+    def on_reference(self, point: Array, element: Any = slice(None)) -> Array:
+        """Return where a point lies on the reference element, seen from each or one element."""
+        corner = self.basis.mesh.p[:, self.basis.mesh.t[0, element]]
+        return np.einsum("...ra,a...->r...", self.inverse[element], (point - corner.T).T)
+
     def facet_nodes(self, facets: Index) -> Index:
         """Return the numbers of the nodes on some facets of the mesh."""
         return np.asarray(self.basis.get_dofs(facets).flatten(), dtype=np.intp)
 
-    def at_points(self, points: Array) -> tuple[Index, Array]:
-        """Return the element at each point, and its basis functions there.
+    def at_points(self, points: Array) -> tuple[Index, Array, Array]:
+        """Return the element at each point, and its basis functions there, with their slopes.
 
         Parameters
         ----------
@@ -139,28 +148,24 @@ class FiniteElements:
         -------
         elements : ndarray of int, shape (n,)
         values : ndarray, shape (n, nodes)
+        slopes : ndarray, shape (dimension, n, nodes)
 
         Raises
         ------
         InputError
             If a point lies outside the mesh.
         """
-        corner = self.basis.mesh.p[:, self.basis.mesh.t[0]]
         elements = np.empty(len(points), dtype=np.intp)
         local = np.empty(points.T.shape)
         for number, point in enumerate(points):
-            # where it lies on the reference element, seen from each element
-            here = np.einsum("era,ae->re", self._inverse, point[:, None] - corner)
+            here = self.on_reference(point)
             depth = np.minimum(here.min(axis=0), 1.0 - here.sum(axis=0))
             elements[number] = nearest = depth.argmax()
             if depth[nearest] < -_BY_ROUNDING:
                 where = ", ".join(f"{value:g}" for value in point)
                 raise InputError(f"the point ({where}) µm lies outside the lever")
             local[:, number] = here[:, nearest]
-        nodes = range(self.dofs.shape[1])
-        return elements, np.stack([self.basis.elem.lbasis(local, node)[0] for node in nodes], 1)
-
-    def point_weights(self, point: tuple[float, ...]) -> tuple[Index, Array]:
-        """Return nodes and weights that interpolate a field at a point; see `at_points`."""
-        (element,), (weights,) = self.at_points(np.array([point], dtype=float))
-        return self.dofs[element], weights
+        shape = [self.basis.elem.lbasis(local, node) for node in range(self.dofs.shape[1])]
+        values = np.stack([value for value, _ in shape], axis=1)
+        slopes = np.stack([slope for _, slope in shape], axis=-1)
+        return elements, values, np.einsum("nra,rnk->ank", self.inverse[elements], slopes)

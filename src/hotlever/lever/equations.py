@@ -15,11 +15,12 @@ operator fills the plate itself with air too; κ is therefore κ_Si − κ_air w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from hotlever.lever.motion import Motion
 from hotlever.lever.space import LEVER, TIP, Factors, Fields, Fluxes, Pin, Space, Tangent
 from hotlever.materials import Material
 from hotlever.materials.air import kirchhoff_variable, thermal_conductivity_of_air
@@ -70,6 +71,8 @@ class LeverEquations:
     space : Space
     material : Material
     base_temperature_K : float
+    motions : mapping of str to Motion, optional
+        Of the dimensions by which derivatives may be asked for.
 
     Attributes
     ----------
@@ -78,15 +81,25 @@ class LeverEquations:
         compare, and the largest step.
     """
 
-    def __init__(self, space: Space, material: Material, base_temperature_K: float) -> None:
-        self.space, self.material = space, material
+    def __init__(
+        self,
+        space: Space,
+        material: Material,
+        base_temperature_K: float,
+        motions: Mapping[str, Motion] | None = None,
+    ) -> None:
+        self.space, self.material, self.motions = space, material, motions or {}
         self.base_temperature_K = base_temperature_K
         self._sheet = PER_CM_TO_MILLI_PER_UM * space.thickness_um
         self._latest: tuple[Array, tuple[Fields, Conductivities]] | None = None
         along, length_um = space.tapered.along, space.tapered.length_um
-        self._doping = tapered_doping(
+        self._doping, by = tapered_doping(
             along, material.n_d, material.delta, length=length_um, n_hd=material.n_hd
         )
+        self._doping_by = {"n_d": by["n_d"], "delta": by["delta"]} | {
+            name: by["x"] * motion.along + by["length"] * motion.length_um
+            for name, motion in self.motions.items()
+        }
         self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]
         self.step_limit = np.where(space.is_temperature, 60.0, 5.0)[:, None]
 
@@ -97,14 +110,18 @@ class LeverEquations:
         material, here = self.material, self.space.tapered.points
         kappa, kappa_by = thermal_conductivity(T, material.c_kappa)
         if self.space.air is not None:
-            filling = self.space.air.filling
+            air = self.space.air
+            filling = air.gas_conductivity * air.filling
             of_air, of_air_by = thermal_conductivity_of_air(T)
             kappa = kappa - filling * of_air
-            kappa_by = {**kappa_by, "T": kappa_by["T"] - filling * of_air_by["T"]}
+            kappa_by = {
+                **kappa_by,
+                "T": kappa_by["T"] - filling * of_air_by["T"],
+                "gas_conductivity": -air.filling * of_air,
+            }
         sigma, sigma_by = conductivity_high_doped(T, material.a0, material.a1)
-        n, n_by = self._doping
-        sigma[here], low_by = conductivity_low_doped(T[here], n, material.p)
-        low_by |= {name: low_by["n"] * n_by[name] for name in ("n_d", "delta")}
+        sigma[here], low_by = conductivity_low_doped(T[here], self._doping, material.p)
+        low_by |= {name: low_by["n"] * by for name, by in self._doping_by.items()}
 
         def sheet_by(name: str) -> Array:
             by = np.zeros_like(sigma) + sigma_by.get(name, 0.0)
@@ -146,10 +163,11 @@ class LeverEquations:
         return weak
 
     def kirchhoff(self, x: Array) -> tuple[Array, Array]:
-        """Return θ (mW/µm) and κ_air (mW/(K µm)) at the sites of the air operator."""
+        """Return θ (mW/µm) and κ (mW/(K µm)) of the gas at the sites of the air operator."""
         base = self.base_temperature_K
         theta, by = kirchhoff_variable(base + self.space.air.rise(x), base)
-        return PER_CM_TO_MILLI_PER_UM * theta, PER_CM_TO_MILLI_PER_UM * by["T"]
+        unit = PER_CM_TO_MILLI_PER_UM * self.space.air.gas_conductivity
+        return unit * theta, unit * by["T"]
 
     def factorised(self, x: Array, pin: Pin = TIP) -> Factors:
         """Return the factorised Jacobians of states, with the row of a pin last."""
@@ -199,14 +217,36 @@ class LeverEquations:
         return weak
 
     def by_parameter(self, x: Array, names: Sequence[str]) -> Array:
-        """Return how `balance` changes with some material parameters, (size + 1, n, k)."""
-        fields, _ = self.at(x)
+        """Return how `balance` changes with parameters or dimensions, (size + 1, n, k)."""
+        fields, known = self.at(x)
         laws = self.conductivities(fields.T, names)
         sigma = np.stack([laws.sigma_by[name] for name in names], axis=-1)
         kappa = np.stack([laws.kappa_by[name] for name in names], axis=-1)
         grad_T, grad_V = fields.grad_T[..., None], fields.grad_V[..., None]
         heat = -sigma * square(fields.grad_V)[..., None]
-        return self.space.weak_form(Fluxes(heat, kappa * grad_T, sigma * grad_V))
+        changes = Fluxes(heat, kappa * grad_T, sigma * grad_V)
+        for place in (place for place, name in enumerate(names) if name in self.motions):
+            motion = self.motions[names[place]]
+            moved = motion.of_fluxes(fields, self.fluxes(x), known.kappa, known.sigma)
+            changes.heat_source[..., place] += moved.heat_source
+            changes.heat[..., place] += moved.heat
+            changes.charge[..., place] += moved.charge
+        weak = self.space.weak_form(changes)
+        if "gas_conductivity" in names and self.space.air is not None:
+            lost = self.space.air.weak_form(self.kirchhoff(x)[0])
+            place = list(names).index("gas_conductivity")
+            weak[..., place] += lost / self.space.air.gas_conductivity
+        return weak
+
+    def tip_by_parameter(self, x: Array, names: Sequence[str]) -> Array:
+        """Return how the tip's rise (K) changes with parameters, the unknowns being the same.
+
+        The tip moves against the mesh. The shape is (n, k).
+        """
+        unknowns, _ = self.space.tip
+        still = np.zeros(unknowns.size)
+        rates = [self.motions[name].tip if name in self.motions else still for name in names]
+        return np.asarray(np.tensordot(x[unknowns], rates, axes=(0, 1)))
 
     def solve_linear(
         self, x: Array, factors: Factors, right_hand_side: Array, pin: Pin = TIP

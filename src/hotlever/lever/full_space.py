@@ -18,7 +18,7 @@ from hotlever.air.operator import AirOperator
 from hotlever.lever.air_loss import AirLoss, AirSolver
 from hotlever.lever.elements import FiniteElements, sums_by_index
 from hotlever.lever.space import LinearMap, Pin, Space, Tangent, Tapered
-from hotlever.probe.layout import Part
+from hotlever.probe.layout import Layout, Part
 from hotlever.probe.mesh import ProbeMesh
 from hotlever.probe.solid import SolidMesh
 from hotlever.types import Array, Index
@@ -56,8 +56,8 @@ class FullSpace(Space):
         # in the middle of the silicon's thickness
         tip = np.zeros(len(self.elements.positions))
         tip[:2] = mesh.layout.tip
-        tip_nodes, tip_weights = self.elements.point_weights(tuple(tip))
-        self.tip = (self._T[tip_nodes], tip_weights)
+        (element,), (weights,), _ = self.elements.at_points(tip[None])
+        self.tip = (self._T[self.elements.dofs[element]], weights)
         self._lay_out_matrix()
         reader = terminal_nodes.get("reader")
         self.reader = (
@@ -70,7 +70,9 @@ class FullSpace(Space):
         self.weights = self.elements.weights[:, None]
         self.end_test = self._sampled_sum(ends).reshape(kinds, points)
         self.ground_test = self._sampled_sum(ground).reshape(kinds, points)[1:]
-        self.thickness_um = self._thickness()
+        # elements of a solid have their thickness themselves
+        flat = len(self.elements.positions) == 2
+        self.thickness_um = thickness_at(mesh.layout, self.elements.positions) if flat else 1.0
         region = np.repeat(mesh.region, self.elements.per_element)
         self.tapered = self._tapered_points(region)
         parts = np.array([one.part for one in mesh.layout.regions])[region]
@@ -120,19 +122,6 @@ class FullSpace(Space):
         lengths = np.array([one.length_um for one in tapers])
         return Tapered(points, along[:, None], lengths[:, None])
 
-    def _thickness(self) -> float | Array:
-        """Thickness of the silicon (µm); where there is a cone, at the quadrature points.
-
-        One if the elements are solid and have their thickness themselves.
-        """
-        layout, positions = self.mesh.layout, self.elements.positions
-        if len(positions) == 3:
-            return 1.0
-        if layout.cone is None:
-            return float(layout.thickness_um)
-        distance = np.linalg.norm(positions - np.reshape(layout.tip, (2, 1)), axis=0)
-        return np.asarray(layout.thickness_um + layout.cone.thickening_um(distance))[:, None]
-
     def nodal(self, x: Array, base_temperature_K: float) -> tuple[Array, Array]:
         """Return temperature (K) and potential (V) of a state at all nodes, each (nodes,)."""
         T = base_temperature_K + np.where(self._T >= 0, x[self._T], 0.0)
@@ -158,11 +147,18 @@ class FullSpace(Space):
         space = copy(self)
         space.air = None
         if air is not None:
-            element, shares = self.elements.at_points(air.sites)
+            element, shares, _ = self.elements.at_points(air.sites)
             nodes = self.elements.dofs.shape[1]
             slots = self._slots[element, :nodes, :nodes]
             unknowns = self._T[self.elements.dofs[element]]
             space.air = AirLoss(air, unknowns, shares, slots, self.size + 1)
+        return space
+
+    def in_gas(self, conductivity: float) -> FullSpace:
+        """Return the same space in a gas that conducts so many times as well as air."""
+        space = copy(self)
+        space.air = copy(self.air)
+        space.air.gas_conductivity = conductivity
         return space
 
     def in_air_at_nodes(self, air: Any, surface: Index) -> FullSpace:
@@ -260,6 +256,14 @@ class SparseFactors:
         """Return the same factors, those of some states taken from others, in their order."""
         solvers = dict(enumerate(self._solvers)) | dict(zip(states, other._solvers, strict=True))
         return SparseFactors(list(solvers.values()))
+
+
+def thickness_at(layout: Layout, positions: Array) -> float | Array:
+    """Return the silicon's thickness (µm); where there is a cone, at positions (2, points)."""
+    if layout.cone is None:
+        return float(layout.thickness_um)
+    distance = np.linalg.norm(positions - np.reshape(layout.tip, (2, 1)), axis=0)
+    return np.asarray(layout.thickness_um + layout.cone.thickening_um(distance))[:, None]
 
 
 def _rows(points: Iterable[tuple[float, float]]) -> Array:

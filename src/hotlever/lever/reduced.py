@@ -27,7 +27,8 @@ from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
 from hotlever.lever.pinned import AtTip
 from hotlever.lever.sensitivities import Linearised
 from hotlever.lever.space import LinearMap, Pin, Space, Tangent
-from hotlever.materials import Material
+from hotlever.materials import PARAMETERS, Material
+from hotlever.probe import Probe
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
@@ -173,7 +174,8 @@ class ReducedAir:
     """The air operator between temperature modes; see `AirLoss`."""
 
     def __init__(self, full: AirLoss, modes: Array, size: int) -> None:
-        self.filling, self._size, self._count = full.filling, size, len(modes)
+        self.filling, self.gas_conductivity = full.filling, full.gas_conductivity
+        self._size, self._count = size, len(modes)
         self._samples = full.sampling[:, : modes.shape[1]] @ modes.T
         self._spread = self._samples.T @ full.operator.matrix
 
@@ -233,23 +235,29 @@ class ReducedLever:
 
     @one_blas_thread
     def linearised(
-        self, material: Material, reach: Reach, near: Linearised | None = None
+        self,
+        probe: Probe,
+        reach: Reach,
+        near: Linearised | None = None,
+        names: tuple[str, ...] = tuple(PARAMETERS),
     ) -> Linearised:
-        """Solve the branch of a material, with its derivatives by the material.
+        """Solve the branch of a probe of another material, with its derivatives by the material.
 
         It starts from a branch of a similar material, or from the atlas; see `Lever.linearised`.
         """
+        material = probe.material
         if near is None:
             count = reach.count(self.atlas.shown(material))
             u, guess = self.atlas.u[1:count], self.atlas.states(material)[:, 1:count]
             factors = None
         else:
-            u, guess, factors = near.branch.u[1:], near.states(material)[:, 1:], near.factors
+            u, guess, factors = near.branch.u[1:], near.states(probe)[:, 1:], near.factors
         few, found = self.solved(material, u, guess, factors)
         every = self.equations(material)
         found = find_roots(AtTip(every, u**2), found.x, _DONE, found.factors)
         # derivatives by the material are taken at the few points: exact ones cost too much here
-        return Linearised.of(branch_of(every, u, found), reach, few, found.factors)
+        branch = branch_of(every, u, found)
+        return Linearised.of(probe, names, branch, reach, few, found.factors)
 
     # --- on disk ----------------------------------------------------------------------------------
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import nnls
 
-from hotlever import __version__
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.lever.atlas import BOX, Atlas, material_in_box
 from hotlever.lever.equations import SHOWN
@@ -67,10 +66,10 @@ def reduce(
     progress : callable, optional
         Called with the parameter sets done and their number.
     """
-    options = options or ReductionOptions()
-    training = []
     from scipy.stats import qmc  # takes long, and most commands reduce nothing
 
+    options = options or ReductionOptions()
+    training = []
     shares = qmc.Sobol(len(BOX), seed=options.seed).random(options.parameter_sets)
     for done, row in enumerate(shares, start=1):
         training.append(_trained(lever.with_material(material_in_box(lever.probe.material, row))))
@@ -102,10 +101,10 @@ def _file(lever: Lever) -> Path | None:
     """Return the file of a reduced lever, named by all that it depends on."""
     elements, air = lever.space.elements, lever.space.air
     facts = {
-        "version": __version__,
         "shape": lever.probe.shape.model_dump(),
         "tip": lever.probe.tip and lever.probe.tip.model_dump(),
         "base_temperature_K": lever.circuit.base_temperature_K,
+        "gas_conductivity": lever.probe.surroundings.gas_conductivity,
         "n_hd": lever.probe.material.n_hd,
         "options": asdict(ReductionOptions()),
         # a change of Netgen's mesh makes a new file instead of a wrong answer
@@ -122,7 +121,9 @@ def _file(lever: Lever) -> Path | None:
 
 def _trained(lever: Lever) -> Linearised:
     """Return a branch and its derivatives, without the factors: those of all branches are large."""
-    found = Linearised.of(lever.branch(HOTTEST), lambda _: True, lever.equations)
+    found = Linearised.of(
+        lever.probe, tuple(PARAMETERS), lever.branch(HOTTEST), lambda _: True, lever.equations
+    )
     return replace(found, factors=None)
 
 

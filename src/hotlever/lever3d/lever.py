@@ -18,12 +18,10 @@ from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.dataset import at_bias
 from hotlever.lever.elements import FiniteElements
-from hotlever.lever.equations import PER_CM_TO_MILLI_PER_UM
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever, checked_bias
 from hotlever.lever.state import State
 from hotlever.lever3d.still_air import OpenAir, ngsolve
-from hotlever.materials.air import kirchhoff_variable
 from hotlever.probe import Probe
 from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid
 from hotlever.types import Array, Index, Progress
@@ -82,7 +80,7 @@ class SolidLever(Lever):
         if in_air:
             ngsolve()  # says what to install, before the meshing
             around = self.probe.surroundings
-            if around != type(around)(medium="air"):
+            if around != type(around)(medium="air", gas_conductivity=around.gas_conductivity):
                 raise InputError(
                     "[surroundings]: the full 3-D simulation knows free space only; expected no "
                     "surface below, no chip and no temperature jump"
@@ -95,7 +93,8 @@ class SolidLever(Lever):
         if not in_air:
             return space
         air = OpenAir(solid.netgen, solid.centre, radius, order=self._air_order)
-        return space.in_air_at_nodes(air, surface_nodes(space.elements, air))
+        space = space.in_air_at_nodes(air, surface_nodes(space.elements, air))
+        return space.in_gas(self.probe.surroundings.gas_conductivity)
 
     def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
         """Return the space in the probe's surroundings; air needs a mesh of its own."""
@@ -160,7 +159,7 @@ class SolidLever(Lever):
     def _from_flat(self) -> csr_matrix:
         """The matrix from nodal values of the flat lever to those of this one."""
         flat, nodes = self._flat.space.elements, self.space.elements.nodes
-        element, shares = flat.at_points(nodes[:2].T)
+        element, shares, _ = flat.at_points(nodes[:2].T)
         rows = np.repeat(np.arange(len(element)), shares.shape[1])
         return csr_matrix(
             (shares.ravel(), (rows, flat.dofs[element].ravel())), shape=(len(element), flat.size)
@@ -217,9 +216,7 @@ class SolidLever(Lever):
         air = self.space.air
         if air is None:
             raise InputError("this lever is in vacuum: it gives no heat to air")
-        base = self.circuit.base_temperature_K
-        theta, _ = kirchhoff_variable(base + air.rise(state.x)[:, 0], base)
-        coefficients, heat = air.operator.solve(PER_CM_TO_MILLI_PER_UM * theta)
+        coefficients, heat = air.operator.solve(self.equations.kirchhoff(state.x)[0][:, 0])
         return coefficients, heat
 
 

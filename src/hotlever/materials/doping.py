@@ -24,7 +24,7 @@ def tapered_doping(
 
     The paper's unnumbered equation between Eqs. 4 and 5: the step profile of a heater of
     `length` between high-doped neighbours, smoothed by 1-D diffusion over the length Δ. The
-    partial derivatives are by ``x``, ``n_d`` and ``delta``.
+    partial derivatives are by ``x``, ``n_d``, ``delta`` and ``length``.
 
     Parameters
     ----------
@@ -52,6 +52,7 @@ def tapered_doping(
         "n_d": 1.0 - high_share,
         "delta": -per_unit * (bell_right * right + bell_left * left) / delta,
         "x": per_unit * (bell_right - bell_left) / delta,
+        "length": -0.5 * per_unit * (bell_right + bell_left) / delta,
     }
 
 

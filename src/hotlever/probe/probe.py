@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import os
 import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from pydantic import model_validator
 
 from hotlever.errors import InputError, quoted, unknown_name
@@ -15,11 +17,13 @@ from hotlever.files import read_text, write_text
 from hotlever.materials import Material
 from hotlever.probe.circuit import Circuit
 from hotlever.probe.layout import Layout
+from hotlever.probe.priors import PriorTexts, priors_of
 from hotlever.probe.shapes import Shape, ThreeLeg, UShape, shape_of
 from hotlever.probe.surroundings import Surroundings
 from hotlever.probe.tip import Tip
 from hotlever.records import Record
 from hotlever.spieser2017 import DOI, published
+from hotlever.types import Array
 
 #: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
 #: gigabytes to read.
@@ -31,6 +35,7 @@ _PARTS: dict[str, type[Record]] = {
     "material": Material,
     "surroundings": Surroundings,
     "tip": Tip,
+    "prior": PriorTexts,
 }
 SECTIONS = ("probe", *_PARTS)
 
@@ -38,7 +43,8 @@ SECTIONS = ("probe", *_PARTS)
 class Probe(Record):
     """Shape, circuit, material, surroundings and tip of one lever: everything a solve needs.
 
-    Without a `tip` the lever is flat, as in the paper.
+    Without a `tip` the lever is flat, as in the paper. What is known of it before it is measured
+    counts in fits and calibrations only.
 
     Examples
     --------
@@ -54,6 +60,7 @@ class Probe(Record):
     material: Material = published("option III").material
     surroundings: Surroundings = Surroundings()
     tip: Tip | None = None
+    prior: PriorTexts | None = None
 
     @model_validator(mode="after")
     def _tip_stands_on_the_heater(self) -> Probe:
@@ -139,7 +146,10 @@ class Probe(Record):
             if name in values:
                 section = {**usual.get(name, {}), **values[name]}
                 parts[name] = part.of(section, f"{where}: [{name}]")
-        return cls.of(parts, where)
+        probe = cls.of(parts, where)
+        if probe.prior is not None:
+            priors_of(probe.prior.by_name, probe, f"{where}: [prior]")
+        return probe
 
     @classmethod
     def from_file(cls, path: str | os.PathLike[str]) -> Probe:
@@ -195,6 +205,24 @@ class Probe(Record):
                 raise unknown_name("name", name, known)
             section[name] = value
         return Probe.from_values(sections, "probe")
+
+    def at(self, names: Sequence[str]) -> Array:
+        """Return some of its values by their names in a probe file, shape (len(names),)."""
+        return np.array([getattr(self._part_with(name), name) for name in names], dtype=float)
+
+    def moved(self, values: Mapping[str, float]) -> Probe:
+        """Return a copy with some values changed, as `with_` does but unchecked and fast."""
+        parts = {}
+        for field in type(self).model_fields:
+            part = getattr(self, field)
+            own = {
+                name: values[name] for name in values if part and name in type(part).model_fields
+            }
+            parts[field] = part.model_copy(update=own) if own else part
+        return self.model_copy(update=parts)
+
+    def _part_with(self, name: str) -> Record:
+        return next(part for part in self._sections.values() if name in type(part).model_fields)
 
     def __repr__(self) -> str:
         # the probe file without its comments

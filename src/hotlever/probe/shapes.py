@@ -31,6 +31,10 @@ class Shape(Record):
 
     shape: str
 
+    def dimensions(self) -> dict[str, float]:
+        """Return the dimensions (µm) that are given, by name."""
+        return self.model_dump(exclude={"shape"}, exclude_none=True)
+
     @abstractmethod
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""

@@ -50,6 +50,12 @@ class Surroundings(Record):
         le=1,
         description="0.01 to 1: the air's temperature jumps at surfaces; left out: no jump",
     )
+    gas_conductivity: float = Field(
+        default=1.0,
+        ge=0.01,
+        le=20,
+        description="of the gas, over that of dry air at the same temperature",
+    )
     pressure_mbar: float = Field(
         default=ATMOSPHERE,
         ge=1e-6,

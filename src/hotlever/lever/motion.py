@@ -1,0 +1,115 @@
+"""What changes at the quadrature points of a lever when one of its dimensions does.
+
+The mesh moves with the drawing (`hotlever.probe.moving`), every quadrature point with its element.
+At a point that moves so, the values of a field stay, its slopes are strained, and the weight of
+the point grows with the element. That is all that the equations need for exact derivatives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hotlever.lever.full_space import FullSpace, thickness_at
+from hotlever.lever.space import Fields, Fluxes
+from hotlever.probe.moving import LayoutRate, Movement
+from hotlever.types import Array
+
+#: A small change of a dimension (µm), by which the thickness of a cone is differenced.
+_SMALL_UM = 1e-4
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Rates at the quadrature points, per unit of a dimension.
+
+    Attributes
+    ----------
+    strain : ndarray, shape (dimension, dimension, points)
+        Derivative of the velocity's component i (first axis) along j.
+    swelling : ndarray, shape (points, 1)
+        Of the weights and of the thickness, relative.
+    along, length_um : ndarray, shape (k, 1)
+        Of what `hotlever.lever.space.Tapered` holds.
+    tip : ndarray, shape (nodes,)
+        Of the weights that give the rise of the tip temperature.
+    """
+
+    strain: Array
+    swelling: Array
+    along: Array
+    length_um: Array
+    tip: Array
+
+    def strained(self, gradient: Array) -> Array:
+        """Return how slopes (dimension, points, n) change, the values being the same."""
+        return -self._contracted(self.strain.swapaxes(0, 1), gradient)
+
+    def pulled(self, flux: Array) -> Array:
+        """Return how a flux (dimension, points, n) changes what it is tested with.
+
+        Its points grow, and the slopes of the test functions are strained.
+        """
+        return self.swelling * flux - self._contracted(self.strain, flux)
+
+    def _contracted(self, strain: Array, vectors: Array) -> Array:
+        return (strain[..., None] * vectors[None]).sum(axis=1)
+
+    def of_fluxes(self, fields: Fields, fluxes: Fluxes, kappa: Array, sigma: Array) -> Fluxes:
+        """Return how fluxes change with the dimension, conductivities (points, n) being the same.
+
+        The heat source is −σ |∇V|².
+        """
+        grad_T, grad_V = self.strained(fields.grad_T), self.strained(fields.grad_V)
+        made = 2.0 * sigma * (fields.grad_V * grad_V).sum(axis=0)
+        return Fluxes(
+            self.swelling * fluxes.heat_source - made,
+            self.pulled(fluxes.heat) + kappa * grad_T,
+            self.pulled(fluxes.charge) + sigma * grad_V,
+        )
+
+
+def motion_of(space: FullSpace, movement: Movement) -> Motion:
+    """Return what changes at the points of a flat lever as it moves with a dimension."""
+    elements, mesh, rate = space.elements, space.mesh, movement.rate
+    corners = movement.velocity[:, mesh.elements.t]
+    sides = corners[:, 1:] - corners[:, :1]
+    # the velocity is linear in each triangle
+    strain = np.einsum("irm,mra->iam", sides, elements.inverse)
+    start = corners[:, 0, :, None]
+    velocity = (start + np.einsum("irm,rq->imq", sides, elements.basis.X)).reshape(2, -1)
+    strain = np.repeat(strain, elements.per_element, axis=2)
+
+    layout, at = mesh.layout, elements.positions
+
+    def thickness(way: float) -> float | Array:
+        there = tuple((layout.tip + way * rate.tip).tolist())
+        moved = replace(layout, tip=there, thickness_um=layout.thickness_um + way * rate.thickness)
+        return thickness_at(moved, at + way * velocity)
+
+    thicker = (thickness(_SMALL_UM) - thickness(-_SMALL_UM)) / (2 * _SMALL_UM * thickness(0.0))
+    (element,), _, slopes = elements.at_points(np.array([layout.tip]))
+    reference = elements.on_reference(np.array(layout.tip), element)
+    at_tip = corners[:, 0, element] + sides[:, :, element] @ reference
+    return Motion(
+        strain,
+        np.asarray(strain[0, 0] + strain[1, 1])[:, None] + thicker,
+        *_tapers(space, rate, velocity),
+        tip=(rate.tip - at_tip) @ slopes[:, 0],
+    )
+
+
+def _tapers(space: FullSpace, rate: LayoutRate, velocity: Array) -> tuple[Array, Array]:
+    """Return how the places along the current and the lengths of tapered regions change."""
+    points = space.tapered.points
+    region = np.repeat(space.mesh.region, space.elements.per_element)[points]
+    pairs: list[Any] = [
+        (rate.now.regions[one].taper, rate.later.regions[one].taper) for one in region
+    ]
+    centres = np.array([rate.of_point(now.centre, later.centre) for now, later in pairs])
+    axes = np.array([now.axis for now, _ in pairs])
+    lengths = np.array([(later.length_um - now.length_um) / rate.step for now, later in pairs])
+    along = ((velocity[:, points].T - centres) * axes).sum(axis=1)
+    return along[:, None], lengths[:, None]

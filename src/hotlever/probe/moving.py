@@ -1,0 +1,159 @@
+"""How a drawing, and the mesh on it, move with a dimension.
+
+The vertices of a mesh follow the corners of the drawing: along edges in proportion, inside as
+smoothly as possible. So a lever whose dimensions are a little different has the same mesh, moved,
+and what it shows is differentiable by its dimensions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse.linalg import splu
+from skfem import CellBasis, ElementTriP1, MeshTri
+from skfem.models.poisson import laplace
+
+from hotlever.errors import ComputationError
+from hotlever.probe.layout import Layout, Point
+from hotlever.probe.mesh import ON_LINE, ProbeMesh
+from hotlever.probe.shapes import Shape
+from hotlever.types import Array
+
+#: Share of a dimension by which it is changed to find how the drawing moves: any would do, since
+#: corners are sums of dimensions.
+_STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class LayoutRate:
+    """How a layout changes, per unit of a dimension.
+
+    Attributes
+    ----------
+    now, later : Layout
+        The same regions, before and after a change by `step`.
+    step : float
+    """
+
+    now: Layout
+    later: Layout
+    step: float
+
+    @classmethod
+    def of(cls, shape: Shape, name: str) -> LayoutRate:
+        """Return how a shape's layout changes with one of its dimensions."""
+        step = _STEP * getattr(shape, name)
+        # a heater as long as its gap can only become shorter
+        for signed in (step, -step):
+            later = shape.model_copy(update={name: getattr(shape, name) + signed}).layout()
+            if len(later.regions) == len(shape.layout().regions):
+                break
+        return cls(shape.layout(), later, signed)
+
+    def of_point(self, now: Point, later: Point) -> Array:
+        """Return the velocity of a place in the drawing, shape (2,)."""
+        return np.subtract(later, now) / self.step
+
+    @property
+    def thickness(self) -> float:
+        """Rate of the thickness."""
+        return (self.later.thickness_um - self.now.thickness_um) / self.step
+
+    @property
+    def tip(self) -> Array:
+        """Velocity of the tip, shape (2,)."""
+        return self.of_point(self.now.tip, self.later.tip)
+
+    def corners(self) -> dict[Point, Array]:
+        """Return the velocity of every corner of a region; where two meet, their mean."""
+        found: dict[Point, list[Array]] = {}
+        for now, later in zip(self.now.regions, self.later.regions, strict=True):
+            for corner, moved in zip(now.outline, later.outline, strict=True):
+                place = (round(corner[0], 9), round(corner[1], 9))
+                found.setdefault(place, []).append(self.of_point(corner, moved))
+        return {place: np.mean(velocities, axis=0) for place, velocities in found.items()}
+
+
+@dataclass(frozen=True)
+class Movement:
+    """How a layout and the vertices (2, n) of its mesh move, per unit of a dimension."""
+
+    rate: LayoutRate
+    velocity: Array
+
+
+def vertex_velocity(mesh: ProbeMesh, rate: LayoutRate) -> Array:
+    """Return the velocity (2, vertices) of a flat mesh's vertices, per unit of a dimension."""
+    points, corners = mesh.elements.p, rate.corners()
+    places = np.array(list(corners))
+    velocities = np.array(list(corners.values()))
+    velocity = np.zeros(points.shape)
+    held = np.zeros(points.shape[1], dtype=bool)
+    for region in rate.now.regions:
+        outline = region.outline
+        for start, end in pairwise([*outline, outline[0]]):
+            along, near = _on_line(np.array(start), np.array(end), points)
+            knots, on = _on_line(np.array(start), np.array(end), places.T)
+            order = np.argsort(knots[on])
+            for axis in (0, 1):
+                velocity[axis, near] = np.interp(
+                    along[near], knots[on][order], velocities[on, axis][order]
+                )
+            held |= near
+    stiffness = laplace.assemble(CellBasis(mesh.elements, ElementTriP1())).tocsc()
+    inside = np.flatnonzero(~held)
+    if inside.size:
+        load = -(stiffness[inside][:, held] @ velocity[:, held].T)
+        velocity[:, inside] = splu(stiffness[inside][:, inside].tocsc()).solve(load).T
+    return velocity
+
+
+def _on_line(start: Array, end: Array, points: Array) -> tuple[Array, Array]:
+    """Return where points (2, n) are along a line, and which lie on it."""
+    line = end - start
+    length = np.linalg.norm(line)
+    away = points - start[:, None]
+    along, across = line @ away / length, (line[0] * away[1] - line[1] * away[0]) / length
+    on = (np.abs(across) < ON_LINE) & (along > -ON_LINE) & (along < length + ON_LINE)
+    return along, on
+
+
+class MovingMesh:
+    """A flat mesh that follows its shape; it moves in proportion to the change of a dimension."""
+
+    def __init__(self, mesh: ProbeMesh, shape: Shape) -> None:
+        self._mesh, self._shape = mesh, shape
+        self._known: dict[str, Movement] = {}
+
+    def movement(self, name: str) -> Movement:
+        """Return how mesh and layout move with a dimension."""
+        if name not in self._known:
+            rate = LayoutRate.of(self._shape, name)
+            self._known[name] = Movement(rate, vertex_velocity(self._mesh, rate))
+        return self._known[name]
+
+    def at(self, shape: Shape, layout: Layout) -> ProbeMesh:
+        """Return the mesh of other dimensions, whose layout is given.
+
+        Raises
+        ------
+        ComputationError
+            If a triangle would turn over.
+        """
+        points = self._mesh.elements.p.copy()
+        for name in shape.dimensions():
+            change = getattr(shape, name) - getattr(self._shape, name)
+            if change:
+                points += change * self.movement(name).velocity
+        before, triangles = self._mesh.elements.p, self._mesh.elements.t
+        if np.any(_doubled_areas(before[:, triangles]) * _doubled_areas(points[:, triangles]) <= 0):
+            raise ComputationError("the mesh cannot follow so large a change of the dimensions")
+        return replace(self._mesh, layout=layout, elements=MeshTri(points, triangles))
+
+
+def _doubled_areas(corners: Array) -> Array:
+    """Return twice the signed areas of triangles (2, 3, n)."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.asarray(first[0] * second[1] - first[1] * second[0])

@@ -1,0 +1,200 @@
+"""What is known of a lever before it is measured: a value and a spread for each parameter.
+
+Written as text, in the section ``[prior]`` of a probe file or on the command line:
+``3.3e17 ± 15%``, ``± 5%`` (about the probe's own value), ``0.40 ± 0.02``. ``+-`` stands for ``±``.
+The name ``dimensions`` means all of the drawing and the thickness.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydantic import ConfigDict
+
+from hotlever.errors import InputError, unknown_name
+from hotlever.probe.parameters import parameters_of
+from hotlever.records import Record
+from hotlever.spieser2017 import published
+from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from hotlever.probe.probe import Probe
+
+#: Levers whose scatter stands for that of any lever of unknown material (Table II of the paper),
+#: and by how much it is widened: four levers of one wafer differ less than those of two makers.
+SCATTER_OF, _WIDENED = ("lever 1", "lever 2", "lever 3", "lever 4"), 1.5
+#: Relative spread of what the drawing says, and of a resistor that was measured.
+_DIMENSIONS, _RESISTANCE = 0.05, 1e-3
+#: Nominal doping is that good, where the probe file says no better (the makers' own tolerance).
+_DOPING = 0.15
+#: Dimensions that do not matter to the tip.
+_HARMLESS = ("reader_length_um", "reader_centre_um")
+ALL_DIMENSIONS = "dimensions"
+_TEXT = re.compile(r"([^±]{0,40})±([^±]{1,40})")
+
+
+class PriorTexts(Record):
+    """What is known of a lever beforehand (section ``[prior]`` of a probe file), as text."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, str]
+
+    @property
+    def by_name(self) -> dict[str, str]:
+        """The text for each parameter."""
+        return self.model_extra or {}
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A normal distribution of a parameter, or of its logarithm.
+
+    Attributes
+    ----------
+    value : float
+    spread : float
+        Standard deviation: relative (of the logarithm), or in the parameter's unit.
+    relative : bool
+
+    Examples
+    --------
+    >>> Prior(400.0, 0.05).deviation(420.0) < 1.0
+    True
+    """
+
+    value: float
+    spread: float
+    relative: bool = True
+
+    @property
+    def absolute(self) -> float:
+        """The spread in the parameter's unit."""
+        return self.spread * (self.value if self.relative else 1.0)
+
+    def deviation(self, value: float) -> float:
+        """Return how far a value is from the prior's, in standard deviations."""
+        away = np.log(value / self.value) if self.relative else value - self.value
+        return float(away) / self.spread
+
+    def slope(self, value: float) -> float:
+        """Return the derivative of `deviation` by the value."""
+        return 1.0 / (self.spread * (value if self.relative else 1.0))
+
+
+@dataclass(frozen=True)
+class JointPrior:
+    """A normal distribution of the logarithms of several parameters, as an estimate leaves it.
+
+    Attributes
+    ----------
+    names : list of str
+    values : ndarray, shape (p,)
+    covariance : ndarray, shape (p, p)
+        In the parameters' own units.
+    """
+
+    names: list[str]
+    values: Array
+    covariance: Array
+
+    @cached_property
+    def _whitening(self) -> Array:
+        relative = self.covariance / np.outer(self.values, self.values)
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(relative)))
+
+    def deviations(self, values: Array) -> Array:
+        """Return how far values are from the prior's, in uncorrelated standard deviations."""
+        return np.asarray(self._whitening @ np.log(values / self.values))
+
+    def slopes(self, values: Array) -> Array:
+        """Return the derivatives of `deviations` by the values, (p, p)."""
+        return np.asarray(self._whitening / values)
+
+
+def nuisances(probe: Probe) -> list[str]:
+    """Return the dimensions that matter to the tip."""
+    return [name for name in probe.shape.dimensions() if name not in _HARMLESS]
+
+
+def default_priors(probe: Probe) -> dict[str, Prior]:
+    """Return what is known of a lever of which nothing but the probe file is known.
+
+    The material scatters about the probe's as that of the published levers does, half as much
+    again; the doping is nominal within 15 %, dimensions are within 5 %, the series resistance
+    within 0.1 %. What the probe file says of its priors wins.
+    """
+    known = [published(name).material for name in SCATTER_OF]
+    names = [name for name in parameters_of(probe) if name in type(probe.material).model_fields]
+    logarithms = np.log([[getattr(material, name) for name in names] for material in known])
+    spreads = dict(zip(names, _WIDENED * logarithms.std(axis=0, ddof=1), strict=True))
+    spreads["n_d"] = _DOPING
+    spreads |= dict.fromkeys(nuisances(probe), _DIMENSIONS)
+    if probe.circuit.series_resistance_ohm > 0:
+        spreads["series_resistance_ohm"] = _RESISTANCE
+    values = probe.at(list(spreads)).tolist()
+    found = {
+        name: Prior(value, float(spread))
+        for (name, spread), value in zip(spreads.items(), values, strict=True)
+        if value > 0
+    }
+    stated = {} if probe.prior is None else priors_of(probe.prior.by_name, probe, "[prior]")
+    return found | stated
+
+
+def priors_of(texts: Mapping[str, str], probe: Probe, where: str) -> dict[str, Prior]:
+    """Return priors that are written as text.
+
+    Raises
+    ------
+    InputError
+        If a name does not exist (with the nearest that does) or a text is no prior.
+
+    Examples
+    --------
+    >>> from hotlever import Probe
+    >>> priors_of({"n_d": "3.3e17 ± 15%"}, Probe.reference(), "here")["n_d"]
+    Prior(value=3.3e+17, spread=0.15, relative=True)
+    """
+    known, found = parameters_of(probe), {}
+    for name, text in texts.items():
+        if name not in known and name != ALL_DIMENSIONS:
+            raise unknown_name("prior", name, [*known, ALL_DIMENSIONS], where)
+        value, spread, relative = _parsed(text, f"{where}: {name}")
+        if name == ALL_DIMENSIONS:
+            if value is not None or not relative:
+                raise InputError(f"{where}: {name} = '{text}', expected a share such as '± 5%'")
+            # those that are named have their own
+            some = [one for one in nuisances(probe) if one not in texts]
+        else:
+            some = [name]
+        for one, own in zip(some, probe.at(some).tolist(), strict=True):
+            found[one] = Prior(own if value is None else value, spread, relative)
+            if relative and found[one].value <= 0:
+                raise InputError(f"{where}: {one}: a relative spread needs a value above 0")
+    return found
+
+
+def _parsed(text: str, where: str) -> tuple[float | None, float, bool]:
+    """Return value (None for the probe's own), spread and whether that is relative."""
+    wrong = InputError(
+        f"{where} = '{text[:60]}', expected a value and its spread such as '3.3e17 ± 15%', "
+        "'0.40 ± 0.02' or '± 5%'"
+    )
+    match = _TEXT.fullmatch(text.replace("+-", "±").replace("+/-", "±"))
+    if match is None:
+        raise wrong
+    first, second = (part.strip() for part in match.groups())
+    relative = second.endswith("%")
+    try:
+        value = float(first) if first else None
+        spread = float(second.removesuffix("%")) / (100.0 if relative else 1.0)
+    except ValueError:
+        raise wrong from None
+    if not (0 < spread < np.inf and (value is None or np.isfinite(value))):
+        raise wrong
+    return value, spread, relative

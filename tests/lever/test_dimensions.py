@@ -1,0 +1,99 @@
+"""Derivatives by dimensions, by the conductivity of the gas and by the series resistance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever.errors import ComputationError
+from hotlever.fitting.models import full_model
+from hotlever.lever.branch import Reach
+from hotlever.lever.lever import COARSE, Lever
+from hotlever.probe import Probe
+from hotlever.probe.tip import Tip
+
+REACH = Reach(Probe.reference().circuit, 6.0)
+PROBES = {
+    "three-leg": Probe.reference(),
+    "u-shape": Probe.u_shape(),
+    "with a tip": Probe.reference().model_copy(update={"tip": Tip(height_um=0.7)}),
+}
+
+
+def orders(lever, name):
+    """Observed orders of what a first-order prediction leaves at fixed tip temperatures."""
+    probe, names = lever.probe, (name,)
+    start = lever.linearised(probe, REACH, None, names)
+    shown = slice(0, 3 if "reader" in lever.space.mesh.terminal_facets else 2)
+    (value,), rest = probe.at(names), []
+    for step in (0.02, 0.01):
+        moved = probe.moved({name: float(value * (1 + step))})
+        other = lever.linearised(moved, REACH, start, names).branch
+        count = start.branch.u.size
+        change = (other.values[:count] - start.branch.values)[1:, shown]
+        rest.append(np.abs(change - step * value * start.shown[1:, shown, 0]))
+    size = np.abs(start.branch.values[1:, shown])
+    # what does not bend leaves nothing to measure an order of
+    bent = rest[0] > 1e-7 * size
+    return np.log2(rest[0][bent] / rest[1][bent]), rest[0] / size
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [(kind, name) for kind, probe in PROBES.items() for name in probe.shape.dimensions()],
+)
+def test_derivatives_by_dimensions_have_taylor_order_two(kind, name):
+    found, rest = orders(Lever(PROBES[kind], COARSE), name)
+    assert np.all(found > 1.6)
+    assert rest.max() < 2e-3
+
+
+def test_so_has_that_by_the_gas(in_air):
+    found, _ = orders(in_air, "gas_conductivity")
+    assert np.all(found > 1.8)
+
+
+def test_a_moved_mesh_shows_what_a_new_one_does(coarse):
+    probe = coarse.probe.with_(heater_length_um=4.3, gap_um=3.0, length_um=56.0, thickness_um=0.42)
+    moved = coarse.linearised(probe, REACH).branch
+    new = Lever(probe, COARSE).branch_to(6.0)
+    u = np.linspace(2.0, 9.0, 8)
+    np.testing.assert_allclose(moved.curve(u)[:, :3], new.curve(u)[:, :3], rtol=1e-3)
+
+
+def test_a_mesh_that_would_turn_over_is_refused(coarse):
+    probe = coarse.probe.moved({"heater_length_um": 60.0})
+    with pytest.raises(ComputationError, match="cannot follow so large a change"):
+        coarse.linearised(probe, REACH)
+
+
+@pytest.mark.parametrize("name", ["series_resistance_ohm", "heater_width_um", "thickness_um"])
+def test_derivatives_at_a_fixed_bias(coarse, name):
+    """Circuit and dimensions together, as a fit takes them."""
+    bias = np.array([2.0, 5.0, 7.0])
+    names = (name,)
+    model = full_model(coarse, bias)
+    model = type(model)(model.fast, None, bias, names)
+    probe, rest = coarse.probe, []
+    start = model.predict(probe)
+    for step in (0.02, 0.01):
+        (value,) = probe.at(names)
+        moved = model.predict(probe.moved({name: float(value * (1 + step))}), start)
+        change = moved.values - start.values
+        rest.append(np.abs(change - step * value * start.slopes[..., 0]) / start.values)
+    # between its states a branch's slopes are splines
+    assert np.all(rest[0] < 2e-3)
+    assert np.all(rest[1] < 0.35 * rest[0] + 2e-5)
+
+
+def test_predictions_nearby_agree_with_a_new_branch(coarse):
+    """To second order, at four per cent."""
+    bias, names = np.array([2.0, 5.0, 7.0]), ("n_d", "heater_length_um", "series_resistance_ohm")
+    model = type(full_model(coarse, bias))(coarse, None, bias, names)
+    start = model.predict(coarse.probe)
+    values = coarse.probe.at(names) * np.array([1.04, 0.96, 1.01])
+    nearby, slopes = start.nearby.predict(values)
+    moved = coarse.probe.moved(dict(zip(names, values.tolist(), strict=True)))
+    exact = model.predict(moved)
+    np.testing.assert_allclose(nearby, exact.values, rtol=3e-3)
+    assert slopes.shape == exact.slopes.shape == (3, 3, 3)
