@@ -17,7 +17,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from hotlever.calibration.budget import MATERIAL_SCATTER
 from hotlever.calibration.knee import IVCurve, find_knee
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
@@ -27,6 +26,7 @@ from hotlever.lever import Branch, Lever
 from hotlever.materials import Material
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import Circuit, MeshOptions, Probe
+from hotlever.probe.priors import SCATTER_OF
 from hotlever.spieser2017 import BASE_TEMPERATURE_K as BASE
 from hotlever.spieser2017 import published
 from synthetic_curves import current_at, measured_curve
@@ -51,7 +51,7 @@ def twin(rng: np.random.Generator) -> Probe:
     }
     names = [name for name in Material.model_fields if name != "n_hd"]
     known = np.log(
-        [[getattr(published(lever).material, name) for name in names] for lever in MATERIAL_SCATTER]
+        [[getattr(published(lever).material, name) for name in names] for lever in SCATTER_OF]
     )
     # normal deviates with the covariance of the four levers
     deviations = (known - known.mean(axis=0)).T @ rng.standard_normal(len(known))

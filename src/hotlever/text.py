@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
-from uncertainties import ufloat
-
 from hotlever.materials import PARAMETERS
+from hotlever.materials.material import Parameter
 
 INVERSION = "inversion_temperature"
+#: Numbers between these are written without a power of ten.
+_PLAIN = 1e-4, 1e6
+#: Units by the endings of names in probe files.
+_UNITS = {"um": "µm", "ohm": "Ω", "K": "K", "deg": "°"}
 
 
 def value_with_error(value: float, stderr: float | None, scale: float = 1.0) -> str:
@@ -21,11 +25,42 @@ def value_with_error(value: float, stderr: float | None, scale: float = 1.0) -> 
     '0.686(5)'
     >>> value_with_error(5.75e17, None, 1e17)
     '5.75'
+    >>> value_with_error(771.3, 28.0), value_with_error(897.24, 1.31), value_with_error(12.0, 53.0)
+    ('770(30)', '897.2(1.3)', '10(50)')
     """
-    if not stderr or stderr != stderr:
-        return f"{value / scale:.6g}"
-    number = ufloat(value / scale, stderr / scale)
-    return f"{number:.1uS}" if f"{stderr:e}"[0] > "1" else f"{number:.2uS}"
+    value = value / scale
+    if not stderr or not math.isfinite(stderr):
+        return f"{value:.6g}"
+    error = stderr / scale
+    largest = max(abs(value), error)
+    if not _PLAIN[0] <= largest < _PLAIN[1]:
+        power = math.floor(math.log10(largest))
+        return f"{value_with_error(value / 10.0**power, error / 10.0**power)}e{power:+03d}"
+    # one digit of the error, two where the first is a 1
+    first = f"{error:.0e}"
+    place = int(first[2:]) - (f"{error:.1e}"[0] == "1")
+    if place >= 0:
+        return f"{round(value, -place):.0f}({round(error, -place):.0f})"
+    if error >= 1.0:
+        return f"{value:.{-place}f}({error:.{-place}f})"
+    return f"{value:.{-place}f}({round(error * 10.0**-place)})"
+
+
+def parameter_named(name: str) -> Parameter:
+    """Return how a parameter of the material, or any other value of a probe file, is printed.
+
+    Examples
+    --------
+    >>> parameter_named("heater_width_um").symbol, parameter_named("heater_width_um").unit
+    ('heater width', 'µm')
+    """
+    if name in PARAMETERS:
+        return PARAMETERS[name]
+    stem, _, ending = name.rpartition("_")
+    if ending not in _UNITS:
+        return Parameter(name, name.replace("_", " "), "1", 1.0, -math.inf, math.inf, name)
+    symbol = stem.replace("_", " ")
+    return Parameter(name, symbol, _UNITS[ending], 1.0, -math.inf, math.inf, name)
 
 
 def scaled_unit(name: str) -> str:
@@ -36,7 +71,7 @@ def scaled_unit(name: str) -> str:
     >>> scaled_unit("n_d")
     '1e17 cm⁻³'
     """
-    known = PARAMETERS[name]
+    known = parameter_named(name)
     power = "" if known.scale == 1 else f"{known.scale:.0e}".replace("e+", "e") + " "
     return (power + ("" if known.unit == "1" else known.unit)).strip()
 
@@ -57,7 +92,7 @@ def heading(name: str) -> str:
 
 def scale_of(name: str) -> float:
     """Return the unit, of its own, that a parameter or the inversion temperature is printed in."""
-    return PARAMETERS[name].scale if name in PARAMETERS else 1.0
+    return parameter_named(name).scale
 
 
 def sentence(text: str) -> str:

@@ -33,7 +33,12 @@ if TYPE_CHECKING:
 
 
 #: Columns of a calibration's table.
-TABLE_COLUMNS = ("bias_V", "lever_V", "current_mA", "power_mW", "tip_K", "tip_stderr_K")
+TABLE_COLUMNS = (
+    *("bias_V", "lever_V", "current_mA", "power_mW"),
+    *("tip_K", "tip_stderr_K", "tip_low_K", "tip_high_K"),
+)
+#: Standard errors that 95 % of a normal distribution lie within.
+_BAND = 1.96
 
 
 @dataclass(frozen=True)
@@ -47,18 +52,24 @@ class Calibration:
     medium : str
         Of the model whose temperatures are used.
     power_law : PowerLaw
-        In vacuum; T_tip is the law's value at P_l / k, approximately (see `law_residual_K`).
+        In vacuum, of the estimated lever or as given; T_tip is the law's value at P_l / k,
+        approximately (see `law_residual_K`).
     law_residual_K : float
         Largest difference of the law from the model it was fitted to; 0 for a given law.
     k, k_stderr : float
-        Power of the measured knee over the threshold of the power law.
+        Power of the knee over the threshold of the power law; NaN without a knee.
     knee : Knee
-        As measured or, where its voltage is NaN, with its power estimated.
+        Of the estimated lever, or as measured; NaN where there is none, or all but its power.
     knee_tip_K : float
         Tip temperature there.
     table : xarray.Dataset
         `TABLE_COLUMNS` on the dimension ``bias``, evenly spaced over the measured range, and
         ``budget_K``, the standard error by ``source``.
+    priors : dict of str to dict
+        What was known of each parameter before and after: ``value``, ``spread``,
+        ``posterior_value`` and ``posterior_spread``.
+    reason : str
+        Why the data are not described by any such lever; empty if they are.
     measured_rms_K : float
         Rms of the measurement's own tip temperatures about the calibration; NaN if it has none.
     probe : Probe
@@ -78,7 +89,14 @@ class Calibration:
     measured_rms_K: float
     probe: Probe
     measurement: Measurement
+    priors: dict[str, dict[str, float]] = field(default_factory=dict)
+    reason: str = ""
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def describes_data(self) -> bool:
+        """Whether such a lever shows what was measured."""
+        return not self.reason
 
     @property
     def base_temperature_K(self) -> float:
@@ -89,6 +107,11 @@ class Calibration:
     def tip_temperature_uncertainty_K(self) -> float:
         """Largest standard error of the tip temperature in the table (K)."""
         return float(self.table.tip_stderr_K.max())
+
+    @property
+    def knee_measured(self) -> bool:
+        """Whether the knee lies in the measured range."""
+        return self.knee.measured and self.knee.bias_V <= float(self.table.bias_V.max())
 
     def tip_temperature(self, power_mW: ArrayLike) -> Array:
         """Return the tip temperature (K) by power (mW); NaN outside the measured range."""
@@ -137,13 +160,16 @@ class Calibration:
             "power_law_residual_K": self.law_residual_K,
             "k": self.k,
             "k_stderr": self.k_stderr,
-            "knee": vars(self.knee) | {"tip_K": self.knee_tip_K, "measured": self.knee.measured},
+            "knee": vars(self.knee) | {"tip_K": self.knee_tip_K, "measured": self.knee_measured},
             "tip_temperature_uncertainty_K": self.tip_temperature_uncertainty_K,
             "uncertainty_budget_K": {name: float(np.nanmax(e)) for name, e in sources.items()},
             "base_temperature_K": self.base_temperature_K,
             "table": self.table[list(TABLE_COLUMNS)].to_dataframe().to_dict("records"),
             "budget_K": sources,
             "measured_rms_K": self.measured_rms_K,
+            "priors": self.priors,
+            "describes_data": self.describes_data,
+            "reason": self.reason,
             "probe": self.probe.values(),
             "data": embed(self.measurement),
             "notes": self.notes,
@@ -163,6 +189,8 @@ class Calibration:
 
 def table_of(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:
     """Return the table of a calibration: `TABLE_COLUMNS`, and the error by source."""
+    tip, wide = columns["tip_K"], _BAND * columns["tip_stderr_K"]
+    columns = {**columns, "tip_low_K": tip - wide, "tip_high_K": tip + wide}
     errors = (("source", "bias"), np.array(list(budget.values())))
     return labelled(
         {**columns, "budget_K": errors},
@@ -177,12 +205,14 @@ class _CalibrationFile(Section):
     medium: str
     power_law: dict[str, float]
     power_law_residual_K: float
-    k: float
-    k_stderr: float
+    k: Number
+    k_stderr: Number
     knee: dict[str, Number]
     table: list[dict[str, Number]]
     budget_K: dict[str, list[Number]]
     measured_rms_K: Number = np.nan
+    priors: dict[str, dict[str, float]] = {}  # noqa: RUF012
+    reason: str = ""
     probe: dict[str, dict[str, Any]]
     data: EmbeddedMeasurement
     notes: list[str]
@@ -228,5 +258,7 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
         measured_rms_K=found.measured_rms_K,
         probe=Probe.from_values(found.probe, f"{path}: probe"),
         measurement=found.data.measurement(f"{path}: data"),
+        priors=found.priors,
+        reason=found.reason,
         notes=found.notes,
     )

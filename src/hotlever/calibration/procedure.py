@@ -3,51 +3,29 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import replace
-from itertools import count
 
 import numpy as np
 
-from hotlever.calibration.budget import (
-    MATERIAL_SCATTER,
-    Tolerances,
-    geometry_variations,
-    knee_and_meters,
-    levers,
-    material_variations,
-    thermometer,
-)
 from hotlever.calibration.calibration import TABLE_COLUMNS, Calibration, table_of
-from hotlever.calibration.knee import (
-    IVCurve,
-    Knee,
-    KneeOutsideError,
-    find_knee,
-    scale_to,
-    smooth_rows,
-)
+from hotlever.calibration.estimated import Estimated, estimated
+from hotlever.calibration.knee import IVCurve
+from hotlever.calibration.plausibility import check_plausible
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.power_law_fit import fit_power_law
-from hotlever.calibration.transfer import (
-    Models,
-    TemperatureCurve,
-    curve_of_law,
-    curve_of_model,
-    knee_of,
-)
+from hotlever.calibration.rule import by_rule
+from hotlever.calibration.transfer import curve_of_law, curve_of_model, knee_of
 from hotlever.errors import InputError
 from hotlever.fitting import Fit, Measurement, read_fit
 from hotlever.fitting.estimation import with_measured_circuit
-from hotlever.lever import Branch
-from hotlever.lever.lever import COARSE
+from hotlever.lever import Branch, Lever
 from hotlever.probe import Probe
-from hotlever.types import Array
+from hotlever.probe.priors import Prior
+from hotlever.types import Array, Progress
 
 #: A vacuum model that needs this factor is told that its lever is probably in air.
 _LOOKS_LIKE_AIR = 1.08
-#: Largest relative error of a knee estimated from the points below it, to go on with.
-_WORST_ESTIMATE = 0.3
 #: Powers (over the knee's) at which the power law is fitted to a model: even, up to here.
 _LAW_TO, _LAW_POINTS = 1.4, 160
 
@@ -59,15 +37,19 @@ def calibrate(
     fit: Fit | str | os.PathLike[str] | None = None,
     law: PowerLaw | None = None,
     medium: str | None = None,
-    tolerances: Tolerances | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    priors: Mapping[str, Prior] | None = None,
+    progress: Progress | None = None,
 ) -> Calibration:
     """Find the tip temperature of a lever from its I-V curve.
+
+    What is known of the lever beforehand is brought up to date by all that was measured
+    (`hotlever.calibration.estimated`); with a power law the paper's rule is used instead
+    (`hotlever.calibration.rule`).
 
     Parameters
     ----------
     measurement : Measurement or path
-        With bias and current; its own tip temperatures, if it has any, are only compared with.
+        With bias and current; reader voltages and tip temperatures count where they are.
     probe : Probe or path, optional
         A probe like the measured one; the reference probe by default.
     fit : Fit or path, optional
@@ -75,25 +57,26 @@ def calibrate(
     law : PowerLaw, optional
         A power law in vacuum, in place of a model.
     medium : {"vacuum", "air"}, optional
-        Of the model whose temperatures are used; by default what the data file says, or else
-        the fit or the probe. With vacuum the paper's rule is used in any medium: the same
-        temperatures at k times the power.
-    tolerances : Tolerances, optional
+        What the lever is in; by default what the data file says, or else the fit or the probe.
+        With vacuum for data from air the paper's rule is used: the temperatures that the probe has
+        in vacuum, at k times the power.
+    priors : mapping of str to Prior, optional
+        What is known beforehand; what `hotlever.probe.priors.default_priors` gives if left out.
     progress : callable, optional
-        Called with solved levers and their number.
+        Called with solved branches and how many there usually are.
 
     Raises
     ------
     InputError
-        If the measurement cannot tell: no knee in its range and too cold for an estimate.
+        If the data cannot be those of the probe.
     ComputationError
-        If a model cannot be solved, or has no knee.
+        If no lever near the probe has states at all measured biases.
     """
     if (probe is not None) + (fit is not None) + (law is not None) > 1:
         raise InputError("a fit, a probe and a power law exclude each other")
     if law is not None and medium not in (None, "vacuum"):
         raise InputError("a power law holds in vacuum; with one, leave the medium out")
-    measured, tolerances = Measurement.given(measurement), tolerances or Tolerances()
+    measured = Measurement.given(measurement)
     if fit is not None:
         fit = fit if isinstance(fit, Fit) else read_fit(fit)
         route, origin = f"fit in {fit.medium}", fit.probe
@@ -103,157 +86,125 @@ def calibrate(
     # a power law holds for vacuum, whatever the lever is in
     known = measured if law is None else replace(measured, medium=None)
     probe, notes = with_measured_circuit(origin, known, medium if law is None else "vacuum")
-    medium, circuit = probe.surroundings.medium, probe.circuit
-    step = _steps(probe, fit, tolerances, progress)
+    if law is not None or (medium == "vacuum" and measured.medium == "air"):
+        return _by_rule(measured, probe, law, route, notes)
+    check_plausible(measured, probe)
+    return _by_estimate(measured, estimated(measured, probe, fit, priors, progress), route, notes)
 
-    models = Models(probe, solved=step)
-    curve, like = IVCurve.of(measured.bias_V, measured.current_mA, circuit), models[medium]
-    measured_knee = None if fit is None else _knee_of_fit(fit, models, notes)
-    reference = (
-        curve_of_model(models, medium, measured_knee)
-        if law is None
-        else curve_of_law(law, circuit.base_temperature_K)
-    )
-    try:
-        knee = find_knee(curve, like)
-    except KneeOutsideError as outside:
-        others = material_variations(probe, tolerances.material) if fit is None else ()
-        scatter = [
-            (variation.share, Models(variation.probe, COARSE)[medium]) for variation in others
-        ]
-        where = measured.path or "measurement"
-        knee = _estimated_knee(curve, like, reference, scatter, f"{where}: {outside}")
-        notes.append(
-            f"{outside}; until then the power of the knee is estimated from the points below it, "
-            f"as {knee.power_mW:.2f} ± {knee.power_mW_stderr:.2f} mW"
-        )
-    bias, current = smooth_rows(curve, knee.power_mW, like)
-    lever_V = circuit.lever_voltage(bias, current)
-    rows = lever_V * current
-    tip = reference.at(rows, knee.power_mW)
 
-    def temperature(changed: Probe) -> Array:
-        coarse = curve_of_model(Models(changed, COARSE), medium, measured_knee)
-        return coarse.at(rows, knee.power_mW)
-
-    def away_from(medium: str) -> Array:
-        return np.abs(curve_of_model(models, medium).at(rows, knee.power_mW) - tip)
-
-    parts = knee_and_meters(curve, like, reference, knee, bias, current, tolerances)
-    parts |= levers(probe, fit, tolerances, temperature, step)
-    if law is not None:
-        parts["power law"] = away_from("vacuum")
-    if fit is not None and "tip" in fit.observables:
-        parts["Raman"] = thermometer(fit.measurement, tip, notes)
-    if medium == "vacuum" and knee.power_mW > _LOOKS_LIKE_AIR * reference.knee_mW:
-        parts["constant k"] = away_from("air")
-    total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
-    found, residual = (law, 0.0) if law is not None else _law_of(models, measured_knee)
-    k = knee.power_mW / found.threshold_mW
-    columns = dict(zip(TABLE_COLUMNS, (bias, lever_V, current, rows, tip, total), strict=True))
-    own = reference.at(circuit.power(measured.bias_V, measured.current_mA), knee.power_mW)
-    return Calibration(
+def _by_estimate(
+    measured: Measurement, found: Estimated, route: str, notes: list[str]
+) -> Calibration:
+    lever = Lever(found.probe)
+    own = lever.branch()
+    vacuum = own if lever.medium == "vacuum" else lever.in_medium("vacuum").branch()
+    knee = found.knee_of(own)
+    k = k_stderr = float("nan")
+    if own.knee is not None and vacuum.knee is not None:
+        # in vacuum the law is that of the lever itself
+        k = own.knee.power_mW / vacuum.knee.power_mW
+        k_stderr = 0.0 if own is vacuum else k * knee.power_mW_stderr / knee.power_mW
+    else:
+        notes = [*notes, f"the model has no knee below {own.hottest_K:.0f} K; none is needed"]
+    circuit = found.probe.circuit
+    shown = circuit.power(measured.bias_V, measured.current_mA)
+    return _calibration(
+        found.bias_V,
+        found.current_mA,
+        found.tip_K,
+        found.parts,
         route=route,
-        medium=medium,
-        power_law=found,
+        medium=lever.medium,
+        power_law=(law := _law_of(vacuum))[0],
+        law_residual_K=law[1],
+        k=k,
+        k_stderr=k_stderr,
+        knee=knee,
+        knee_tip_K=float("nan") if own.knee is None else own.knee.tip_K,
+        measured_rms_K=_rms(measured.tip_K - own.tip_temperature(shown)),
+        probe=found.probe,
+        measurement=measured,
+        priors={name: vars(use) for name, use in found.priors.items()},
+        reason=found.reason,
+        notes=[*notes, *found.notes],
+    )
+
+
+def _by_rule(
+    measured: Measurement, probe: Probe, law: PowerLaw | None, route: str, notes: list[str]
+) -> Calibration:
+    lever = Lever(probe)
+    vacuum, circuit = lever.branch(), probe.circuit
+    knee_of(vacuum)
+    curve = IVCurve.of(measured.bias_V, measured.current_mA, circuit)
+    of_model = curve_of_model({"vacuum": vacuum}, "vacuum")
+    reference = of_model if law is None else curve_of_law(law, circuit.base_temperature_K)
+    found = by_rule(curve, vacuum, probe, reference, str(measured.path or "measurement"))
+    rows, at_knee = circuit.power(found.bias_V, found.current_mA), found.knee.power_mW
+    parts = found.parts
+    if law is not None:
+        parts = {**parts, "power law": np.abs(of_model.at(rows, at_knee) - found.tip_K)}
+    if law is None or at_knee > _LOOKS_LIKE_AIR * reference.knee_mW:
+        air = {"vacuum": vacuum, "air": lever.in_medium("air").branch()}
+        away = curve_of_model(air, "air").at(rows, at_knee) - of_model.at(rows, at_knee)
+        parts = {**parts, "constant k": np.abs(away)}
+    used, residual = (law, 0.0) if law is not None else _law_of(vacuum)
+    k = at_knee / used.threshold_mW
+    own = reference.at(circuit.power(measured.bias_V, measured.current_mA), at_knee)
+    return _calibration(
+        found.bias_V,
+        found.current_mA,
+        found.tip_K,
+        parts,
+        route=route,
+        medium="vacuum",
+        power_law=used,
         law_residual_K=residual,
         k=k,
-        k_stderr=knee.power_mW_stderr / found.threshold_mW,
-        knee=knee,
-        knee_tip_K=float(reference.at(np.array(knee.power_mW), knee.power_mW)),
-        table=table_of(columns, parts),
+        k_stderr=found.knee.power_mW_stderr / used.threshold_mW,
+        knee=found.knee,
+        knee_tip_K=float(reference.at(np.array(at_knee), at_knee)),
         measured_rms_K=_rms(measured.tip_K - own),
         probe=probe,
         measurement=measured,
-        notes=[*notes, *_statements(medium, k, tip)],
+        notes=[*notes, *found.notes, *_statements(k, found.tip_K)],
     )
 
 
-def _steps(
-    probe: Probe,
-    fit: Fit | None,
-    tolerances: Tolerances,
-    progress: Callable[[int, int], None] | None,
-) -> Callable[[], None]:
-    """Return what is called after each solved lever, and tells their usual number with it."""
-    dimensions = sum(1 for _ in geometry_variations(probe, tolerances.geometry))
-    materials = len(fit.names) if fit is not None else len(MATERIAL_SCATTER)
-    usual, done = 2 * dimensions + materials + 4, count(1)
-
-    def step() -> None:
-        number = next(done)
-        if progress is not None:
-            progress(number, max(usual, number))
-
-    return step
+def _calibration(
+    bias: Array, current: Array, tip: Array, parts: dict[str, Array], **rest: object
+) -> Calibration:
+    """Return a calibration with its table."""
+    probe = rest["probe"]
+    assert isinstance(probe, Probe)
+    total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
+    lever = probe.circuit.lever_voltage(bias, current)
+    columns = (bias, lever, current, lever * current, tip, total)
+    table = table_of(dict(zip(TABLE_COLUMNS, columns, strict=False)), parts)
+    return Calibration(table=table, **rest)  # type: ignore[arg-type]
 
 
-def _knee_of_fit(fit: Fit, models: Models, notes: list[str]) -> tuple[str, float] | None:
-    """Find medium and power of the knee in the data of a fit, if they are there and reach it."""
-    data = fit.measurement
-    try:
-        curve = IVCurve.of(data.bias_V, data.current_mA, fit.probe.circuit)
-        return fit.medium, find_knee(curve, models[fit.medium]).power_mW
-    except InputError:
-        notes.append("the fitted measurement does not show its knee, so the model's sets the scale")
-        return None
-
-
-def _estimated_knee(
-    curve: IVCurve,
-    like: Branch,
-    reference: TemperatureCurve,
-    scatter: list[tuple[float, Branch]],
-    text: str,
-) -> Knee:
-    """Estimate the knee from how the resistance rises below it, with its error.
-
-    `scatter` holds levers of other materials, which have other knees for the same rise, with
-    their shares of the variance; `text` says why the knee is not measured.
-    """
-
-    def estimate(model: Branch) -> float:
-        return scale_to(curve, model).power * knee_of(model).power_mW
-
-    nominal = estimate(like)
-    squares = scale_to(curve, like).power_stderr ** 2
-    squares += sum(share * (estimate(other) / nominal - 1.0) ** 2 for share, other in scatter)
-    # the knee of a fitted measurement stands above or below the model's
-    power, error = nominal * reference.knee_mW / knee_of(like).power_mW, float(np.sqrt(squares))
-    if error > _WORST_ESTIMATE:
-        raise InputError(
-            f"{text}. The points below it give its power to ± {error:.0%} only, which is too "
-            "little to calibrate with"
-        )
-    return Knee(power_mW=power, power_mW_stderr=error * power)
-
-
-def _law_of(models: Models, measured_knee: tuple[str, float] | None) -> tuple[PowerLaw, float]:
+def _law_of(vacuum: Branch) -> tuple[PowerLaw, float]:
     """Fit Eq. 12 to the model in vacuum, with its threshold at the knee; return what it misses."""
-    model = models["vacuum"]
-    threshold = curve_of_model(models, "vacuum", measured_knee).knee_mW
-    power = np.linspace(0.0, _LAW_TO, _LAW_POINTS + 1)[1:] * threshold
+    threshold = None if vacuum.knee is None else vacuum.knee.power_mW
+    highest = vacuum.highest_power_mW if threshold is None else _LAW_TO * threshold
+    power = np.linspace(0.0, highest, _LAW_POINTS + 1)[1:]
     found = fit_power_law(
         power,
-        model.tip_temperature(power),
-        base_temperature_K=model.base_temperature_K,
+        vacuum.tip_temperature(power),
+        base_temperature_K=vacuum.base_temperature_K,
         threshold_mW=threshold,
     )
     return found.law, found.largest_residual_K()
 
 
-def _statements(medium: str, k: float, tip: Array) -> list[str]:
+def _statements(k: float, tip: Array) -> list[str]:
     """Say what the user should know."""
     found = []
-    if medium == "vacuum" and k > _LOOKS_LIKE_AIR:
+    if k > _LOOKS_LIKE_AIR:
         found.append(
             f"the lever needs {k:.2f} times the power of the model in vacuum: it seems to be "
             "in air, where --medium air is more accurate"
-        )
-    if medium == "air" and k < _LOOKS_LIKE_AIR:
-        found.append(
-            f"the lever needs only {k:.2f} times the power of the model in vacuum: it seems to "
-            "be in vacuum, not in air"
         )
     beyond = int(np.isnan(tip).sum())
     if beyond:

@@ -15,8 +15,7 @@ import numpy as np
 
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.errors import ComputationError
-from hotlever.lever import Branch, Lever, OperatingPoint
-from hotlever.probe import MeshOptions, Probe
+from hotlever.lever import Branch, OperatingPoint
 from hotlever.types import Array
 
 
@@ -76,26 +75,3 @@ def knee_of(model: Branch) -> OperatingPoint:
             "has one"
         )
     return model.knee
-
-
-class Models(dict[str, Branch]):
-    """The models of one probe by medium, each solved when it is first asked for; all have a knee.
-
-    `solved` is called after each.
-    """
-
-    def __init__(
-        self,
-        probe: Probe,
-        mesh: MeshOptions | None = None,
-        solved: Callable[[], None] = lambda: None,
-    ) -> None:
-        super().__init__()
-        self._probe, self._mesh, self._solved = probe, mesh, solved
-
-    def __missing__(self, medium: str) -> Branch:
-        model = Lever(self._probe.in_medium(medium), self._mesh).branch()
-        knee_of(model)
-        self[medium] = model
-        self._solved()
-        return model

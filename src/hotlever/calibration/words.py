@@ -16,10 +16,13 @@ _SHOWN = (400.0, 600.0, 800.0, 900.0, 1000.0, 1100.0, 1200.0)
 #: What each route rests on, in words.
 _BASIS = {
     "power law": "a given power law",
-    "probe": "the model of a probe like this lever",
-    "fit in vacuum": "a fit of this lever in vacuum",
-    "fit in air": "a fit of this lever in air",
+    "probe": "a probe like this lever, brought up to date by these data",
+    "fit in vacuum": "a fit of this lever in vacuum, and these data",
+    "fit in air": "a fit of this lever in air, and these data",
 }
+#: A prior is named as leaned on where its data narrow it to no less than this share, and as moved
+#: where they move it by so many of its standard deviations.
+_LEANED_ON, _MOVED = 0.9, 1.0
 #: Errors (K) up to which a calibration is called good, and fair.
 _GOOD, _FAIR = 15.0, 40.0
 
@@ -29,9 +32,7 @@ def calibration_text(calibration: Calibration) -> str:
     law, stated = calibration.power_law, calibration.tip_temperature_uncertainty_K
     lines = [
         f"based on {_BASIS[calibration.route]}, used in {calibration.medium}",
-        _knee_line(calibration),
-        f"k = {value_with_error(calibration.k, calibration.k_stderr)} times the power of the knee "
-        f"in vacuum, {law.threshold_mW:.3f} mW",
+        *_knee_lines(calibration),
         f"power law in vacuum: a {law.linear_K_per_mW:.1f} K/mW, b {law.nonlinear_K:.2f} K, "
         f"m {law.exponent:.3f}, c {law.hot_K_per_mW:.1f} K/mW; jump {law.jump_K:+.0f} K"
         + (
@@ -42,8 +43,13 @@ def calibration_text(calibration: Calibration) -> str:
         "",
         *_budget_lines(calibration),
         "",
+        *_prior_lines(calibration),
         f"sure to ± {stated:.0f} K (standard error, largest in the table): {_verdict(calibration)}",
     ]
+    if not calibration.describes_data:
+        said = f"no lever like this one shows these data: {calibration.reason}"
+        lines[0:] = [said, "what follows is what comes nearest, and its errors do not hold", *lines]
+        del lines[-1]
     if np.isfinite(calibration.measured_rms_K):
         lines.append(
             f"the measured tip temperatures differ by {calibration.measured_rms_K:.1f} K (rms)"
@@ -51,17 +57,42 @@ def calibration_text(calibration: Calibration) -> str:
     return "\n".join(lines)
 
 
-def _knee_line(calibration: Calibration) -> str:
-    knee = calibration.knee
+def _knee_lines(calibration: Calibration) -> list[str]:
+    knee, law = calibration.knee, calibration.power_law
+    if np.isnan(knee.power_mW):
+        return ["no knee below the melting point of silicon"]
+    factor = (
+        f"k = {value_with_error(calibration.k, calibration.k_stderr)} times the power of the knee "
+        f"in vacuum, {law.threshold_mW:.3f} mW"
+    )
     if not knee.measured:
         power = value_with_error(knee.power_mW, knee.power_mW_stderr)
-        return f"knee (estimated): {power} mW, tip {calibration.knee_tip_K:.0f} K"
-    return (
+        return [f"knee (estimated): {power} mW, tip {calibration.knee_tip_K:.0f} K", factor]
+    return [
         f"knee: {value_with_error(knee.lever_V, knee.lever_V_stderr)} V, "
         f"{value_with_error(knee.current_mA, knee.current_mA_stderr)} mA, "
         f"{value_with_error(knee.power_mW, knee.power_mW_stderr)} mW at a bias of "
-        f"{value_with_error(knee.bias_V, knee.bias_V_stderr)} V, tip {calibration.knee_tip_K:.0f} K"
-    )
+        f"{value_with_error(knee.bias_V, knee.bias_V_stderr)} V, "
+        f"tip {calibration.knee_tip_K:.0f} K",
+        factor,
+    ]
+
+
+def _prior_lines(calibration: Calibration) -> list[str]:
+    """Say which priors the answer leans on, and which the data moved far."""
+    leaned, moved = [], []
+    for name, use in calibration.priors.items():
+        if use["posterior_spread"] > _LEANED_ON * use["spread"]:
+            leaned.append(name)
+        away = (use["posterior_value"] - use["value"]) / use["spread"]
+        if abs(away) > _MOVED:
+            moved.append(f"{name} by {away:+.1f} σ to {use['posterior_value']:.4g}")
+    lines = []
+    if moved:
+        lines.append(f"moved by the data beyond what was known before: {', '.join(moved)}")
+    if leaned:
+        lines.append(f"as known before, since the data do not tell: {', '.join(leaned)}")
+    return lines
 
 
 def _budget_lines(calibration: Calibration) -> list[str]:
@@ -85,18 +116,18 @@ def _verdict(calibration: Calibration) -> str:
     word = "good" if stated <= _GOOD else "fair" if stated <= _FAIR else "rough"
     largest = calibration.table.budget_K.max("bias").idxmax("source").item()
     better = {
-        "probe": "a fit of this lever (--fit) would know its material",
         "power law": "a probe (--probe) or a fit (--fit) would know more than a power law",
-        "fit in vacuum": "a fit in air would measure the loss to air instead of modelling it",
     }
     advice = {
+        "measurement": "less noise, or tip temperatures at some points, would help",
+        "geometry": "better known dimensions would help (--prior dimensions=±2%)",
+        "material": "a fit of this lever (--fit), or its tip temperatures, would know its material",
+        "air": "a fit in air would measure the loss to air",
         "k": "a finer measurement near the knee would help",
         "constant k": "--medium air would not assume a constant k",
-        "Raman": "a better thermometer would help",
         "electronics": "better known meters would help",
     }
     text = f"{word}; mostly from {largest}"
     if largest in advice:
         return f"{text}: {advice[largest]}"
-    in_vacuum = calibration.route == "fit in vacuum" and calibration.medium == "vacuum"
-    return text if in_vacuum else "; ".join([text, *filter(None, [better.get(calibration.route)])])
+    return "; ".join([text, *filter(None, [better.get(calibration.route)])])

@@ -7,9 +7,18 @@ from pathlib import Path
 from typer import Argument, Option
 
 from hotlever.cli.application import app
-from hotlever.cli.options import File, MediumOption, PlotFile, check_medium, check_plot, load_probe
+from hotlever.cli.options import (
+    File,
+    MediumOption,
+    PlotFile,
+    PriorOption,
+    check_medium,
+    check_plot,
+    load_probe,
+    parse_priors,
+)
 from hotlever.cli.output import give, note, progress
-from hotlever.errors import InputError
+from hotlever.errors import ComputationError, InputError
 from hotlever.files import Outputs, write_text
 
 
@@ -22,16 +31,16 @@ def calibrate_command(
     ),
     power_law: File = Option(None, help="Power law in vacuum (JSON), or a calibration file."),
     medium: MediumOption = None,
-    tolerance: float = Option(0.05, help="Relative standard error of the lever's dimensions."),
+    prior: PriorOption = None,
     output: File = Option(None, "-o", "--output", help="Calibration file (JSON)."),
     table: File = Option(None, help="Write the table for an instrument to this CSV file."),
     plot: PlotFile = None,
 ) -> None:
     """Find the tip temperature of a lever from its I-V curve, with its error."""
-    from hotlever.calibration.budget import Tolerances
     from hotlever.calibration.power_law import read_power_law
     from hotlever.calibration.procedure import calibrate
     from hotlever.fitting import read_fit, read_measurement
+    from hotlever.probe.priors import default_priors
 
     given = {"--fit": fit_file, "--probe": probe_file, "--power-law": power_law}
     several = [name for name, path in given.items() if path is not None]
@@ -46,14 +55,18 @@ def calibrate_command(
     note(*measurement.notes)
     if "current" not in measurement.observables:
         raise InputError(f"{data}: no values of I_h, which a calibration needs beside V_b")
+    fit = None if fit_file is None else read_fit(fit_file)
+    probe = load_probe(probe_file) if fit is None else fit.probe
+    priors = parse_priors(prior, probe)
     with progress("calibrate") as update:
         result = calibrate(
             measurement,
-            probe=None if probe_file is None else load_probe(probe_file),
-            fit=None if fit_file is None else read_fit(fit_file),
+            probe=probe if fit is None and power_law is None else None,
+            fit=fit,
             law=None if power_law is None else read_power_law(power_law),
             medium=medium,
-            tolerances=Tolerances(geometry=tolerance),
+            # what is asked for wins over what is usual, but for none at all
+            priors={**default_priors(probe), **priors} if priors else priors,
             progress=update,
         )
     note(*result.notes)
@@ -67,3 +80,5 @@ def calibrate_command(
 
             figures.save_figure(figures.calibration_curves(result), plot)
     give(result.text() + "\n")
+    if not result.describes_data:
+        raise ComputationError(f"{data}: no lever like this one shows these data: {result.reason}")

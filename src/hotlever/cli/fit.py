@@ -9,7 +9,15 @@ import typer
 from typer import Argument, Option
 
 from hotlever.cli.application import app
-from hotlever.cli.options import File, MediumOption, check_number, load_probe, parse_values
+from hotlever.cli.options import (
+    File,
+    MediumOption,
+    PriorOption,
+    check_number,
+    load_probe,
+    parse_priors,
+    parse_values,
+)
 from hotlever.cli.output import fail, give, note, progress, progress_bars
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.files import Outputs, write_text
@@ -41,6 +49,7 @@ def fit_command(
     weights: str = Option(
         "maximum", help="maximum: of each observable, as in the paper; or errors, as measured."
     ),
+    prior: PriorOption = None,
     medium: MediumOption = None,
     output: File = Option(
         None, "-o", "--output", help="Fit file (JSON); a folder of them with several data files."
@@ -64,6 +73,7 @@ def fit_command(
     command again goes on where it was stopped.
     """
     from hotlever.fitting import FitOptions
+    from hotlever.probe.priors import stated_priors
 
     check_number("--samples", samples, 1, 1_000_000)
     check_number("--processes", processes, 1, 256)
@@ -74,11 +84,18 @@ def fit_command(
     if len(data) == 1 and scheduler is not None:
         raise InputError("--scheduler: expected several data files")
     chosen: Any = {"weights": weights, "medium": medium, "robust": robust, "drift": drift}
+    probe = load_probe(probe_file)
     options = FitOptions(
         observables=None if observables is None else observables.split(","),
         fixed=parse_values("--fix", fix, bare=True),
+        priors=stated_priors(probe, parse_priors(prior, probe)),
         **chosen,
     )
+    if options.priors and (posterior or profiles):
+        raise InputError(
+            "--posterior and --profiles are for fits without priors; with them the covariance is "
+            "that of the posterior"
+        )
     outputs = Outputs(*data, probe_file)
     to = Destination(outputs, output, report)
     where: Any = {"processes": processes}

@@ -16,6 +16,7 @@ from hotlever.files import Outputs
 
 if TYPE_CHECKING:
     from hotlever.probe import Probe
+    from hotlever.probe.priors import Prior
     from hotlever.types import Array
 
 #: Between these (V) a lever has a current that can be told from none, and no spark.
@@ -30,6 +31,14 @@ ProbeFile = Annotated[
 PlotFile = Annotated[File, Option("--plot", help="Draw to this file: .png, .svg or .pdf.")]
 SweepPlot = Annotated[
     File, Option("--plot", help="Draw the sweep to this file: .png, .svg or .pdf.")
+]
+PriorOption = Annotated[
+    list[str] | None,
+    Option(
+        "--prior",
+        metavar="NAME=VALUE±SPREAD",
+        help="What is known beforehand, as n_d=3.3e17±15%, dimensions=±2% or none; repeated.",
+    ),
 ]
 MediumOption = Annotated[str | None, Option(help="vacuum or air; what the files say if left out.")]
 
@@ -142,6 +151,32 @@ def parse_number(text: str, where: str) -> float:
     if not math.isfinite(value):
         raise InputError(f"{where}: found {quoted(text)}, expected a number")
     return value
+
+
+def parse_priors(texts: list[str] | None, probe: Probe) -> dict[str, Prior] | None:
+    """Parse ``NAME=VALUE±SPREAD``, by name; ``none`` alone is no prior at all, None if not given.
+
+    Examples
+    --------
+    >>> from hotlever import Probe
+    >>> parse_priors(["thickness_um=0.40±0.02"], Probe.reference())["thickness_um"].spread
+    0.02
+    """
+    from hotlever.probe.priors import priors_of
+
+    if not texts:
+        return None
+    if texts == ["none"]:
+        return {}
+    pairs: dict[str, str] = {}
+    for text in texts:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise InputError(f"--prior {text}: expected NAME=VALUE±SPREAD, or none alone")
+        if name in pairs:
+            raise InputError(f"--prior {name}: given twice, expected once")
+        pairs[name] = value
+    return priors_of(pairs, probe, "--prior")
 
 
 def check_number(option: str, value: float | None, least: float, most: float) -> None:

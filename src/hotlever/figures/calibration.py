@@ -42,15 +42,18 @@ def calibration_curves(calibration: Calibration) -> Figure:
             axes.set(xlabel=label, ylabel="tip temperature (K)")
             if measured.tip_K.notnull().any():
                 axes.plot(measured[along], measured.tip_K, **MEASURED)
-        law = calibration.power_law.scaled(calibration.k)
-        expected = law.tip_temperature(power, calibration.base_temperature_K)
-        by_power.plot(power, expected, "--", color=ORANGE, label="power law at P$_l$/k")
-        by_power.axvline(knee.power_mW, color=VERMILION, lw=0.9, ls=":")
-        by_power.annotate(" knee", (knee.power_mW, calibration.base_temperature_K), color=VERMILION)
+        if np.isfinite(calibration.k):
+            law = calibration.power_law.scaled(calibration.k)
+            expected = law.tip_temperature(power, calibration.base_temperature_K)
+            by_power.plot(power, expected, "--", color=ORANGE, label="power law at P$_l$/k")
+        if knee.power_mW <= power.max():
+            by_power.axvline(knee.power_mW, color=VERMILION, lw=0.9, ls=":")
+            base = calibration.base_temperature_K
+            by_power.annotate(" knee", (knee.power_mW, base), color=VERMILION)
         by_power.legend(loc="upper left")
         iv.plot(measured.lever_V, measured.current_mA, **MEASURED)
-        iv.plot(table.lever_V, table.current_mA, color=BLUE, label="smoothed")
-        if knee.measured:
+        iv.plot(table.lever_V, table.current_mA, color=BLUE, label="calibrated lever")
+        if calibration.knee_measured:
             across, up = 1.96 * knee.lever_V_stderr, 1.96 * knee.current_mA_stderr
             style: Any = {"fmt": "s", "color": VERMILION, "label": "knee, 95 %"}
             iv.errorbar(knee.lever_V, knee.current_mA, xerr=across, yerr=up, **style)

@@ -24,7 +24,7 @@ from hotlever.figures.style import (
     figure,
     panel_letters,
 )
-from hotlever.materials import PARAMETERS
+from hotlever.text import parameter_named
 from hotlever.types import Array
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
     count = len(names)
     with figure(1.2 + 0.52 * count, 0.6 + 0.52 * count) as (made, axes):
         image = axes.imshow(correlation, cmap="PuOr", vmin=-1, vmax=1)
-        symbols = [PARAMETERS[name].symbol for name in names]
+        symbols = [parameter_named(name).symbol for name in names]
         axes.set_xticks(range(count), symbols)
         axes.set_yticks(range(count), symbols)
         axes.grid(False)

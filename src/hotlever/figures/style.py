@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 
 from hotlever.errors import InputError
 from hotlever.files import whole_file
-from hotlever.materials import PARAMETERS
-from hotlever.text import INVERSION
+from hotlever.text import INVERSION, parameter_named
 
 #: Okabe and Ito's colours, safe for colour-blind readers.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -101,7 +100,7 @@ def axis_label(name: str) -> tuple[str, float]:
     """Return a quantity's axis label and the unit (of its own) that it is drawn in."""
     if name == INVERSION:
         return "T$_i$ (K)", 1.0
-    known = PARAMETERS[name]
+    known = parameter_named(name)
     unit = "" if known.unit == "1" else known.unit
     if known.scale != 1.0:
         unit = f"10$^{{{math.log10(known.scale):.0f}}}$ {unit}"

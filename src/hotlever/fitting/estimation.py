@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -25,7 +25,11 @@ from hotlever.lever.reduced import ReducedLever
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.priors import JointPrior
+from hotlever.spieser2017 import RAMAN_ERROR_SHARE
 from hotlever.types import Array, Progress
+
+#: Rise (K) from which a stated error tells the scale of a thermometer.
+_WARM_K = 100.0
 
 
 def fit(
@@ -108,14 +112,13 @@ def estimate(
     options: FitOptions,
     *,
     joint: JointPrior | None = None,
-    shared: Mapping[str, Array] | None = None,
     model: Callable[[Probe, Array], ForwardModel] | None = None,
     progress: Progress | None = None,
 ) -> Estimate:
     """Find the parameters that priors and a measurement make most likely; see `fit`.
 
-    A joint prior of several parameters takes the place of priors of their own; for errors that
-    data share see `Residuals`.
+    A joint prior of several parameters takes the place of priors of their own. With priors the
+    temperatures may be wrong together, by the scale of their thermometer.
     """
     began = time.perf_counter()
     measurement = Measurement.given(measurement)
@@ -125,9 +128,8 @@ def estimate(
     # priors are in standard deviations, so the data must be too
     known = bool(options.priors) or joint is not None
     weights = "errors" if known else options.weights
-    residuals = Residuals(
-        measurement, observables, weights, options.drift, shared=_wanted(shared, observables)
-    )
+    shared = _thermometer_scale(measurement, observables) if known else {}
+    residuals = Residuals(measurement, observables, weights, options.drift, shared=shared)
     if not known and residuals.size < len(options.varied):
         raise InputError(
             f"{measurement.path or 'measurement'}: {residuals.size} data for "
@@ -143,8 +145,17 @@ def estimate(
     return Estimate(problem, optimum, measurement, options, seconds, notes)
 
 
-def _wanted(shared: Mapping[str, Array] | None, observables: Sequence[str]) -> dict[str, Array]:
-    return {name: error for name, error in (shared or {}).items() if name in observables}
+def _thermometer_scale(measurement: Measurement, observables: Sequence[str]) -> dict[str, Array]:
+    """Return the error of a thermometer's scale, which all its temperatures have in common.
+
+    As large, relative to their rise, as what the measurement states of each, or as the paper's.
+    """
+    if "tip" not in observables:
+        return {}
+    rise = measurement.tip_K - np.nanmin(measurement.tip_K)
+    stated = measurement.tip_error_K / np.maximum(rise, _WARM_K)
+    known = np.isfinite(stated).any()
+    return {"tip": rise * (float(np.nanmedian(stated)) if known else RAMAN_ERROR_SHARE)}
 
 
 def _attempts(
@@ -201,10 +212,10 @@ def _found(estimate: Estimate) -> Fit:
     notes = residuals.suspicious(values, options.robust) + residuals.zeros(values, every)
     chi_square = residuals.reduced_chi_square(values, len(options.varied))
     if chi_square is not None:
-        notes.append(
-            f"the scatter about the fit is {np.sqrt(chi_square):.2f} times the measurement errors; "
-            "standard errors follow the scatter"
+        text = (
+            f"the scatter about the fit is {np.sqrt(chi_square):.2f} times the measurement errors"
         )
+        notes.append(text if options.priors else f"{text}; standard errors follow the scatter")
     weighted = residuals.weighted(values)
     return Fit(
         probe=optimum.probe,

@@ -126,8 +126,9 @@ class LeastSquares:
             If the lever cannot be solved at the start, or the fit does not converge.
         """
         found = self.solve(self._start)
-        for _ in range(_SCATTER_TURNS if self.residuals.without_errors.any() else 0):
-            self.residuals.take_scatter(found.prediction.values, self._used_up(found))
+        unknown = self.residuals.without_errors.any() and not self._informed
+        for _ in range(_SCATTER_TURNS if unknown else 0):
+            self.residuals.take_scatter(found.prediction.values)
             found = self.solve(found.probe)
         if robust:
             found = self._reweighted(found)
@@ -192,6 +193,9 @@ class LeastSquares:
         squares = self._squares(prediction)
         for _ in range(_MOST_ROUNDS):
             found = self._round(prediction, far)
+            if self._informed and self.residuals.without_errors.any():
+                found = self._with_scatter(found, far)
+                squares = self._squares(prediction)
             here = self._values(probe)
             near = np.maximum(_FOUND * found.stderr, _NEAR * np.abs(here))
             gain = squares - found.squares if self._informed else np.inf
@@ -214,6 +218,15 @@ class LeastSquares:
             probe, prediction, squares = found.probe, trial, better
             far = min(_FAR, 2.0 * far)
         raise ComputationError(f"the fit did not converge in {_MOST_ROUNDS} rounds")
+
+    def _with_scatter(self, found: Optimum, far: float) -> Optimum:
+        """Take scatter and optimum in turns, among parameters near those of a prediction."""
+        at = found.prediction
+        for _ in range(_SCATTER_TURNS):
+            values, slopes = at.nearby.predict(found.probe.at(self.model.names))
+            self.residuals.take_scatter(values, self._used_up(found.probe, slopes))
+            found = self._round(at, far)
+        return found
 
     def _round(self, at: Prediction, far: float) -> Optimum:
         """Run Levenberg-Marquardt among parameters near those of a prediction."""
@@ -266,20 +279,18 @@ class LeastSquares:
             2.0 * float(found.cost),
         )
 
-    def _used_up(self, optimum: Optimum) -> Array | float:
+    def _used_up(self, probe: Probe, slopes: Array) -> Array:
         """Return how many degrees of freedom of each observable a fit with priors uses up."""
-        if not self._informed:
-            return 0.0
-        jacobian = self._jacobian(optimum.prediction.slopes)
+        jacobian = self._jacobian(slopes)
         leverage = np.zeros(self.residuals.data.shape)
         leverage[self.residuals.present] = np.einsum(
-            "ij,jk,ik->i", jacobian, self._posterior(optimum, jacobian), jacobian
+            "ij,jk,ik->i", jacobian, self._posterior(probe, jacobian), jacobian
         )
         return np.asarray(leverage.sum(axis=1, keepdims=True))
 
-    def _posterior(self, optimum: Optimum, jacobian: Array) -> Array:
+    def _posterior(self, probe: Probe, jacobian: Array) -> Array:
         """Return the covariance of the scaled parameters that data and priors leave."""
-        prior = self._of_priors(self._values(optimum.probe) / self._scale)
+        prior = self._of_priors(self._values(probe) / self._scale)
         return _inverse(jacobian.T @ jacobian + prior.T @ prior)
 
     def covariance(self, optimum: Optimum) -> Array:
@@ -293,7 +304,7 @@ class LeastSquares:
         residual = self.residuals.weighted(optimum.prediction.values)
         jacobian = self._jacobian(optimum.prediction.slopes)
         if self._informed:
-            return self._posterior(optimum, jacobian) * np.outer(self._scale, self._scale)
+            return self._posterior(optimum.probe, jacobian) * np.outer(self._scale, self._scale)
         inverse = _inverse(jacobian.T @ jacobian)
         if residual.size <= self._scale.size:
             return np.full_like(inverse, np.nan)
@@ -307,10 +318,12 @@ class LeastSquares:
         By the name of each prior, and of the data as ``measurement``: the estimate is, to first
         order, a weighted sum of all of them, each with an error of its own.
         """
+        if not self._informed:
+            return {"measurement": self.covariance(optimum)}
         jacobian = self._jacobian(optimum.prediction.slopes)
         prior = self._of_priors(self._values(optimum.probe) / self._scale)
         names = [*(self._varied[place] for place in self._priors), *["fit"] * len(self._of_joint)]
-        left = self._posterior(optimum, jacobian) * self._scale[:, None]
+        left = self._posterior(optimum.probe, jacobian) * self._scale[:, None]
         found = {"measurement": left @ (jacobian.T @ jacobian) @ left.T}
         for name, row in zip(names, prior, strict=True):
             found[name] = found.get(name, 0.0) + np.outer(left @ row, left @ row)

@@ -20,7 +20,7 @@ from hotlever.types import Array, Index
 #: Krylov's method stops at this residual, relative to the right-hand side; what is left is small
 #: beside that of a kept Jacobian, and both are removed by the next step.
 _TOLERANCE = 1e-5
-_MOST_DIRECTIONS = 200
+_MOST_DIRECTIONS, _MOST_RESTARTS = 200, 5
 
 
 class AirLoss:
@@ -115,7 +115,7 @@ class AirSolver:
         x: Array = self._factors.solve(right_hand_side)
         residual = self._air.sampling @ x
         goal = _TOLERANCE * np.linalg.norm(residual)
-        used = 0
+        used = restarts = 0
         while True:
             images = self._images[used : self._known]
             shares = images @ residual
@@ -125,8 +125,12 @@ class AirSolver:
             if not np.linalg.norm(residual) > goal:
                 return x
             if used == _MOST_DIRECTIONS:
+                # those of many other right-hand sides fill the memory; begin again
+                used, self._known, restarts = 0, 0, restarts + 1
+            if restarts > _MOST_RESTARTS:
                 raise ComputationError(
-                    f"a linear system in air was not solved with {used} directions"
+                    f"a linear system in air was not solved with {restarts} times "
+                    f"{_MOST_DIRECTIONS} directions"
                 )
             self._add_direction(residual)
 

@@ -42,7 +42,7 @@ LAWS = (thermal_conductivity, conductivity_low_doped, conductivity_high_doped)
 SHOWN = ("lever_V", "current_mA", "reader_V")
 
 #: Error (relative) to which derivatives are solved, and the most rounds of refinement.
-_EXACT, _MOST_ROUNDS = 1e-6, 6
+EXACT, _MOST_ROUNDS = 1e-6, 6
 
 
 @dataclass(frozen=True)
@@ -249,12 +249,18 @@ class LeverEquations:
         return np.asarray(np.tensordot(x[unknowns], rates, axes=(0, 1)))
 
     def solve_linear(
-        self, x: Array, factors: Factors, right_hand_side: Array, pin: Pin = TIP
+        self,
+        x: Array,
+        factors: Factors,
+        right_hand_side: Array,
+        pin: Pin = TIP,
+        accuracy: float = EXACT,
     ) -> Array:
         """Solve Jacobian at `x` times change = right-hand side, the last row that of the pin.
 
         The factors, with the same pin, may be those of states nearby: what they lack is removed by
-        refinement. Right-hand sides are one of each state or several, as in `flux_changes`.
+        refinement, until errors (relative) are below an accuracy. Right-hand sides are one of each
+        state or several, as in `flux_changes`.
         """
         states = np.arange(x.shape[1])
         scale = self.scale.reshape(-1, *(1,) * (right_hand_side.ndim - 1))
@@ -266,7 +272,7 @@ class LeverEquations:
             change = change + correction
             ratio = _length(correction / scale) / _length(change / scale)
             # the next correction would be smaller by the same ratio once more
-            if not np.any(ratio**2 > _EXACT):
+            if not np.any(ratio**2 > accuracy):
                 break
         return change
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hotlever.lever.branch import Branch
 from hotlever.lever.curve import spline_through
-from hotlever.lever.equations import SHOWN, LeverEquations
+from hotlever.lever.equations import EXACT, SHOWN, LeverEquations
 from hotlever.lever.following import Follower
 from hotlever.lever.space import Factors
 from hotlever.materials import PARAMETERS
@@ -26,6 +26,7 @@ def by_parameter(
     x: Array,
     factors: Factors | None = None,
     names: Sequence[str] = tuple(PARAMETERS),
+    accuracy: float = EXACT,
 ) -> tuple[Array, Array]:
     """Return how states with power change with parameters, at fixed tip temperatures.
 
@@ -37,7 +38,7 @@ def by_parameter(
     direct = equations.by_parameter(x, names)
     right_hand_side = -direct
     right_hand_side[-1] = -equations.tip_by_parameter(x, names)
-    changes = equations.solve_linear(x, factors, right_hand_side)
+    changes = equations.solve_linear(x, factors, right_hand_side, accuracy=accuracy)
     shown = equations.observed_change(x, changes)
     shown[1] += direct[-1]
     return changes, shown.swapaxes(0, 1)
@@ -126,6 +127,7 @@ class Linearised:
         enough: Callable[[Branch], bool],
         derivatives: LeverEquations,
         factors: Factors | None = None,
+        accuracy: float = EXACT,
     ) -> Linearised:
         """Follow a branch until it goes far enough (see `Follower.until`), and differentiate it.
 
@@ -135,7 +137,7 @@ class Linearised:
         longer = Follower(branch.equations, branch).until(enough)
         if factors is None or longer is not branch:
             factors = derivatives.factorised(longer.x[:, 1:])
-        changes, shown = by_parameter(derivatives, longer.x[:, 1:], factors, names)
+        changes, shown = by_parameter(derivatives, longer.x[:, 1:], factors, names, accuracy)
         # without power nothing depends on the parameters
         changes, shown = np.insert(changes, 0, 0.0, axis=1), np.insert(shown, 0, 0.0, axis=0)
         return cls(probe, names, longer, factors, changes, shown)

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 SCATTER_OF, _WIDENED = ("lever 1", "lever 2", "lever 3", "lever 4"), 1.5
 #: Relative spread of what the drawing says, and of a resistor that was measured.
 _DIMENSIONS, _RESISTANCE = 0.05, 1e-3
+#: Of what air takes up: humidity, what is around, and dimensions as far as they matter to it.
+_GAS = 0.1
 #: Nominal doping is that good, where the probe file says no better (the makers' own tolerance).
 _DOPING = 0.15
 #: Dimensions that do not matter to the tip.
@@ -126,7 +128,7 @@ def default_priors(probe: Probe) -> dict[str, Prior]:
 
     The material scatters about the probe's as that of the published levers does, half as much
     again; the doping is nominal within 15 %, dimensions are within 5 %, the series resistance
-    within 0.1 %. What the probe file says of its priors wins.
+    within 0.1 %; what air takes up is known to 10 %. What the probe file states wins.
     """
     known = [published(name).material for name in SCATTER_OF]
     names = [name for name in parameters_of(probe) if name in type(probe.material).model_fields]
@@ -136,14 +138,26 @@ def default_priors(probe: Probe) -> dict[str, Prior]:
     spreads |= dict.fromkeys(nuisances(probe), _DIMENSIONS)
     if probe.circuit.series_resistance_ohm > 0:
         spreads["series_resistance_ohm"] = _RESISTANCE
+    if probe.surroundings.medium == "air":
+        spreads["gas_conductivity"] = _GAS
     values = probe.at(list(spreads)).tolist()
     found = {
         name: Prior(value, float(spread))
         for (name, spread), value in zip(spreads.items(), values, strict=True)
         if value > 0
     }
+    return found | stated_priors(probe)
+
+
+def stated_priors(probe: Probe, asked: Mapping[str, Prior] | None = None) -> dict[str, Prior]:
+    """Return the priors that a probe file states, and those asked for, which win.
+
+    None at all if an empty mapping is asked for.
+    """
+    if asked is not None and not asked:
+        return {}
     stated = {} if probe.prior is None else priors_of(probe.prior.by_name, probe, "[prior]")
-    return found | stated
+    return {**stated, **(asked or {})}
 
 
 def priors_of(texts: Mapping[str, str], probe: Probe, where: str) -> dict[str, Prior]:

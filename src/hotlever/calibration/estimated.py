@@ -1,0 +1,197 @@
+"""A calibration as an estimate: what is known of a lever, brought up to date by its measurement.
+
+Material, dimensions and circuit have priors (`hotlever.probe.priors`); the measurement moves them
+to where both are most likely, and the tip temperature with its error follows from there. No knee
+is needed: a lever that was measured below it is less certain above, and that is all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hotlever.calibration.knee import Knee
+from hotlever.calibration.plausibility import misfit
+from hotlever.fitting import Fit, FitOptions, Measurement
+from hotlever.fitting.estimation import Estimate, estimate
+from hotlever.lever import Branch
+from hotlever.lever.dataset import OBSERVABLES
+from hotlever.materials import PARAMETERS
+from hotlever.probe import Probe
+from hotlever.probe.priors import JointPrior, Prior, default_priors
+from hotlever.types import Array, Progress
+
+#: Rows of the table.
+_ROWS = 101
+#: By which source of error a parameter counts.
+_CIRCUIT = {"series_resistance_ohm": "electronics", "gas_conductivity": "air"}
+#: How far (standard errors) along each axis of the estimate the knee is looked at.
+_ASIDE = 0.5
+
+
+@dataclass(frozen=True)
+class PriorUse:
+    """What a prior said and what the data made of it.
+
+    Attributes
+    ----------
+    value, spread : float
+        Before, in the parameter's unit.
+    posterior_value, posterior_spread : float
+        After.
+    """
+
+    value: float
+    spread: float
+    posterior_value: float
+    posterior_spread: float
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """A lever as estimated, and what that says of its tip temperature.
+
+    Attributes
+    ----------
+    probe : Probe
+    bias_V, current_mA, tip_K : ndarray, shape (n,)
+        Even rows over the measured range.
+    parts : dict of str to ndarray
+        Standard error of the tip temperature (K) at the rows, by source; independent of each other.
+    priors : dict of str to PriorUse
+    reason : str
+        Why the data are not described; empty if they are.
+    notes : list of str
+    """
+
+    probe: Probe
+    bias_V: Array
+    current_mA: Array
+    tip_K: Array
+    parts: dict[str, Array]
+    priors: dict[str, PriorUse]
+    reason: str
+    notes: list[str]
+    _estimate: Estimate
+
+    def knee_of(self, branch: Branch) -> Knee:
+        """Return the knee that the estimated lever has, with standard errors; NaN without one."""
+        if branch.knee is None:
+            return Knee()
+        point, circuit = branch.knee, self.probe.circuit
+        values = [point.lever_V, point.current_mA, point.power_mW]
+        values.append(float(circuit.bias(point.lever_V, point.current_mA)))
+        return Knee(*values, *np.sqrt(np.sum(self._knee_changes() ** 2, axis=0)).tolist())
+
+    def _knee_changes(self) -> Array:
+        """Return V_l, I_h, P_l and V_b of the knee one standard error away on each axis."""
+        found, known = self._estimate, self._estimate.problem.model.names
+        at = found.optimum.prediction
+        origin, circuit = at.probe.at(known), self.probe.circuit
+        places = [known.index(name) for name in found.options.varied]
+        changes = []
+        for axis in np.linalg.cholesky(found.covariance).T:
+            ends = []
+            for way in (_ASIDE, -_ASIDE):
+                moved = origin.copy()
+                moved[places] += way * axis
+                knee = at.nearby.branch_at(moved).knee
+                if knee is None:  # beyond the measured range
+                    return np.full((1, 4), np.nan)
+                shown = [knee.lever_V, knee.current_mA, knee.power_mW]
+                ends.append([*shown, circuit.bias(knee.lever_V, knee.current_mA)])
+            changes.append((np.array(ends[0]) - np.array(ends[1])) / (2.0 * _ASIDE))
+        return np.array(changes)
+
+
+def estimated(
+    measured: Measurement,
+    probe: Probe,
+    fit: Fit | None = None,
+    priors: Mapping[str, Prior] | None = None,
+    progress: Progress | None = None,
+) -> Estimated:
+    """Estimate a lever from its measurement.
+
+    Parameters
+    ----------
+    measured : Measurement
+    probe : Probe
+        In the circuit and medium of the measurement.
+    fit : Fit, optional
+        Of this lever to other data, or to the same. Its data count, not what it made of them.
+    priors : mapping of str to Prior, optional
+        What is known beforehand; `default_priors` if left out. Dimensions without one are held.
+    progress : callable, optional
+
+    Raises
+    ------
+    ComputationError
+        If no lever near the probe has states at all measured biases.
+    """
+    known = dict(default_priors(probe) if priors is None else priors)
+    joint, same = None, fit is not None and _same_data(fit.measurement, measured)
+    if fit is not None:
+        # the data of the fit tell more of its material than any prior
+        own = {name: prior for name, prior in known.items() if name not in PARAMETERS}
+        options = FitOptions(observables=fit.observables, priors=own)
+        found = estimate(fit.measurement, fit.probe, options, progress=progress)
+        known = own
+        if not same:
+            best, names = found.optimum.probe, found.options.varied
+            joint = JointPrior(names, best.at(names), found.covariance)
+            probe = probe.moved(dict(zip(names, best.at(names).tolist(), strict=True)))
+            probe = probe.with_(series_resistance_ohm=probe.circuit.series_resistance_ohm)
+    if fit is None or not same:
+        found = estimate(
+            measured,
+            probe,
+            FitOptions(priors={} if joint else known),
+            joint=joint,
+            progress=progress,
+        )
+    return _put_together(found, measured, known)
+
+
+def _same_data(one: Measurement, other: Measurement) -> bool:
+    return np.array_equal(one.bias_V, other.bias_V) and np.array_equal(
+        one.current_mA, other.current_mA
+    )
+
+
+def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Prior]) -> Estimated:
+    best = found.optimum.probe
+    present = measured.bias_V[np.isfinite(measured.current_mA) & (measured.bias_V > 0)]
+    highest = float(found.problem.residuals.bias.max())
+    bias = np.linspace(present.min(), min(present.max(), highest), _ROWS)
+    predicted = found.predicted(bias)
+    slopes = found.slopes(predicted)[list(OBSERVABLES).index("tip")]
+    parts: dict[str, Array] = {}
+    for name, share in found.problem.shares(found.optimum).items():
+        source = name if name in ("measurement", "fit") else _source(name)
+        variance = np.einsum("bi,ij,bj->b", slopes, share, slopes)
+        parts[source] = parts.get(source, 0.0) + variance
+    names, spread = found.options.varied, np.sqrt(np.diag(found.covariance))
+    after = dict(zip(names, zip(best.at(names), spread, strict=True), strict=True))
+    use = {
+        name: PriorUse(prior.value, prior.absolute, *map(float, after[name]))
+        for name, prior in known.items()
+        if name in after
+    }
+    return Estimated(
+        probe=best,
+        bias_V=bias,
+        current_mA=predicted.values[0],
+        tip_K=predicted.values[2],
+        parts={source: np.sqrt(variance) for source, variance in parts.items()},
+        priors=use,
+        reason=misfit(found.problem.residuals, found.optimum.prediction.values, use),
+        notes=found.notes,
+        _estimate=found,
+    )
+
+
+def _source(name: str) -> str:
+    return _CIRCUIT.get(name, "material" if name in PARAMETERS else "geometry")
