@@ -136,7 +136,11 @@ def estimated(
     if fit is not None:
         # the data of the fit tell more of its material than any prior
         own = {name: prior for name, prior in known.items() if name not in PARAMETERS}
-        options = FitOptions(observables=fit.observables, priors=own)
+        options = FitOptions(
+            observables=fit.observables,
+            fixed={name: None for name in fit.options.fixed if name not in own},
+            priors=own,
+        )
         found = estimate(fit.measurement, fit.probe, options, progress=progress)
         known = own
         if not same:
@@ -148,7 +152,9 @@ def estimated(
         found = estimate(
             measured,
             probe,
-            FitOptions(priors={} if joint else known),
+            FitOptions(priors=known)
+            if joint is None
+            else FitOptions(fixed=options.fixed, free=tuple(options.priors)),
             joint=joint,
             progress=progress,
         )

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import ComputationError, InputError, unknown_name
+from hotlever.errors import BranchEndError, ComputationError, InputError, unknown_name
 from hotlever.fitting.least_squares import LeastSquares, Optimum
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement
 from hotlever.fitting.models import ForwardModel, Prediction, forward_model
@@ -24,12 +24,16 @@ from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.reduced import ReducedLever
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
+from hotlever.probe.parameters import parameter_of
 from hotlever.probe.priors import JointPrior
 from hotlever.spieser2017 import RAMAN_ERROR_SHARE
 from hotlever.types import Array, Progress
 
 #: Rise (K) from which a stated error tells the scale of a thermometer.
 _WARM_K = 100.0
+#: Where a lever as known before melts below the highest bias: the share of what it reaches that is
+#: fitted first, and the rows that are enough for that.
+_SAFELY, _FEWEST = 0.9, 5
 
 
 def fit(
@@ -124,6 +128,8 @@ def estimate(
     measurement = Measurement.given(measurement)
     given = Probe.reference() if probe is None else Probe.given(probe)
     probe, notes = with_measured_circuit(given, measurement, options.medium)
+    for name in (*options.priors, *options.free):
+        parameter_of(probe, name)
     observables = _observables(options, measurement, probe, notes)
     # priors are in standard deviations, so the data must be too
     known = bool(options.priors) or joint is not None
@@ -139,10 +145,34 @@ def estimate(
     # with priors errors are a matter of standard deviations, to which the fast lever's slopes do
     names = (*PARAMETERS, *(name for name in options.varied if name not in PARAMETERS))
     forward = replace(forward, names=names, first_order=not known)
-    attempts = _attempts(forward, options.held(probe), options, residuals)
-    problem, optimum = _first_found(attempts, residuals, options, joint, progress)
+    if len(names) > len(PARAMETERS) and isinstance(forward.fast, ReducedLever):
+        # its modes are those of one geometry
+        forward = replace(forward, fast=Lever(probe, COARSE))
+    start = probe.moved({name: prior.value for name, prior in options.priors.items()})
+    attempts = _attempts(forward, options.held(start), options, residuals)
+    try:
+        problem, optimum = _first_found(attempts, residuals, options, joint, progress)
+    except BranchEndError as error:
+        colder = _below(measurement, _SAFELY * error.bias_reached)
+        if not known or colder is None:
+            raise
+        # a lever as known before would melt; what is measured below that tells a better one
+        near = estimate(colder, probe, options, joint=joint, model=model).optimum.probe
+        attempts = iter([(forward, near)])
+        problem, optimum = _first_found(attempts, residuals, options, joint, progress)
     seconds = time.perf_counter() - began
     return Estimate(problem, optimum, measurement, options, seconds, notes)
+
+
+def _below(measurement: Measurement, bias: float) -> Measurement | None:
+    """Return what was measured below a bias (V); None if that is too little to go on with."""
+    here = measurement.bias_V < bias
+    if here.all() or here.sum() < _FEWEST:
+        return None
+    columns = {
+        name: values[here] for name, values in vars(measurement).items() if np.ndim(values) == 1
+    }
+    return replace(measurement, **columns)
 
 
 def _thermometer_scale(measurement: Measurement, observables: Sequence[str]) -> dict[str, Array]:

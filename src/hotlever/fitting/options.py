@@ -38,8 +38,10 @@ class FitOptions:
     medium : {"vacuum", "air"}, optional
         What the lever was measured in; wins over measurement and probe.
     priors : mapping of str to Prior
-        What is known before, of parameters of the material, dimensions or the series resistance;
-        dimensions and the series resistance are varied if they have a prior.
+        What is known before, of parameters of the material, dimensions or the circuit; all that
+        have a prior are varied.
+    free : sequence of str
+        What else is varied beside the material.
 
     Raises
     ------
@@ -54,10 +56,13 @@ class FitOptions:
     drift: bool = False
     medium: Medium | None = None
     priors: Mapping[str, Prior] = field(default_factory=dict)
+    free: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         for name in self.fixed:
             parameter(name)
+            if name in self.priors:
+                raise InputError(f"{name} is fixed and has a prior, expected one of them")
         if len(self.fixed) >= len(PARAMETERS):
             raise InputError("all parameters are fixed; nothing is left to fit")
         asked: list[tuple[str, Any, tuple[str, ...]]] = [
@@ -84,7 +89,8 @@ class FitOptions:
     @property
     def varied(self) -> list[str]:
         """All parameters to find."""
-        return [*self.material, *(name for name in self.priors if name not in PARAMETERS)]
+        more = dict.fromkeys([*self.priors, *self.free])
+        return [*self.material, *(name for name in more if name not in PARAMETERS)]
 
     def held(self, probe: Probe) -> Probe:
         """Return a probe with the fixed values in place.
@@ -99,4 +105,4 @@ class FitOptions:
 
     def values(self) -> dict[str, Any]:
         """Return the options as plain values."""
-        return asdict(self) | {"fixed": dict(self.fixed)}
+        return asdict(self) | {"fixed": dict(self.fixed), "free": list(self.free)}

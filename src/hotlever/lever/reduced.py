@@ -245,6 +245,8 @@ class ReducedLever:
 
         It starts from a branch of a similar material, or from the atlas; see `Lever.linearised`.
         """
+        if not set(names) <= set(PARAMETERS):
+            raise ValueError("a reduced lever has derivatives by the material only")
         material = probe.material
         if near is None:
             count = reach.count(self.atlas.shown(material))

@@ -271,7 +271,8 @@ def _entries(part: Record, start: str = "") -> list[str]:
     meaning, lines = part.description(), []
     for key, value in part.model_dump(exclude_none=isinstance(part, Shape)).items():
         # JSON writes texts and truth as TOML does
-        written = f"{value:.12g}" if isinstance(value, float) else json.dumps(value)
+        text = json.dumps(value, ensure_ascii=False)
+        written = f"{value:.12g}" if isinstance(value, float) else text
         entry = f"# {key} =" if value is None else f"{start}{key} = {written}"
         lines.append(f"{entry:<32}# {meaning[key]}" if key in meaning else entry)
     return lines

@@ -1,0 +1,111 @@
+"""Fits that vary dimensions and the circuit too, held by what is known of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever.errors import InputError
+from hotlever.fitting import Measurement, fit, read_fit
+from hotlever.fitting.estimation import estimate
+from hotlever.fitting.options import FitOptions
+from hotlever.fitting.residuals import Residuals
+from hotlever.lever import Lever
+from hotlever.lever.lever import COARSE
+from hotlever.probe import Probe
+from hotlever.probe.priors import Prior, default_priors
+
+NOMINAL = Probe.reference()
+TRUE = NOMINAL.with_(n_d=5.2e17, delta=0.68, heater_length_um=4.12, thickness_um=0.39)
+
+
+@pytest.fixture(scope="module")
+def data():
+    """A lever with other dimensions, measured with noise."""
+    sweep = Lever(TRUE, COARSE).sweep(np.linspace(0.5, 11.0, 30))
+    rng = np.random.default_rng(3)
+    nothing = np.full(30, np.nan)
+    current = sweep.current_mA.values * (1 + 1e-3 * rng.standard_normal(30))
+    return Measurement(sweep.bias.values, current, nothing, nothing, nothing), sweep
+
+
+@pytest.fixture(scope="module")
+def found(data):
+    return fit(data[0], NOMINAL, priors=default_priors(NOMINAL))
+
+
+def test_the_tip_is_found_with_an_honest_error(data, found):
+    error = np.abs(found.band.tip_K.values - data[1].tip_K.values)
+    assert error.max() < 40.0
+    assert (error / found.band.tip_stderr_K.values).max() < 3.0
+    # the fit with the wrong drawing is sure of something else
+    flat = fit(data[0], NOMINAL)
+    assert np.abs(flat.band.tip_K.values - data[1].tip_K.values).max() > error.max()
+
+
+def test_everything_with_a_prior_is_varied_and_stays_near_it(found):
+    known = default_priors(NOMINAL)
+    assert set(found.names) == set(known)
+    for name, prior in known.items():
+        one = found.parameters[name]
+        assert abs(prior.deviation(one.value)) < 3.0
+        assert 0 < one.stderr <= 1.2 * prior.absolute
+
+
+def test_a_fit_with_priors_is_read_back_whole(found, tmp_path):
+    found.write(tmp_path / "fit.json")
+    again = read_fit(tmp_path / "fit.json")
+    np.testing.assert_allclose(again.covariance, found.covariance, rtol=1e-12)
+    assert again.probe == found.probe
+    assert again.options.priors == found.options.priors
+    assert repr(again) == repr(found)
+    assert "heater_length_um" in repr(again)
+
+
+def test_a_narrow_prior_is_a_fixed_parameter(data):
+    held = Prior(5.2e17, 1e-7)
+    narrow = fit(data[0], NOMINAL, priors={**default_priors(NOMINAL), "n_d": held})
+    assert narrow.parameters["n_d"].value == pytest.approx(5.2e17, rel=1e-5)
+    priors = {name: one for name, one in default_priors(NOMINAL).items() if name != "n_d"}
+    fixed = fit(data[0], NOMINAL, priors=priors, fixed={"n_d": 5.2e17})
+    np.testing.assert_allclose(fixed.band.tip_K, narrow.band.tip_K, atol=0.5)
+
+
+def test_the_shares_add_up_to_the_covariance(data):
+    options = FitOptions(priors=default_priors(NOMINAL))
+    one = estimate(data[0], NOMINAL, options)
+    shares = one.problem.shares(one.optimum)
+    assert set(shares) == {"measurement", *options.priors}
+    total = np.sum(list(shares.values()), axis=0)
+    scale = np.sqrt(np.diag(one.covariance))
+    np.testing.assert_allclose(
+        total / np.outer(scale, scale), one.covariance / np.outer(scale, scale), atol=1e-6
+    )
+
+
+def test_priors_of_what_does_not_exist_or_is_fixed_are_refused(data):
+    with pytest.raises(InputError, match="unknown parameter 'heater_um'"):
+        fit(data[0], NOMINAL, priors={"heater_um": Prior(1.0, 0.1)})
+    with pytest.raises(InputError, match="n_d is fixed and has a prior"):
+        FitOptions(fixed={"n_d": None}, priors={"n_d": Prior(5e17, 0.1)})
+
+
+def test_errors_that_data_share_weigh_as_one():
+    """Against the full covariance of the data."""
+    bias, nothing = np.linspace(1.0, 5.0, 5), np.full(5, np.nan)
+    tip, error = np.linspace(300.0, 700.0, 5), np.full(5, 4.0)
+    data = Measurement(bias, nothing, nothing, tip, error)
+    shared = 0.02 * (tip - 293.0)
+    residuals = Residuals(data, ["tip"], "errors", shared={"tip": shared})
+    values = np.stack([nothing, nothing, tip + np.array([3.0, -2.0, 1.0, 5.0, -4.0])])
+    weighted = residuals.weighted(values)
+    covariance = np.diag(error**2) + np.outer(shared, shared)
+    difference = values[2] - tip
+    assert weighted @ weighted == pytest.approx(
+        difference @ np.linalg.solve(covariance, difference)
+    )
+    slopes = np.zeros((3, 5, 2))
+    slopes[2] = np.random.default_rng(0).standard_normal((5, 2))
+    jacobian = residuals.jacobian(slopes)
+    expected = slopes[2].T @ np.linalg.solve(covariance, slopes[2])
+    np.testing.assert_allclose(jacobian.T @ jacobian, expected)

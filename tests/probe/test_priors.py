@@ -1,0 +1,120 @@
+"""What is known beforehand: how it is written, what the defaults are, what it weighs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hotlever.errors import InputError
+from hotlever.probe import Probe
+from hotlever.probe.parameters import parameter_of, parameters_of
+from hotlever.probe.priors import (
+    JointPrior,
+    Prior,
+    default_priors,
+    nuisances,
+    priors_of,
+    stated_priors,
+)
+
+PROBE = Probe.reference()
+
+
+@pytest.mark.parametrize(
+    ("text", "prior"),
+    [
+        ("3.3e17 ± 15%", Prior(3.3e17, 0.15)),
+        ("3.3e17±15%", Prior(3.3e17, 0.15)),
+        ("± 5 %", Prior(5.75e17, 0.05)),
+        ("4e17 +- 2e16", Prior(4e17, 2e16, relative=False)),
+        ("4e17 +/- 2e16", Prior(4e17, 2e16, relative=False)),
+    ],
+)
+def test_priors_are_read_as_they_are_written(text, prior):
+    assert priors_of({"n_d": text}, PROBE, "here") == {"n_d": prior}
+
+
+def test_dimensions_are_all_that_are_not_named():
+    found = priors_of({"dimensions": "± 2%", "gap_um": "3.1 ± 0.1"}, PROBE, "here")
+    assert set(found) == set(nuisances(PROBE))
+    assert found["gap_um"] == Prior(3.1, 0.1, relative=False)
+    assert found["length_um"] == Prior(54.4, 0.02)
+    assert "reader_length_um" not in found
+
+
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        ({"n_d": "3e17"}, r"here: n_d = '3e17', expected a value and its spread"),
+        ({"n_d": "± -5%"}, "expected a value and its spread"),
+        ({"n_d": "± 0"}, "expected a value and its spread"),
+        ({"n_d": "nan ± 5%"}, "expected a value and its spread"),
+        ({"n_d": "1 ± 2 ± 3"}, "expected a value and its spread"),
+        ({"n_d": "±" * 1000}, "expected a value and its spread"),
+        ({"nd": "± 5%"}, "unknown prior 'nd'.*did you mean 'n_d'"),
+        ({"dimensions": "3 ± 1%"}, "expected a share such as"),
+        ({"a1": "-1e-6 ± 5%"}, "a relative spread needs a value above 0"),
+    ],
+)
+def test_what_is_no_prior_gets_one_line(texts, message):
+    with pytest.raises(InputError, match=message) as no:
+        priors_of(texts, PROBE, "here")
+    assert "\n" not in str(no.value)
+
+
+def test_a_probe_file_states_priors_which_win_over_the_usual_ones(tmp_path):
+    path = tmp_path / "probe.toml"
+    section = '\n[prior]\nn_d = "3.3e17 ± 10%"\ndimensions = "± 2%"\n'
+    path.write_text(PROBE.to_toml().split("\n# Without")[0] + section)
+    probe = Probe.from_file(path)
+    assert Probe.from_values(probe.values(), "again") == probe
+    assert '"3.3e17 ± 10%"' in probe.to_toml()
+    known = default_priors(probe)
+    assert known["n_d"] == Prior(3.3e17, 0.10)
+    assert known["length_um"].spread == 0.02
+    assert known["p"].spread != 0.02
+    assert set(stated_priors(probe)) == {"n_d", *nuisances(probe)}
+    asked = {"n_d": Prior(4e17, 0.01)}
+    assert stated_priors(probe, asked)["n_d"] == asked["n_d"]
+    assert stated_priors(probe, {}) == {}
+    path.write_text(path.read_text().replace('n_d = "3', 'n_q = "3'))
+    with pytest.raises(InputError, match=r"probe.toml: \[prior\]: unknown prior 'n_q'"):
+        Probe.from_file(path)
+
+
+@given(st.floats(0.1, 10.0), st.floats(0.01, 1.0), st.booleans())
+def test_the_slope_is_that_of_the_deviation(share, spread, relative):
+    prior = Prior(2.0, spread, relative)
+    value, step = 2.0 * share, 1e-6 * share
+    slope = (prior.deviation(value + step) - prior.deviation(value - step)) / (2 * step)
+    assert prior.slope(value) == pytest.approx(slope, rel=1e-4)
+    assert prior.deviation(2.0) == 0.0
+
+
+def test_a_joint_prior_is_as_wide_as_its_covariance():
+    values = np.array([2.0, 5.0])
+    covariance = np.array([[0.04, 0.03], [0.03, 0.09]])
+    joint = JointPrior(["a", "b"], values, covariance)
+    slopes = joint.slopes(values)
+    np.testing.assert_allclose(np.linalg.inv(slopes.T @ slopes), covariance, rtol=1e-12)
+    moved = values * 1.001
+    np.testing.assert_allclose(joint.deviations(moved), slopes @ (moved - values), rtol=1e-3)
+
+
+def test_everything_that_a_prior_may_have_is_a_parameter():
+    for probe in (PROBE, Probe.u_shape(), PROBE.in_medium("air")):
+        known = parameters_of(probe)
+        assert set(default_priors(probe)) <= set(known)
+        for name, value in zip(known, probe.at(list(known)), strict=True):
+            assert known[name].lower <= value <= known[name].upper
+            assert known[name].meaning
+    with pytest.raises(InputError, match="did you mean 'heater_width_um'"):
+        parameter_of(PROBE, "heater_width")
+
+
+def test_values_are_moved_in_whatever_section_they_are():
+    moved = PROBE.moved({"n_d": 4e17, "gap_um": 3.0, "series_resistance_ohm": 5.0})
+    assert moved == PROBE.with_(n_d=4e17, gap_um=3.0, series_resistance_ohm=5.0)
+    np.testing.assert_array_equal(moved.at(["gap_um", "n_d"]), [3.0, 4e17])
