@@ -144,7 +144,7 @@ def test_derivatives_by_the_material_have_taylor_order_two(one, start, name):
     reach = Reach(NORMAL, 4.0)
     u = start.branch.u[1:]
     value, rest = getattr(MATERIAL, name), []
-    _, slope = by_parameter(start.branch.equations, hot(start.branch), names=[name])
+    slope = by_parameter(start.branch.equations, hot(start.branch), [name])
     for step in (0.02, 0.01):
         moved = one.probe.moved({name: value * (1 + step)})
         other = one.lever.linearised(moved, reach, start).branch

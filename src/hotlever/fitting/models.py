@@ -248,14 +248,14 @@ class ForwardModel:
             some = np.unique(np.linspace(1, fast.u.size - 1, _CORRECTED_AT).astype(int))
             u, guess = fast.u[some], space.expanded(fast.x[:, some])
             found = find_roots(AtTip(equations, u**2), guess, NewtonOptions(tolerance=1e-5))
-            x, factors = found.x, found.factors
+            x = found.x
         else:
             branch = Follower(equations).until(self.reach(probe))
-            u, x, factors = branch.u[1:], branch.x[:, 1:], None
+            u, x = branch.u[1:], branch.x[:, 1:]
         values = equations.observed(x).T - fast.curve(u)[:, :3]
         lacking = np.zeros((u.size, 3, len(self.names)))
         if self.first_order:
-            _, slopes = by_parameter(equations, x, factors, self.names)
+            slopes = by_parameter(equations, x, self.names)
             lacking = slopes - at.linearised.shown_at(u)
         return replace(self, offset=Offset.through(probe.at(self.names), u, values, lacking))
 

@@ -7,6 +7,7 @@ Krylov's method for the rest.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -91,18 +92,23 @@ class AirSolver:
     """Solves (M + Eᵀ R κ E) x = b, with M factorised and R the non-local part of the operator.
 
     With t = E x this is (1 + E M⁻¹ Eᵀ R κ) t = E M⁻¹ b between the sites, solved by generalised
-    conjugate residuals. Search directions are kept for the next right-hand side.
+    conjugate residuals. Search directions are kept for the next right-hand side. Transposed, M⁻¹
+    is so too, and R κ becomes κ R.
     """
 
     def __init__(self, factors: SuperLU, air: AirLoss, kappa: Array) -> None:
-        self._factors, self._air, self._kappa = factors, air, kappa
-        count, size = air.sampling.shape
-        # per direction: its image between the sites (orthonormal), and the change of x
-        self._images = np.empty((_MOST_DIRECTIONS, count))
-        self._changes = np.empty((_MOST_DIRECTIONS, size))
-        self._known = 0
+        def lost(theta: Array) -> Array:
+            return np.asarray(air.spreading @ (air.rest @ (kappa * theta)))
 
-    def solve(self, right_hand_side: Array) -> Array:
+        def lost_transposed(theta: Array) -> Array:
+            return np.asarray(air.spreading @ (kappa * (air.rest @ theta)))
+
+        self._ways = {
+            "N": _Directions(lambda b: factors.solve(b), lost, air.sampling),
+            "T": _Directions(lambda b: factors.solve(b, "T"), lost_transposed, air.sampling),
+        }
+
+    def solve(self, right_hand_side: Array, how: str = "N") -> Array:
         """Solve for one right-hand side (size + 1,) or several (size + 1, k).
 
         Raises
@@ -110,10 +116,31 @@ class AirSolver:
         ComputationError
             If the directions do not suffice.
         """
-        if right_hand_side.ndim > 1:
-            return np.stack([self.solve(column) for column in right_hand_side.T], axis=1)
-        x: Array = self._factors.solve(right_hand_side)
-        residual = self._air.sampling @ x
+        way = self._ways[how]
+        if right_hand_side.ndim == 1:
+            return way.solve(right_hand_side)
+        return np.stack([way.solve(column) for column in right_hand_side.T], axis=1)
+
+
+class _Directions:
+    """Generalised conjugate residuals between the sites, for one of the two systems."""
+
+    def __init__(
+        self,
+        near: Callable[[Array], Array],
+        lost: Callable[[Array], Array],
+        sampling: csr_matrix,
+    ) -> None:
+        self._near, self._lost, self._sampling = near, lost, sampling
+        # per direction: its image between the sites (orthonormal), and the change of x
+        sites, size = sampling.shape
+        self._images, self._changes = np.empty((0, sites)), np.empty((0, size))
+        self._known = 0
+
+    def solve(self, right_hand_side: Array) -> Array:
+        """Solve for one right-hand side."""
+        x = self._near(right_hand_side)
+        residual = self._sampling @ x
         goal = _TOLERANCE * np.linalg.norm(residual)
         used = restarts = 0
         while True:
@@ -132,12 +159,17 @@ class AirSolver:
                     f"a linear system in air was not solved with {restarts} times "
                     f"{_MOST_DIRECTIONS} directions"
                 )
-            self._add_direction(residual)
+            self._add(residual)
 
-    def _add_direction(self, direction: Array) -> None:
-        air, known = self._air, self._known
-        change = -self._factors.solve(air.spreading @ (air.rest @ (self._kappa * direction)))
-        image = direction - air.sampling @ change
+    def _add(self, direction: Array) -> None:
+        known = self._known
+        if not self._images.size:
+            # only one of the two systems may ever be asked for
+            sites, size = self._sampling.shape
+            self._images = np.empty((_MOST_DIRECTIONS, sites))
+            self._changes = np.empty((_MOST_DIRECTIONS, size))
+        change = -self._near(self._lost(direction))
+        image = direction - self._sampling @ change
         shares = self._images[:known] @ image
         image = image - shares @ self._images[:known]
         change = change - shares @ self._changes[:known]

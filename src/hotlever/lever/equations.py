@@ -42,7 +42,7 @@ LAWS = (thermal_conductivity, conductivity_low_doped, conductivity_high_doped)
 SHOWN = ("lever_V", "current_mA", "reader_V")
 
 #: Error (relative) to which derivatives are solved, and the most rounds of refinement.
-EXACT, _MOST_ROUNDS = 1e-6, 6
+_EXACT, _MOST_ROUNDS = 1e-6, 6
 
 
 @dataclass(frozen=True)
@@ -254,13 +254,11 @@ class LeverEquations:
         factors: Factors,
         right_hand_side: Array,
         pin: Pin = TIP,
-        accuracy: float = EXACT,
     ) -> Array:
         """Solve Jacobian at `x` times change = right-hand side, the last row that of the pin.
 
         The factors, with the same pin, may be those of states nearby: what they lack is removed by
-        refinement, until errors (relative) are below an accuracy. Right-hand sides are one of each
-        state or several, as in `flux_changes`.
+        refinement. Right-hand sides are one of each state or several, as in `flux_changes`.
         """
         states = np.arange(x.shape[1])
         scale = self.scale.reshape(-1, *(1,) * (right_hand_side.ndim - 1))
@@ -272,7 +270,7 @@ class LeverEquations:
             change = change + correction
             ratio = _length(correction / scale) / _length(change / scale)
             # the next correction would be smaller by the same ratio once more
-            if not np.any(ratio**2 > accuracy):
+            if not np.any(ratio**2 > _EXACT):
                 break
         return change
 
@@ -317,6 +315,26 @@ class LeverEquations:
         """Return how `observed` changes with the unknowns, to first order."""
         current = self.balance_change(x, change)[-1]
         return np.stack([change[-1], current, self.space.reader_voltage(change)])
+
+    def observed_gradient(self, x: Array) -> Array:
+        """Return the derivatives of `observed` by the unknowns, (size + 1, n, 3).
+
+        Those of V_r are zero without a reader.
+        """
+        fields, laws = self.at(x)
+        unit = np.zeros((len(x), 1))
+        unit[-1] = 1.0
+        # the current is the charge equation tested with the function that is one on the supply
+        supply = self.space.fields(unit, 0.0).grad_V
+        along = laws.sigma_by["T"] * (fields.grad_V * supply).sum(axis=0)
+        flat = np.zeros_like(fields.grad_V)
+        gradient = np.zeros((*x.shape, len(SHOWN)))
+        gradient[-1, :, 0] = 1.0
+        gradient[..., 1] = self.space.weak_form(Fluxes(along, flat, laws.sigma * supply))
+        if self.space.reader is not None:
+            unknowns, weights = self.space.reader
+            gradient[unknowns, :, 2] = weights[:, None]
+        return gradient
 
 
 def _length(columns: Array) -> Array:

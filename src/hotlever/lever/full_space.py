@@ -245,11 +245,11 @@ class SparseFactors:
     def __init__(self, solvers: list[Any]) -> None:
         self._solvers = solvers
 
-    def solve(self, right_hand_side: Array, states: Index) -> Array:
+    def solve(self, right_hand_side: Array, states: Index, *, transposed: bool = False) -> Array:
         """Solve for right-hand sides (size + 1, n) or (size + 1, n, k) of these n states."""
-        solution = np.empty_like(right_hand_side)
+        solution, how = np.empty_like(right_hand_side), "T" if transposed else "N"
         for place, state in enumerate(states):
-            solution[:, place] = self._solvers[state].solve(right_hand_side[:, place])
+            solution[:, place] = self._solvers[state].solve(right_hand_side[:, place], how)
         return solution
 
     def replaced(self, states: Index, other: SparseFactors) -> SparseFactors:

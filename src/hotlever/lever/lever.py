@@ -17,7 +17,7 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.lever.balances import balance_columns, balance_slopes
 from hotlever.lever.branch import Branch, Reach, Reading
 from hotlever.lever.dataset import at_bias, sweep_dataset
-from hotlever.lever.equations import EXACT, SHOWN, LeverEquations
+from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.following import Follower, branch_of
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.motion import motion_of
@@ -36,8 +36,6 @@ HOTTEST = 1300.0
 #: A coarse mesh, with coarse panels for the air: within 2 K of the default one, at a fifth of its
 #: price. For differences between levers, and for fits, which the default one corrects.
 COARSE = MeshOptions(heater=0.5, corner=0.25, lever=0.2, panels=0.5)
-#: Error (relative) of derivatives where there are many.
-_NEARLY = 1e-3
 #: States that a branch has, more or less, for a progress bar to fill.
 _USUAL_STATES = 20
 
@@ -208,13 +206,11 @@ class Lever:
         equations = self.equations_of(probe, names)
         if near is None:
             branch = Follower(equations).until(reach)
-            return Linearised.of(probe, names, branch, reach, equations)
+            return Linearised.of(probe, names, branch, reach)
         u, guess = near.branch.u[1:], near.states(probe)[:, 1:]
         found = find_roots(AtTip(equations, u**2), guess, NewtonOptions(), near.factors)
         branch = branch_of(equations, u, found)
-        # many parameters are those of a fit with priors, which asks for less
-        accuracy = EXACT if len(names) <= len(PARAMETERS) else _NEARLY
-        return Linearised.of(probe, names, branch, reach, equations, found.factors, accuracy)
+        return Linearised.of(probe, names, branch, reach)
 
     def equations_of(self, probe: Probe, names: tuple[str, ...] = ()) -> LeverEquations:
         """Return the equations of a similar probe, with the motions of dimensions among names."""

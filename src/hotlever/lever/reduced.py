@@ -157,10 +157,12 @@ class DenseFactors:
     def __init__(self, inverses: Array) -> None:
         self._inverses = inverses
 
-    def solve(self, right_hand_side: Array, states: Index) -> Array:
+    def solve(self, right_hand_side: Array, states: Index, *, transposed: bool = False) -> Array:
         """Solve for right-hand sides (size + 1, n) or (size + 1, n, k) of these n states."""
         columns = right_hand_side.reshape(*right_hand_side.shape[:2], -1).swapaxes(0, 1)
-        solution = np.matmul(self._inverses[states], columns).swapaxes(0, 1)
+        inverses = self._inverses[states]
+        inverses = inverses.swapaxes(1, 2) if transposed else inverses
+        solution = np.matmul(inverses, columns).swapaxes(0, 1)
         return solution.reshape(right_hand_side.shape)
 
     def replaced(self, states: Index, other: DenseFactors) -> DenseFactors:

@@ -9,7 +9,7 @@ import numpy as np
 
 from hotlever.lever.branch import Branch
 from hotlever.lever.curve import spline_through
-from hotlever.lever.equations import EXACT, SHOWN, LeverEquations
+from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.following import Follower
 from hotlever.lever.space import Factors
 from hotlever.materials import PARAMETERS
@@ -24,21 +24,39 @@ _AT_ONCE = 20
 def by_parameter(
     equations: LeverEquations,
     x: Array,
-    factors: Factors | None = None,
     names: Sequence[str] = tuple(PARAMETERS),
-    accuracy: float = EXACT,
-) -> tuple[Array, Array]:
-    """Return how states with power change with parameters, at fixed tip temperatures.
+    factors: Factors | None = None,
+) -> Array:
+    """Return how V_l, I_h and V_r change with parameters at fixed tip temperatures, (n, 3, k).
 
     Beside those of the material these may be dimensions whose motions the equations know. The
-    factors may be those of states nearby. The first result, (size + 1, n, k), is of the states, the
-    second, (n, 3, k), of V_l, I_h and V_r.
+    states have power; factors are those of these very states. Adjoint: three solves for each state,
+    however many parameters there are.
     """
     factors = factors or equations.factorised(x)
     direct = equations.by_parameter(x, names)
+    missing = -direct
+    missing[-1] = -equations.tip_by_parameter(x, names)
+    gradient = equations.observed_gradient(x)
+    adjoint = factors.solve(gradient, np.arange(x.shape[1]), transposed=True)
+    shown = np.einsum("sno,snk->nok", adjoint, missing)
+    shown[:, 1] += direct[-1]
+    if equations.space.reader is None:
+        shown[:, 2] = np.nan
+    return np.asarray(shown)
+
+
+def with_changes(
+    equations: LeverEquations, x: Array, names: Sequence[str], factors: Factors
+) -> tuple[Array, Array]:
+    """Return how the states themselves change, (size + 1, n, k), and what `by_parameter` does.
+
+    The factors may be those of states nearby.
+    """
+    direct = equations.by_parameter(x, names)
     right_hand_side = -direct
     right_hand_side[-1] = -equations.tip_by_parameter(x, names)
-    changes = equations.solve_linear(x, factors, right_hand_side, accuracy=accuracy)
+    changes = equations.solve_linear(x, factors, right_hand_side)
     shown = equations.observed_change(x, changes)
     shown[1] += direct[-1]
     return changes, shown.swapaxes(0, 1)
@@ -88,7 +106,7 @@ def sensitivities_of(branch: Branch, u: Array, circuit: Circuit) -> Array:
     hot = np.flatnonzero(u > 0)  # without power nothing depends on the material
     for start in range(0, hot.size, _AT_ONCE):
         some = hot[start : start + _AT_ONCE]
-        _, shown[some] = by_parameter(branch.equations, branch.states(u[some]))
+        shown[some] = by_parameter(branch.equations, branch.states(u[some]))
     return at_fixed_bias(branch.curve(u, 1), u, circuit, shown)
 
 
@@ -106,7 +124,7 @@ class Linearised:
     factors : Factors or None
         Of all its states but the first; None if they were not kept.
     changes : ndarray, shape (size + 1, k, p)
-        Derivatives of the states by the parameters.
+        Derivatives of the states by the parameters; empty if they were not asked for.
     shown : ndarray, shape (k, 3, p)
         Derivatives of V_l, I_h and V_r.
     """
@@ -125,27 +143,38 @@ class Linearised:
         names: tuple[str, ...],
         branch: Branch,
         enough: Callable[[Branch], bool],
-        derivatives: LeverEquations,
+        derivatives: LeverEquations | None = None,
         factors: Factors | None = None,
-        accuracy: float = EXACT,
     ) -> Linearised:
         """Follow a branch until it goes far enough (see `Follower.until`), and differentiate it.
 
-        The derivatives may be taken with equations that differ little and cost less, the factors be
-        those of states nearby.
+        With equations for the derivatives, which may differ a little and cost less, the states are
+        differentiated as well; the factors may then be those of states nearby.
         """
         longer = Follower(branch.equations, branch).until(enough)
-        if factors is None or longer is not branch:
-            factors = derivatives.factorised(longer.x[:, 1:])
-        changes, shown = by_parameter(derivatives, longer.x[:, 1:], factors, names, accuracy)
+        x, changes = longer.x[:, 1:], np.empty(0)
+        if derivatives is None:
+            factors = longer.equations.factorised(x)
+            shown = by_parameter(longer.equations, x, names, factors)
+        else:
+            if factors is None or longer is not branch:
+                factors = derivatives.factorised(x)
+            changes, shown = with_changes(derivatives, x, names, factors)
+            changes = np.insert(changes, 0, 0.0, axis=1)
         # without power nothing depends on the parameters
-        changes, shown = np.insert(changes, 0, 0.0, axis=1), np.insert(shown, 0, 0.0, axis=0)
-        return cls(probe, names, longer, factors, changes, shown)
+        return cls(probe, names, longer, factors, changes, np.insert(shown, 0, 0.0, axis=0))
 
     def states(self, probe: Probe) -> Array:
-        """Return the states of a similar probe to first order, (size + 1, k)."""
-        moved = probe.at(self.names) - self.probe.at(self.names)
-        return np.asarray(self.branch.x + self.changes @ moved)
+        """Return the states of a similar probe, (size + 1, k), to first order or roughly.
+
+        Roughly: with the same temperatures, and potentials in proportion to the lever voltage.
+        """
+        moved, x = probe.at(self.names) - self.probe.at(self.names), self.branch.x
+        if self.changes.size:
+            return np.asarray(x + self.changes @ moved)
+        factor = np.ones(x.shape[1])
+        factor[1:] += self.shown[1:, 0] @ moved / x[-1, 1:]
+        return np.where(self.branch.equations.space.is_temperature[:, None], x, factor * x)
 
     def shown_at(self, u: Array) -> Array:
         """Return the derivatives of V_l, I_h and V_r at any u, (n, 3, p).

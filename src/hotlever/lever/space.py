@@ -22,7 +22,7 @@ from hotlever.types import Array, Index
 class Factors(Protocol):
     """Factorised Jacobians of some states, the last row being that of the pin."""
 
-    def solve(self, right_hand_side: Array, states: Index) -> Array:
+    def solve(self, right_hand_side: Array, states: Index, *, transposed: bool = False) -> Array:
         """Solve for right-hand sides (size + 1, n) or (size + 1, n, k) of these n states."""
         ...
 
