@@ -364,3 +364,18 @@ def test_a_lever_in_air_is_estimated_in_air(lever, reference):
     by_rule = calibrate(replace(curve, medium="air"), medium="vacuum")
     assert by_rule.table.budget_K.sel(source="constant k").max() > 10.0
     assert by_rule.k == pytest.approx(found.k, rel=0.05)
+
+
+def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(lever, reference):
+    """What the fit knows of material and dimensions narrows the band in air."""
+    rng = np.random.default_rng(6)
+    vacuum = measurement_of(measured_curve(reference, rng))
+    air = lever.in_medium("air").branch()
+    other = replace(measurement_of(measured_curve(air, rng, to_V=12.0)), medium="air")
+    found = fit(vacuum, Probe.reference(), fixed={"p": None})
+    both = calibrate(other, fit=found)
+    assert both.medium == "air"
+    assert {"fit", "measurement", "air"} <= set(both.table.source.values.tolist())
+    error = np.abs(both.table.tip_K - air.tip_temperature(both.table.power_mW))
+    assert float((error / both.table.tip_stderr_K).max()) < 3.0
+    assert both.probe.material.p == Probe.reference().material.p

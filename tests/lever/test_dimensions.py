@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from hotlever.errors import ComputationError
 from hotlever.fitting.models import full_model
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
 from hotlever.probe.tip import Tip
 
@@ -22,13 +25,13 @@ PROBES = {
 
 def orders(lever, name):
     """Observed orders of what a first-order prediction leaves at fixed tip temperatures."""
-    probe, names = lever.probe, (name,)
-    start = lever.linearised(probe, REACH, None, names)
+    probe, names, similar = lever.probe, (name,), SimilarLevers(lever)
+    start = similar.linearised(probe, REACH, None, names)
     shown = slice(0, 3 if "reader" in lever.space.mesh.terminal_facets else 2)
     (value,), rest = probe.at(names), []
     for step in (0.02, 0.01):
         moved = probe.moved({name: float(value * (1 + step))})
-        other = lever.linearised(moved, REACH, start, names).branch
+        other = similar.linearised(moved, REACH, start, names).branch
         count = start.branch.u.size
         change = (other.values[:count] - start.branch.values)[1:, shown]
         rest.append(np.abs(change - step * value * start.shown[1:, shown, 0]))
@@ -55,7 +58,7 @@ def test_so_has_that_by_the_gas(in_air):
 
 def test_a_moved_mesh_shows_what_a_new_one_does(coarse):
     probe = coarse.probe.with_(heater_length_um=4.3, gap_um=3.0, length_um=56.0, thickness_um=0.42)
-    moved = coarse.linearised(probe, REACH).branch
+    moved = SimilarLevers(coarse).linearised(probe, REACH).branch
     new = Lever(probe, COARSE).branch_to(6.0)
     u = np.linspace(2.0, 9.0, 8)
     np.testing.assert_allclose(moved.curve(u)[:, :3], new.curve(u)[:, :3], rtol=1e-3)
@@ -64,7 +67,7 @@ def test_a_moved_mesh_shows_what_a_new_one_does(coarse):
 def test_a_mesh_that_would_turn_over_is_refused(coarse):
     probe = coarse.probe.moved({"heater_length_um": 60.0})
     with pytest.raises(ComputationError, match="cannot follow so large a change"):
-        coarse.linearised(probe, REACH)
+        SimilarLevers(coarse).linearised(probe, REACH)
 
 
 @pytest.mark.parametrize("name", ["series_resistance_ohm", "heater_width_um", "thickness_um"])
@@ -72,8 +75,7 @@ def test_derivatives_at_a_fixed_bias(coarse, name):
     """Circuit and dimensions together, as a fit takes them."""
     bias = np.array([2.0, 5.0, 7.0])
     names = (name,)
-    model = full_model(coarse, bias)
-    model = type(model)(model.fast, None, bias, names)
+    model = replace(full_model(coarse, bias), names=names)
     probe, rest = coarse.probe, []
     start = model.predict(probe)
     for step in (0.02, 0.01):
@@ -89,7 +91,7 @@ def test_derivatives_at_a_fixed_bias(coarse, name):
 def test_predictions_nearby_agree_with_a_new_branch(coarse):
     """To second order, at four per cent."""
     bias, names = np.array([2.0, 5.0, 7.0]), ("n_d", "heater_length_um", "series_resistance_ohm")
-    model = type(full_model(coarse, bias))(coarse, None, bias, names)
+    model = replace(full_model(coarse, bias), names=names)
     start = model.predict(coarse.probe)
     values = coarse.probe.at(names) * np.array([1.04, 0.96, 1.01])
     nearby, slopes = start.nearby.predict(values)

@@ -14,7 +14,7 @@ from hotlever.lever.lever import COARSE, Lever
 from hotlever.probe import Probe
 
 if TYPE_CHECKING:
-    from hotlever.calibration.estimated import PriorUse
+    from hotlever.calibration.inference import PriorUse
 
 #: The resistance of a cold lever is within this factor of its model's.
 _WITHIN = 2.5

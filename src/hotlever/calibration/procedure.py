@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from hotlever.calibration.calibration import TABLE_COLUMNS, Calibration, table_of
-from hotlever.calibration.estimated import Estimated, estimated
+from hotlever.calibration.inference import Estimated, estimated
 from hotlever.calibration.knee import IVCurve
 from hotlever.calibration.plausibility import check_plausible
 from hotlever.calibration.power_law import PowerLaw
@@ -43,7 +43,7 @@ def calibrate(
     """Find the tip temperature of a lever from its I-V curve.
 
     What is known of the lever beforehand is brought up to date by all that was measured
-    (`hotlever.calibration.estimated`); with a power law the paper's rule is used instead
+    (`hotlever.calibration.inference`); with a power law the paper's rule is used instead
     (`hotlever.calibration.rule`).
 
     Parameters

@@ -25,6 +25,7 @@ from hotlever.lever import Branch
 from hotlever.lever.branch import Reach
 from hotlever.lever.curve import spline_through
 from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
 from hotlever.probe.priors import default_priors
 from hotlever.types import Array
@@ -103,7 +104,7 @@ class _Scatter:
         # the circuit is the measured one, whatever the lever
         names = tuple(name for name in priors if name != "series_resistance_ohm")
         past = float(branch.bias(branch.hottest_K, probe.circuit))
-        found = Lever(probe, COARSE).linearised(
+        found = SimilarLevers(Lever(probe, COARSE)).linearised(
             probe, Reach(probe.circuit, min(past, 1e3)), None, names
         )
         known = found.branch

@@ -22,6 +22,7 @@ from hotlever.fitting.start import starting_material
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.reduced import ReducedLever
+from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameter_of
@@ -147,7 +148,7 @@ def estimate(
     forward = replace(forward, names=names, first_order=not known)
     if len(names) > len(PARAMETERS) and isinstance(forward.fast, ReducedLever):
         # its modes are those of one geometry
-        forward = replace(forward, fast=Lever(probe, COARSE))
+        forward = replace(forward, fast=SimilarLevers(Lever(probe, COARSE)))
     start = probe.moved({name: prior.value for name, prior in options.priors.items()})
     attempts = _attempts(forward, options.held(start), options, residuals)
     try:
@@ -197,7 +198,7 @@ def _attempts(
         start = starting_material(atlas, probe.circuit, probe.material, options.material, residuals)
         yield forward, probe.model_copy(update={"material": start})
         # far from the parameters it was made for, a reduced lever may fail where others do not
-        forward = replace(forward, fast=Lever(probe, COARSE), offset=None)
+        forward = replace(forward, fast=SimilarLevers(Lever(probe, COARSE)), offset=None)
     yield forward, probe
     usual = options.held(probe.model_copy(update={"material": Probe.reference().material}))
     if usual != probe:

@@ -23,6 +23,7 @@ from hotlever.lever.pinned import AtTip
 from hotlever.lever.reduced import ReducedLever, ReducedSpace
 from hotlever.lever.reduction import cached_reduction, known_reduction
 from hotlever.lever.sensitivities import Linearised, at_fixed_bias, by_parameter
+from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import parameters_of
@@ -200,7 +201,7 @@ class ForwardModel:
     """
 
     fast: BranchSolver
-    full: Lever | None
+    full: SimilarLevers | None
     bias: Array
     names: tuple[str, ...] = tuple(PARAMETERS)
     first_order: bool = True
@@ -242,7 +243,7 @@ class ForwardModel:
         if self.full is None:
             return self
         fast, probe = at.linearised.branch, at.probe
-        equations = self.full.equations_of(probe, self.names)
+        equations = self.full.equations(probe, self.names)
         space = fast.equations.space
         if isinstance(space, ReducedSpace):
             some = np.unique(np.linspace(1, fast.u.size - 1, _CORRECTED_AT).astype(int))
@@ -262,12 +263,12 @@ class ForwardModel:
 
 def full_model(lever: Lever, bias: Array) -> ForwardModel:
     """Return a lever as forward model, just as it is."""
-    return ForwardModel(lever, None, bias)
+    return ForwardModel(SimilarLevers(lever), None, bias)
 
 
 def reduced_model(lever: Lever, reduced: ReducedLever, bias: Array) -> ForwardModel:
     """Return a reduced lever, corrected by the full one, as forward model."""
-    return ForwardModel(reduced, lever, bias)
+    return ForwardModel(reduced, SimilarLevers(lever), bias)
 
 
 def forward_model(
@@ -288,5 +289,5 @@ def forward_model(
     """
     lever = Lever(probe)
     reduced = cached_reduction(lever) if reduce else known_reduction(lever)
-    fast: BranchSolver = Lever(probe, COARSE) if reduced is None else reduced
-    return ForwardModel(fast, lever, bias)
+    fast: BranchSolver = SimilarLevers(Lever(probe, COARSE)) if reduced is None else reduced
+    return ForwardModel(fast, SimilarLevers(lever), bias)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hotlever.fitting.models import ForwardModel, multiplied, shown_at_bias
+from hotlever.fitting.models import multiplied, reduced_model, shown_at_bias
 from hotlever.lever.curve import spline_through
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduced import ReducedLever
@@ -28,7 +28,7 @@ class RoughModel:
     """
 
     def __init__(self, lever: Lever, reduced: ReducedLever, bias: Array) -> None:
-        model, probe = ForwardModel(reduced, lever, bias), lever.probe
+        model, probe = reduced_model(lever, reduced, bias), lever.probe
         first = model.predict(probe)
         exact = model.confirmed(first)
         at = exact.predict(probe, first)

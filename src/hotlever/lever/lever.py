@@ -18,16 +18,13 @@ from hotlever.lever.balances import balance_columns, balance_slopes
 from hotlever.lever.branch import Branch, Reach, Reading
 from hotlever.lever.dataset import at_bias, sweep_dataset
 from hotlever.lever.equations import SHOWN, LeverEquations
-from hotlever.lever.following import Follower, branch_of
+from hotlever.lever.following import Follower
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.motion import motion_of
-from hotlever.lever.newton import NewtonOptions, find_roots
-from hotlever.lever.pinned import AtTip, state_at_bias
-from hotlever.lever.sensitivities import Linearised, sensitivities_of
+from hotlever.lever.pinned import state_at_bias
+from hotlever.lever.sensitivities import sensitivities_of
 from hotlever.lever.state import State
-from hotlever.materials import PARAMETERS, Material
+from hotlever.materials import Material
 from hotlever.probe import Circuit, Layout, MeshOptions, Probe, mesh_layout
-from hotlever.probe.moving import MovingMesh
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
@@ -82,7 +79,6 @@ class Lever:
             self.space, self.probe.material, self.probe.circuit.base_temperature_K
         )
         self._branch: Branch | None = None
-        self._moving = MovingMesh(self.space.mesh, self.probe.shape)
 
     def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
         """Return a space in the probe's surroundings."""
@@ -177,55 +173,6 @@ class Lever:
     def branch_past_knee(self) -> Branch:
         """Return a branch that reaches beyond its knee, or ends below because silicon melts."""
         return self._followed(lambda branch: bool(np.any(np.diff(branch.values[:-1, 0]) < 0)))
-
-    @one_blas_thread
-    def linearised(
-        self,
-        probe: Probe,
-        reach: Reach,
-        near: Linearised | None = None,
-        names: tuple[str, ...] = tuple(PARAMETERS),
-    ) -> Linearised:
-        """Solve the branch of a similar probe on the same mesh, with its derivatives.
-
-        Parameters
-        ----------
-        probe : Probe
-            Material, dimensions and series resistance may differ; the mesh moves with the latter.
-        reach : Reach
-        near : Linearised, optional
-            Of a similar probe on this mesh, to start from.
-        names : tuple of str
-            Parameters of the derivatives: of the material, or dimensions.
-
-        Raises
-        ------
-        ComputationError
-            If a state was not found.
-        """
-        equations = self.equations_of(probe, names)
-        if near is None:
-            branch = Follower(equations).until(reach)
-            return Linearised.of(probe, names, branch, reach)
-        u, guess = near.branch.u[1:], near.states(probe)[:, 1:]
-        found = find_roots(AtTip(equations, u**2), guess, NewtonOptions(), near.factors)
-        branch = branch_of(equations, u, found)
-        return Linearised.of(probe, names, branch, reach)
-
-    def equations_of(self, probe: Probe, names: tuple[str, ...] = ()) -> LeverEquations:
-        """Return the equations of a similar probe, with the motions of dimensions among names."""
-        space = self.space
-        if probe.shape != self.probe.shape:
-            space = FullSpace(self._moving.at(probe.shape, probe.layout()))
-            # air takes up from a place nearly what it took before the place moved a little
-            space.air = self.space.air
-        gas = probe.surroundings.gas_conductivity
-        if space.air is not None and gas != space.air.gas_conductivity:
-            space = space.in_gas(gas)
-        dimensions = [name for name in names if name in probe.shape.dimensions()]
-        motions = {name: motion_of(space, self._moving.movement(name)) for name in dimensions}
-        base = probe.circuit.base_temperature_K
-        return LeverEquations(space, probe.material, base, motions)
 
     @one_blas_thread
     def solve(self, bias: ArrayLike, progress: Progress | None = None) -> list[State]:

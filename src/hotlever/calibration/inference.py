@@ -7,7 +7,7 @@ is needed: a lever that was measured below it is less certain above, and that is
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from hotlever.lever import Branch
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
+from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import JointPrior, Prior, default_priors
 from hotlever.types import Array, Progress
 
@@ -132,39 +133,42 @@ def estimated(
         If no lever near the probe has states at all measured biases.
     """
     known = dict(default_priors(probe) if priors is None else priors)
-    joint, same = None, fit is not None and _same_data(fit.measurement, measured)
-    if fit is not None:
-        # the data of the fit tell more of its material than any prior
-        own = {name: prior for name, prior in known.items() if name not in PARAMETERS}
-        options = FitOptions(
-            observables=fit.observables,
-            fixed={name: None for name in fit.options.fixed if name not in own},
-            priors=own,
-        )
-        found = estimate(fit.measurement, fit.probe, options, progress=progress)
-        known = own
-        if not same:
-            best, names = found.optimum.probe, found.options.varied
-            joint = JointPrior(names, best.at(names), found.covariance)
-            probe = probe.moved(dict(zip(names, best.at(names).tolist(), strict=True)))
-            probe = probe.with_(series_resistance_ohm=probe.circuit.series_resistance_ohm)
-    if fit is None or not same:
-        found = estimate(
-            measured,
-            probe,
-            FitOptions(priors=known)
-            if joint is None
-            else FitOptions(fixed=options.fixed, free=tuple(options.priors)),
-            joint=joint,
-            progress=progress,
-        )
-    return _put_together(found, measured, known)
+    if fit is None:
+        found = estimate(measured, probe, FitOptions(priors=known), progress=progress)
+        return _put_together(found, measured, known)
+    # the data of the fit tell more of its material than any prior
+    before = default_priors(fit.probe) if priors is None else known
+    options = FitOptions(
+        observables=fit.observables,
+        fixed=dict.fromkeys(fit.options.fixed),
+        priors=_chosen(before, lambda name: name in parameters_of(fit.probe).keys() - PARAMETERS),
+    )
+    found = estimate(fit.measurement, fit.probe, options, progress=progress)
+    if _same_data(fit.measurement, measured):
+        return _put_together(found, measured, options.priors)
+    # what that leaves of the lever itself is known before the other data; circuit and gas are
+    # those of each measurement
+    own = [name for name in found.options.varied if name not in _CIRCUIT]
+    places = [found.options.varied.index(name) for name in own]
+    values = found.optimum.probe.at(own)
+    joint = JointPrior(own, values, found.covariance[np.ix_(places, places)])
+    probe = probe.moved(dict(zip(own, values.tolist(), strict=True)))
+    again = FitOptions(
+        fixed=options.fixed,
+        priors=_chosen(known, lambda name: name in _CIRCUIT),
+        free=tuple(name for name in own if name not in PARAMETERS),
+    )
+    found = estimate(measured, probe, again, joint=joint, progress=progress)
+    return _put_together(found, measured, {**options.priors, **again.priors})
+
+
+def _chosen(priors: Mapping[str, Prior], wanted: Callable[[str], bool]) -> dict[str, Prior]:
+    return {name: prior for name, prior in priors.items() if wanted(name)}
 
 
 def _same_data(one: Measurement, other: Measurement) -> bool:
-    return np.array_equal(one.bias_V, other.bias_V) and np.array_equal(
-        one.current_mA, other.current_mA
-    )
+    same = np.array_equal(one.bias_V, other.bias_V, equal_nan=True)
+    return same and np.array_equal(one.current_mA, other.current_mA, equal_nan=True)
 
 
 def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Prior]) -> Estimated:
