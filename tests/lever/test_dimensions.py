@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hotlever.errors import ComputationError
+from hotlever.errors import ComputationError, InputError
 from hotlever.fitting.models import full_model
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
+from hotlever.probe.priors import nuisances
 from hotlever.probe.tip import Tip
 
 REACH = Reach(Probe.reference().circuit, 6.0)
@@ -99,3 +100,13 @@ def test_predictions_nearby_agree_with_a_new_branch(coarse):
     exact = model.predict(moved)
     np.testing.assert_allclose(nearby, exact.values, rtol=3e-3)
     assert slopes.shape == exact.slopes.shape == (3, 3, 3)
+
+
+def test_dimensions_that_hold_parts_together_are_held():
+    """A heater that fills its gap, in a U-shaped lever."""
+    probe = Probe.u_shape().with_(heater_length_um=6.0)
+    assert {"heater_length_um", "gap_um"}.isdisjoint(nuisances(probe))
+    with pytest.raises(InputError, match="gap_um cannot change by itself"):
+        SimilarLevers(Lever(probe, COARSE)).equations(probe, ("gap_um",))
+    # what remains can move
+    SimilarLevers(Lever(probe, COARSE)).linearised(probe, REACH, None, tuple(nuisances(probe)))

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 from skfem import CellBasis, ElementTriP1, MeshTri
 from skfem.models.poisson import laplace
 
-from hotlever.errors import ComputationError
+from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout, Point
 from hotlever.probe.mesh import ON_LINE, ProbeMesh
 from hotlever.probe.shapes import Shape
@@ -43,14 +43,21 @@ class LayoutRate:
 
     @classmethod
     def of(cls, shape: Shape, name: str) -> LayoutRate:
-        """Return how a shape's layout changes with one of its dimensions."""
-        step = _STEP * getattr(shape, name)
-        # a heater as long as its gap can only become shorter
-        for signed in (step, -step):
-            later = shape.model_copy(update={name: getattr(shape, name) + signed}).layout()
-            if len(later.regions) == len(shape.layout().regions):
-                break
-        return cls(shape.layout(), later, signed)
+        """Return how a shape's layout changes with one of its dimensions.
+
+        Raises
+        ------
+        InputError
+            If parts would come apart.
+        """
+        now, step = shape.layout(), _STEP * getattr(shape, name)
+        later = shape.model_copy(update={name: getattr(shape, name) + step}).layout()
+        if len(later.regions) != len(now.regions):
+            raise InputError(
+                f"{name} cannot change by itself here: parts of the lever would come apart; "
+                "expected a fit or priors without it"
+            )
+        return cls(now, later, step)
 
     def of_point(self, now: Point, later: Point) -> Array:
         """Return the velocity of a place in the drawing, shape (2,)."""

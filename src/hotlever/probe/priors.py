@@ -120,7 +120,8 @@ class JointPrior:
 
 def nuisances(probe: Probe) -> list[str]:
     """Return the dimensions that matter to the tip."""
-    return [name for name in probe.shape.dimensions() if name not in _HARMLESS]
+    held = (*_HARMLESS, *probe.shape.tied())
+    return [name for name in probe.shape.dimensions() if name not in held]
 
 
 def default_priors(probe: Probe) -> dict[str, Prior]:

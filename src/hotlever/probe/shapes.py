@@ -35,6 +35,10 @@ class Shape(Record):
         """Return the dimensions (µm) that are given, by name."""
         return self.model_dump(exclude={"shape"}, exclude_none=True)
 
+    def tied(self) -> tuple[str, ...]:
+        """Return dimensions that cannot change by themselves, since parts would come apart."""
+        return ()
+
     @abstractmethod
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
@@ -185,6 +189,11 @@ class UShape(Shape):
             f"heater_length_um = {self.heater_length_um:g} must not exceed "
             f"gap_um = {self.gap_um:g}",
         )
+
+    def tied(self) -> tuple[str, ...]:
+        """Return gap and length of a heater that fills it."""
+        filled = self.heater_length_um == self.gap_um
+        return ("heater_length_um", "gap_um") if filled else ()
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
