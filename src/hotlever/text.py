@@ -34,6 +34,8 @@ def value_with_error(value: float, stderr: float | None, scale: float = 1.0) -> 
     error = stderr / scale
     largest = max(abs(value), error)
     if not _PLAIN[0] <= largest < _PLAIN[1]:
+        if error >= abs(value):
+            return f"{value:.2g} ± {error:.1g}"
         power = math.floor(math.log10(largest))
         return f"{value_with_error(value / 10.0**power, error / 10.0**power)}e{power:+03d}"
     # one digit of the error, two where the first is a 1

@@ -379,3 +379,16 @@ def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(lever, ref
     error = np.abs(both.table.tip_K - air.tip_temperature(both.table.power_mW))
     assert float((error / both.table.tip_stderr_K).max()) < 3.0
     assert both.probe.material.p == Probe.reference().material.p
+
+
+def test_priors_are_about_the_circuit_of_the_measurement(reference):
+    """Not about the probe file's, where they differ; also as text."""
+    circuit = Circuit(series_resistance_ohm=3000.0)
+    curve = measured_curve(reference, np.random.default_rng(7), circuit=circuit, to_V=7.5)
+    data = replace(measurement_of(curve), series_resistance_ohm=3000.0)
+    found = calibrate(data, priors={"dimensions": "± 2%"})
+    assert found.describes_data
+    assert found.priors["series_resistance_ohm"]["value"] == 3000.0
+    assert found.priors["length_um"]["spread"] == pytest.approx(0.02 * 54.4)
+    own = fit(data, priors={"series_resistance_ohm": "± 0.1%", "n_d": "± 15%"})
+    assert own.parameters["series_resistance_ohm"].value == pytest.approx(3000.0, rel=5e-3)

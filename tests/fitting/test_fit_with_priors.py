@@ -84,7 +84,7 @@ def test_the_shares_add_up_to_the_covariance(data):
 
 
 def test_priors_of_what_does_not_exist_or_is_fixed_are_refused(data):
-    with pytest.raises(InputError, match="unknown parameter 'heater_um'"):
+    with pytest.raises(InputError, match="priors: unknown prior 'heater_um'"):
         fit(data[0], NOMINAL, priors={"heater_um": Prior(1.0, 0.1)})
     with pytest.raises(InputError, match="n_d is fixed and has a prior"):
         FitOptions(fixed={"n_d": None}, priors={"n_d": Prior(5e17, 0.1)})

@@ -14,9 +14,9 @@ from hotlever.probe.priors import (
     JointPrior,
     Prior,
     default_priors,
+    known_beforehand,
     nuisances,
     priors_of,
-    stated_priors,
 )
 
 PROBE = Probe.reference()
@@ -75,10 +75,12 @@ def test_a_probe_file_states_priors_which_win_over_the_usual_ones(tmp_path):
     assert known["n_d"] == Prior(3.3e17, 0.10)
     assert known["length_um"].spread == 0.02
     assert known["p"].spread != 0.02
-    assert set(stated_priors(probe)) == {"n_d", *nuisances(probe)}
-    asked = {"n_d": Prior(4e17, 0.01)}
-    assert stated_priors(probe, asked)["n_d"] == asked["n_d"]
-    assert stated_priors(probe, {}) == {}
+    asked = {"n_d": Prior(4e17, 0.01), "gap_um": "± 1%"}
+    assert known_beforehand(probe, None) == known
+    both = known_beforehand(probe, asked)
+    assert (both["n_d"], both["gap_um"]) == (asked["n_d"], Prior(3.2, 0.01))
+    assert both["p"] == known["p"]
+    assert known_beforehand(probe, {}) == {}
     path.write_text(path.read_text().replace('n_d = "3', 'n_q = "3'))
     with pytest.raises(InputError, match=r"probe.toml: \[prior\]: unknown prior 'n_q'"):
         Probe.from_file(path)
@@ -118,3 +120,11 @@ def test_values_are_moved_in_whatever_section_they_are():
     moved = PROBE.moved({"n_d": 4e17, "gap_um": 3.0, "series_resistance_ohm": 5.0})
     assert moved == PROBE.with_(n_d=4e17, gap_um=3.0, series_resistance_ohm=5.0)
     np.testing.assert_array_equal(moved.at(["gap_um", "n_d"]), [3.0, 4e17])
+
+
+def test_a_prior_of_the_gas_counts_in_air_only():
+    texts = {"gas_conductivity": "± 5%"}
+    assert priors_of(texts, PROBE, "here") == {}
+    assert priors_of(texts, PROBE.in_medium("air"), "here") == {
+        "gas_conductivity": Prior(1.0, 0.05)
+    }

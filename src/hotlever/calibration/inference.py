@@ -7,21 +7,21 @@ is needed: a lever that was measured below it is less certain above, and that is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.plausibility import misfit
+from hotlever.errors import ComputationError
 from hotlever.fitting import Fit, FitOptions, Measurement
 from hotlever.fitting.estimation import Estimate, estimate
 from hotlever.lever import Branch
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameters_of
-from hotlever.probe.priors import JointPrior, Prior, default_priors
+from hotlever.probe.priors import JointPrior, Prior, known_beforehand
 from hotlever.types import Array, Progress
 
 #: Rows of the table.
@@ -111,7 +111,7 @@ def estimated(
     measured: Measurement,
     probe: Probe,
     fit: Fit | None = None,
-    priors: Mapping[str, Prior] | None = None,
+    priors: Mapping[str, Prior | str] | None = None,
     progress: Progress | None = None,
 ) -> Estimated:
     """Estimate a lever from its measurement.
@@ -123,8 +123,8 @@ def estimated(
         In the circuit and medium of the measurement.
     fit : Fit, optional
         Of this lever to other data, or to the same. Its data count, not what it made of them.
-    priors : mapping of str to Prior, optional
-        What is known beforehand; `default_priors` if left out. Dimensions without one are held.
+    priors : mapping of str to Prior or str, optional
+        In place of some of the usual ones; if empty there are none, and dimensions are held.
     progress : callable, optional
 
     Raises
@@ -132,20 +132,19 @@ def estimated(
     ComputationError
         If no lever near the probe has states at all measured biases.
     """
-    known = dict(default_priors(probe) if priors is None else priors)
+    known = known_beforehand(probe, priors)
     if fit is None:
         found = estimate(measured, probe, FitOptions(priors=known), progress=progress)
         return _put_together(found, measured, known)
     # the data of the fit tell more of its material than any prior
-    before = default_priors(fit.probe) if priors is None else known
+    before = known_beforehand(fit.probe, priors)
+    held = {name: prior for name, prior in before.items() if name not in PARAMETERS}
     options = FitOptions(
-        observables=fit.observables,
-        fixed=dict.fromkeys(fit.options.fixed),
-        priors=_chosen(before, lambda name: name in parameters_of(fit.probe).keys() - PARAMETERS),
+        observables=fit.observables, fixed=dict.fromkeys(fit.options.fixed), priors=held
     )
     found = estimate(fit.measurement, fit.probe, options, progress=progress)
     if _same_data(fit.measurement, measured):
-        return _put_together(found, measured, options.priors)
+        return _put_together(found, measured, held)
     # what that leaves of the lever itself is known before the other data; circuit and gas are
     # those of each measurement
     own = [name for name in found.options.varied if name not in _CIRCUIT]
@@ -153,17 +152,19 @@ def estimated(
     values = found.optimum.probe.at(own)
     joint = JointPrior(own, values, found.covariance[np.ix_(places, places)])
     probe = probe.moved(dict(zip(own, values.tolist(), strict=True)))
+    theirs = {name: prior for name, prior in known.items() if name in _CIRCUIT}
     again = FitOptions(
         fixed=options.fixed,
-        priors=_chosen(known, lambda name: name in _CIRCUIT),
+        priors=theirs,
         free=tuple(name for name in own if name not in PARAMETERS),
     )
-    found = estimate(measured, probe, again, joint=joint, progress=progress)
-    return _put_together(found, measured, {**options.priors, **again.priors})
-
-
-def _chosen(priors: Mapping[str, Prior], wanted: Callable[[str], bool]) -> dict[str, Prior]:
-    return {name: prior for name, prior in priors.items() if wanted(name)}
+    try:
+        found = estimate(measured, probe, again, joint=joint, progress=progress)
+    except ComputationError as error:
+        raise ComputationError(
+            f"no lever like the fitted one shows these data; is it another lever's fit? ({error})"
+        ) from error
+    return _put_together(found, measured, {**held, **theirs})
 
 
 def _same_data(one: Measurement, other: Measurement) -> bool:

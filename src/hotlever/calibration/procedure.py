@@ -37,7 +37,7 @@ def calibrate(
     fit: Fit | str | os.PathLike[str] | None = None,
     law: PowerLaw | None = None,
     medium: str | None = None,
-    priors: Mapping[str, Prior] | None = None,
+    priors: Mapping[str, Prior | str] | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
     """Find the tip temperature of a lever from its I-V curve.
@@ -60,8 +60,10 @@ def calibrate(
         What the lever is in; by default what the data file says, or else the fit or the probe.
         With vacuum for data from air the paper's rule is used: the temperatures that the probe has
         in vacuum, at k times the power.
-    priors : mapping of str to Prior, optional
-        What is known beforehand; what `hotlever.probe.priors.default_priors` gives if left out.
+    priors : mapping of str to Prior or str, optional
+        What is known beforehand, in place of some of the usual priors, such as
+        ``{"n_d": "3.3e17 ± 15%"}``; see `hotlever.probe.priors`. If empty there are none, and
+        dimensions are held.
     progress : callable, optional
         Called with solved branches and how many there usually are.
 
@@ -76,6 +78,8 @@ def calibrate(
         raise InputError("a fit, a probe and a power law exclude each other")
     if law is not None and medium not in (None, "vacuum"):
         raise InputError("a power law holds in vacuum; with one, leave the medium out")
+    if law is not None and priors is not None:
+        raise InputError("a power law takes no priors; a probe or a fit does")
     measured = Measurement.given(measurement)
     if fit is not None:
         fit = fit if isinstance(fit, Fit) else read_fit(fit)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from hotlever.calibration.calibration import Calibration
 
 #: Tip temperatures (K) at which the error budget is printed.
-_SHOWN = (400.0, 600.0, 800.0, 900.0, 1000.0, 1100.0, 1200.0)
+_SHOWN, _FEW = (400.0, 600.0, 800.0, 900.0, 1000.0, 1100.0, 1200.0), 4
 #: What each route rests on, in words.
 _BASIS = {
     "power law": "a given power law",
@@ -65,6 +65,13 @@ def _knee_lines(calibration: Calibration) -> list[str]:
         f"k = {value_with_error(calibration.k, calibration.k_stderr)} times the power of the knee "
         f"in vacuum, {law.threshold_mW:.3f} mW"
     )
+    if knee.measured and not calibration.knee_measured:
+        return [
+            f"knee, beyond the measured range: about {knee.lever_V:.2f} V, {knee.current_mA:.2f} "
+            f"mA, {knee.power_mW:.2f} mW at a bias of {knee.bias_V:.1f} V, tip "
+            f"{calibration.knee_tip_K:.0f} K",
+            factor,
+        ]
     if not knee.measured:
         power = value_with_error(knee.power_mW, knee.power_mW_stderr)
         return [f"knee (estimated): {power} mW, tip {calibration.knee_tip_K:.0f} K", factor]
@@ -103,11 +110,13 @@ def _budget_lines(calibration: Calibration) -> list[str]:
     tip = table.tip_K.values[known]
     rows = [[head.rjust(7) for head in ("T_tip (K)", "P_l (mW)", "± (K)", *sources)]]
     errors = [table.tip_stderr_K.values, *table.budget_K.values]
-    for shown in _SHOWN:
-        if tip[0] <= shown <= tip[-1]:
-            power = np.interp(shown, tip, table.power_mW.values[known])
-            kelvins = [f"{np.interp(shown, tip, error[known]):.1f}" for error in errors]
-            rows.append([f"{shown:.0f}", f"{power:.3f}", *kelvins])
+    inside = [shown for shown in _SHOWN if tip[0] <= shown <= tip[-1]]
+    if len(inside) < _FEW:  # a cold lever, or a short range
+        inside = np.linspace(tip[0], tip[-1], _FEW + 1)[1:].round(1).tolist()
+    for shown in inside:
+        power = np.interp(shown, tip, table.power_mW.values[known])
+        kelvins = [f"{np.interp(shown, tip, error[known]):.1f}" for error in errors]
+        rows.append([f"{shown:.0f}", f"{power:.3f}", *kelvins])
     return aligned(rows, right=True)
 
 
@@ -122,6 +131,7 @@ def _verdict(calibration: Calibration) -> str:
         "measurement": "less noise, or tip temperatures at some points, would help",
         "geometry": "better known dimensions would help (--prior dimensions=±2%)",
         "material": "a fit of this lever (--fit), or its tip temperatures, would know its material",
+        "fit": "more data for the fit would help",
         "air": "a fit in air would measure the loss to air",
         "k": "a finer measurement near the knee would help",
         "constant k": "--medium air would not assume a constant k",

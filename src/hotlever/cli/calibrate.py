@@ -40,7 +40,6 @@ def calibrate_command(
     from hotlever.calibration.power_law import read_power_law
     from hotlever.calibration.procedure import calibrate
     from hotlever.fitting import read_fit, read_measurement
-    from hotlever.probe.priors import default_priors
 
     given = {"--fit": fit_file, "--probe": probe_file, "--power-law": power_law}
     several = [name for name, path in given.items() if path is not None]
@@ -65,8 +64,7 @@ def calibrate_command(
             fit=fit,
             law=None if power_law is None else read_power_law(power_law),
             medium=medium,
-            # what is asked for wins over what is usual, but for none at all
-            priors={**default_priors(probe), **priors} if priors else priors,
+            priors=priors,
             progress=update,
         )
     note(*result.notes)

@@ -73,7 +73,6 @@ def fit_command(
     command again goes on where it was stopped.
     """
     from hotlever.fitting import FitOptions
-    from hotlever.probe.priors import stated_priors
 
     check_number("--samples", samples, 1, 1_000_000)
     check_number("--processes", processes, 1, 256)
@@ -85,10 +84,12 @@ def fit_command(
         raise InputError("--scheduler: expected several data files")
     chosen: Any = {"weights": weights, "medium": medium, "robust": robust, "drift": drift}
     probe = load_probe(probe_file)
+    given = parse_priors(prior, probe)
+    stated = {} if probe.prior is None else probe.prior.by_name
     options = FitOptions(
         observables=None if observables is None else observables.split(","),
         fixed=parse_values("--fix", fix, bare=True),
-        priors=stated_priors(probe, parse_priors(prior, probe)),
+        priors=stated if given is None else {**stated, **given} if given else {},
         **chosen,
     )
     if options.priors and (posterior or profiles):

@@ -16,7 +16,6 @@ from hotlever.files import Outputs
 
 if TYPE_CHECKING:
     from hotlever.probe import Probe
-    from hotlever.probe.priors import Prior
     from hotlever.types import Array
 
 #: Between these (V) a lever has a current that can be told from none, and no spark.
@@ -153,14 +152,14 @@ def parse_number(text: str, where: str) -> float:
     return value
 
 
-def parse_priors(texts: list[str] | None, probe: Probe) -> dict[str, Prior] | None:
-    """Parse ``NAME=VALUE±SPREAD``, by name; ``none`` alone is no prior at all, None if not given.
+def parse_priors(texts: list[str] | None, probe: Probe) -> dict[str, str] | None:
+    """Split and check ``NAME=VALUE±SPREAD``; ``none`` alone is no prior at all, nothing is None.
 
     Examples
     --------
     >>> from hotlever import Probe
-    >>> parse_priors(["thickness_um=0.40±0.02"], Probe.reference())["thickness_um"].spread
-    0.02
+    >>> parse_priors(["thickness_um=0.40±0.02"], Probe.reference())
+    {'thickness_um': '0.40±0.02'}
     """
     from hotlever.probe.priors import priors_of
 
@@ -176,7 +175,8 @@ def parse_priors(texts: list[str] | None, probe: Probe) -> dict[str, Prior] | No
         if name in pairs:
             raise InputError(f"--prior {name}: given twice, expected once")
         pairs[name] = value
-    return priors_of(pairs, probe, "--prior")
+    priors_of(pairs, probe, "--prior")
+    return pairs
 
 
 def check_number(option: str, value: float | None, least: float, most: float) -> None:

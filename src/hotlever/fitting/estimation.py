@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -26,10 +26,12 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameter_of
-from hotlever.probe.priors import JointPrior
+from hotlever.probe.priors import JointPrior, Prior, priors_of
 from hotlever.spieser2017 import RAMAN_ERROR_SHARE
 from hotlever.types import Array, Progress
 
+#: Standard error of a meter's scale, relative.
+_METERS = 1e-3
 #: Rise (K) from which a stated error tells the scale of a thermometer.
 _WARM_K = 100.0
 #: Where a lever as known before melts below the highest bias: the share of what it reaches that is
@@ -123,19 +125,21 @@ def estimate(
     """Find the parameters that priors and a measurement make most likely; see `fit`.
 
     A joint prior of several parameters takes the place of priors of their own. With priors the
-    temperatures may be wrong together, by the scale of their thermometer.
+    data of an observable may be wrong together, by the scale of their meter or thermometer.
     """
     began = time.perf_counter()
     measurement = Measurement.given(measurement)
     given = Probe.reference() if probe is None else Probe.given(probe)
     probe, notes = with_measured_circuit(given, measurement, options.medium)
-    for name in (*options.priors, *options.free):
+    for name in options.free:
         parameter_of(probe, name)
+    priors = priors_of(options.priors, probe, "priors")
+    options = replace(options, priors=priors)
     observables = _observables(options, measurement, probe, notes)
     # priors are in standard deviations, so the data must be too
     known = bool(options.priors) or joint is not None
     weights = "errors" if known else options.weights
-    shared = _thermometer_scale(measurement, observables) if known else {}
+    shared = _scales(measurement, observables) if known else {}
     residuals = Residuals(measurement, observables, weights, options.drift, shared=shared)
     if not known and residuals.size < len(options.varied):
         raise InputError(
@@ -149,10 +153,10 @@ def estimate(
     if len(names) > len(PARAMETERS) and isinstance(forward.fast, ReducedLever):
         # its modes are those of one geometry
         forward = replace(forward, fast=SimilarLevers(Lever(probe, COARSE)))
-    start = probe.moved({name: prior.value for name, prior in options.priors.items()})
+    start = probe.moved({name: prior.value for name, prior in priors.items()})
     attempts = _attempts(forward, options.held(start), options, residuals)
     try:
-        problem, optimum = _first_found(attempts, residuals, options, joint, progress)
+        problem, optimum = _first_found(attempts, residuals, options, priors, joint, progress)
     except BranchEndError as error:
         colder = _below(measurement, _SAFELY * error.bias_reached)
         if not known or colder is None:
@@ -160,7 +164,7 @@ def estimate(
         # a lever as known before would melt; what is measured below that tells a better one
         near = estimate(colder, probe, options, joint=joint, model=model).optimum.probe
         attempts = iter([(forward, near)])
-        problem, optimum = _first_found(attempts, residuals, options, joint, progress)
+        problem, optimum = _first_found(attempts, residuals, options, priors, joint, progress)
     seconds = time.perf_counter() - began
     return Estimate(problem, optimum, measurement, options, seconds, notes)
 
@@ -176,17 +180,24 @@ def _below(measurement: Measurement, bias: float) -> Measurement | None:
     return replace(measurement, **columns)
 
 
-def _thermometer_scale(measurement: Measurement, observables: Sequence[str]) -> dict[str, Array]:
-    """Return the error of a thermometer's scale, which all its temperatures have in common.
+def _scales(measurement: Measurement, observables: Sequence[str]) -> dict[str, Array]:
+    """Return the errors of the meters' and the thermometer's scales, which all data have in common.
 
-    As large, relative to their rise, as what the measurement states of each, or as the paper's.
+    The latter is as large, relative to the rise, as what the measurement states of each
+    temperature, or as the paper's.
     """
+    meters = {
+        name: _METERS * np.abs(measurement.observable(name))
+        for name in ("current", "reader")
+        if name in observables
+    }
     if "tip" not in observables:
-        return {}
+        return meters
     rise = measurement.tip_K - np.nanmin(measurement.tip_K)
     stated = measurement.tip_error_K / np.maximum(rise, _WARM_K)
     known = np.isfinite(stated).any()
-    return {"tip": rise * (float(np.nanmedian(stated)) if known else RAMAN_ERROR_SHARE)}
+    share = float(np.nanmedian(stated)) if known else RAMAN_ERROR_SHARE
+    return {**meters, "tip": share * rise}
 
 
 def _attempts(
@@ -210,6 +221,7 @@ def _first_found(
     attempts: Iterable[tuple[ForwardModel, Probe]],
     residuals: Residuals,
     options: FitOptions,
+    priors: Mapping[str, Prior],
     joint: JointPrior | None,
     progress: Progress | None,
 ) -> tuple[LeastSquares, Optimum]:
@@ -224,7 +236,7 @@ def _first_found(
     for forward, start in attempts:
         residuals.down[:] = 1.0
         problem = LeastSquares(
-            forward, residuals, start, options.varied, progress, None, options.priors, joint
+            forward, residuals, start, options.varied, progress, None, priors, joint
         )
         try:
             return problem, problem.solve_and_confirm(options.robust)

@@ -80,7 +80,7 @@ class Nearby:
 
     At a fixed tip temperature, voltages and currents are nearly powers of the parameters, much
     more so than anything is at a fixed bias. What they change by at the branch's states,
-    `by_parameter`, has the shape (k, 3, p).
+    ``by_parameter``, has the shape (k, 3, p).
     """
 
     def __init__(
@@ -197,7 +197,7 @@ class ForwardModel:
 
     The full lever corrects the fast one, unless it is None. What is predicted depends on the
     probe alone: correcting the model makes another one. Derivatives are by `names`, and are
-    corrected too if `first_order`.
+    corrected too if ``first_order``.
     """
 
     fast: BranchSolver

@@ -37,9 +37,9 @@ class FitOptions:
         Let the zeros of I_h and V_r lie on straight lines over the order of the rows.
     medium : {"vacuum", "air"}, optional
         What the lever was measured in; wins over measurement and probe.
-    priors : mapping of str to Prior
-        What is known before, of parameters of the material, dimensions or the circuit; all that
-        have a prior are varied.
+    priors : mapping of str to Prior or str
+        What is known before, of parameters of the material, dimensions or the circuit, also as text
+        (`hotlever.probe.priors`); all that have a prior are varied.
     free : sequence of str
         What else is varied beside the material.
 
@@ -55,7 +55,7 @@ class FitOptions:
     weights: Weights = "maximum"
     drift: bool = False
     medium: Medium | None = None
-    priors: Mapping[str, Prior] = field(default_factory=dict)
+    priors: Mapping[str, Prior | str] = field(default_factory=dict)
     free: Sequence[str] = ()
 
     def __post_init__(self) -> None:

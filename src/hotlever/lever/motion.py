@@ -60,7 +60,7 @@ class Motion:
     def of_fluxes(self, fields: Fields, fluxes: Fluxes, kappa: Array, sigma: Array) -> Fluxes:
         """Return how fluxes change with the dimension, conductivities (points, n) being the same.
 
-        The heat source is −σ |∇V|².
+        The heat source is ``−σ |∇V|²``.
         """
         grad_T, grad_V = self.strained(fields.grad_T), self.strained(fields.grad_V)
         made = 2.0 * sigma * (fields.grad_V * grad_V).sum(axis=0)

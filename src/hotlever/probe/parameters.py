@@ -15,8 +15,10 @@ if TYPE_CHECKING:
 _LEAST, _MOST = 0.5, 1.5
 
 
-def parameters_of(probe: Probe) -> dict[str, Parameter]:
+def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Parameter]:
     """Return all that a fit may vary, by name: first the material's parameters.
+
+    With `anywhere`, what counts in other surroundings only as well.
 
     Examples
     --------
@@ -37,7 +39,7 @@ def parameters_of(probe: Probe) -> dict[str, Parameter]:
         found[name] = Parameter(
             name, "R_s", "Ω", value, _LEAST * value, _MOST * value, meaning[name]
         )
-    if probe.surroundings.medium == "air":
+    if anywhere or probe.surroundings.medium == "air":
         name, value = "gas_conductivity", probe.surroundings.gas_conductivity
         meaning = probe.surroundings.description()
         found[name] = Parameter(

@@ -147,22 +147,27 @@ def default_priors(probe: Probe) -> dict[str, Prior]:
         for (name, spread), value in zip(spreads.items(), values, strict=True)
         if value > 0
     }
-    return found | stated_priors(probe)
+    stated = {} if probe.prior is None else probe.prior.by_name
+    return found | priors_of(stated, probe, "[prior]")
 
 
-def stated_priors(probe: Probe, asked: Mapping[str, Prior] | None = None) -> dict[str, Prior]:
-    """Return the priors that a probe file states, and those asked for, which win.
+def known_beforehand(probe: Probe, stated: Mapping[str, Prior | str] | None) -> dict[str, Prior]:
+    """Return the usual priors, with those stated in their place; none at all for an empty mapping.
 
-    None at all if an empty mapping is asked for.
+    Raises
+    ------
+    InputError
+        See `priors_of`.
     """
-    if asked is not None and not asked:
+    if stated is not None and not stated:
         return {}
-    stated = {} if probe.prior is None else priors_of(probe.prior.by_name, probe, "[prior]")
-    return {**stated, **(asked or {})}
+    return default_priors(probe) | priors_of(stated or {}, probe, "priors")
 
 
-def priors_of(texts: Mapping[str, str], probe: Probe, where: str) -> dict[str, Prior]:
-    """Return priors that are written as text.
+def priors_of(stated: Mapping[str, Prior | str], probe: Probe, where: str) -> dict[str, Prior]:
+    """Return priors of which some are written as text.
+
+    What does not count in the probe's surroundings is left out.
 
     Raises
     ------
@@ -175,23 +180,26 @@ def priors_of(texts: Mapping[str, str], probe: Probe, where: str) -> dict[str, P
     >>> priors_of({"n_d": "3.3e17 ± 15%"}, Probe.reference(), "here")["n_d"]
     Prior(value=3.3e+17, spread=0.15, relative=True)
     """
-    known, found = parameters_of(probe), {}
-    for name, text in texts.items():
+    known, found = parameters_of(probe, anywhere=True), dict[str, Prior]()
+    for name, text in stated.items():
         if name not in known and name != ALL_DIMENSIONS:
             raise unknown_name("prior", name, [*known, ALL_DIMENSIONS], where)
+        if isinstance(text, Prior):
+            found[name] = text
+            continue
         value, spread, relative = _parsed(text, f"{where}: {name}")
         if name == ALL_DIMENSIONS:
             if value is not None or not relative:
                 raise InputError(f"{where}: {name} = '{text}', expected a share such as '± 5%'")
             # those that are named have their own
-            some = [one for one in nuisances(probe) if one not in texts]
+            some = [one for one in nuisances(probe) if one not in stated]
         else:
             some = [name]
         for one, own in zip(some, probe.at(some).tolist(), strict=True):
             found[one] = Prior(own if value is None else value, spread, relative)
             if relative and found[one].value <= 0:
                 raise InputError(f"{where}: {one}: a relative spread needs a value above 0")
-    return found
+    return {name: prior for name, prior in found.items() if name in parameters_of(probe)}
 
 
 def _parsed(text: str, where: str) -> tuple[float | None, float, bool]:
