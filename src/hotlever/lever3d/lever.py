@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_matrix
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from skfem.element import ElementTetP2
 
 from hotlever.cache import cache_file, store_arrays, stored
@@ -228,7 +228,7 @@ def surface_nodes(of_silicon: FiniteElements, air: OpenAir) -> Index:
     ComputationError
         If the two meshes do not match.
     """
-    away, nodes = cKDTree(of_silicon.nodes.T).query(air.sites)
+    away, nodes = KDTree(of_silicon.nodes.T).query(air.sites)
     if away.max() > _SAME_UM:
         raise ComputationError("the air does not touch the silicon node by node")
     return np.asarray(nodes)
