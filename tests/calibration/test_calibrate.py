@@ -172,7 +172,7 @@ def test_a_power_law_is_used_by_the_paper_s_rule(calibrated, lever_3):
         ({"current_mA": 1e3}, r"is the current given in µA"),
         ({"current_mA": 1e-3}, r"is the current given in A"),
         ({"current_mA": 7.0}, r"series resistance left out"),
-        ({"current_mA": 0.2}, r"is the doping lower"),
+        ({"current_mA": 0.2}, r"rather 33\.\d kΩ, the doping lower, or a terminal open"),
     ],
 )
 def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
@@ -319,7 +319,12 @@ def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
     content = json.loads((tmp_path / "cal.json").read_text())
     assert content["k"] == pytest.approx(1.0, abs=1e-6)
     # the data of the fit are those calibrated, and know the material
-    assert set(content["uncertainty_budget_K"]) == {"measurement", "electronics", "geometry"}
+    assert set(content["uncertainty_budget_K"]) == {
+        "measurement",
+        "electronics",
+        "geometry",
+        "material",
+    }
     assert content["priors"]["heater_length_um"]["spread"] == pytest.approx(0.04)
     assert content["tip_temperature_uncertainty_K"] < 40
     assert (tmp_path / "t.csv").read_text().startswith("bias_V,lever_V,current_mA,power_mW,tip_K")

@@ -55,7 +55,11 @@ def test_dimensions_are_all_that_are_not_named():
         ({"n_d": "±" * 1000}, "expected a value and its spread"),
         ({"nd": "± 5%"}, "unknown prior 'nd'.*did you mean 'n_d'"),
         ({"dimensions": "3 ± 1%"}, "expected a share such as"),
-        ({"a1": "-1e-6 ± 5%"}, "a relative spread needs a value above 0"),
+        ({"a1": "0 ± 5%"}, "a relative spread needs a value above 0"),
+        ({"a1": "-1e-6 ± 1e-7"}, "expected a value from 0 to 1e-05"),
+        ({"thickness_um": "4e19 ± 5%"}, "thickness_um = 4e.19, expected a value from 0.2 to 0.6"),
+        ({"thickness_um": "0.4 ± 1e-300"}, "a spread of 2.5e-300 times the value"),
+        ({"n_d": "± 1e300%"}, "a spread of inf times the value"),
     ],
 )
 def test_what_is_no_prior_gets_one_line(texts, message):

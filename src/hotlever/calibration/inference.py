@@ -21,13 +21,15 @@ from hotlever.lever import Branch
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
-from hotlever.probe.priors import JointPrior, Prior, known_beforehand
+from hotlever.probe.priors import JointPrior, Prior, known_beforehand, priors_of, published_material
 from hotlever.types import Array, Progress
 
 #: Rows of the table.
 _ROWS = 101
 #: By which source of error a parameter counts.
 _CIRCUIT = {"series_resistance_ohm": "electronics", "gas_conductivity": "air"}
+#: Data that are enough to tell which of them are outliers.
+_ENOUGH = 15
 #: How far (standard errors) along each axis of the estimate the knee is looked at.
 _ASIDE = 0.5
 
@@ -93,7 +95,9 @@ class Estimated:
         origin, circuit = at.probe.at(known), self.probe.circuit
         places = [known.index(name) for name in found.options.varied]
         changes = []
-        for axis in np.linalg.cholesky(found.covariance).T:
+        scale = np.sqrt(np.diag(found.covariance))
+        variances, axes = np.linalg.eigh(found.covariance / np.outer(scale, scale))
+        for axis in (axes * np.sqrt(np.maximum(variances, 0.0)) * scale[:, None]).T:
             ends = []
             for way in (_ASIDE, -_ASIDE):
                 moved = origin.copy()
@@ -134,13 +138,15 @@ def estimated(
     """
     known = known_beforehand(probe, priors)
     if fit is None:
-        found = estimate(measured, probe, FitOptions(priors=known), progress=progress)
+        options = FitOptions(priors=known, robust=_robust(measured))
+        found = estimate(measured, probe, options, progress=progress)
         return _put_together(found, measured, known)
-    # the data of the fit tell more of its material than any prior
-    before = known_beforehand(fit.probe, priors)
-    held = {name: prior for name, prior in before.items() if name not in PARAMETERS}
+    held = _before(fit, priors)
     options = FitOptions(
-        observables=fit.observables, fixed=dict.fromkeys(fit.options.fixed), priors=held
+        observables=fit.observables,
+        fixed=dict.fromkeys(fit.options.fixed),
+        priors=held,
+        robust=_robust(fit.measurement),
     )
     found = estimate(fit.measurement, fit.probe, options, progress=progress)
     if _same_data(fit.measurement, measured):
@@ -156,6 +162,7 @@ def estimated(
     again = FitOptions(
         fixed=options.fixed,
         priors=theirs,
+        robust=_robust(measured),
         free=tuple(name for name in own if name not in PARAMETERS),
     )
     try:
@@ -167,15 +174,33 @@ def estimated(
     return _put_together(found, measured, {**held, **theirs})
 
 
+def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Prior]:
+    """Return what was known of a lever before it was fitted.
+
+    The probe of a fit has the material that was found, so that this is no prior of its own.
+    """
+    before = known_beforehand(fit.probe, priors)
+    if not before:
+        return before
+    asked = priors_of({**fit.options.priors, **(priors or {})}, fit.probe, "priors")
+    known = before | published_material() | asked
+    return {name: prior for name, prior in known.items() if name not in fit.options.fixed}
+
+
+def _robust(measured: Measurement) -> bool:
+    """Whether there are enough data to tell which of them are outliers."""
+    return int(np.isfinite(measured.current_mA).sum()) >= _ENOUGH
+
+
 def _same_data(one: Measurement, other: Measurement) -> bool:
     same = np.array_equal(one.bias_V, other.bias_V, equal_nan=True)
     return same and np.array_equal(one.current_mA, other.current_mA, equal_nan=True)
 
 
 def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Prior]) -> Estimated:
-    best = found.optimum.probe
+    best, residuals = found.optimum.probe, found.problem.residuals
     present = measured.bias_V[np.isfinite(measured.current_mA) & (measured.bias_V > 0)]
-    highest = float(found.problem.residuals.bias.max())
+    highest = float(residuals.bias.max())
     bias = np.linspace(present.min(), min(present.max(), highest), _ROWS)
     predicted = found.predicted(bias)
     slopes = found.slopes(predicted)[list(OBSERVABLES).index("tip")]
@@ -198,8 +223,8 @@ def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Pr
         tip_K=predicted.values[2],
         parts={source: np.sqrt(variance) for source, variance in parts.items()},
         priors=use,
-        reason=misfit(found.problem.residuals, found.optimum.prediction.values, use),
-        notes=found.notes,
+        reason=misfit(residuals, found.optimum.prediction.values, use),
+        notes=[*found.notes, *residuals.suspicious(found.optimum.prediction.values, robust=True)],
         _estimate=found,
     )
 

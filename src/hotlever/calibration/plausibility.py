@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import chdtrc
 
 from hotlever.errors import InputError
 from hotlever.fitting.measurement import Measurement
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 #: The resistance of a cold lever is within this factor of its model's.
 _WITHIN = 2.5
 #: Data are not described where they scatter about the model by more than this share of the largest,
-#: and neighbours together; or where a parameter is so many standard deviations from its prior.
-_SCATTER, _TOGETHER, _FAR = 0.004, 0.6, 4.5
+#: and neighbours together; or where parameters are as far from their priors as one lever in 500 is.
+_SCATTER, _TOGETHER, _UNLIKELY = 0.004, 0.6, 2e-3
 
 
 def check_plausible(measured: Measurement, probe: Probe) -> None:
@@ -54,15 +55,21 @@ def check_plausible(measured: Measurement, probe: Probe) -> None:
 
 def _cause(found: float, lever: float, series: float) -> str:
     """Return the likeliest cause of a resistance (kΩ) that is not the lever's."""
-    for factor, unit in ((1e3, "A"), (1e-3, "µA")):
+    for factor, units in (
+        (1e3, "the current given in A, or the bias in mV"),
+        (1e-3, "the current given in µA, or the bias in kV"),
+    ):
         if 1 / _WITHIN < found / factor / (lever + series) < _WITHIN:
-            return f"is the current given in {unit}?"
+            return f"is {units}, by their headings?"
     if 1 / _WITHIN < found / lever < _WITHIN:
         return "is the series resistance left out, or is V_b the lever's own voltage?"
     if found <= series:
-        return "is the series resistance smaller than stated?"
+        return "is the series resistance smaller than stated, or are columns swapped?"
     if found / (lever + series) > 1:
-        return "is the doping lower, or a terminal open?"
+        return (
+            f"is the series resistance rather {found - lever:.3g} kΩ, the doping lower, or a "
+            "terminal open?"
+        )
     return "is the doping higher, or another part in parallel?"
 
 
@@ -82,11 +89,14 @@ def misfit(residuals: Residuals, values: np.ndarray, priors: Mapping[str, PriorU
                 f"{name} differs by {rms:.1%} of its largest value (rms), and not at random; most "
                 f"at {residuals.bias[worst]:.3g} V"
             )
-    for name, use in priors.items():
-        away = abs(use.posterior_value - use.value) / use.spread
-        if away > _FAR:
-            return (
-                f"{name} had to be moved by {away:.1f} standard deviations of what was known of "
-                f"it, from {use.value:.4g} to {use.posterior_value:.4g}"
-            )
+    away = {name: (use.posterior_value - use.value) / use.spread for name, use in priors.items()}
+    # as many are free to be away as the data tell of
+    told = sum(1.0 - (use.posterior_spread / use.spread) ** 2 for use in priors.values())
+    if told > 0 and chdtrc(told, sum(one**2 for one in away.values())) < _UNLIKELY:
+        most = sorted(away, key=lambda name: -abs(away[name]))[:3]
+        moved = ", ".join(f"{name} by {away[name]:+.1f} σ" for name in most)
+        return (
+            f"what was known beforehand would have to be wrong by too much together, {moved}; is "
+            "it another lever, medium or resistor?"
+        )
     return ""

@@ -47,9 +47,13 @@ def calibration_text(calibration: Calibration) -> str:
         f"sure to ± {stated:.0f} K (standard error, largest in the table): {_verdict(calibration)}",
     ]
     if not calibration.describes_data:
-        said = f"no lever like this one shows these data: {calibration.reason}"
-        lines[0:] = [said, "what follows is what comes nearest, and its errors do not hold", *lines]
-        del lines[-1]
+        # no errors are shown, since they would not hold
+        lines = [
+            f"no lever like this one shows these data: {calibration.reason}",
+            f"what comes nearest is {lines[0]}:",
+            *_knee_lines(calibration)[:1],
+            *_prior_lines(calibration)[:1],
+        ]
     if np.isfinite(calibration.measured_rms_K):
         lines.append(
             f"the measured tip temperatures differ by {calibration.measured_rms_K:.1f} K (rms)"

@@ -36,7 +36,7 @@ _METERS = 1e-3
 _WARM_K = 100.0
 #: Where a lever as known before melts below the highest bias: the share of what it reaches that is
 #: fitted first, and the rows that are enough for that.
-_SAFELY, _FEWEST = 0.9, 5
+_SAFELY, _FEWEST = 0.9, 3
 
 
 def fit(
@@ -159,8 +159,13 @@ def estimate(
         problem, optimum = _first_found(attempts, residuals, options, priors, joint, progress)
     except BranchEndError as error:
         colder = _below(measurement, _SAFELY * error.bias_reached)
-        if not known or colder is None:
+        if not known:
             raise
+        if colder is None:
+            raise ComputationError(
+                f"no lever near this one, as it is known beforehand, reaches the data: {error}; is "
+                "the series resistance, the drawing or a prior wrong?"
+            ) from error
         # a lever as known before would melt; what is measured below that tells a better one
         near = estimate(colder, probe, options, joint=joint, model=model).optimum.probe
         attempts = iter([(forward, near)])
@@ -174,8 +179,10 @@ def _below(measurement: Measurement, bias: float) -> Measurement | None:
     here = measurement.bias_V < bias
     if here.all() or here.sum() < _FEWEST:
         return None
-    columns = {
-        name: values[here] for name, values in vars(measurement).items() if np.ndim(values) == 1
+    columns: Any = {
+        name: values[here]
+        for name, values in vars(measurement).items()
+        if isinstance(values, np.ndarray)
     }
     return replace(measurement, **columns)
 

@@ -52,6 +52,8 @@ _MOST_REWEIGHTINGS = 20
 _LEAST_FREE = 0.05
 #: Rounds in which an observable without measurement errors finds its scatter.
 _SCATTER_TURNS = 3
+#: Scatter that is usual, as a share of the largest value.
+_USUAL = 1e-3
 
 
 @dataclass(frozen=True)
@@ -157,8 +159,8 @@ class LeastSquares:
                 if at_first
                 else np.clip(1.0 - (size / _TUKEY) ** 2, 0.0, None)
             )
-            # outliers can drive the first fit onto a bound, where it would stay
-            origin = self._start if at_first else found.probe
+            # outliers can drive the first fit onto a bound, where it would stay without priors
+            origin = self._start if at_first and not self._informed else found.probe
             previous, found = found, self.solve(origin)
             if not at_first and self._settled(previous, found):
                 break
@@ -224,7 +226,7 @@ class LeastSquares:
         at = found.prediction
         for _ in range(_SCATTER_TURNS):
             values, slopes = at.nearby.predict(found.probe.at(self.model.names))
-            self.residuals.take_scatter(values, self._used_up(found.probe, slopes))
+            self.residuals.take_scatter(values, self._used_up(found.probe, slopes), _USUAL)
             found = self._round(at, far)
         return found
 

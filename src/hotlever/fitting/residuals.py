@@ -158,13 +158,18 @@ class Residuals:
         floor = 1e-4 * self.largest
         return np.nan_to_num(difference / np.maximum(scatter, floor))
 
-    def take_scatter(self, values: Array, used_up: Array | float = 0.0) -> None:
+    def take_scatter(self, values: Array, used_up: Array | float = 0.0, usual: float = 0.0) -> None:
         """Give observables without measurement errors their scatter about a prediction.
 
-        Of their degrees of freedom a fit has used up some, (observables, 1).
+        Of their degrees of freedom a fit has used up some, (observables, 1). Outliers count as
+        little as they weigh. The `usual` scatter, a share of the largest value, counts as one
+        datum more: a few data say little of their own.
         """
-        squares = np.nansum(self.difference(values) ** 2, axis=1, keepdims=True)
-        count = self.present.sum(axis=1, keepdims=True)
+        weight = np.where(self.present, self.down**2, 0.0)
+        squares = np.nansum(weight * self.difference(values) ** 2, axis=1, keepdims=True)
+        count = weight.sum(axis=1, keepdims=True)
+        if usual:
+            squares, count = squares + (usual * self.largest) ** 2, count + 1.0
         rms = np.sqrt(squares / np.maximum(count - used_up, 1.0))
         scatter = np.maximum(rms, 1e-6 * self.largest)
         self._scale = np.where(self.without_errors[:, None], scatter, self._scale)

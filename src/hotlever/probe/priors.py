@@ -17,6 +17,8 @@ import numpy as np
 from pydantic import ConfigDict
 
 from hotlever.errors import InputError, unknown_name
+from hotlever.materials import PARAMETERS
+from hotlever.materials.material import Parameter
 from hotlever.probe.parameters import parameters_of
 from hotlever.records import Record
 from hotlever.spieser2017 import published
@@ -37,6 +39,8 @@ _DOPING = 0.15
 #: Dimensions that do not matter to the tip.
 _HARMLESS = ("reader_length_um", "reader_centre_um")
 ALL_DIMENSIONS = "dimensions"
+#: Relative spreads that mean something.
+_LEAST, _MOST = 1e-6, 10.0
 _TEXT = re.compile(r"([^±]{0,40})±([^±]{1,40})")
 
 
@@ -124,6 +128,20 @@ def nuisances(probe: Probe) -> list[str]:
     return [name for name in probe.shape.dimensions() if name not in held]
 
 
+def published_material() -> dict[str, Prior]:
+    """Return what is known of the material of any lever: the published ones, and their scatter.
+
+    Half as much again as that of the four levers, which are of one wafer.
+    """
+    known = [published(name).material for name in SCATTER_OF]
+    logarithms = np.log([[getattr(material, name) for name in PARAMETERS] for material in known])
+    means, scatter = logarithms.mean(axis=0), logarithms.std(axis=0, ddof=1)
+    return {
+        name: Prior(float(np.exp(mean)), float(_WIDENED * spread))
+        for name, mean, spread in zip(PARAMETERS, means, scatter, strict=True)
+    }
+
+
 def default_priors(probe: Probe) -> dict[str, Prior]:
     """Return what is known of a lever of which nothing but the probe file is known.
 
@@ -131,10 +149,7 @@ def default_priors(probe: Probe) -> dict[str, Prior]:
     again; the doping is nominal within 15 %, dimensions are within 5 %, the series resistance
     within 0.1 %; what air takes up is known to 10 %. What the probe file states wins.
     """
-    known = [published(name).material for name in SCATTER_OF]
-    names = [name for name in parameters_of(probe) if name in type(probe.material).model_fields]
-    logarithms = np.log([[getattr(material, name) for name in names] for material in known])
-    spreads = dict(zip(names, _WIDENED * logarithms.std(axis=0, ddof=1), strict=True))
+    spreads = {name: prior.spread for name, prior in published_material().items()}
     spreads["n_d"] = _DOPING
     spreads |= dict.fromkeys(nuisances(probe), _DIMENSIONS)
     if probe.circuit.series_resistance_ohm > 0:
@@ -197,9 +212,24 @@ def priors_of(stated: Mapping[str, Prior | str], probe: Probe, where: str) -> di
             some = [name]
         for one, own in zip(some, probe.at(some).tolist(), strict=True):
             found[one] = Prior(own if value is None else value, spread, relative)
-            if relative and found[one].value <= 0:
-                raise InputError(f"{where}: {one}: a relative spread needs a value above 0")
+            _check(found[one], known[one], f"{where}: {one}")
     return {name: prior for name, prior in found.items() if name in parameters_of(probe)}
+
+
+def _check(prior: Prior, known: Parameter, where: str) -> None:
+    """Refuse a prior outside what a parameter can be, or with a spread that means nothing."""
+    if not known.lower <= prior.value <= known.upper:
+        raise InputError(
+            f"{where} = {prior.value:g}, expected a value from {known.lower:g} to {known.upper:g} "
+            f"{known.unit}"
+        )
+    if prior.relative and prior.value == 0:
+        raise InputError(f"{where}: a relative spread needs a value above 0")
+    share = prior.absolute / abs(prior.value or known.scale)
+    if not _LEAST <= share <= _MOST:
+        raise InputError(
+            f"{where}: a spread of {share:.2g} times the value, expected {_LEAST:g} to {_MOST:g}"
+        )
 
 
 def _parsed(text: str, where: str) -> tuple[float | None, float, bool]:
