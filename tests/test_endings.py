@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from hotlever.cli import commands, main
+from hotlever.cli import commands, main, running
 from hotlever.cli.output import note, progress
 
 COMMAND = [sys.executable, "-c", "from hotlever.cli import main; main()"]
@@ -218,3 +218,11 @@ def test_every_command_is_registered():
     with pytest.raises(SystemExit) as ended:
         main(["--version"])
     assert ended.value.code == 0
+
+
+def test_what_a_stopped_import_says_is_not_an_internal_error(monkeypatch):
+    """A compiled module whose initialisation is interrupted raises ImportError instead."""
+    error = ImportError("initialization failed")
+    assert "internal error" in running._ended(error, [])[1]
+    monkeypatch.setattr(running, "_received", [signal.SIGINT])
+    assert running._ended(error, []) == (1, "stopped by the user")

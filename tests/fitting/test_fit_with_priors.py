@@ -60,6 +60,9 @@ def test_a_fit_with_priors_is_read_back_whole(found, tmp_path):
     assert again.options.priors == found.options.priors
     assert repr(again) == repr(found)
     assert "heater_length_um" in repr(again)
+    use = again.content()["priors"]["heater_length_um"]
+    assert (use["value"], use["spread"]) == (4.0, pytest.approx(0.2))
+    assert use["posterior_value"] == found.parameters["heater_length_um"].value
 
 
 def test_a_narrow_prior_is_a_fixed_parameter(data):

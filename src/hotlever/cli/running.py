@@ -13,14 +13,17 @@ import sys
 import tempfile
 import traceback
 from contextlib import suppress
+from types import FrameType
 from typing import NoReturn
 
 from hotlever import __version__
 from hotlever.cli.output import fail, give
 from hotlever.errors import HotleverError
 
-#: Signals that end a command as Ctrl-C does.
-_STOPS = ("SIGTERM", "SIGHUP")
+#: Signals that end a command, and those that have come: a compiled module that is stopped while
+#: it is imported says something else.
+_STOPS = ("SIGINT", "SIGTERM", "SIGHUP")
+_received: list[int] = []
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:
@@ -31,8 +34,9 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     for name in _STOPS:
         number = getattr(signal, name, None)
         # nohup, for one, has a command ignore a signal
-        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
-            signal.signal(number, signal.default_int_handler)
+        usual = (signal.SIG_DFL, signal.default_int_handler)
+        if number is not None and signal.getsignal(number) in usual:
+            signal.signal(number, _stop)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             # a terminal in Latin-1 has no κ, and a file name need not be text
@@ -43,6 +47,11 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         status, message = _ended(error, arguments)
         fail(message)
     sys.exit(status)
+
+
+def _stop(number: int, _: FrameType | None) -> NoReturn:
+    _received.append(number)
+    raise KeyboardInterrupt
 
 
 def _keep_to_ourselves() -> None:
@@ -77,7 +86,7 @@ def _ended(error: BaseException, arguments: list[str]) -> tuple[int, str]:
     """Return exit status and message for what ended a command."""
     if isinstance(error, HotleverError):
         return error.exit_status, str(error)
-    if isinstance(error, KeyboardInterrupt):
+    if isinstance(error, KeyboardInterrupt) or (_received and not isinstance(error, SystemExit)):
         return 1, "stopped by the user"
     if isinstance(error, BrokenPipeError):
         # the reader of our standard output has gone (`| head`): nothing left to say to it
