@@ -83,13 +83,14 @@ def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
     with figure(1.2 + 0.52 * count, 0.6 + 0.52 * count) as (made, axes):
         image = axes.imshow(correlation, cmap="PuOr", vmin=-1, vmax=1)
         symbols = [parameter_named(name).symbol for name in names]
-        axes.set_xticks(range(count), symbols)
+        # names of dimensions are long
+        axes.set_xticks(range(count), symbols, rotation=90 if max(map(len, symbols)) > 4 else 0)
         axes.set_yticks(range(count), symbols)
         axes.grid(False)
         for (row, column), value in np.ndenumerate(correlation):
             colour = "white" if abs(value) > 0.7 else "black"
             place: Any = {"ha": "center", "va": "center", "fontsize": 7.5}
-            axes.text(column, row, f"{value:.2f}", color=colour, **place)
+            axes.text(column, row, f"{round(value, 2) + 0.0:.2f}", color=colour, **place)
         made.colorbar(image, label="correlation (1)", shrink=0.9)
     return made
 
