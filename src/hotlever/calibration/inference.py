@@ -79,8 +79,14 @@ class Estimated:
     notes: list[str]
     _estimate: Estimate
 
+    @property
+    def branch(self) -> Branch:
+        """The lever as far as it was measured, corrected by the full model."""
+        at = self._estimate.optimum.prediction
+        return at.nearby.branch_at(at.probe.at(self._estimate.problem.model.names))
+
     def knee_of(self, branch: Branch) -> Knee:
-        """Return the knee that the estimated lever has, with standard errors; NaN without one."""
+        """Return the knee of a branch of this lever, with standard errors; NaN without one."""
         if branch.knee is None:
             return Knee()
         point, circuit = branch.knee, self.probe.circuit

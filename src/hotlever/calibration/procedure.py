@@ -20,6 +20,7 @@ from hotlever.errors import InputError
 from hotlever.fitting import Fit, Measurement, read_fit
 from hotlever.fitting.estimation import with_measured_circuit
 from hotlever.lever import Branch, Lever
+from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
 from hotlever.types import Array, Progress
@@ -99,17 +100,23 @@ def calibrate(
 def _by_estimate(
     measured: Measurement, found: Estimated, route: str, notes: list[str]
 ) -> Calibration:
-    lever = Lever(found.probe)
-    own = lever.branch()
-    vacuum = own if lever.medium == "vacuum" else lever.in_medium("vacuum").branch()
-    knee = found.knee_of(own)
+    lever, measured_part = Lever(found.probe.in_medium("vacuum"), COARSE), found.branch
+    vacuum, medium = lever.branch(), found.probe.surroundings.medium
+    # beyond the measured range a coarse lever says where the knee is
+    own = measured_part
+    if own.knee is None:
+        own = vacuum if medium == "vacuum" else lever.in_medium(medium).branch()
+    knee, threshold = found.knee_of(own), vacuum.knee
     k = k_stderr = float("nan")
-    if own.knee is not None and vacuum.knee is not None:
-        # in vacuum the law is that of the lever itself
-        k = own.knee.power_mW / vacuum.knee.power_mW
-        k_stderr = 0.0 if own is vacuum else k * knee.power_mW_stderr / knee.power_mW
+    if own.knee is None or threshold is None:
+        notes = [*notes, f"the model has no knee below {vacuum.hottest_K:.0f} K; none is needed"]
+    elif medium == "vacuum":
+        # the law is that of the lever itself
+        k, k_stderr, threshold = 1.0, 0.0, own.knee
     else:
-        notes = [*notes, f"the model has no knee below {own.hottest_K:.0f} K; none is needed"]
+        k = own.knee.power_mW / threshold.power_mW
+        k_stderr = k * knee.power_mW_stderr / knee.power_mW
+    law, residual = _law_of(vacuum, None if threshold is None else threshold.power_mW)
     circuit = found.probe.circuit
     shown = circuit.power(measured.bias_V, measured.current_mA)
     return _calibration(
@@ -118,14 +125,14 @@ def _by_estimate(
         found.tip_K,
         found.parts,
         route=route,
-        medium=lever.medium,
-        power_law=(law := _law_of(vacuum))[0],
-        law_residual_K=law[1],
+        medium=medium,
+        power_law=law,
+        law_residual_K=residual,
         k=k,
         k_stderr=k_stderr,
         knee=knee,
         knee_tip_K=float("nan") if own.knee is None else own.knee.tip_K,
-        measured_rms_K=_rms(measured.tip_K - own.tip_temperature(shown)),
+        measured_rms_K=_rms(measured.tip_K - measured_part.tip_temperature(shown)),
         probe=found.probe,
         measurement=measured,
         priors={name: vars(use) for name, use in found.priors.items()},
@@ -152,7 +159,7 @@ def _by_rule(
         air = {"vacuum": vacuum, "air": lever.in_medium("air").branch()}
         away = curve_of_model(air, "air").at(rows, at_knee) - of_model.at(rows, at_knee)
         parts = {**parts, "constant k": np.abs(away)}
-    used, residual = (law, 0.0) if law is not None else _law_of(vacuum)
+    used, residual = (law, 0.0) if law is not None else _law_of(vacuum, knee_of(vacuum).power_mW)
     k = at_knee / used.threshold_mW
     own = reference.at(circuit.power(measured.bias_V, measured.current_mA), at_knee)
     return _calibration(
@@ -188,9 +195,8 @@ def _calibration(
     return Calibration(table=table, **rest)  # type: ignore[arg-type]
 
 
-def _law_of(vacuum: Branch) -> tuple[PowerLaw, float]:
+def _law_of(vacuum: Branch, threshold: float | None) -> tuple[PowerLaw, float]:
     """Fit Eq. 12 to the model in vacuum, with its threshold at the knee; return what it misses."""
-    threshold = None if vacuum.knee is None else vacuum.knee.power_mW
     highest = vacuum.highest_power_mW if threshold is None else _LAW_TO * threshold
     power = np.linspace(0.0, highest, _LAW_POINTS + 1)[1:]
     found = fit_power_law(
