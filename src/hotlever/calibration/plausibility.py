@@ -41,7 +41,8 @@ def check_plausible(measured: Measurement, probe: Probe) -> None:
     bias, current = measured.bias_V[here], measured.current_mA[here]
     low = np.argsort(bias)[: max(3, bias.size // 8)]
     found = float(np.median(bias[low] / current[low]))
-    cold = Lever(probe, COARSE).branch_to(0.0).values[1]
+    # what a cold lever shows does not depend on what is around it
+    cold = Lever(probe.in_medium("vacuum"), COARSE).branch_to(0.0).values[1]
     series = probe.circuit.series_kohm
     lever = float(cold[0] / cold[1])
     ratio = found / (lever + series)

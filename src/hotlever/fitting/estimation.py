@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -146,21 +146,18 @@ def estimate(
             f"{measurement.path or 'measurement'}: {residuals.size} data for "
             f"{len(options.varied)} parameters; fix some or measure more"
         )
-    forward = (model or forward_model)(probe, residuals.bias)
-    # with priors errors are a matter of standard deviations, to which the fast lever's slopes do
     names = (*PARAMETERS, *(name for name in options.varied if name not in PARAMETERS))
-    forward = replace(forward, names=names, first_order=not known)
-    if len(names) > len(PARAMETERS) and isinstance(forward.fast, ReducedLever):
-        # its modes are those of one geometry
-        forward = replace(forward, fast=SimilarLevers(Lever(probe, COARSE)))
+    make = model or partial(forward_model, names=names)
+    # with priors errors are a matter of standard deviations, to which the fast lever's slopes do
+    forward = replace(make(probe, residuals.bias), names=names, first_order=not known)
     start = probe.moved({name: prior.value for name, prior in priors.items()})
     attempts = _attempts(forward, options.held(start), options, residuals)
     try:
         problem, optimum = _first_found(attempts, residuals, options, priors, joint, progress)
     except BranchEndError as error:
-        colder = _below(measurement, _SAFELY * error.bias_reached)
         if not known:
             raise
+        colder = _below(measurement, _SAFELY * error.bias_reached)
         if colder is None:
             raise ComputationError(
                 f"no lever near this one, as it is known beforehand, reaches the data: {error}; is "

@@ -275,6 +275,7 @@ def forward_model(
     probe: Probe,
     bias: Array,
     *,
+    names: tuple[str, ...] = tuple(PARAMETERS),
     reduce: bool = False,
 ) -> ForwardModel:
     """Return the fastest forward model of a probe.
@@ -283,11 +284,15 @@ def forward_model(
     ----------
     probe : Probe
     bias : ndarray, shape (n,)
+    names : tuple of str
+        Parameters of the derivatives. With dimensions among them no reduced lever serves, since its
+        modes are those of one geometry.
     reduce : bool
         Make and keep a reduced lever (some seconds) if the geometry has none yet: it pays where
         more than one fit is to come.
     """
-    lever = Lever(probe)
-    reduced = cached_reduction(lever) if reduce else known_reduction(lever)
+    lever, reduced = Lever(probe), None
+    if set(names) <= set(PARAMETERS):
+        reduced = cached_reduction(lever) if reduce else known_reduction(lever)
     fast: BranchSolver = SimilarLevers(Lever(probe, COARSE)) if reduced is None else reduced
-    return ForwardModel(fast, SimilarLevers(lever), bias)
+    return ForwardModel(fast, SimilarLevers(lever), bias, names)

@@ -145,8 +145,10 @@ class Residuals:
         """
         if not self._shared.size:
             return np.asarray(rows)
-        pattern = (self.by[..., None] * self._shared)[self.present]
-        along, size, _ = np.linalg.svd(np.nan_to_num(pattern), full_matrices=False)
+        pattern = np.nan_to_num((self.by[..., None] * self._shared)[self.present])
+        # one for each observable, so that they have no rows in common
+        size = np.linalg.norm(pattern, axis=0)
+        along = pattern / np.maximum(size, 1e-300)
         kept = 1.0 / np.sqrt(1.0 + size**2) - 1.0
         return np.asarray(rows + along @ (kept * (along.T @ rows).T).T)
 
