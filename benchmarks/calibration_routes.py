@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from hotlever.calibration.knee import IVCurve, find_knee
 from hotlever.calibration.power_law import EQ12
-from hotlever.calibration.transfer import curve_of_law, curve_of_model
+from hotlever.calibration.transfer import curve_of_law, curve_of_model, knee_of
 from hotlever.errors import HotleverError
 from hotlever.fitting import Measurement, fit
 from hotlever.lever import Branch, Lever
@@ -113,22 +113,23 @@ def routes(
         "bare rule, nominal doping": bare_rule(knee, nominal),
         "bare rule, doping known": bare_rule(knee, probe.material),
         "Eq. 12 times k": lambda power: curve_of_law(EQ12, BASE).at(power, knee),
-        "reference probe, vacuum times k": lambda power: curve_of_model(reference, "vacuum").at(
+        "reference probe, vacuum times k": lambda power: curve_of_model(reference["vacuum"]).at(
             power, knee
         ),
-        "probe known, vacuum times k": lambda power: curve_of_model(own, "vacuum").at(power, knee),
+        "probe known, vacuum times k": lambda power: curve_of_model(own["vacuum"]).at(power, knee),
     }
     if medium == "air":
-        found["reference probe, air model"] = lambda power: curve_of_model(reference, "air").at(
+        found["reference probe, air model"] = lambda power: curve_of_model(reference["air"]).at(
             power, knee
         )
-        found["probe known, air model"] = lambda power: curve_of_model(own, "air").at(power, knee)
+        found["probe known, air model"] = lambda power: curve_of_model(own["air"]).at(power, knee)
     for fit_medium, (models, fit_knee) in fits.items():
         if fit_medium == "air" and medium == "vacuum":
             continue
-        found[f"fit in {fit_medium}"] = lambda power, models=models, at=(fit_medium, fit_knee): (
-            curve_of_model(models, medium, at).at(power, knee)
-        )
+        # the fitted lever's knee is above or below its model's by as much in either medium
+        above = fit_knee / knee_of(models[fit_medium]).power_mW
+        fitted_curve = curve_of_model(models[medium], above * knee_of(models[medium]).power_mW)
+        found[f"fit in {fit_medium}"] = lambda power, of=fitted_curve: of.at(power, knee)
     return found
 
 

@@ -98,7 +98,7 @@ def paper_ways(data: Measurement, nominal: Probe) -> dict[str, Callable]:
     return {
         "knee at T_i": lambda power: 293.0 + (inversion - 293.0) * power / knee,
         "power law, k": lambda power: curve_of_law(EQ12, 293.0).at(power, knee),
-        "drawing, k": lambda power: curve_of_model({"vacuum": model}, "vacuum").at(power, knee),
+        "drawing, k": lambda power: curve_of_model(model).at(power, knee),
     }
 
 

@@ -243,7 +243,7 @@ def test_routes_exclude_each_other(reference):
 
 
 def test_a_scaled_model_is_the_paper_s_rule(reference):
-    curve = curve_of_model({"vacuum": reference}, "vacuum")
+    curve = curve_of_model(reference)
     power = np.linspace(0.5, 4.0, 8)
     np.testing.assert_allclose(
         curve.at(1.29 * power, 1.29 * reference.knee.power_mW), reference.tip_temperature(power)
@@ -255,7 +255,7 @@ def test_a_scaled_model_is_the_paper_s_rule(reference):
 def test_a_measured_knee_takes_the_place_of_the_model_s(reference):
     """A model whose knee is 6 % off leaves the temperature of its own lever as it is."""
     measured = 1.06 * reference.knee.power_mW
-    curve = curve_of_model({"vacuum": reference}, "vacuum", ("vacuum", measured))
+    curve = curve_of_model(reference, measured)
     power = np.linspace(0.5, 4.0, 8)
     np.testing.assert_allclose(curve.at(power, measured), reference.tip_temperature(power))
 

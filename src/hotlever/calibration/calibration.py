@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from hotlever import __version__
 from hotlever.calibration.knee import Knee
@@ -211,7 +212,7 @@ class _CalibrationFile(Section):
     table: list[dict[str, Number]]
     budget_K: dict[str, list[Number]]
     measured_rms_K: Number = np.nan
-    priors: dict[str, dict[str, float]] = {}  # noqa: RUF012
+    priors: dict[str, dict[str, float]] = Field(default_factory=dict)
     reason: str = ""
     probe: dict[str, dict[str, Any]]
     data: EmbeddedMeasurement

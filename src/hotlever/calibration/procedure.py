@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 
 from hotlever.calibration.calibration import TABLE_COLUMNS, Calibration, table_of
 from hotlever.calibration.inference import Estimated, estimated
@@ -15,13 +16,13 @@ from hotlever.calibration.plausibility import check_plausible
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.power_law_fit import fit_power_law
 from hotlever.calibration.rule import by_rule
-from hotlever.calibration.transfer import curve_of_law, curve_of_model, knee_of
+from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import InputError
 from hotlever.fitting import Fit, Measurement, read_fit
 from hotlever.fitting.estimation import with_measured_circuit
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
-from hotlever.probe import Probe
+from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import Prior
 from hotlever.types import Array, Progress
 
@@ -119,11 +120,8 @@ def _by_estimate(
     law, residual = _law_of(vacuum, None if threshold is None else threshold.power_mW)
     circuit = found.probe.circuit
     shown = circuit.power(measured.bias_V, measured.current_mA)
-    return _calibration(
-        found.bias_V,
-        found.current_mA,
-        found.tip_K,
-        found.parts,
+    return Calibration(
+        table=_table(circuit, found.bias_V, found.current_mA, found.tip_K, found.parts),
         route=route,
         medium=medium,
         power_law=law,
@@ -146,9 +144,8 @@ def _by_rule(
 ) -> Calibration:
     lever = Lever(probe)
     vacuum, circuit = lever.branch(), probe.circuit
-    knee_of(vacuum)
+    of_model = curve_of_model(vacuum)
     curve = IVCurve.of(measured.bias_V, measured.current_mA, circuit)
-    of_model = curve_of_model({"vacuum": vacuum}, "vacuum")
     reference = of_model if law is None else curve_of_law(law, circuit.base_temperature_K)
     found = by_rule(curve, vacuum, probe, reference, str(measured.path or "measurement"))
     rows, at_knee = circuit.power(found.bias_V, found.current_mA), found.knee.power_mW
@@ -156,17 +153,14 @@ def _by_rule(
     if law is not None:
         parts = {**parts, "power law": np.abs(of_model.at(rows, at_knee) - found.tip_K)}
     if law is None or at_knee > _LOOKS_LIKE_AIR * reference.knee_mW:
-        air = {"vacuum": vacuum, "air": lever.in_medium("air").branch()}
-        away = curve_of_model(air, "air").at(rows, at_knee) - of_model.at(rows, at_knee)
+        in_air = curve_of_model(lever.in_medium("air").branch())
+        away = in_air.at(rows, at_knee) - of_model.at(rows, at_knee)
         parts = {**parts, "constant k": np.abs(away)}
-    used, residual = (law, 0.0) if law is not None else _law_of(vacuum, knee_of(vacuum).power_mW)
+    used, residual = (law, 0.0) if law is not None else _law_of(vacuum, of_model.knee_mW)
     k = at_knee / used.threshold_mW
     own = reference.at(circuit.power(measured.bias_V, measured.current_mA), at_knee)
-    return _calibration(
-        found.bias_V,
-        found.current_mA,
-        found.tip_K,
-        parts,
+    return Calibration(
+        table=_table(circuit, found.bias_V, found.current_mA, found.tip_K, parts),
         route=route,
         medium="vacuum",
         power_law=used,
@@ -182,17 +176,14 @@ def _by_rule(
     )
 
 
-def _calibration(
-    bias: Array, current: Array, tip: Array, parts: dict[str, Array], **rest: object
-) -> Calibration:
-    """Return a calibration with its table."""
-    probe = rest["probe"]
-    assert isinstance(probe, Probe)
+def _table(
+    circuit: Circuit, bias: Array, current: Array, tip: Array, parts: dict[str, Array]
+) -> xr.Dataset:
+    """Return the table of a calibration, of what was found at its rows."""
     total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
-    lever = probe.circuit.lever_voltage(bias, current)
+    lever = circuit.lever_voltage(bias, current)
     columns = (bias, lever, current, lever * current, tip, total)
-    table = table_of(dict(zip(TABLE_COLUMNS, columns, strict=False)), parts)
-    return Calibration(table=table, **rest)  # type: ignore[arg-type]
+    return table_of(dict(zip(TABLE_COLUMNS, columns, strict=False)), parts)
 
 
 def _law_of(vacuum: Branch, threshold: float | None) -> tuple[PowerLaw, float]:

@@ -21,19 +21,18 @@ from hotlever.calibration.knee import (
 )
 from hotlever.calibration.transfer import TemperatureCurve, knee_of
 from hotlever.errors import InputError
+from hotlever.fitting.estimation import METERS
 from hotlever.lever import Branch
 from hotlever.lever.branch import Reach
 from hotlever.lever.curve import spline_through
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
-from hotlever.probe.priors import default_priors
+from hotlever.probe.priors import RESISTANCE, default_priors
 from hotlever.types import Array
 
 #: Largest relative error of a knee estimated from the points below it, to go on with.
 _WORST_ESTIMATE = 0.3
-#: Relative standard errors of the meters.
-_VOLTAGE, _CURRENT = 1e-3, 1e-3
 
 
 @dataclass(frozen=True)
@@ -173,8 +172,7 @@ def _knee_and_meters(
     power = knee.power_mW
     nominal = temperature(1.0, 1.0, 1.0, power)
     by_knee = temperature(1.0, 1.0, 1.0, power + knee.power_mW_stderr) - nominal
-    # the resistor is known as well as a prior says
-    shares = np.diag([1e-3, _VOLTAGE, _CURRENT])
+    shares = np.diag([RESISTANCE, METERS, METERS])
     squares = np.zeros_like(nominal)
     for series, voltage, amperes in 1.0 + shares:
         ohm = series * curve.circuit.series_resistance_ohm

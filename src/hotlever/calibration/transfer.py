@@ -8,7 +8,7 @@ model of a probe, or a model fitted to the lever itself.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,20 +45,13 @@ def curve_of_law(law: PowerLaw, base_temperature_K: float) -> TemperatureCurve:
     )
 
 
-def curve_of_model(
-    models: Mapping[str, Branch], medium: str, measured_knee: tuple[str, float] | None = None
-) -> TemperatureCurve:
-    """Return the model of a lever, by medium, in the medium it is to be calibrated in as reference.
+def curve_of_model(model: Branch, knee_mW: float | None = None) -> TemperatureCurve:
+    """Return the model of a lever, in the medium it is to be calibrated in, as reference.
 
-    A knee that was measured (medium and power in mW) on the lever which the model was fitted to
-    takes the place of the model's, since models are less sure of the knee than of the temperature
-    at a power.
+    A knee that was measured (its power) on the lever which the model was fitted to takes the place
+    of the model's, since models are less sure of the knee than of the temperature at a power.
     """
-    knee_mW = knee_of(models[medium]).power_mW
-    if measured_knee is not None:
-        where, power = measured_knee
-        knee_mW *= power / knee_of(models[where]).power_mW
-    return TemperatureCurve(models[medium].tip_temperature, knee_mW)
+    return TemperatureCurve(model.tip_temperature, knee_mW or knee_of(model).power_mW)
 
 
 def knee_of(model: Branch) -> OperatingPoint:

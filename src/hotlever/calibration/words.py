@@ -128,9 +128,6 @@ def _verdict(calibration: Calibration) -> str:
     stated = calibration.tip_temperature_uncertainty_K
     word = "good" if stated <= _GOOD else "fair" if stated <= _FAIR else "rough"
     largest = calibration.table.budget_K.max("bias").idxmax("source").item()
-    better = {
-        "power law": "a probe (--probe) or a fit (--fit) would know more than a power law",
-    }
     advice = {
         "measurement": "less noise, or tip temperatures at some points, would help",
         "geometry": "better known dimensions would help (--prior dimensions=±2%)",
@@ -144,4 +141,6 @@ def _verdict(calibration: Calibration) -> str:
     text = f"{word}; mostly from {largest}"
     if largest in advice:
         return f"{text}: {advice[largest]}"
-    return "; ".join([text, *filter(None, [better.get(calibration.route)])])
+    if calibration.route == "power law":
+        return f"{text}; a probe (--probe) or a fit (--fit) would know more than a power law"
+    return text

@@ -31,7 +31,7 @@ from hotlever.spieser2017 import RAMAN_ERROR_SHARE
 from hotlever.types import Array, Progress
 
 #: Standard error of a meter's scale, relative.
-_METERS = 1e-3
+METERS = 1e-3
 #: Rise (K) from which a stated error tells the scale of a thermometer.
 _WARM_K = 100.0
 #: Where a lever as known before melts below the highest bias: the share of what it reaches that is
@@ -191,7 +191,7 @@ def _scales(measurement: Measurement, observables: Sequence[str]) -> dict[str, A
     temperature, or as the paper's.
     """
     meters = {
-        name: _METERS * np.abs(measurement.observable(name))
+        name: METERS * np.abs(measurement.observable(name))
         for name in ("current", "reader")
         if name in observables
     }

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 #: and by how much it is widened: four levers of one wafer differ less than those of two makers.
 SCATTER_OF, _WIDENED = ("lever 1", "lever 2", "lever 3", "lever 4"), 1.5
 #: Relative spread of what the drawing says, and of a resistor that was measured.
-_DIMENSIONS, _RESISTANCE = 0.05, 1e-3
+_DIMENSIONS, RESISTANCE = 0.05, 1e-3
 #: Of what air takes up: humidity, what is around, and dimensions as far as they matter to it.
 _GAS = 0.1
 #: Nominal doping is that good, where the probe file says no better (the makers' own tolerance).
@@ -153,7 +153,7 @@ def default_priors(probe: Probe) -> dict[str, Prior]:
     spreads["n_d"] = _DOPING
     spreads |= dict.fromkeys(nuisances(probe), _DIMENSIONS)
     if probe.circuit.series_resistance_ohm > 0:
-        spreads["series_resistance_ohm"] = _RESISTANCE
+        spreads["series_resistance_ohm"] = RESISTANCE
     if probe.surroundings.medium == "air":
         spreads["gas_conductivity"] = _GAS
     values = probe.at(list(spreads)).tolist()
@@ -213,7 +213,8 @@ def priors_of(stated: Mapping[str, Prior | str], probe: Probe, where: str) -> di
         for one, own in zip(some, probe.at(some).tolist(), strict=True):
             found[one] = Prior(own if value is None else value, spread, relative)
             _check(found[one], known[one], f"{where}: {one}")
-    return {name: prior for name, prior in found.items() if name in parameters_of(probe)}
+    counting = parameters_of(probe)
+    return {name: prior for name, prior in found.items() if name in counting}
 
 
 def _check(prior: Prior, known: Parameter, where: str) -> None:
