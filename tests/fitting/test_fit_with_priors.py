@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+from threading import Thread
+
 import numpy as np
 import pytest
 
@@ -112,3 +116,16 @@ def test_errors_that_data_share_weigh_as_one():
     jacobian = residuals.jacobian(slopes)
     expected = slopes[2].T @ np.linalg.solve(covariance, slopes[2])
     np.testing.assert_allclose(jacobian.T @ jacobian, expected)
+
+
+def test_a_probe_file_is_read_once_and_may_be_a_pipe(run, tmp_path):
+    """Its priors and the probe itself come from the same bytes."""
+    os.mkfifo(tmp_path / "probe.toml")
+    text = NOMINAL.to_toml() + '\n[prior]\nn_d = "± 15%"\n'
+    writer = Thread(target=(tmp_path / "probe.toml").write_text, args=(text,), daemon=True)
+    writer.start()
+    data = Path(__file__).parents[2] / "examples" / "lever-a.csv"
+    status, out, err = run("fit", data, "--probe", "probe.toml", "-o", "fit.json")
+    assert status == 0, err
+    assert set(read_fit(tmp_path / "fit.json").options.priors) == {"n_d"}
+    assert "n_d" in out

@@ -21,7 +21,14 @@ from hotlever.lever import Branch
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
-from hotlever.probe.priors import JointPrior, Prior, known_beforehand, priors_of, published_material
+from hotlever.probe.priors import (
+    JointPrior,
+    Prior,
+    PriorUse,
+    known_beforehand,
+    priors_of,
+    published_material,
+)
 from hotlever.types import Array, Progress
 
 #: Rows of the table.
@@ -32,24 +39,6 @@ _CIRCUIT = {"series_resistance_ohm": "electronics", "gas_conductivity": "air"}
 _ENOUGH = 15
 #: How far (standard errors) along each axis of the estimate the knee is looked at.
 _ASIDE = 0.5
-
-
-@dataclass(frozen=True)
-class PriorUse:
-    """What a prior said and what the data made of it.
-
-    Attributes
-    ----------
-    value, spread : float
-        Before, in the parameter's unit.
-    posterior_value, posterior_spread : float
-        After.
-    """
-
-    value: float
-    spread: float
-    posterior_value: float
-    posterior_spread: float
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtrc
@@ -13,9 +12,7 @@ from hotlever.fitting.measurement import Measurement
 from hotlever.fitting.residuals import Residuals
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.probe import Probe
-
-if TYPE_CHECKING:
-    from hotlever.calibration.inference import PriorUse
+from hotlever.probe.priors import PriorUse
 
 #: The resistance of a cold lever is within this factor of its model's.
 _WITHIN = 2.5

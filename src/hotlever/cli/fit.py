@@ -25,6 +25,7 @@ from hotlever.files import Outputs, write_text
 if TYPE_CHECKING:
     from hotlever.fitting import FitOptions
     from hotlever.fitting.uncertainty import Uncertainty
+    from hotlever.probe import Probe
 
 #: The table of many levers, in the folder of their fits.
 _TABLE = "levers.csv"
@@ -85,7 +86,7 @@ def fit_command(
     chosen: Any = {"weights": weights, "medium": medium, "robust": robust, "drift": drift}
     probe = load_probe(probe_file)
     given = parse_priors(prior, probe)
-    stated = {} if probe.prior is None else probe.prior.by_name
+    stated = probe.stated_priors
     options = FitOptions(
         observables=None if observables is None else observables.split(","),
         fixed=parse_values("--fix", fix, bare=True),
@@ -101,10 +102,10 @@ def fit_command(
     to = Destination(outputs, output, report)
     where: Any = {"processes": processes}
     if len(data) > 1:
-        _fit_several(data, probe_file, options, {**where, "scheduler": scheduler}, to)
+        _fit_several(data, probe, options, {**where, "scheduler": scheduler}, to)
     else:
         asked = {"samples": samples if posterior else None, "profiles": profiles}
-        _fit_one(data[0], probe_file, options, where | asked, to)
+        _fit_one(data[0], probe, options, where | asked, to)
 
 
 class Destination(NamedTuple):
@@ -116,7 +117,7 @@ class Destination(NamedTuple):
 
 
 def _fit_one(
-    data: Path, probe_file: File, options: FitOptions, examined: dict[str, Any], to: Destination
+    data: Path, probe: Probe, options: FitOptions, examined: dict[str, Any], to: Destination
 ) -> None:
     from hotlever.fitting import fit, read_measurement
     from hotlever.fitting.words import fit_text, uncertainty_text
@@ -125,7 +126,6 @@ def _fit_one(
     to.outputs.folder(to.report)
     measurement = read_measurement(data)
     note(*measurement.notes)
-    probe = load_probe(probe_file)
     with progress("fit") as update:
         result = fit(measurement, probe, options, progress=update)
     note(*result.notes)
@@ -157,7 +157,7 @@ def _fit_one(
 
 
 def _fit_several(
-    data: list[Path], probe_file: File, options: FitOptions, where: dict[str, Any], to: Destination
+    data: list[Path], probe: Probe, options: FitOptions, where: dict[str, Any], to: Destination
 ) -> None:
     from hotlever.fitting.batch import fit_many
     from hotlever.fitting.levers import compare_levers, levers_csv
@@ -173,7 +173,6 @@ def _fit_several(
     outputs.folder(report)
     if folder.is_dir():
         outputs.file(folder / _TABLE)
-    probe = load_probe(probe_file)
     done = 0
     with progress_bars("levers", "geometry") as (fitting, reducing):
 

@@ -33,7 +33,7 @@ from hotlever.materials import PARAMETERS
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameter_of, parameters_of
-from hotlever.probe.priors import Prior
+from hotlever.probe.priors import Prior, PriorUse
 from hotlever.types import Array
 
 #: A parameter is called poorly determined from this relative standard error.
@@ -138,17 +138,12 @@ class Fit:
         }
 
     @property
-    def priors(self) -> dict[str, dict[str, float | None]]:
+    def priors(self) -> dict[str, PriorUse]:
         """What was known of parameters before, and what the data made of it, by name."""
         return {
-            name: {
-                "value": prior.value,
-                "spread": prior.absolute,
-                "posterior_value": self.parameters[name].value,
-                "posterior_spread": self.parameters[name].stderr,
-            }
+            name: PriorUse(prior.value, prior.absolute, after.value, after.stderr or np.nan)
             for name, prior in self.options.priors.items()
-            if isinstance(prior, Prior)
+            if isinstance(prior, Prior) and (after := self.parameters[name])
         }
 
     @property
@@ -198,7 +193,7 @@ class Fit:
         content = {
             "parameters": {name: vars(p) for name, p in self.parameters.items()},
             "correlation": {"names": self.names, "matrix": self.correlation.tolist()},
-            "priors": self.priors,
+            "priors": {name: vars(use) for name, use in self.priors.items()},
             "observables": list(self.observables),
             "inversion_temperature_K": self.inversion_temperature_K,
             "inversion_temperature_stderr_K": self.inversion_temperature_stderr_K,

@@ -93,6 +93,24 @@ class Prior:
 
 
 @dataclass(frozen=True)
+class PriorUse:
+    """What a prior said and what the data made of it.
+
+    Attributes
+    ----------
+    value, spread : float
+        Before, in the parameter's unit.
+    posterior_value, posterior_spread : float
+        After.
+    """
+
+    value: float
+    spread: float
+    posterior_value: float
+    posterior_spread: float
+
+
+@dataclass(frozen=True)
 class JointPrior:
     """A normal distribution of the logarithms of several parameters, as an estimate leaves it.
 
@@ -162,8 +180,7 @@ def default_priors(probe: Probe) -> dict[str, Prior]:
         for (name, spread), value in zip(spreads.items(), values, strict=True)
         if value > 0
     }
-    stated = {} if probe.prior is None else probe.prior.by_name
-    return found | priors_of(stated, probe, "[prior]")
+    return found | priors_of(probe.stated_priors, probe, "[prior]")
 
 
 def known_beforehand(probe: Probe, stated: Mapping[str, Prior | str] | None) -> dict[str, Prior]:

@@ -147,8 +147,7 @@ class Probe(Record):
                 section = {**usual.get(name, {}), **values[name]}
                 parts[name] = part.of(section, f"{where}: [{name}]")
         probe = cls.of(parts, where)
-        if probe.prior is not None:
-            priors_of(probe.prior.by_name, probe, f"{where}: [prior]")
+        priors_of(probe.stated_priors, probe, f"{where}: [prior]")
         return probe
 
     @classmethod
@@ -240,6 +239,11 @@ class Probe(Record):
             If the medium is neither.
         """
         return self.with_(medium=medium)
+
+    @property
+    def stated_priors(self) -> dict[str, str]:
+        """What its file says of its priors, by name."""
+        return {} if self.prior is None else self.prior.by_name
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip."""
