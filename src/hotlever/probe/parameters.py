@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 from hotlever.errors import unknown_name
 from hotlever.materials import PARAMETERS
 from hotlever.materials.material import Parameter
+from hotlever.text import parameter_named
 
 if TYPE_CHECKING:
     from hotlever.probe.probe import Probe
 
-#: Shares of a dimension, or of a resistance, within which a fit stays.
-_LEAST, _MOST = 0.5, 1.5
+#: Shares of a dimension or a resistance, and of what a gas conducts, within which a fit stays.
+_OF_THE_VALUE, _OF_THE_GAS = (0.5, 1.5), (0.2, 5.0)
 
 
 def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Parameter]:
@@ -26,24 +27,20 @@ def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Paramete
     >>> parameters_of(Probe.reference())["heater_width_um"].unit
     'µm'
     """
-    meaning = probe.shape.description()
-    found = dict(PARAMETERS)
-    for name, value in probe.shape.dimensions().items():
-        symbol = name.removesuffix("_um").replace("_", " ")
-        found[name] = Parameter(
-            name, symbol, "µm", value, _LEAST * value, _MOST * value, meaning[name]
-        )
-    name = "series_resistance_ohm"
-    if (value := probe.circuit.series_resistance_ohm) > 0:
-        meaning = probe.circuit.description()
-        found[name] = Parameter(
-            name, "R_s", "Ω", value, _LEAST * value, _MOST * value, meaning[name]
-        )
+    shares = dict.fromkeys(probe.shape.dimensions(), _OF_THE_VALUE)
+    if probe.circuit.series_resistance_ohm > 0:
+        shares["series_resistance_ohm"] = _OF_THE_VALUE
     if anywhere or probe.surroundings.medium == "air":
-        name, value = "gas_conductivity", probe.surroundings.gas_conductivity
-        meaning = probe.surroundings.description()
-        found[name] = Parameter(
-            name, "κ_gas/κ_air", "1", 1.0, 0.2 * value, 5 * value, meaning[name]
+        shares["gas_conductivity"] = _OF_THE_GAS
+    parts = (probe.shape, probe.circuit, probe.surroundings)
+    meaning = {name: text for part in parts for name, text in part.description().items()}
+    found = dict(PARAMETERS)
+    for (name, (least, most)), value in zip(shares.items(), probe.at(list(shares)), strict=True):
+        found[name] = parameter_named(name)._replace(
+            scale=float(value),
+            lower=float(least * value),
+            upper=float(most * value),
+            meaning=meaning[name],
         )
     return found
 
