@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from hotlever.calibration.calibration import TABLE_COLUMNS, read_calibration
+from hotlever.calibration.inference import _before
 from hotlever.calibration.knee import IVCurve
 from hotlever.calibration.power_law import EQ12, read_power_law
 from hotlever.calibration.procedure import calibrate
@@ -21,7 +22,7 @@ from hotlever.errors import InputError
 from hotlever.fitting import Measurement, fit, read_fit
 from hotlever.lever import Lever
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.priors import Prior, default_priors
+from hotlever.probe.priors import Prior, PriorTexts, default_priors, published_material
 from made_up import GONE, damaged
 from synthetic_curves import measured_curve
 
@@ -397,3 +398,16 @@ def test_priors_are_about_the_circuit_of_the_measurement(reference):
     assert found.priors["length_um"]["spread"] == pytest.approx(0.02 * 54.4)
     own = fit(data, priors={"series_resistance_ohm": "± 0.1%", "n_d": "± 15%"})
     assert own.parameters["series_resistance_ohm"].value == pytest.approx(3000.0, rel=5e-3)
+
+
+def test_what_was_known_before_a_fit_is_not_what_it_found(shared_fit):
+    """The published levers, the probe file, what the fit was asked and what is asked now."""
+    one = read_fit(shared_fit)
+    usual = _before(one, None)
+    assert usual["n_d"] == published_material()["n_d"]
+    stated = {"n_d": "3e17 ± 10%", "p": "2.7 ± 1%"}
+    probe = one.probe.model_copy(update={"prior": PriorTexts.of(stated, "here")})
+    of_file = _before(replace(one, probe=probe), None)
+    assert (of_file["n_d"], of_file["p"]) == (Prior(3e17, 0.1), Prior(2.7, 0.01))
+    assert _before(replace(one, probe=probe), {"p": "2.8 ± 1%"})["p"] == Prior(2.8, 0.01)
+    assert _before(one, {}) == {}

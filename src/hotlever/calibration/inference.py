@@ -25,6 +25,7 @@ from hotlever.probe.priors import (
     JointPrior,
     Prior,
     PriorUse,
+    default_priors,
     known_beforehand,
     priors_of,
     published_material,
@@ -174,11 +175,10 @@ def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Pri
 
     The probe of a fit has the material that was found, so that this is no prior of its own.
     """
-    before = known_beforehand(fit.probe, priors)
-    if not before:
-        return before
+    if priors is not None and not priors:
+        return {}
     asked = priors_of({**fit.options.priors, **(priors or {})}, fit.probe, "priors")
-    known = before | published_material() | asked
+    known = default_priors(fit.probe, published_material()) | asked
     return {name: prior for name, prior in known.items() if name not in fit.options.fixed}
 
 

@@ -160,12 +160,13 @@ def published_material() -> dict[str, Prior]:
     }
 
 
-def default_priors(probe: Probe) -> dict[str, Prior]:
+def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) -> dict[str, Prior]:
     """Return what is known of a lever of which nothing but the probe file is known.
 
     The material scatters about the probe's as that of the published levers does, half as much
     again; the doping is nominal within 15 %, dimensions are within 5 %, the series resistance
-    within 0.1 %; what air takes up is known to 10 %. What the probe file states wins.
+    within 0.1 %; what air takes up is known to 10 %. What is known of the
+    material instead may be given; what the probe file states wins.
     """
     spreads = {name: prior.spread for name, prior in published_material().items()}
     spreads["n_d"] = _DOPING
@@ -180,7 +181,7 @@ def default_priors(probe: Probe) -> dict[str, Prior]:
         for (name, spread), value in zip(spreads.items(), values, strict=True)
         if value > 0
     }
-    return found | priors_of(probe.stated_priors, probe, "[prior]")
+    return found | {**(material or {})} | priors_of(probe.stated_priors, probe, "[prior]")
 
 
 def known_beforehand(probe: Probe, stated: Mapping[str, Prior | str] | None) -> dict[str, Prior]:
