@@ -20,7 +20,14 @@ COMMAND = [sys.executable, "-c", "from hotlever.cli import main; main()"]
 LONG = ("sweep", "--bias", "1:11:10000", "-o", "a.csv")
 
 
+def as_in_a_terminal() -> None:
+    """Let signals end a command even where these tests run under nohup or in the background."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
 def start(folder: Path, *arguments: str, **options) -> subprocess.Popen:
+    options.setdefault("preexec_fn", as_in_a_terminal)
     return subprocess.Popen(
         [*COMMAND, *arguments], cwd=folder, stderr=subprocess.PIPE, text=True, **options
     )
