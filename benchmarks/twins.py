@@ -46,7 +46,7 @@ def drawn(rng: np.random.Generator, number: int, medium: str) -> tuple[Probe, Pr
     """Return a twin, and what is known of it before."""
     nominal = (Probe.reference() if number % 2 == 0 else Probe.u_shape()).in_medium(medium)
     values = {
-        name: prior.value * float(np.exp(prior.spread * rng.standard_normal()))
+        name: prior.at(float(rng.standard_normal()))
         for name, prior in default_priors(nominal).items()
         if name != "series_resistance_ohm"
     }

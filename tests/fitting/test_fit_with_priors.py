@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from threading import Thread
 
@@ -11,13 +12,14 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.fitting import Measurement, fit, read_fit
+from hotlever.fitting.common_errors import CommonError, errors_of_scales
 from hotlever.fitting.estimation import estimate
 from hotlever.fitting.options import FitOptions
 from hotlever.fitting.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
-from hotlever.probe.priors import Prior, default_priors
+from hotlever.probe.priors import Prior, default_priors, priors_of
 
 NOMINAL = Probe.reference()
 TRUE = NOMINAL.with_(n_d=5.2e17, delta=0.68, heater_length_um=4.12, thickness_um=0.39)
@@ -103,7 +105,8 @@ def test_errors_that_data_share_weigh_as_one():
     tip, error = np.linspace(300.0, 700.0, 5), np.full(5, 4.0)
     data = Measurement(bias, nothing, nothing, tip, error)
     shared = 0.02 * (tip - 293.0)
-    residuals = Residuals(data, ["tip"], "errors", shared={"tip": shared})
+    common = [CommonError("raman_scale", "tip", 0.02, shared)]
+    residuals = Residuals(data, ["tip"], "errors", common=common)
     values = np.stack([nothing, nothing, tip + np.array([3.0, -2.0, 1.0, 5.0, -4.0])])
     weighted = residuals.weighted(values)
     covariance = np.diag(error**2) + np.outer(shared, shared)
@@ -116,6 +119,32 @@ def test_errors_that_data_share_weigh_as_one():
     jacobian = residuals.jacobian(slopes)
     expected = slopes[2].T @ np.linalg.solve(covariance, slopes[2])
     np.testing.assert_allclose(jacobian.T @ jacobian, expected)
+    # the scale as one more unknown
+    wide, prior = np.column_stack([slopes[2], shared]) / error[:, None], np.diag([0.0, 0.0, 1.0])
+    every = np.linalg.inv(wide.T @ wide + prior)
+    own = every[:2, :2]
+    np.testing.assert_allclose(own, np.linalg.inv(expected))
+    size, left = residuals.in_common(values, slopes, own)["raman_scale"]
+    assert left == pytest.approx(np.sqrt(every[2, 2]))
+    told = (shared / error**2) @ difference / (1.0 + np.sum((shared / error) ** 2))
+    assert size == pytest.approx(-told)
+
+
+def test_scales_are_as_uncertain_as_priors_say(data):
+    """A thermometer without a prior is as uncertain as each of its readings."""
+    tip = data[1].tip_K.values
+    warm = replace(data[0], tip_K=tip, tip_error_K=0.03 * np.maximum(tip - 293.0, 100.0))
+    one = estimate(warm, NOMINAL, FitOptions(priors=default_priors(NOMINAL)))
+    shares = {common.name: common.share for common in one.problem.residuals.common}
+    assert shares == {"current_scale": 1e-3, "raman_scale": pytest.approx(0.03, rel=0.02)}
+    known = priors_of({"raman_scale": "± 0.5%"}, NOMINAL, "here")
+    raman = errors_of_scales(warm, ["tip"], known)[0]
+    np.testing.assert_allclose(raman.errors, 0.005 * (tip - tip.min()))
+    # what the data tell of the scale is said as of any other prior
+    use = one.priors(default_priors(NOMINAL))["raman_scale"]
+    assert (use.value, use.spread) == (1.0, shares["raman_scale"])
+    assert 0 < use.posterior_spread < use.spread
+    assert abs(use.posterior_value - 1.0) < 3.0 * use.spread
 
 
 def test_a_probe_file_is_read_once_and_may_be_a_pipe(run, tmp_path):

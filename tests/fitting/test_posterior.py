@@ -10,7 +10,10 @@ from hotlever.fitting import Measurement, fit
 from hotlever.fitting.diagnostics import effective_sample_size, split_rhat
 from hotlever.fitting.ensembles import Gaussian, sample
 from hotlever.fitting.posterior import predictive_band, sample_posterior
-from hotlever.fitting.rough import RoughModel
+from hotlever.fitting.profile import profile_likelihood
+from hotlever.fitting.rough import OtherMaterials, SimilarProbes
+from hotlever.lever.lever import COARSE, Lever
+from hotlever.probe.priors import default_priors
 
 BIAS = np.linspace(2, 11, 10)
 HELD = {"n_d": None, "a0": None, "a1": None}
@@ -120,10 +123,10 @@ def test_effective_sample_size_of_an_autoregressive_chain():
 
 
 def test_the_rough_model_predicts_nearby_what_the_full_lever_does(coarse, reduced):
-    model = RoughModel(coarse, reduced, BIAS)
+    model = OtherMaterials(coarse, reduced, BIAS)
     there = coarse.probe.material.with_(c_kappa=0.70, p=2.70)
     exact = coarse.with_material(there).sweep(BIAS)
-    current, reader, tip = model.predict(there)
+    current, reader, tip = model.predict(coarse.with_material(there).probe)
     np.testing.assert_allclose(current, exact.current_mA, rtol=2e-4)
     np.testing.assert_allclose(reader, exact.reader_V, rtol=2e-4)
     np.testing.assert_allclose(tip, exact.tip_K, atol=0.2)
@@ -131,16 +134,18 @@ def test_the_rough_model_predicts_nearby_what_the_full_lever_does(coarse, reduce
 
 def test_the_rough_model_is_exact_at_its_own_material_in_any_order_of_bias(coarse, reduced):
     bias = np.array([9.0, 3.0, 9.0, 0.0])
-    model = RoughModel(coarse, reduced, bias)
+    model = OtherMaterials(coarse, reduced, bias)
     exact = coarse.sweep(bias)
-    np.testing.assert_allclose(model.predict(coarse.probe.material)[2], exact.tip_K, atol=0.02)
+    np.testing.assert_allclose(model.predict(coarse.probe)[2], exact.tip_K, atol=0.02)
 
 
 def test_the_rough_model_serves_far_away_too(coarse, reduced):
-    model = RoughModel(coarse, reduced, BIAS)
+    model = OtherMaterials(coarse, reduced, BIAS)
     there = coarse.probe.material.with_(c_kappa=1.0, n_d=6e17, p=2.8)
     exact = coarse.with_material(there).sweep(BIAS)
-    np.testing.assert_allclose(model.predict(there)[2], exact.tip_K, atol=5.0)
+    np.testing.assert_allclose(
+        model.predict(coarse.with_material(there).probe)[2], exact.tip_K, atol=5.0
+    )
 
 
 def test_posterior_agrees_with_the_covariance_of_the_fit(fitted, posterior):
@@ -176,3 +181,47 @@ def test_band_holds_the_fit_and_rises_with_power(fitted, lever, posterior):
     assert (np.diff(band.tip_at_power_K.values) > 0).all()
     for name in ("tip_K", "tip_at_power_K", "bias", "power_mW", "quantile"):
         assert {"units", "long_name"} <= set(band[name].attrs)
+
+
+@pytest.fixture(scope="module")
+def informed(coarse):
+    """A fit of the material and a dimension, with priors, of data with stated errors."""
+    true = coarse.probe.with_(n_d=5.3e17, heater_length_um=4.1)
+    exact = Measurement.of_sweep(Lever(true, COARSE).sweep(BIAS))
+    error = 3e-3 * exact.current_mA
+    noisy = exact.current_mA + error * np.random.default_rng(1).normal(size=BIAS.size)
+    nothing = np.full(BIAS.size, np.nan)
+    data = Measurement(BIAS, noisy, nothing, nothing, nothing, current_error_mA=error)
+    stated = ("n_d", "c_kappa", "heater_length_um", "series_resistance_ohm")
+    priors = {name: default_priors(coarse.probe)[name] for name in stated}
+    return fit(data, coarse.probe, priors=priors, fixed={"a0": None, "a1": None})
+
+
+def test_the_posterior_of_a_fit_with_priors_agrees_with_its_covariance(informed):
+    assert {"heater_length_um", "series_resistance_ohm"} < set(informed.names)
+    posterior = sample_posterior(informed, samples=1200, processes=1)
+    for name in ("n_d", "c_kappa", "heater_length_um", "series_resistance_ohm"):
+        known = informed.parameters[name]
+        assert posterior[name].mean().item() == pytest.approx(known.value, abs=0.4 * known.stderr)
+        assert posterior[name].std().item() == pytest.approx(known.stderr, rel=0.3)
+        assert {"units", "long_name"} <= set(posterior[name].attrs)
+    assert posterior.attrs["rough_error_K"] < 10.0
+    band = predictive_band(informed, posterior, bias=BIAS, samples=100)
+    low, _, _, _, high = band.tip_K.values
+    said = informed.band.tip_stderr_K.values
+    np.testing.assert_allclose((high - low) / 3.92, said, rtol=0.5, atol=0.3)
+
+
+def test_a_profile_counts_priors(informed):
+    """Where data hardly tell, it is the prior's parabola."""
+    profile = profile_likelihood(informed, "series_resistance_ohm", points=5)
+    np.testing.assert_allclose(profile.delta_chi_square, profile.parabola, rtol=0.3, atol=0.2)
+
+
+def test_other_probes_are_predicted_by_powers_nearly_as_they_are_solved(coarse):
+    names = ("n_d", "heater_length_um", "base_temperature_K")
+    model = SimilarProbes(coarse.probe, names, BIAS)
+    there = coarse.probe.with_(n_d=5.5e17, heater_length_um=4.1, base_temperature_K=295.0)
+    exact = Lever(there).sweep(BIAS).tip_K.values
+    assert np.abs(model.predict(there)[2] - exact).max() < 2.0
+    assert model.error_K(there) < 2.0

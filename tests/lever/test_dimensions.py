@@ -13,6 +13,7 @@ from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
+from hotlever.probe.parameters import dimensions_of
 from hotlever.probe.priors import nuisances
 from hotlever.probe.tip import Tip
 
@@ -44,7 +45,7 @@ def orders(lever, name):
 
 @pytest.mark.parametrize(
     ("kind", "name"),
-    [(kind, name) for kind, probe in PROBES.items() for name in probe.shape.dimensions()],
+    [(kind, name) for kind, probe in PROBES.items() for name in dimensions_of(probe)],
 )
 def test_derivatives_by_dimensions_have_taylor_order_two(kind, name):
     found, rest = orders(Lever(PROBES[kind], COARSE), name)
@@ -52,8 +53,27 @@ def test_derivatives_by_dimensions_have_taylor_order_two(kind, name):
     assert rest.max() < 2e-3
 
 
-def test_so_has_that_by_the_gas(in_air):
-    found, _ = orders(in_air, "gas_conductivity")
+@pytest.mark.parametrize("name", ["gas_conductivity", "base_temperature_K"])
+def test_so_have_those_by_gas_and_base_temperature_in_air(in_air, name):
+    found, _ = orders(in_air, name)
+    assert np.all(found > 1.8)
+
+
+def test_so_has_that_by_the_gap_to_a_surface(coarse):
+    above = Lever(coarse.probe.with_(medium="air", surface_gap_um=2.0), COARSE)
+    found, _ = orders(above, "surface_gap_um")
+    assert np.all(found > 1.8)
+    # linear in the inverse gap is nearly what another operator says
+    names, other = ("surface_gap_um",), above.probe.with_(surface_gap_um=2.2)
+    moved = SimilarLevers(above).linearised(other, REACH, None, names).branch
+    new, u = Lever(other, COARSE).branch_to(6.0), np.linspace(2.0, 9.0, 8)
+    start = above.branch_to(6.0).curve(u)[:, :2]
+    change = new.curve(u)[:, :2] - start
+    np.testing.assert_allclose(moved.curve(u)[:, :2] - start, change, rtol=0.03, atol=1e-6)
+
+
+def test_so_has_that_by_the_base_temperature_in_vacuum(coarse):
+    found, _ = orders(coarse, "base_temperature_K")
     assert np.all(found > 1.8)
 
 
@@ -71,7 +91,10 @@ def test_a_mesh_that_would_turn_over_is_refused(coarse):
         SimilarLevers(coarse).linearised(probe, REACH)
 
 
-@pytest.mark.parametrize("name", ["series_resistance_ohm", "heater_width_um", "thickness_um"])
+@pytest.mark.parametrize(
+    "name",
+    ["series_resistance_ohm", "base_temperature_K", "heater_width_um", "thickness_um"],
+)
 def test_derivatives_at_a_fixed_bias(coarse, name):
     """Circuit and dimensions together, as a fit takes them."""
     bias = np.array([2.0, 5.0, 7.0])
@@ -91,15 +114,16 @@ def test_derivatives_at_a_fixed_bias(coarse, name):
 
 def test_predictions_nearby_agree_with_a_new_branch(coarse):
     """To second order, at four per cent."""
-    bias, names = np.array([2.0, 5.0, 7.0]), ("n_d", "heater_length_um", "series_resistance_ohm")
+    bias = np.array([2.0, 5.0, 7.0])
+    names = ("n_d", "heater_length_um", "series_resistance_ohm", "base_temperature_K")
     model = replace(full_model(coarse, bias), names=names)
     start = model.predict(coarse.probe)
-    values = coarse.probe.at(names) * np.array([1.04, 0.96, 1.01])
+    values = coarse.probe.at(names) * np.array([1.04, 0.96, 1.01, 1.02])
     nearby, slopes = start.nearby.predict(values)
     moved = coarse.probe.moved(dict(zip(names, values.tolist(), strict=True)))
     exact = model.predict(moved)
     np.testing.assert_allclose(nearby, exact.values, rtol=3e-3)
-    assert slopes.shape == exact.slopes.shape == (3, 3, 3)
+    assert slopes.shape == exact.slopes.shape == (3, 3, 4)
 
 
 def test_dimensions_that_hold_parts_together_are_held():

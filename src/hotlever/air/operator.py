@@ -25,6 +25,9 @@ from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.types import Array, Progress
 
+#: Share of the gap by which it is changed to find how the operator does. The loss to a near surface
+#: goes with the inverse gap, and so does what is taken as linear.
+_OTHER_GAP = 1.05
 #: Panels of a lever that takes no finer ones than the default: its matrix has half a gigabyte.
 _MOST_PANELS = 8000
 
@@ -97,6 +100,25 @@ def air_operator(
     operator = PanelledAir(layout, surroundings, base_temperature_K, options, progress).operator()
     store_arrays(path, {name: np.asarray(value) for name, value in vars(operator).items()})
     return operator
+
+
+def change_with_gap(
+    operator: AirOperator,
+    layout: Layout,
+    surroundings: Surroundings,
+    base_temperature_K: float = BASE_TEMPERATURE_K,
+    options: PanelOptions | None = None,
+) -> Array:
+    """Return how an operator's matrix changes with the inverse of the gap to the surface below.
+
+    In µm², with the shape of the matrix. Parameters and errors are those of `air_operator`.
+    """
+    gap = surroundings.surface_gap_um
+    assert gap is not None
+    other = surroundings.model_copy(update={"surface_gap_um": _OTHER_GAP * gap})
+    farther = air_operator(layout, other, base_temperature_K, options)
+    change: Array = farther.matrix - operator.matrix
+    return change / (1.0 / (_OTHER_GAP * gap) - 1.0 / gap)
 
 
 class PanelledAir:

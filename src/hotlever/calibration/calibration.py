@@ -27,6 +27,7 @@ from hotlever.fitting.embedded import (
 )
 from hotlever.fitting.measurement import Measurement
 from hotlever.probe import Circuit, Probe
+from hotlever.probe.priors import PriorUse
 from hotlever.types import Array
 
 if TYPE_CHECKING:
@@ -66,9 +67,8 @@ class Calibration:
     table : xarray.Dataset
         `TABLE_COLUMNS` on the dimension ``bias``, evenly spaced over the measured range, and
         ``budget_K``, the standard error by ``source``.
-    priors : dict of str to dict
-        What was known of each parameter before and after: ``value``, ``spread``,
-        ``posterior_value`` and ``posterior_spread``.
+    priors : dict of str to PriorUse
+        What was known of each parameter before and after, by name.
     reason : str
         Why the data are not described by any such lever; empty if they are.
     measured_rms_K : float
@@ -90,7 +90,7 @@ class Calibration:
     measured_rms_K: float
     probe: Probe
     measurement: Measurement
-    priors: dict[str, dict[str, float]] = field(default_factory=dict)
+    priors: dict[str, PriorUse] = field(default_factory=dict)
     reason: str = ""
     notes: list[str] = field(default_factory=list)
 
@@ -168,7 +168,7 @@ class Calibration:
             "table": self.table[list(TABLE_COLUMNS)].to_dataframe().to_dict("records"),
             "budget_K": sources,
             "measured_rms_K": self.measured_rms_K,
-            "priors": self.priors,
+            "priors": {name: vars(use) for name, use in self.priors.items()},
             "describes_data": self.describes_data,
             "reason": self.reason,
             "probe": self.probe.values(),
@@ -212,7 +212,7 @@ class _CalibrationFile(Section):
     table: list[dict[str, Number]]
     budget_K: dict[str, list[Number]]
     measured_rms_K: Number = np.nan
-    priors: dict[str, dict[str, float]] = Field(default_factory=dict)
+    priors: dict[str, PriorUse] = Field(default_factory=dict)
     reason: str = ""
     probe: dict[str, dict[str, Any]]
     data: EmbeddedMeasurement

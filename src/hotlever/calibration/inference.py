@@ -22,6 +22,7 @@ from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.priors import (
+    SCALES,
     JointPrior,
     Prior,
     PriorUse,
@@ -35,7 +36,15 @@ from hotlever.types import Array, Progress
 #: Rows of the table.
 _ROWS = 101
 #: By which source of error a parameter counts.
-_CIRCUIT = {"series_resistance_ohm": "electronics", "gas_conductivity": "air"}
+_CIRCUIT = {
+    "series_resistance_ohm": "electronics",
+    "gas_conductivity": "air",
+    "surface_gap_um": "air",
+    "base_temperature_K": "base temperature",
+}
+#: Share of the rise by which the flat lever, or air as panels, differ from full 3-D where the tip
+#: is no steeper in bias than that of a lever of constant properties (benchmarks/air_3d.py).
+_MODEL = {"vacuum": 3e-4, "air": 7e-4}
 #: Data that are enough to tell which of them are outliers.
 _ENOUGH = 15
 #: How far (standard errors) along each axis of the estimate the knee is looked at.
@@ -154,7 +163,7 @@ def estimated(
     values = found.optimum.probe.at(own)
     joint = JointPrior(own, values, found.covariance[np.ix_(places, places)])
     probe = probe.moved(dict(zip(own, values.tolist(), strict=True)))
-    theirs = {name: prior for name, prior in known.items() if name in _CIRCUIT}
+    theirs = {name: prior for name, prior in known.items() if name in {*_CIRCUIT, *SCALES}}
     again = FitOptions(
         fixed=options.fixed,
         priors=theirs,
@@ -204,13 +213,9 @@ def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Pr
         source = name if name in ("measurement", "fit") else _source(name)
         variance = np.einsum("bi,ij,bj->b", slopes, share, slopes)
         parts[source] = parts.get(source, 0.0) + variance
-    names, spread = found.options.varied, np.sqrt(np.diag(found.covariance))
-    after = dict(zip(names, zip(best.at(names), spread, strict=True), strict=True))
-    use = {
-        name: PriorUse(prior.value, prior.absolute, *map(float, after[name]))
-        for name, prior in known.items()
-        if name in after
-    }
+    rise = predicted.values[2] - best.circuit.base_temperature_K
+    parts["model"] = _error_of_model(best.surroundings.medium, bias, rise) ** 2
+    use = found.priors(known)
     return Estimated(
         probe=best,
         bias_V=bias,
@@ -222,6 +227,13 @@ def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Pr
         notes=[*found.notes, *residuals.suspicious(found.optimum.prediction.values, robust=True)],
         _estimate=found,
     )
+
+
+def _error_of_model(medium: str, bias: Array, rise: Array) -> Array:
+    """Return by how much the tip may be off since the model is (K); most where the tip is steep."""
+    # a rise that grows as the square of the bias is that of a lever of constant properties
+    steepness = 0.5 * np.gradient(np.log(rise), np.log(bias))
+    return _MODEL[medium] * rise * np.maximum(steepness, 1.0)
 
 
 def _source(name: str) -> str:

@@ -133,7 +133,7 @@ def _by_estimate(
         measured_rms_K=_rms(measured.tip_K - measured_part.tip_temperature(shown)),
         probe=found.probe,
         measurement=measured,
-        priors={name: vars(use) for name, use in found.priors.items()},
+        priors=found.priors,
         reason=found.reason,
         notes=[*notes, *found.notes],
     )

@@ -21,7 +21,7 @@ from hotlever.calibration.knee import (
 )
 from hotlever.calibration.transfer import TemperatureCurve, knee_of
 from hotlever.errors import InputError
-from hotlever.fitting.estimation import METERS
+from hotlever.fitting.common_errors import METERS
 from hotlever.lever import Branch
 from hotlever.lever.branch import Reach
 from hotlever.lever.curve import spline_through

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hotlever.fitting.words import prior_lines
 from hotlever.text import aligned, value_with_error
 
 if TYPE_CHECKING:
@@ -20,9 +21,6 @@ _BASIS = {
     "fit in vacuum": "a fit of this lever in vacuum, and these data",
     "fit in air": "a fit of this lever in air, and these data",
 }
-#: A prior is named as leaned on where its data narrow it to no less than this share, and as moved
-#: where they move it by so many of its standard deviations.
-_LEANED_ON, _MOVED = 0.9, 1.0
 #: Errors (K) up to which a calibration is called good, and fair.
 _GOOD, _FAIR = 15.0, 40.0
 
@@ -43,7 +41,7 @@ def calibration_text(calibration: Calibration) -> str:
         "",
         *_budget_lines(calibration),
         "",
-        *_prior_lines(calibration),
+        *prior_lines(calibration.priors),
         f"sure to ± {stated:.0f} K (standard error, largest in the table): {_verdict(calibration)}",
     ]
     if not calibration.describes_data:
@@ -52,7 +50,7 @@ def calibration_text(calibration: Calibration) -> str:
             f"no lever like this one shows these data: {calibration.reason}",
             f"what comes nearest is {lines[0]}:",
             *_knee_lines(calibration)[:1],
-            *_prior_lines(calibration)[:1],
+            *prior_lines(calibration.priors)[:1],
         ]
     if np.isfinite(calibration.measured_rms_K):
         lines.append(
@@ -89,23 +87,6 @@ def _knee_lines(calibration: Calibration) -> list[str]:
     ]
 
 
-def _prior_lines(calibration: Calibration) -> list[str]:
-    """Say which priors the answer leans on, and which the data moved far."""
-    leaned, moved = [], []
-    for name, use in calibration.priors.items():
-        if use["posterior_spread"] > _LEANED_ON * use["spread"]:
-            leaned.append(name)
-        away = (use["posterior_value"] - use["value"]) / use["spread"]
-        if abs(away) > _MOVED:
-            moved.append(f"{name} by {away:+.1f} σ to {use['posterior_value']:.4g}")
-    lines = []
-    if moved:
-        lines.append(f"moved by the data beyond what was known before: {', '.join(moved)}")
-    if leaned:
-        lines.append(f"as known before, since the data do not tell: {', '.join(leaned)}")
-    return lines
-
-
 def _budget_lines(calibration: Calibration) -> list[str]:
     """Return the standard error by source at some temperatures, and the power there."""
     table = calibration.table
@@ -137,6 +118,7 @@ def _verdict(calibration: Calibration) -> str:
         "k": "a finer measurement near the knee would help",
         "constant k": "--medium air would not assume a constant k",
         "electronics": "better known meters would help",
+        "base temperature": "a thermometer at the chip would help",
     }
     text = f"{word}; mostly from {largest}"
     if largest in advice:

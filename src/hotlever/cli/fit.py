@@ -93,11 +93,6 @@ def fit_command(
         priors=stated if given is None else {**stated, **given} if given else {},
         **chosen,
     )
-    if options.priors and (posterior or profiles):
-        raise InputError(
-            "--posterior and --profiles are for fits without priors; with them the covariance is "
-            "that of the posterior"
-        )
     outputs = Outputs(*data, probe_file)
     to = Destination(outputs, output, report)
     where: Any = {"processes": processes}

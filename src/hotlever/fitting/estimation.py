@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hotlever.errors import BranchEndError, ComputationError, InputError, unknown_name
+from hotlever.fitting.common_errors import errors_of_scales
 from hotlever.fitting.least_squares import LeastSquares, Optimum
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement
 from hotlever.fitting.models import ForwardModel, Prediction, forward_model
@@ -26,14 +27,9 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameter_of
-from hotlever.probe.priors import JointPrior, Prior, priors_of
-from hotlever.spieser2017 import RAMAN_ERROR_SHARE
+from hotlever.probe.priors import SCALES, JointPrior, Prior, PriorUse, priors_of
 from hotlever.types import Array, Progress
 
-#: Standard error of a meter's scale, relative.
-METERS = 1e-3
-#: Rise (K) from which a stated error tells the scale of a thermometer.
-_WARM_K = 100.0
 #: Where a lever as known before melts below the highest bias: the share of what it reaches that is
 #: fitted first, and the rows that are enough for that.
 _SAFELY, _FEWEST = 0.9, 3
@@ -102,6 +98,27 @@ class Estimate:
         known = self.problem.model.names
         return prediction.slopes[:, :, [known.index(name) for name in self.options.varied]]
 
+    @property
+    def known(self) -> dict[str, Prior]:
+        """The priors that were asked for."""
+        return priors_of(self.options.priors, self.optimum.probe, "priors")
+
+    def priors(self, known: Mapping[str, Prior]) -> dict[str, PriorUse]:
+        """Return what was known before, and what the data made of it."""
+        names, at = self.options.varied, self.optimum.prediction
+        after = zip(self.optimum.probe.at(names), np.sqrt(np.diag(self.covariance)), strict=True)
+        found = {
+            name: PriorUse(known[name].value, known[name].absolute, float(value), float(spread))
+            for name, (value, spread) in zip(names, after, strict=True)
+            if name in known
+        }
+        residuals, slopes = self.problem.residuals, self.slopes(at)
+        sizes = residuals.in_common(at.values, slopes, self.covariance)
+        for one in residuals.common:
+            size, left = sizes[one.name]
+            found[one.name] = PriorUse(1.0, one.share, 1.0 + one.share * size, one.share * left)
+        return found
+
     def predicted(self, bias: Array) -> Prediction:
         """Return what is predicted at other biases (V), as far as the measured ones reach."""
         model = replace(self.problem.model, bias=bias)
@@ -139,8 +156,8 @@ def estimate(
     # priors are in standard deviations, so the data must be too
     known = bool(options.priors) or joint is not None
     weights = "errors" if known else options.weights
-    shared = _scales(measurement, observables) if known else {}
-    residuals = Residuals(measurement, observables, weights, options.drift, shared=shared)
+    common = errors_of_scales(measurement, observables, priors) if known else []
+    residuals = Residuals(measurement, observables, weights, options.drift, common=common)
     if not known and residuals.size < len(options.varied):
         raise InputError(
             f"{measurement.path or 'measurement'}: {residuals.size} data for "
@@ -150,10 +167,11 @@ def estimate(
     make = model or partial(forward_model, names=names)
     # with priors errors are a matter of standard deviations, to which the fast lever's slopes do
     forward = replace(make(probe, residuals.bias), names=names, first_order=not known)
-    start = probe.moved({name: prior.value for name, prior in priors.items()})
+    own = {name: prior for name, prior in priors.items() if name not in SCALES}
+    start = probe.moved({name: prior.value for name, prior in own.items()})
     attempts = _attempts(forward, options.held(start), options, residuals)
     try:
-        problem, optimum = _first_found(attempts, residuals, options, priors, joint, progress)
+        problem, optimum = _first_found(attempts, residuals, options, own, joint, progress)
     except BranchEndError as error:
         if not known:
             raise
@@ -166,7 +184,7 @@ def estimate(
         # a lever as known before would melt; what is measured below that tells a better one
         near = estimate(colder, probe, options, joint=joint, model=model).optimum.probe
         attempts = iter([(forward, near)])
-        problem, optimum = _first_found(attempts, residuals, options, priors, joint, progress)
+        problem, optimum = _first_found(attempts, residuals, options, own, joint, progress)
     seconds = time.perf_counter() - began
     return Estimate(problem, optimum, measurement, options, seconds, notes)
 
@@ -182,26 +200,6 @@ def _below(measurement: Measurement, bias: float) -> Measurement | None:
         if isinstance(values, np.ndarray)
     }
     return replace(measurement, **columns)
-
-
-def _scales(measurement: Measurement, observables: Sequence[str]) -> dict[str, Array]:
-    """Return the errors of the meters' and the thermometer's scales, which all data have in common.
-
-    The latter is as large, relative to the rise, as what the measurement states of each
-    temperature, or as the paper's.
-    """
-    meters = {
-        name: METERS * np.abs(measurement.observable(name))
-        for name in ("current", "reader")
-        if name in observables
-    }
-    if "tip" not in observables:
-        return meters
-    rise = measurement.tip_K - np.nanmin(measurement.tip_K)
-    stated = measurement.tip_error_K / np.maximum(rise, _WARM_K)
-    known = np.isfinite(stated).any()
-    share = float(np.nanmedian(stated)) if known else RAMAN_ERROR_SHARE
-    return {**meters, "tip": share * rise}
 
 
 def _attempts(
@@ -284,6 +282,7 @@ def _found(estimate: Estimate) -> Fit:
         evaluations=problem.evaluations,
         steps=problem.steps,
         seconds=estimate.seconds,
+        priors=estimate.priors(priors) if (priors := estimate.known) else {},
         notes=notes,
     )
 

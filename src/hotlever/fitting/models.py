@@ -78,7 +78,7 @@ class Prediction:
 class Nearby:
     """Predictions for probes near one whose branch is known: a branch costs nothing there.
 
-    At a fixed tip temperature, voltages and currents are nearly powers of the parameters, much
+    At a fixed rise of the tip, voltages and currents are nearly powers of the parameters, much
     more so than anything is at a fixed bias. What they change by at the branch's states,
     ``by_parameter``, has the shape (k, 3, p).
     """
@@ -116,10 +116,8 @@ class Nearby:
         """
         branch = self.branch_at(values)
         by_parameter = branch.values[:, :3, None] * self._powers / self._unit
-        circuit = self._probe.circuit
-        if "series_resistance_ohm" in self._names:
-            series = float(values[self._names.index("series_resistance_ohm")])
-            circuit = circuit.model_copy(update={"series_resistance_ohm": series})
+        moved = dict(zip(self._names, values.tolist(), strict=True))
+        circuit = self._probe.moved(moved).circuit
         return _with_slopes(branch, by_parameter, circuit, self._bias, self._names)
 
 
@@ -145,7 +143,8 @@ def shown_at_bias(branch: Branch, circuit: Circuit, bias: Array) -> tuple[Array,
     reading = branch.read(circuit, bias)
     if np.isnan(reading.u).any():
         raise branch.ended(reading)
-    shown, tip_K = branch.shown(reading.u), branch.base_temperature_K + reading.u**2
+    # the base temperature of a similar lever may be another one
+    shown, tip_K = branch.shown(reading.u), circuit.base_temperature_K + reading.u**2
     return reading.u, np.stack([shown["current_mA"], shown["reader_V"], tip_K])
 
 
@@ -156,7 +155,8 @@ def _with_slopes(
     u, values = shown_at_bias(branch, circuit, bias)
     slopes = spline_through(branch.u, by_parameter)(u)
     of_circuit = np.stack([circuit.bias_by(name, values[0]) for name in names], axis=1)
-    return values, at_fixed_bias(branch.curve(u, 1), u, circuit, slopes, of_circuit)
+    of_base = np.array([circuit.base_by(name) for name in names])
+    return values, at_fixed_bias(branch.curve(u, 1), u, circuit, slopes, of_circuit, of_base)
 
 
 @dataclass(frozen=True)

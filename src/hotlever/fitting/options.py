@@ -10,7 +10,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import PARAMETERS, parameter
 from hotlever.probe import Probe
-from hotlever.probe.priors import Prior
+from hotlever.probe.priors import SCALES, Prior
 from hotlever.probe.surroundings import Medium
 
 Weights = Literal["maximum", "errors"]
@@ -28,8 +28,8 @@ class FitOptions:
     fixed : mapping of str to float or None
         Parameters to hold, at a value or (None) at the probe's.
     robust : bool
-        Lessen the weight of points far from the others' fit (Tukey's biweight on the residuals
-        in units of their median absolute deviation), down to nothing beyond 4.7 of them.
+        Lessen the weight of points far from the others' fit: from 3.5 standard deviations on, as
+        the median absolute residual tells them, down to nothing beyond 6.
     weights : {"maximum", "errors"}
         Divide every observable by its largest measured value, as in the paper, or every datum by
         its measurement error; an observable without errors then takes its scatter about the fit.
@@ -38,8 +38,8 @@ class FitOptions:
     medium : {"vacuum", "air"}, optional
         What the lever was measured in; wins over measurement and probe.
     priors : mapping of str to Prior or str
-        What is known before, of parameters of the material, dimensions or the circuit, also as text
-        (`hotlever.probe.priors`); all that have a prior are varied.
+        What is known before, of parameters of the material, dimensions, the circuit or the scales
+        of meters, also as text (`hotlever.probe.priors`); all that have a prior are varied.
     free : sequence of str
         What else is varied beside the material.
 
@@ -90,7 +90,7 @@ class FitOptions:
     def varied(self) -> list[str]:
         """All parameters to find."""
         more = dict.fromkeys([*self.priors, *self.free])
-        return [*self.material, *(name for name in more if name not in PARAMETERS)]
+        return [*self.material, *(name for name in more if name not in {*PARAMETERS, *SCALES})]
 
     def held(self, probe: Probe) -> Probe:
         """Return a probe with the fixed values in place.

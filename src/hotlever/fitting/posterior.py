@@ -3,7 +3,8 @@
 Sampled with emcee on the reduced lever. The likelihood takes the fit's own weighted residuals as
 normal, with one unknown noise scale for each observable. With the prior 1/σ the scales are
 integrated out exactly: a group of n residuals with the sum of squares Q contributes Q^(−n/2).
-The parameters have uniform priors within the bounds of `PARAMETERS`.
+In a fit with priors data with stated errors have these, and contribute exp(−Q/2).
+A parameter has the prior that the fit gave it, or is uniform within its bounds.
 """
 
 from __future__ import annotations
@@ -22,14 +23,11 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.fitting.diagnostics import effective_sample_size, split_rhat
 from hotlever.fitting.ensembles import Chains, Gaussian, sample
 from hotlever.fitting.result import Fit
-from hotlever.fitting.rough import RoughModel
-from hotlever.lever.branch import Reach
-from hotlever.lever.certificate import estimated_error
-from hotlever.lever.lever import Lever
-from hotlever.lever.reduced import ReducedLever
-from hotlever.lever.reduction import cached_reduction
-from hotlever.materials import PARAMETERS, Material
+from hotlever.fitting.rough import RoughModel, rough_model
+from hotlever.materials import PARAMETERS
 from hotlever.materials.silicon import inversion_temperature
+from hotlever.probe import Probe
+from hotlever.probe.parameters import parameters_of
 from hotlever.text import INVERSION
 from hotlever.types import Array, Progress
 
@@ -37,55 +35,67 @@ Noise = Literal["each", "common"]
 
 #: Quantiles (%) of a predictive band: median, 68 % and 95 %.
 BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)
+#: Walkers of an ensemble: at least, and for each parameter.
+_WALKERS, _WALKERS_EACH = 24, 3
 
 
 class FitPosterior:
     """Posterior density of a fit's varied parameters, over their scales."""
 
     def __init__(self, fit: Fit, model: RoughModel, noise: Noise) -> None:
-        self._model, self._material, self._names = model, fit.probe.material, fit.names
-        known = [PARAMETERS[name] for name in fit.names]
-        optimum = [getattr(self._material, name) for name in fit.names]
+        self._model, self._probe, self._names = model, fit.probe, fit.names
+        known = [parameters_of(fit.probe)[name] for name in fit.names]
         self.scale = np.array([one.scale for one in known])
-        self.optimum = np.array(optimum) / self.scale
+        self.optimum = fit.probe.at(fit.names) / self.scale
+        priors = fit.known_before
+        self._priors = [(fit.names.index(name), prior) for name, prior in priors.items()]
         self.lower = np.array([one.lower for one in known]) / self.scale
         self.upper = np.array([one.upper for one in known]) / self.scale
         self._residuals = fit.residuals()
         # the data that share a noise scale
         self._group = np.nonzero(self._residuals.present)[0] * (noise == "each")
         self._counts = np.bincount(self._group)
+        stated = [np.isfinite(fit.measurement.error(name)).any() for name in fit.observables]
+        self._known = np.array(stated) if self._priors and noise == "each" else False
 
-    def material(self, point: Array) -> Material:
-        """Return the material of a point."""
-        values = dict(zip(self._names, (point * self.scale).tolist(), strict=True))
-        return self._material.model_copy(update=values)
+    def probe(self, point: Array) -> Probe:
+        """Return the probe of a point."""
+        return self._probe.moved(dict(zip(self._names, point * self.scale, strict=True)))
 
     def log_probability(self, point: Array) -> float:
         """Return the logarithm of the density; −∞ where the lever has no such state."""
         if np.any(point <= self.lower) or np.any(point >= self.upper):
             return -math.inf
         try:
-            values = self._model.predict(self.material(point))
+            values = self._model.predict(self.probe(point))
         except ComputationError:
             return -math.inf
         squares = self._squares(self._residuals.weighted(values))
-        return float(-0.5 * self._counts @ np.log(squares))
+        away = sum(prior.deviation(point[k] * self.scale[k]) ** 2 for k, prior in self._priors)
+        unlikely = np.where(self._known, squares, self._counts * np.log(squares))
+        return float(-0.5 * (unlikely.sum() + away))
 
     def linearised(self) -> Gaussian:
         """Return the posterior of the model linearised at its own material, as a normal one.
 
         The weights follow from the residuals and the residuals from the weights; a few dozen
-        rounds settle both. Directions that the data leave open are closed by the prior.
+        rounds settle both. Directions that the data leave open are closed by the priors.
         """
-        varied = [list(PARAMETERS).index(name) for name in self._names]
-        residual = self._residuals.weighted(self._model.predict(self._material))
+        varied = [self._model.names.index(name) for name in self._names]
+        residual = self._residuals.weighted(self._model.predict(self._probe))
         jacobian = self._residuals.jacobian(self._model.slopes[:, :, varied] * self.scale)
         prior = np.diag(12.0 / (self.upper - self.lower) ** 2)
-        step = np.zeros(len(varied))
+        pull, step = np.zeros(len(varied)), np.zeros(len(varied))
+        for place, one in self._priors:
+            value = self.optimum[place] * self.scale[place]
+            slope = one.slope(value) * self.scale[place]
+            prior[place, place] = slope**2
+            pull[place] = slope * one.deviation(value)
         for _ in range(50):
-            weights = (self._counts / self._squares(residual + jacobian @ step))[self._group]
+            squares = self._squares(residual + jacobian @ step)
+            weights = np.where(self._known, 1.0, self._counts / squares)[self._group]
             covariance = np.linalg.inv(jacobian.T @ (weights[:, None] * jacobian) + prior)
-            step = -covariance @ (jacobian.T @ (weights * residual))
+            step = -covariance @ (jacobian.T @ (weights * residual) + pull)
         margin = 1e-3 * (self.upper - self.lower)
         mean = np.clip(self.optimum + step, self.lower + margin, self.upper - margin)
         return Gaussian(mean, np.asarray(covariance, dtype=float))
@@ -99,21 +109,21 @@ def sample_posterior(
     fit: Fit,
     *,
     samples: int = 10_000,
-    walkers: int = 24,
+    walkers: int | None = None,
     processes: int = 2,
     seed: int = 0,
     noise: Noise = "each",
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Sample the posterior of the parameters that a fit varied.
+    """Sample the posterior of the parameters that a fit varied, with the priors that it had.
 
     Parameters
     ----------
     fit : Fit
     samples : int
         Kept, at least; rounded up to a whole number of steps of all walkers.
-    walkers : int
-        Of each of four independent ensembles.
+    walkers : int, optional
+        Of each of four independent ensembles; by default 24, or three for each parameter.
     processes : int
         Started by spawn: a script that calls this with more than one needs
         ``if __name__ == "__main__"``. The samples do not depend on their number.
@@ -131,8 +141,7 @@ def sample_posterior(
         ``inversion_temperature`` and ``log_probability``; on ``quantity`` (all of these but the
         last): ``effective_sample_size``, ``rhat``; ``acceptance_fraction``; the coordinate
         ``ensemble`` of each chain. Attributes give the fixed parameters, the seed, the noise, and
-        by how much the reduced lever may be wrong at the outermost samples
-        (``reduced_error_K``).
+        by how much the rough lever may be wrong at the outermost samples (``rough_error_K``).
 
     Raises
     ------
@@ -143,30 +152,24 @@ def sample_posterior(
     """
     if noise not in ("each", "common"):
         raise InputError(f"found noise = {noise!r}, expected 'each' or 'common'")
-    lever, bias = Lever(fit.probe), fit.measurement.bias_V
-    reduced = cached_reduction(lever)
-    at_optimum = FitPosterior(fit, RoughModel(lever, reduced, bias), noise)
+    bias = fit.residuals().bias
+    at_optimum = FitPosterior(fit, rough_model(fit.probe, fit.names, bias), noise)
     # with other weights than the fit's, the posterior lies beside the optimum
-    middle = lever.with_material(at_optimum.material(at_optimum.linearised().mean))
-    target = FitPosterior(fit, RoughModel(middle, reduced, bias), noise)
+    middle = rough_model(at_optimum.probe(at_optimum.linearised().mean), fit.names, bias)
+    target = FitPosterior(fit, middle, noise)
     chains = sample(
         target.log_probability,
         at_optimum.linearised(),
         samples=samples,
-        walkers=walkers,
+        walkers=walkers or max(_WALKERS, _WALKERS_EACH * len(fit.names)),
         processes=processes,
         seed=seed,
         progress=progress,
     )
     data = _dataset(fit, chains, target.scale)
     points = chains.points.reshape(-1, target.scale.size)
-    outermost = [points[place] for place in _outermost(points)]
-    reach = Reach(lever.circuit, float(bias.max()))
-    error = max(
-        _reduced_error(lever.with_material(target.material(one)), reduced, reach)
-        for one in outermost
-    )
-    data.attrs |= {"seed": seed, "noise": noise, "reduced_error_K": error}
+    error = max(middle.error_K(target.probe(points[place])) for place in _outermost(points))
+    data.attrs |= {"seed": seed, "noise": noise, "rough_error_K": error}
     return data
 
 
@@ -175,13 +178,6 @@ def _outermost(points: Array) -> list[int]:
     away = (points - points.mean(axis=0)) / np.maximum(points.std(axis=0), 1e-300)
     along = away @ np.linalg.eigh(away.T @ away)[1][:, -1]
     return [int(np.argmin(along)), int(np.argmax(along))]
-
-
-def _reduced_error(lever: Lever, reduced: ReducedLever, reach: Reach) -> float:
-    """Return how far the reduced lever's tip temperature may be off for a lever (K)."""
-    branch = reduced.linearised(lever.probe, reach).branch
-    u = branch.u[np.linspace(1, branch.u.size - 1, 4).astype(int)]
-    return float(estimated_error(lever, branch, u)[2].max())
 
 
 def _dataset(fit: Fit, chains: Chains, scale: Array) -> xr.Dataset:
@@ -201,7 +197,7 @@ def _dataset(fit: Fit, chains: Chains, scale: Array) -> xr.Dataset:
     }
     size = [effective_sample_size(chained[name]) for name in columns]
     held = [name for name in PARAMETERS if name not in fit.names]
-    return labelled(
+    data = labelled(
         {
             **chained,
             "rhat": ("quantity", rhat),
@@ -217,6 +213,10 @@ def _dataset(fit: Fit, chains: Chains, scale: Array) -> xr.Dataset:
         observables=", ".join(fit.observables),
         sampler=f"emcee {emcee.__version__}",
     )
+    for name, known in parameters_of(fit.probe).items():
+        if name in fit.names:
+            data[name].attrs = {"units": known.unit, "long_name": known.meaning}
+    return data
 
 
 # --- the band of tip temperature ----------------------------------------------------------------
@@ -265,16 +265,15 @@ def predictive_band(
         raise InputError(f"found samples = {samples}, expected 2 or more")
     highest = float(fit.measurement.bias_V.max())
     grid = np.linspace(0.0, highest, 81) if bias is None else np.unique(np.asarray(bias, float))
-    lever = Lever(fit.probe)
-    model = RoughModel(lever, cached_reduction(lever), grid)
+    model = rough_model(fit.probe, fit.names, grid)
     flat = np.stack([posterior[name].values.ravel() for name in fit.names], axis=1)
     chosen = flat[np.linspace(0, len(flat) - 1, min(samples, len(flat))).round().astype(int)]
     tips, powers = [], []
     for done, row in enumerate(chosen, start=1):
-        values = dict(zip(fit.names, row.tolist(), strict=True))
-        current, _, tip = model.predict(fit.probe.material.model_copy(update=values))
+        probe = fit.probe.moved(dict(zip(fit.names, row.tolist(), strict=True)))
+        current, _, tip = model.predict(probe)
         tips.append(tip)
-        powers.append(fit.probe.circuit.power(grid, current))
+        powers.append(probe.circuit.power(grid, current))
         if progress is not None:
             progress(done, len(chosen))
     power = np.linspace(np.min(powers, axis=1).max(), np.max(powers, axis=1).min(), grid.size)

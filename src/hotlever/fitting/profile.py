@@ -10,13 +10,12 @@ from scipy.special import chdtri
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting.least_squares import LeastSquares
-from hotlever.fitting.models import ForwardModel, reduced_model
+from hotlever.fitting.models import ForwardModel, Prediction, forward_model
 from hotlever.fitting.residuals import Residuals
 from hotlever.fitting.result import Fit
-from hotlever.lever.lever import Lever
-from hotlever.lever.reduction import cached_reduction
-from hotlever.materials import parameter
+from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
+from hotlever.probe.parameters import parameter_of
 from hotlever.types import Array
 
 #: Confidence levels whose intervals are read off a profile.
@@ -48,9 +47,9 @@ def profile_likelihood(
     -------
     xarray.Dataset
         On the dimension ``point``: ``value``, ``delta_chi_square`` (in units of the fit's own
-        noise variance), ``parabola`` (what the standard error alone says; NaN without one), and
-        ``refitted`` (parameter, point). On (level, side): ``interval``, NaN where it is open.
-        ``notes`` says in words which sides are open and why.
+        noise variance; what priors add is included), ``parabola`` (what the standard error alone
+        says; NaN without one), and ``refitted`` (parameter, point). On (level, side):
+        ``interval``, NaN where it is open. ``notes`` says in words which sides are open and why.
 
     Raises
     ------
@@ -60,7 +59,7 @@ def profile_likelihood(
     ComputationError
         If the lever cannot be solved at the optimum.
     """
-    known = parameter(name)
+    known = parameter_of(result.probe, name)
     if name not in result.names or len(result.names) < 2:
         raise InputError(
             f"no profile of {name}: expected one of several parameters that the fit varied "
@@ -74,16 +73,29 @@ def profile_likelihood(
     others = [other for other in result.names if other != name]
     model = _model(result, residuals)
     near = model.predict(result.probe)
-    variance = _noise_variance(result, name, residuals.size)
+    priors = result.known_before
+    own = priors.pop(name, None)
+    # with priors, residuals are in standard deviations
+    informed = bool(priors) or own is not None
+    variance = 1.0 if informed else _noise_variance(result, name, residuals.size)
+
+    def squares(at: Prediction, probe: Probe) -> float:
+        residual = residuals.weighted(at.values)
+        away = {one: prior.deviation(float(probe.at([one])[0])) for one, prior in priors.items()}
+        if own is not None:
+            away[name] = own.deviation(float(probe.at([name])[0]))
+        return float(residual @ residual) + sum(one**2 for one in away.values())
+
+    least = squares(near, result.probe) if informed else result.sum_of_squares
 
     def refit(value: float, start: Probe) -> tuple[float, Probe]:
         """Fit the others with the parameter at `value`; return Δχ² and where."""
         nonlocal near
-        held = start.with_(**{name: value})
-        found = LeastSquares(model, residuals, held, others, near=near).solve(held)
+        held = start.moved({name: value})
+        problem = LeastSquares(model, residuals, held, others, near=near, priors=priors)
+        found = problem.solve(held)
         near = found.prediction
-        residual = residuals.weighted(near.values)
-        return (float(residual @ residual) - result.sum_of_squares) / variance, found.probe
+        return (squares(near, near.probe) - least) / variance, found.probe
 
     # without a standard error, a tenth of the bounds' distance is a step as good as any
     step = (optimum.stderr or 0.1 * (known.upper - known.lower)) * _REACH / (points // 2)
@@ -115,8 +127,8 @@ def profile_likelihood(
 
 def _model(result: Fit, residuals: Residuals) -> ForwardModel:
     """Return a model that is exact to first order at the optimum, and used as it is from there."""
-    lever = Lever(result.probe)
-    model = reduced_model(lever, cached_reduction(lever), residuals.bias)
+    names = tuple(dict.fromkeys([*PARAMETERS, *result.names]))
+    model = forward_model(result.probe, residuals.bias, names=names, reduce=True)
     return model.confirmed(model.predict(result.probe))
 
 

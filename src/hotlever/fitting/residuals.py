@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from hotlever.errors import InputError
+from hotlever.fitting.common_errors import CommonError
 from hotlever.fitting.drift import Drift
 from hotlever.fitting.measurement import Measurement
 from hotlever.fitting.options import Weights
@@ -30,9 +31,8 @@ class Residuals:
         with a hundredth of its largest value for one, see `take_scatter`.
     data_weights : ndarray, shape (observables, rows of the measurement), optional
         What differences are multiplied by instead, as an earlier fit found it; 0 leaves out.
-    shared : mapping of str to ndarray, optional
-        Errors (standard deviations) that all data of an observable have in common, (n,), such as
-        that of a thermometer's scale.
+    common : sequence of CommonError, optional
+        Errors that data have in common.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Residuals:
         weights: Weights = "maximum",
         drift: bool = False,
         data_weights: Array | None = None,
-        shared: Mapping[str, Array] | None = None,
+        common: Sequence[CommonError] = (),
     ) -> None:
         self._measurement, self._drift = measurement, drift
         self._where = measurement.path or "measurement"
@@ -85,9 +85,9 @@ class Residuals:
             self._scale, self.down = np.ones(self.data.shape), data_weights[:, self._used]
             self.present = self.present & (self.down > 0)
         self._lines = Drift(observables, self.present)
-        self._shared = np.zeros((*self.data.shape, len(shared or {})))
-        for number, (name, error) in enumerate((shared or {}).items()):
-            self._shared[self.observables.index(name), :, number] = error[self._used]
+        self.common, self._common = common, np.zeros((*self.data.shape, len(common)))
+        for number, one in enumerate(common):
+            self._common[self.observables.index(one.observable), :, number] = one.errors[self._used]
 
     def _measured_errors(self) -> Array:
         """Return the standard error of every datum; a hundredth of the largest where unknown."""
@@ -130,35 +130,68 @@ class Residuals:
 
     def weighted(self, values: Array) -> Array:
         """Return the weighted differences, prediction minus data, shape (N,)."""
-        return self._decorrelated((-self.by * self.difference(values))[self.present])
+        return self._decorrelated(self._each(values))
 
     def jacobian(self, slopes: Array) -> Array:
         """Return the derivatives of `weighted`, shape (N, p)."""
+        return self._decorrelated(self._each_by(slopes))
+
+    def _each(self, values: Array) -> Array:
+        """Return weighted differences as if data had no errors in common, (N,)."""
+        return np.asarray((-self.by * self.difference(values))[self.present])
+
+    def _each_by(self, slopes: Array) -> Array:
+        """Return the derivatives of `_each`, (N, p)."""
         jacobian = (self.by[:, :, None] * slopes[self.rows])[self.present]
-        jacobian = self._lines.removed(jacobian, self.by) if self._drift else jacobian
-        return self._decorrelated(jacobian)
+        return self._lines.removed(jacobian, self.by) if self._drift else np.asarray(jacobian)
+
+    @property
+    def _pattern(self) -> Array:
+        """What errors in common, of one standard deviation, add to `_each`, (N, errors)."""
+        return np.nan_to_num((self.by[..., None] * self._common)[self.present])
 
     def _decorrelated(self, rows: Array) -> Array:
         """Return weighted rows (N, ...) less what errors that data share explain.
 
         With unit variances beside them the covariance is 1 + A Aᵀ; this is its inverse root.
         """
-        if not self._shared.size:
+        if not self.common:
             return np.asarray(rows)
-        pattern = np.nan_to_num((self.by[..., None] * self._shared)[self.present])
+        pattern = self._pattern
         # one for each observable, so that they have no rows in common
         size = np.linalg.norm(pattern, axis=0)
         along = pattern / np.maximum(size, 1e-300)
         kept = 1.0 / np.sqrt(1.0 + size**2) - 1.0
         return np.asarray(rows + along @ (kept * (along.T @ rows).T).T)
 
+    def in_common(
+        self, values: Array, slopes: Array, covariance: Array
+    ) -> dict[str, tuple[float, float]]:
+        """Return the errors that data have in common as the data tell them.
+
+        Each as its size and what it is uncertain by, in standard deviations of what was known
+        before; `slopes` (3, n, p) are those by parameters of which the fit leaves this covariance.
+        """
+        pattern = self._pattern
+        own = np.linalg.inv(np.eye(len(self.common)) + pattern.T @ pattern)
+        size = -own @ pattern.T @ self._each(values)
+        by = own @ pattern.T @ self._each_by(slopes)
+        left = np.sqrt(np.diag(own + by @ covariance @ by.T))
+        names = [one.name for one in self.common]
+        return dict(zip(names, zip(size.tolist(), left.tolist(), strict=True), strict=True))
+
     def deviations(self, values: Array) -> Array:
-        """Return differences in units of the scatter of their observable; 0 where nothing is."""
+        """Return differences in units of the scatter of their observable; 0 where nothing is.
+
+        Data may be off by their own errors, if they have some.
+        """
         difference = self.difference(values)
         scatter = 1.4826 * np.nanmedian(np.abs(difference), axis=1, keepdims=True)
         # data without noise have no scatter to measure against
-        floor = 1e-4 * self.largest
-        return np.nan_to_num(difference / np.maximum(scatter, floor))
+        least = np.broadcast_to(1e-4 * self.largest, difference.shape)
+        if self.errors_known:
+            least = np.where(self.without_errors[:, None], least, self._scale)
+        return np.nan_to_num(difference / np.maximum(scatter, least))
 
     def take_scatter(self, values: Array, used_up: Array | float = 0.0, usual: float = 0.0) -> None:
         """Give observables without measurement errors their scatter about a prediction.

@@ -10,11 +10,13 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from hotlever import __version__
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import json_text, write_text
+from hotlever.fitting.common_errors import errors_of_scales
 from hotlever.fitting.embedded import (
     EmbeddedMeasurement,
     Number,
@@ -33,7 +35,7 @@ from hotlever.materials import PARAMETERS
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameter_of, parameters_of
-from hotlever.probe.priors import Prior, PriorUse
+from hotlever.probe.priors import Prior, PriorUse, priors_of
 from hotlever.types import Array
 
 #: A parameter is called poorly determined from this relative standard error.
@@ -43,7 +45,7 @@ _ENTANGLED = 0.95
 #: What a fit file holds just as a fit does.
 _AS_THEY_ARE = (
     *("options", "residual_rms", "sum_of_squares"),
-    *("evaluations", "steps", "seconds", "notes"),
+    *("evaluations", "steps", "seconds", "priors", "notes"),
 )
 #: Variables of `Fit.band`.
 BAND = ("bias_V", "power_mW", "tip_K", "tip_stderr_K")
@@ -94,6 +96,8 @@ class Fit:
     evaluations, steps : int
         Solved sweeps, and Levenberg-Marquardt steps among them.
     seconds : float
+    priors : dict of str to PriorUse
+        What was known of parameters and scales before, and what the data made of it, by name.
     notes : list of str
         What the user should know beside the numbers.
     """
@@ -112,6 +116,7 @@ class Fit:
     evaluations: int
     steps: int
     seconds: float
+    priors: dict[str, PriorUse] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
     def __repr__(self) -> str:
@@ -138,13 +143,10 @@ class Fit:
         }
 
     @property
-    def priors(self) -> dict[str, PriorUse]:
-        """What was known of parameters before, and what the data made of it, by name."""
-        return {
-            name: PriorUse(prior.value, prior.absolute, after.value, after.stderr or np.nan)
-            for name, prior in self.options.priors.items()
-            if isinstance(prior, Prior) and (after := self.parameters[name])
-        }
+    def known_before(self) -> dict[str, Prior]:
+        """The priors of the parameters that were varied, by name."""
+        known = priors_of(self.options.priors, self.probe, "priors")
+        return {name: prior for name, prior in known.items() if name in self.names}
 
     @property
     def correlation(self) -> Array:
@@ -179,11 +181,14 @@ class Fit:
 
     def residuals(self) -> Residuals:
         """Return the data with the fit's own weights, to be compared with predictions."""
+        known = priors_of(self.options.priors, self.probe, "priors")
+        common = errors_of_scales(self.measurement, self.observables, known) if known else []
         return Residuals(
             self.measurement,
             self.observables,
             drift=self.options.drift,
             data_weights=self.data_weights,
+            common=common,
         )
 
     # --- the file -------------------------------------------------------------------------------
@@ -257,6 +262,7 @@ class _FitFile(Section):
     common_noise_covariance: list[list[Number]]
     sum_of_squares: float
     band: dict[str, list[Number]]
+    priors: dict[str, PriorUse] = Field(default_factory=dict)
     notes: list[str]
 
 

@@ -18,7 +18,7 @@ from hotlever.fitting.embedded import without_nan
 from hotlever.fitting.posterior import BAND_QUANTILES, predictive_band, sample_posterior
 from hotlever.fitting.profile import profile_likelihood
 from hotlever.fitting.result import Fit
-from hotlever.materials import PARAMETERS
+from hotlever.probe.parameters import parameters_of
 from hotlever.types import Array, Progress
 
 #: Chains are called unsettled above this R̂ or below this effective sample size (Vehtari et al.,
@@ -27,8 +27,10 @@ _RHAT, _EFFECTIVE = 1.01, 400
 #: A parameter is called undetermined if this share of the samples lies within the second share
 #: of its range from a bound, or if its spread is more than the third share of the prior's.
 _AT_BOUND, _NEAR, _AS_WIDE = 0.025, 0.02, 0.7
-#: The reduced lever is said to be off from this error on (K).
-_REDUCED_ERROR_K = 1.0
+#: It is said to be as known before from this share of its prior's spread on.
+_AS_KNOWN = 0.9
+#: The lever that is sampled is said to be off from this error on (K).
+_ROUGH_ERROR_K = 1.0
 #: Intervals are said to differ from those of the standard error by more than this share of it.
 _DIFFERENT = 0.5
 
@@ -56,11 +58,11 @@ class Uncertainty:
         found = []
         if self.posterior is not None:
             found += _unsettled(self.posterior)
-            error = self.posterior.attrs["reduced_error_K"]
-            if error > _REDUCED_ERROR_K:
+            error = self.posterior.attrs["rough_error_K"]
+            if error > _ROUGH_ERROR_K:
                 found.append(
-                    f"the reduced lever is off by up to {error:.1f} K at the outermost samples of "
-                    "the posterior"
+                    f"the lever that was sampled is off by up to {error:.1f} K at the outermost "
+                    "samples of the posterior"
                 )
             for name in self.fit.names:
                 found += _about(self.fit, name, self.posterior[name].values.ravel())
@@ -156,12 +158,15 @@ def _unsettled(posterior: xr.Dataset) -> list[str]:
 
 def _about(fit: Fit, name: str, values: Array) -> list[str]:
     """Say whether a parameter is undetermined, or its interval not that of its standard error."""
-    known, fitted = PARAMETERS[name], fit.parameters[name]
+    known, fitted = parameters_of(fit.probe)[name], fit.parameters[name]
     span, undetermined = known.upper - known.lower, f"{name} is not determined by these data: its"
     for bound, inwards in ((known.lower, 1.0), (known.upper, -1.0)):
         if np.mean(inwards * (values - bound) < _NEAR * span) > _AT_BOUND:
             unit = "" if known.unit == "1" else f" {known.unit}"
             return [f"{undetermined} posterior reaches its bound {bound:g}{unit}"]
+    prior = fit.known_before.get(name)
+    if prior is not None and values.std() > _AS_KNOWN * prior.absolute:
+        return [f"{name} is as known before: these data do not tell"]
     if values.std() > _AS_WIDE * span / np.sqrt(12.0):
         return [f"{undetermined} posterior is about as wide as its bounds"]
     if not fitted.stderr:

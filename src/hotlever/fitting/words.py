@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +15,11 @@ if TYPE_CHECKING:
 
     from hotlever.fitting.result import Fit
     from hotlever.fitting.uncertainty import Uncertainty
+    from hotlever.probe.priors import PriorUse
+
+#: A prior is named as leaned on where its data narrow it to no less than this share, and as moved
+#: where they move it by so many of its standard deviations.
+_LEANED_ON, _MOVED = 0.9, 1.0
 
 # Caption, columns and rows.
 Table = tuple[str, list[str], list[list[str]]]
@@ -43,9 +48,26 @@ def outcome(fit: Fit) -> list[str]:
     ]
 
 
+def prior_lines(priors: Mapping[str, PriorUse]) -> list[str]:
+    """Say which priors an answer leans on, and which the data moved far."""
+    leaned, moved = [], []
+    for name, use in priors.items():
+        if use.posterior_spread > _LEANED_ON * use.spread:
+            leaned.append(name)
+        away = (use.posterior_value - use.value) / use.spread
+        if abs(away) > _MOVED:
+            moved.append(f"{name} by {away:+.1f} σ to {use.posterior_value:.4g}")
+    lines = []
+    if moved:
+        lines.append(f"moved by the data beyond what was known before: {', '.join(moved)}")
+    if leaned:
+        lines.append(f"as known before, since the data do not tell: {', '.join(leaned)}")
+    return lines
+
+
 def fit_text(fit: Fit) -> str:
     """Return the result of a fit as lines of text."""
-    return "\n".join([*aligned(parameter_rows(fit)), *outcome(fit)])
+    return "\n".join([*aligned(parameter_rows(fit)), *outcome(fit), *prior_lines(fit.priors)])
 
 
 def lever_rows(levers: xr.Dataset) -> list[list[str]]:

@@ -8,6 +8,8 @@ Krylov's method for the rest.
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -46,14 +48,19 @@ class AirLoss:
     ----------
     gas_conductivity : float
         Of the gas, over that of air.
+    gap_um : float
+        To a surface below; NaN without one.
+    by_inverse_gap : ndarray, shape (sites, sites)
+        How the operator changes with the inverse of the gap; nothing where that was not asked for.
     """
 
-    gas_conductivity = 1.0
+    gas_conductivity, gap_um = 1.0, float("nan")
+    by_inverse_gap = np.empty((0, 0))
 
     def __init__(
         self, operator: Any, unknowns: Index, shares: Array, slots: Index, size: int
     ) -> None:
-        self.operator, self.filling = operator, operator.filling
+        self._take(operator)
         held = unknowns < 0
         self._held = np.where(held, shares, 0.0).sum(axis=1)
         rows = np.broadcast_to(np.arange(len(unknowns))[:, None], unknowns.shape)
@@ -63,8 +70,30 @@ class AirLoss:
         self.spreading = self.sampling.T.tocsr()
         self._slots = slots
         self._products = shares[:, :, None] * shares[:, None, :]
-        self._local = operator.matrix @ np.ones(len(unknowns))
+
+    def _take(self, operator: Any) -> None:
+        self.operator, self.filling = operator, operator.filling
+        self._local = operator.matrix @ np.ones(len(operator.sites))
         self.rest = operator.less(self._local)
+
+    def in_gas(self, conductivity: float) -> AirLoss:
+        """Return the loss to a gas that conducts so many times as well as air."""
+        air = copy(self)
+        air.gas_conductivity = conductivity
+        return air
+
+    def in_gap(self, gap_um: float) -> AirLoss:
+        """Return the loss with the surface below at another distance."""
+        air = copy(self)
+        change = (1.0 / gap_um - 1.0 / self.gap_um) * self.by_inverse_gap
+        air._take(replace(self.operator, matrix=self.operator.matrix + change))
+        air.gap_um = gap_um
+        return air
+
+    def change_with_gap(self, theta: Array) -> Array:
+        """Return the derivative of `weak_form` by the gap (per µm)."""
+        change = _columnwise(self.by_inverse_gap, theta) * -(self.gap_um**-2)
+        return _columnwise(self.spreading, change)
 
     def rise(self, x: Array) -> Array:
         """Return the rise of the temperature (K) at the sites, (sites, ...)."""

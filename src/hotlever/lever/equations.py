@@ -41,6 +41,9 @@ LAWS = (thermal_conductivity, conductivity_low_doped, conductivity_high_doped)
 #: What an instrument shows of a state, in the order of `LeverEquations.observed`.
 SHOWN = ("lever_V", "current_mA", "reader_V")
 
+#: Parameters that are of no law: one moves all temperatures, the others are of the air.
+BASE, GAS, GAP = "base_temperature_K", "gas_conductivity", "surface_gap_um"
+
 #: Error (relative) to which derivatives are solved, and the most rounds of refinement.
 _EXACT, _MOST_ROUNDS = 1e-6, 6
 
@@ -117,7 +120,7 @@ class LeverEquations:
             kappa_by = {
                 **kappa_by,
                 "T": kappa_by["T"] - filling * of_air_by["T"],
-                "gas_conductivity": -air.filling * of_air,
+                GAS: -air.filling * of_air,
             }
         sigma, sigma_by = conductivity_high_doped(T, material.a0, material.a1)
         sigma[here], low_by = conductivity_low_doped(T[here], self._doping, material.p)
@@ -219,9 +222,11 @@ class LeverEquations:
     def by_parameter(self, x: Array, names: Sequence[str]) -> Array:
         """Return how `balance` changes with parameters or dimensions, (size + 1, n, k)."""
         fields, known = self.at(x)
-        laws = self.conductivities(fields.T, names)
-        sigma = np.stack([laws.sigma_by[name] for name in names], axis=-1)
-        kappa = np.stack([laws.kappa_by[name] for name in names], axis=-1)
+        # a base temperature that rises takes the whole lever with it
+        by = ["T" if name == BASE else name for name in names]
+        laws = self.conductivities(fields.T, by)
+        sigma = np.stack([laws.sigma_by[name] for name in by], axis=-1)
+        kappa = np.stack([laws.kappa_by[name] for name in by], axis=-1)
         grad_T, grad_V = fields.grad_T[..., None], fields.grad_V[..., None]
         heat = -sigma * square(fields.grad_V)[..., None]
         changes = Fluxes(heat, kappa * grad_T, sigma * grad_V)
@@ -232,10 +237,17 @@ class LeverEquations:
             changes.heat[..., place] += moved.heat
             changes.charge[..., place] += moved.charge
         weak = self.space.weak_form(changes)
-        if "gas_conductivity" in names and self.space.air is not None:
-            lost = self.space.air.weak_form(self.kirchhoff(x)[0])
-            place = list(names).index("gas_conductivity")
-            weak[..., place] += lost / self.space.air.gas_conductivity
+        if self.space.air is None:
+            return weak
+        air, (theta, kappa_air) = self.space.air, self.kirchhoff(x)
+        for place, name in enumerate(names):
+            if name == GAS:
+                weak[..., place] += air.weak_form(theta / air.gas_conductivity)
+            elif name == BASE:
+                cold = self.kirchhoff(np.zeros_like(x))[1]
+                weak[..., place] += air.weak_form(kappa_air - cold)
+            elif name == GAP:
+                weak[..., place] += air.change_with_gap(theta)
         return weak
 
     def tip_by_parameter(self, x: Array, names: Sequence[str]) -> Array:

@@ -157,8 +157,7 @@ class FullSpace(Space):
     def in_gas(self, conductivity: float) -> FullSpace:
         """Return the same space in a gas that conducts so many times as well as air."""
         space = copy(self)
-        space.air = copy(self.air)
-        space.air.gas_conductivity = conductivity
+        space.air = self.air.in_gas(conductivity)
         return space
 
     def in_air_at_nodes(self, air: Any, surface: Index) -> FullSpace:

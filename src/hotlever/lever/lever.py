@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from hotlever.air.operator import air_operator
+from hotlever.air.operator import air_operator, change_with_gap
 from hotlever.air.surface import PanelOptions
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.balances import balance_columns, balance_slopes
@@ -88,6 +88,12 @@ class Lever:
         base = self.circuit.base_temperature_K
         air = air_operator(layout, surroundings, base, self.panels, progress)
         return space.in_air(air).in_gas(surroundings.gas_conductivity)
+
+    def air_by_inverse_gap(self) -> Array:
+        """Return how the operator of the air changes with the gap; see `change_with_gap`."""
+        layout, surroundings = self.probe.layout(), self.probe.surroundings
+        base, operator = self.circuit.base_temperature_K, self.space.air.operator
+        return change_with_gap(operator, layout, surroundings, base, self.panels)
 
     @property
     def panels(self) -> PanelOptions:

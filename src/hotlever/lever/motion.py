@@ -86,7 +86,8 @@ def motion_of(space: FullSpace, movement: Movement) -> Motion:
 
     def thickness(way: float) -> float | Array:
         there = tuple((layout.tip + way * rate.tip).tolist())
-        moved = replace(layout, tip=there, thickness_um=layout.thickness_um + way * rate.thickness)
+        thick = layout.thickness_um + way * rate.thickness
+        moved = replace(layout, tip=there, thickness_um=thick, cone=rate.cone(way))
         return thickness_at(moved, at + way * velocity)
 
     thicker = (thickness(_SMALL_UM) - thickness(-_SMALL_UM)) / (2 * _SMALL_UM * thickness(0.0))

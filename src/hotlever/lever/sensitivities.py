@@ -27,7 +27,7 @@ def by_parameter(
     names: Sequence[str] = tuple(PARAMETERS),
     factors: Factors | None = None,
 ) -> Array:
-    """Return how V_l, I_h and V_r change with parameters at fixed tip temperatures, (n, 3, k).
+    """Return how V_l, I_h and V_r change with parameters at fixed rises of the tip, (n, 3, k).
 
     Beside those of the material these may be dimensions whose motions the equations know. The
     states have power; factors are those of these very states. Adjoint: three solves for each state,
@@ -63,11 +63,16 @@ def with_changes(
 
 
 def at_fixed_bias(
-    along: Array, u: Array, circuit: Circuit, shown: Array, of_circuit: Array | float = 0.0
+    along: Array,
+    u: Array,
+    circuit: Circuit,
+    shown: Array,
+    of_circuit: Array | float = 0.0,
+    of_base: Array | float = 0.0,
 ) -> Array:
     """Return derivatives of I_h, V_r and T_tip by parameters at a fixed bias.
 
-    A parameter moves the curves at fixed tip temperatures; the circuit then moves the state along
+    A parameter moves the curves at fixed rises of the tip; the circuit then moves the state along
     its branch until the bias is what it was.
 
     Parameters
@@ -77,9 +82,11 @@ def at_fixed_bias(
     u : ndarray, shape (n,)
     circuit : Circuit
     shown : ndarray, shape (n, 3, p)
-        Derivatives of V_l, I_h and V_r at fixed tip temperatures, see `by_parameter`.
+        Derivatives of V_l, I_h and V_r at fixed rises of the tip, see `by_parameter`.
     of_circuit : ndarray, shape (n, p)
         Derivatives of the bias for a given state, see `Circuit.bias_by`.
+    of_base : ndarray, shape (p,)
+        Derivatives of the base temperature, see `Circuit.base_by`.
 
     Returns
     -------
@@ -95,7 +102,7 @@ def at_fixed_bias(
         [
             current_mA + by_u[:, 1] * moved,
             reader_V + by_u[:, 2] * moved,
-            2.0 * u[:, None] * moved,
+            of_base + 2.0 * u[:, None] * moved,
         ]
     )
 
@@ -112,7 +119,7 @@ def sensitivities_of(branch: Branch, u: Array, circuit: Circuit) -> Array:
 
 @dataclass(frozen=True)
 class Linearised:
-    """A branch, and how it changes with some parameters at fixed tip temperatures.
+    """A branch, and how it changes with some parameters at fixed rises of the tip.
 
     Attributes
     ----------

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from copy import copy
+
+from hotlever.lever.air_loss import AirLoss
 from hotlever.lever.branch import Reach
-from hotlever.lever.equations import LeverEquations
+from hotlever.lever.equations import GAP, LeverEquations
 from hotlever.lever.following import Follower, branch_of
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever
@@ -14,7 +17,9 @@ from hotlever.lever.sensitivities import Linearised
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.moving import MovingMesh
+from hotlever.probe.parameters import dimensions_of
 from hotlever.threads import one_blas_thread
+from hotlever.types import Array
 
 
 class SimilarLevers:
@@ -31,22 +36,38 @@ class SimilarLevers:
 
     def __init__(self, lever: Lever) -> None:
         self._lever = lever
-        self._moving = MovingMesh(lever.space.mesh, lever.probe.shape)
+        self._moving = MovingMesh(lever.space.mesh, lever.probe)
+        self._by_inverse_gap: Array | None = None
 
     def equations(self, probe: Probe, names: tuple[str, ...] = ()) -> LeverEquations:
         """Return the equations of a probe, with the motions of the dimensions among some names."""
         space = self._lever.space
-        if probe.shape != self._lever.probe.shape:
-            space = FullSpace(self._moving.at(probe.shape, probe.layout()))
-            # air takes up from a place nearly what it took before the place moved a little
-            space.air = self._lever.space.air
-        gas = probe.surroundings.gas_conductivity
-        if space.air is not None and gas != space.air.gas_conductivity:
-            space = space.in_gas(gas)
-        dimensions = [name for name in names if name in probe.shape.dimensions()]
+        own = self._lever.probe
+        if (probe.shape, probe.tip) != (own.shape, own.tip):
+            space = FullSpace(self._moving.at(probe))
+        space = copy(space)
+        # air takes up from a place nearly what it took before the place moved a little
+        space.air = self._air(probe, names)
+        dimensions = [name for name in names if name in dimensions_of(probe)]
         motions = {name: motion_of(space, self._moving.movement(name)) for name in dimensions}
         base = probe.circuit.base_temperature_K
         return LeverEquations(space, probe.material, base, motions)
+
+    def _air(self, probe: Probe, names: tuple[str, ...]) -> AirLoss | None:
+        """Return the air around a similar probe."""
+        air, around = self._lever.space.air, probe.surroundings
+        if air is None:
+            return None
+        if around.gas_conductivity != air.gas_conductivity:
+            air = air.in_gas(around.gas_conductivity)
+        own = self._lever.probe.surroundings.surface_gap_um
+        if own is not None and (GAP in names or around.surface_gap_um != own):
+            if self._by_inverse_gap is None:
+                self._by_inverse_gap = self._lever.air_by_inverse_gap()
+            air = copy(air)
+            air.by_inverse_gap, air.gap_um = self._by_inverse_gap, own
+            air = air.in_gap(around.surface_gap_um)
+        return air
 
     @one_blas_thread
     def linearised(

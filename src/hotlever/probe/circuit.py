@@ -46,6 +46,10 @@ class Circuit(Record):
         """Return how the bias (V) changes with a value of the circuit, the lever being the same."""
         return current_mA / 1000.0 if name == "series_resistance_ohm" else 0.0 * current_mA
 
+    def base_by(self, name: str) -> float:
+        """Return how the base temperature changes with a value of the circuit."""
+        return float(name == "base_temperature_K")
+
     def lever_voltage(self, bias_V: Any, current_mA: Any) -> Any:
         """Return the lever voltage V_l (V) of a bias (V) and a current (mA)."""
         return bias_V - self.series_kohm * current_mA

@@ -18,7 +18,9 @@ from skfem.models.poisson import laplace
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout, Point
 from hotlever.probe.mesh import ON_LINE, ProbeMesh
-from hotlever.probe.shapes import Shape
+from hotlever.probe.parameters import dimensions_of
+from hotlever.probe.probe import Probe
+from hotlever.probe.tip import Tip
 from hotlever.types import Array
 
 #: Share of a dimension by which it is changed to find how the drawing moves: any would do, since
@@ -42,22 +44,32 @@ class LayoutRate:
     step: float
 
     @classmethod
-    def of(cls, shape: Shape, name: str) -> LayoutRate:
-        """Return how a shape's layout changes with one of its dimensions.
+    def of(cls, probe: Probe, name: str) -> LayoutRate:
+        """Return how a probe's layout changes with one of its dimensions.
 
         Raises
         ------
         InputError
             If parts would come apart.
         """
-        now, step = shape.layout(), _STEP * getattr(shape, name)
-        later = shape.model_copy(update={name: getattr(shape, name) + step}).layout()
+        value = float(probe.at([name])[0])
+        now, step = probe.layout(), _STEP * value
+        later = probe.moved({name: value + step}).layout()
         if len(later.regions) != len(now.regions):
             raise InputError(
                 f"{name} cannot change by itself here: parts of the lever would come apart; "
                 "expected a fit or priors without it"
             )
         return cls(now, later, step)
+
+    def cone(self, change: float) -> Tip | None:
+        """Return the tip's body after a small change of the dimension."""
+        now, later = self.now.cone, self.later.cone
+        if now is None or later is None:
+            return None
+        values, ends = now.model_dump(), later.model_dump()
+        rates = {name: (ends[name] - values[name]) / self.step for name in values}
+        return now.model_copy(update={n: values[n] + change * rates[n] for n in values})
 
     def of_point(self, now: Point, later: Point) -> Array:
         """Return the velocity of a place in the drawing, shape (2,)."""
@@ -128,21 +140,21 @@ def _on_line(start: Array, end: Array, points: Array) -> tuple[Array, Array]:
 
 
 class MovingMesh:
-    """A flat mesh that follows its shape; it moves in proportion to the change of a dimension."""
+    """A flat mesh that follows its probe; it moves in proportion to the change of a dimension."""
 
-    def __init__(self, mesh: ProbeMesh, shape: Shape) -> None:
-        self._mesh, self._shape = mesh, shape
+    def __init__(self, mesh: ProbeMesh, probe: Probe) -> None:
+        self._mesh, self._probe = mesh, probe
         self._known: dict[str, Movement] = {}
 
     def movement(self, name: str) -> Movement:
         """Return how mesh and layout move with a dimension."""
         if name not in self._known:
-            rate = LayoutRate.of(self._shape, name)
+            rate = LayoutRate.of(self._probe, name)
             self._known[name] = Movement(rate, vertex_velocity(self._mesh, rate))
         return self._known[name]
 
-    def at(self, shape: Shape, layout: Layout) -> ProbeMesh:
-        """Return the mesh of other dimensions, whose layout is given.
+    def at(self, probe: Probe) -> ProbeMesh:
+        """Return the mesh of a probe with other dimensions.
 
         Raises
         ------
@@ -150,14 +162,14 @@ class MovingMesh:
             If a triangle would turn over.
         """
         points = self._mesh.elements.p.copy()
-        for name in shape.dimensions():
-            change = getattr(shape, name) - getattr(self._shape, name)
+        names = dimensions_of(probe)
+        for name, change in zip(names, probe.at(names) - self._probe.at(names), strict=True):
             if change:
                 points += change * self.movement(name).velocity
         before, triangles = self._mesh.elements.p, self._mesh.elements.t
         if np.any(_doubled_areas(before[:, triangles]) * _doubled_areas(points[:, triangles]) <= 0):
             raise ComputationError("the mesh cannot follow so large a change of the dimensions")
-        return replace(self._mesh, layout=layout, elements=MeshTri(points, triangles))
+        return replace(self._mesh, layout=probe.layout(), elements=MeshTri(points, triangles))
 
 
 def _doubled_areas(corners: Array) -> Array:

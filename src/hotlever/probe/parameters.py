@@ -1,4 +1,4 @@
-"""What a fit may vary of a probe: parameters of the material, dimensions, the series resistance."""
+"""What a fit may vary of a probe: its material, its dimensions, circuit and gas."""
 
 from __future__ import annotations
 
@@ -12,8 +12,16 @@ from hotlever.text import parameter_named
 if TYPE_CHECKING:
     from hotlever.probe.probe import Probe
 
-#: Shares of a dimension or a resistance, and of what a gas conducts, within which a fit stays.
-_OF_THE_VALUE, _OF_THE_GAS = (0.5, 1.5), (0.2, 5.0)
+#: Shares of a dimension or a resistance, of a base temperature, and of what a gas conducts, within
+#: which a fit stays.
+_OF_THE_VALUE, _OF_THE_BASE, _OF_THE_GAS = (0.5, 1.5), (0.8, 1.2), (0.2, 5.0)
+#: Dimensions of a tip that matter to its lever.
+OF_THE_TIP = ("height_um", "half_angle_deg")
+
+
+def dimensions_of(probe: Probe) -> list[str]:
+    """Return the names of all that the drawing says, and the tip if there is one."""
+    return [*probe.shape.dimensions(), *(OF_THE_TIP if probe.tip is not None else ())]
 
 
 def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Parameter]:
@@ -27,13 +35,16 @@ def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Paramete
     >>> parameters_of(Probe.reference())["heater_width_um"].unit
     'µm'
     """
-    shares = dict.fromkeys(probe.shape.dimensions(), _OF_THE_VALUE)
+    shares = dict.fromkeys(dimensions_of(probe), _OF_THE_VALUE)
+    shares["base_temperature_K"] = _OF_THE_BASE
     if probe.circuit.series_resistance_ohm > 0:
         shares["series_resistance_ohm"] = _OF_THE_VALUE
     if anywhere or probe.surroundings.medium == "air":
         shares["gas_conductivity"] = _OF_THE_GAS
-    parts = (probe.shape, probe.circuit, probe.surroundings)
-    meaning = {name: text for part in parts for name, text in part.description().items()}
+        if probe.surroundings.surface_gap_um is not None:
+            shares["surface_gap_um"] = _OF_THE_VALUE
+    parts = (probe.shape, probe.tip, probe.circuit, probe.surroundings)
+    meaning = {name: text for part in parts if part for name, text in part.description().items()}
     found = dict(PARAMETERS)
     for (name, (least, most)), value in zip(shares.items(), probe.at(list(shares)), strict=True):
         found[name] = parameter_named(name)._replace(

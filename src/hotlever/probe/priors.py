@@ -2,7 +2,9 @@
 
 Written as text, in the section ``[prior]`` of a probe file or on the command line:
 ``3.3e17 ± 15%``, ``± 5%`` (about the probe's own value), ``0.40 ± 0.02``. ``+-`` stands for ``±``.
-The name ``dimensions`` means all of the drawing and the thickness.
+The name ``dimensions`` means all of the drawing and the thickness. The scales of meters and of the
+Raman thermometer have priors too, shares such as ``± 2%``: by so much all that they show may be
+wrong together.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from pydantic import ConfigDict
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
 from hotlever.materials.material import Parameter
-from hotlever.probe.parameters import parameters_of
+from hotlever.probe.parameters import OF_THE_TIP, parameters_of
 from hotlever.records import Record
 from hotlever.spieser2017 import published
 from hotlever.types import Array
@@ -32,15 +34,23 @@ if TYPE_CHECKING:
 SCATTER_OF, _WIDENED = ("lever 1", "lever 2", "lever 3", "lever 4"), 1.5
 #: Relative spread of what the drawing says, and of a resistor that was measured.
 _DIMENSIONS, RESISTANCE = 0.05, 1e-3
+#: Of the base temperature (K): a room, or a hot plate and its thermocouple.
+_BASE_K = 1.0
+#: Of a tip, as far as it is stated: its height and half-angle, from a micrograph.
+_TIP = 0.2
 #: Of what air takes up: humidity, what is around, and dimensions as far as they matter to it.
 _GAS = 0.1
+#: Of the distance to a surface below.
+_GAP = 0.1
 #: Nominal doping is that good, where the probe file says no better (the makers' own tolerance).
 _DOPING = 0.15
 #: Dimensions that do not matter to the tip.
 _HARMLESS = ("reader_length_um", "reader_centre_um")
 ALL_DIMENSIONS = "dimensions"
+#: Scales of what is shown, and the observable that each belongs to.
+SCALES = {"current_scale": "current", "reader_scale": "reader", "raman_scale": "tip"}
 #: Relative spreads that mean something.
-_LEAST, _MOST = 1e-6, 10.0
+_LEAST, _MOST, _LARGEST_SHARE = 1e-6, 10.0, 0.5
 _TEXT = re.compile(r"([^±]{0,40})±([^±]{1,40})")
 
 
@@ -81,6 +91,11 @@ class Prior:
     def absolute(self) -> float:
         """The spread in the parameter's unit."""
         return self.spread * (self.value if self.relative else 1.0)
+
+    def at(self, deviation: float) -> float:
+        """Return the value so many standard deviations away; the inverse of `deviation`."""
+        away = self.spread * deviation
+        return float(self.value * np.exp(away)) if self.relative else self.value + away
 
     def deviation(self, value: float) -> float:
         """Return how far a value is from the prior's, in standard deviations."""
@@ -141,7 +156,7 @@ class JointPrior:
 
 
 def nuisances(probe: Probe) -> list[str]:
-    """Return the dimensions that matter to the tip."""
+    """Return the dimensions of the drawing that matter to the tip."""
     held = (*_HARMLESS, *probe.shape.tied())
     return [name for name in probe.shape.dimensions() if name not in held]
 
@@ -164,23 +179,30 @@ def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) ->
     """Return what is known of a lever of which nothing but the probe file is known.
 
     The material scatters about the probe's as that of the published levers does, half as much
-    again; the doping is nominal within 15 %, dimensions are within 5 %, the series resistance
-    within 0.1 %; what air takes up is known to 10 %. What is known of the
-    material instead may be given; what the probe file states wins.
+    again; the doping is nominal within 15 %, dimensions are within 5 %, those of a tip within
+    20 %, the series resistance within 0.1 %, the base temperature within 1 K; what air takes up and
+    the gap to a surface below are known to 10 %. What is known of the material instead may be
+    given; what the probe file states wins.
     """
     spreads = {name: prior.spread for name, prior in published_material().items()}
     spreads["n_d"] = _DOPING
+    if probe.tip is not None:
+        spreads |= dict.fromkeys(OF_THE_TIP, _TIP)
     spreads |= dict.fromkeys(nuisances(probe), _DIMENSIONS)
     if probe.circuit.series_resistance_ohm > 0:
         spreads["series_resistance_ohm"] = RESISTANCE
     if probe.surroundings.medium == "air":
         spreads["gas_conductivity"] = _GAS
+        if probe.surroundings.surface_gap_um is not None:
+            spreads["surface_gap_um"] = _GAP
     values = probe.at(list(spreads)).tolist()
     found = {
         name: Prior(value, float(spread))
         for (name, spread), value in zip(spreads.items(), values, strict=True)
         if value > 0
     }
+    base = Prior(probe.circuit.base_temperature_K, _BASE_K, relative=False)
+    found["base_temperature_K"] = base
     return found | {**(material or {})} | priors_of(probe.stated_priors, probe, "[prior]")
 
 
@@ -215,15 +237,22 @@ def priors_of(stated: Mapping[str, Prior | str], probe: Probe, where: str) -> di
     """
     known, found = parameters_of(probe, anywhere=True), dict[str, Prior]()
     for name, text in stated.items():
-        if name not in known and name != ALL_DIMENSIONS:
-            raise unknown_name("prior", name, [*known, ALL_DIMENSIONS], where)
+        if name not in known and name not in (ALL_DIMENSIONS, *SCALES):
+            raise unknown_name("prior", name, [*known, ALL_DIMENSIONS, *SCALES], where)
         if isinstance(text, Prior):
             found[name] = text
             continue
         value, spread, relative = _parsed(text, f"{where}: {name}")
+        share = value is None and relative and _LEAST <= spread <= _LARGEST_SHARE
+        if name in (ALL_DIMENSIONS, *SCALES) and not share:
+            raise InputError(
+                f"{where}: {name} = '{text}', expected a share such as '± 5%', at most "
+                f"{_LARGEST_SHARE:.0%}"
+            )
+        if name in SCALES:
+            found[name] = Prior(1.0, spread)
+            continue
         if name == ALL_DIMENSIONS:
-            if value is not None or not relative:
-                raise InputError(f"{where}: {name} = '{text}', expected a share such as '± 5%'")
             # those that are named have their own
             some = [one for one in nuisances(probe) if one not in stated]
         else:
@@ -232,7 +261,7 @@ def priors_of(stated: Mapping[str, Prior | str], probe: Probe, where: str) -> di
             found[one] = Prior(own if value is None else value, spread, relative)
             _check(found[one], known[one], f"{where}: {one}")
     counting = parameters_of(probe)
-    return {name: prior for name, prior in found.items() if name in counting}
+    return {name: prior for name, prior in found.items() if name in counting or name in SCALES}
 
 
 def _check(prior: Prior, known: Parameter, where: str) -> None:
