@@ -21,9 +21,13 @@ from hotlever.figures.style import (
     figure,
 )
 from hotlever.studies.design import label_of
+from hotlever.studies.twins import ESTIMATE, LEVELS, WAYS
 
 if TYPE_CHECKING:
     import xarray as xr
+
+#: Colour of each way of calibrating.
+_BY_WAY = (BLUE, GREEN, ORANGE, VERMILION)
 
 
 def calibration_curves(calibration: Calibration) -> Figure:
@@ -65,6 +69,45 @@ def calibration_curves(calibration: Calibration) -> Figure:
         budget.plot(tip, table.tip_stderr_K, color=BLACK, lw=2.0, label="together")
         budget.set(xlabel="tip temperature (K)", ylabel="standard error (K)", ylim=(0, None))
         budget.legend(loc="upper left")
+    return made
+
+
+def twins(found: xr.Dataset) -> Figure:
+    """Draw how wrong each way of calibrating is, and whether the stated errors hold.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        From `hotlever.studies.twins.together`.
+    """
+    shape: Any = {"width_ratios": (1.0, 1.0)}
+    with figure(8.0, 3.4, 1, 2, letters=True, **shape) as (made, (by_way, by_bias)):
+        largest = abs(found.off_K).max("row")
+        for place, (way, colour) in enumerate(zip(WAYS, _BY_WAY, strict=True)):
+            here = largest.sel(way=way).values
+            # next to each other, in the same order for every way
+            across = place + np.linspace(-0.25, 0.25, here.size)
+            by_way.plot(here, across, "o", color=colour, ms=4, alpha=0.7)
+            middle = np.nanmedian(here)
+            by_way.plot([middle] * 2, [place - 0.36, place + 0.36], color=BLACK, lw=2)
+            by_way.annotate(f"{middle:.0f} K", (middle, place - 0.38), ha="center", va="bottom")
+        by_way.set(xscale="log", xlabel="largest error above 400 K (K), bar: median")
+        by_way.set(yticks=range(len(WAYS)), ylim=(len(WAYS) - 0.4, -0.7))
+        by_way.set_yticklabels([way.replace(" at ", "\nat ") for way in WAYS])
+        by_way.xaxis.set_major_formatter("{x:g}")
+        for level, limit in reversed(LEVELS.items()):
+            label = f"stated {level:.0%} band"
+            by_bias.axhspan(-limit, limit, color=SKY, alpha=0.3, lw=0, label=label)
+        ratio = found.off_K.sel(way=ESTIMATE) / found.tip_stderr_K
+        for one in ratio.values:
+            known = one[np.isfinite(one)]
+            share = np.linspace(0.0, 1.0, known.size)
+            by_bias.plot(share, known, color=BLUE, lw=0.9, alpha=0.8)
+        by_bias.axhline(0.0, color=BLACK, lw=0.8)
+        by_bias.set(xlim=(0, 1), xlabel="bias, from 400 K to the highest")
+        by_bias.set(ylabel="error / stated error of the estimate")
+        by_bias.set_xticks([0, 1], ["400 K", "hottest"])
+        by_bias.legend(loc="upper left", ncols=2)
     return made
 
 
