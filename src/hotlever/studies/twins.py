@@ -42,9 +42,8 @@ DEPARTURES = {
     "outliers": "in a third of the twins, one or two currents off by 10 to 50 times the noise",
 }
 ALL = tuple(DEPARTURES)
-#: What may be measured beside the current.
 KINDS = ("iv", "reader", "raman")
-#: Ways of calibrating; the last three are the paper's and need the knee.
+#: Ways of calibrating; all but the estimate need the knee.
 ESTIMATE = "estimate with priors"
 WAYS = (ESTIMATE, "model of the drawing at k", "Eq. 12 at k", "knee at T_i")
 POINTS, NOISE, DRIFT = 40, 2e-3, 5e-4
@@ -59,8 +58,7 @@ _FINER = MeshOptions(refinement=1.3)
 #: Levels of confidence, and their limits in standard deviations.
 LEVELS = {0.68: 0.994, 0.95: 1.960}
 PERCENTILES = (50, 90, 100)
-#: Parts of the bias, and rows of a calibration's table.
-_DECILES, _ROWS = 10, 101
+_DECILES, _ROWS = 10, 101  # of the bias, and of a calibration's table
 
 
 class MinimosLever(Lever):
@@ -103,7 +101,7 @@ def measured(
 ) -> tuple[Measurement, Array, Lever]:
     """Measure a twin over even biases, as far as it goes; return its true temperatures (K) too.
 
-    Of `KINDS` the current is measured alone, with the reader, or with five Raman temperatures.
+    Of `KINDS`, the current is measured alone, with the reader, or with five Raman temperatures.
 
     Raises
     ------
@@ -130,11 +128,10 @@ def measured(
     if what == "raman":
         at = np.linspace(HOT, 0.98 * tip.max(), RAMAN_POINTS)
         some = np.searchsorted(tip, at).clip(0, POINTS - 1)
-        alone, together = RAMAN
-        base = true.circuit.base_temperature_K
-        scale = 1.0 + together * rng.standard_normal()
+        (alone, common), base = RAMAN, true.circuit.base_temperature_K
+        scale = 1.0 + common * rng.standard_normal()
         rise = (tip - base)[some] * scale * (1.0 + alone * rng.standard_normal(some.size))
-        tips[some], errors[some] = base + rise, np.hypot(alone, together) * (tip[some] - base)
+        tips[some], errors[some] = base + rise, np.hypot(alone, common) * (tip[some] - base)
     current = noisy(sweep.current_mA.values)
     if "outliers" in departures and rng.random() < _SOME:
         places = rng.choice(POINTS, rng.integers(1, 3), replace=False)
@@ -178,7 +175,8 @@ def judge(
         ``off_K`` on ``way`` and ``row`` (of the calibration's table), the error above 400 K, NaN
         below, and throughout for a way that gave no answer; ``tip_K``, the truth, and
         ``tip_stderr_K``, as the estimate states it; ``seconds`` of processor; as texts ``refused``,
-        why there is no estimate, and ``doubted``, why it says that the data are not described.
+        why there is no estimate, and ``doubted``, why it says that the data are not described; as
+        coordinates ``twin``, the number, and ``other_law``, whether the mobility is not Eq. 8's.
 
     Raises
     ------
@@ -211,12 +209,13 @@ def judge(
         "refused": refused,
         "doubted": doubted,
     }
-    return labelled(columns, (), {"way": list(WAYS), "twin": number})
+    coordinates = {"way": list(WAYS), "twin": number, "other_law": "mobility" in departures}
+    return labelled(columns, (), coordinates)
 
 
 def together(judged: Sequence[xr.Dataset]) -> xr.Dataset:
     """Return judged twins as one dataset, on the dimension ``twin``."""
-    return xr.concat(judged, "twin", combine_attrs="override")
+    return xr.concat(judged, "twin", coords="all", combine_attrs="override")
 
 
 def summary(found: xr.Dataset) -> xr.Dataset:
@@ -225,10 +224,10 @@ def summary(found: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``largest_K`` by ``way`` and ``percentile`` of the twins; ``held``, the share of the twins
-        within the stated band, by ``level`` of confidence and ``decile`` of the bias above 400 K;
-        as attributes the pooled rms of error over stated error (``rms``), the share of twins
-        within two stated errors everywhere (``everywhere``), and how many were ``answered``.
+        ``largest_K`` by ``way`` and ``percentile``; ``held``, the share within the stated band, by
+        ``level`` and ``decile`` of the bias above 400 K; as attributes ``rms``, the pooled one of
+        error over stated error, ``everywhere``, the share of twins within two stated errors at
+        every bias, and how many were ``answered``.
     """
     answered = found.isel(twin=(found.refused == "").values)
     ratio = abs(answered.off_K.sel(way=ESTIMATE) / answered.tip_stderr_K).values
