@@ -87,6 +87,7 @@ if __name__ == "__main__":
     parser.add_argument("medium", nargs="?", choices=(*HIGHEST_V, "all"), default="vacuum")
     parser.add_argument("what", nargs="?", choices=KINDS, default="iv")
     listed = "\n".join(f"{name}: {meaning}" for name, meaning in DEPARTURES.items())
+    listed = listed.replace("%", "%%")  # argparse formats its help
     parser.add_argument("--without", nargs="+", choices=DEPARTURES, default=[], help=listed)
     given = parser.parse_args()
     chosen = [name for name in DEPARTURES if name not in given.without]

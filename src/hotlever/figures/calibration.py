@@ -111,7 +111,7 @@ def twins(found: xr.Dataset) -> Figure:
                 by_bias.plot(share, known, color=_BY_WAY[0], ls=marks["ls"], lw=0.9)
             by_bias.plot([], [], color=_BY_WAY[0], ls=marks["ls"], label=label)
         by_bias.axhline(0.0, color=BLACK, lw=0.8)
-        by_bias.set(xlim=(0, 1), xlabel="bias V$_b$ (of 400 K to the highest)")
+        by_bias.set(xlim=(0, 1), xlabel="bias V$_b$ (above 400 K)")
         by_bias.set(ylabel="error of the estimate (stated errors)")
         by_bias.set_xticks([0, 1], ["400 K", "hottest"])
         for axes in (by_way, by_bias):

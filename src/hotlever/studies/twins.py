@@ -101,7 +101,7 @@ def measured(
 ) -> tuple[Measurement, Array, Lever]:
     """Measure a twin over even biases, as far as it goes; return its true temperatures (K) too.
 
-    Of `KINDS`, the current is measured alone, with the reader, or with five Raman temperatures.
+    Of ``KINDS``, the current is measured alone, with the reader, or with five Raman temperatures.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def measured(
 
 
 def paper_ways(data: Measurement, nominal: Probe) -> list[Callable[[Array], Array]]:
-    """Return the tip temperature (K) by power (mW) as the paper's rules have it, as in `WAYS`.
+    """Return the tip temperature (K) by power (mW) as the paper's rules have it, as in ``WAYS``.
 
     Raises
     ------
