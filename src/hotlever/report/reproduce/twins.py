@@ -58,7 +58,8 @@ def _compare_ways(page: Findings, count: int) -> None:
     page.table(
         ("largest error (K)", *columns, "needs a knee"),
         rows,
-        "Of the tip temperature above 400 K: half of the levers, 90 % of them, and the worst. k is "
+        "Of the tip temperature above 400 K: half of the levers, 90 % of them, and the worst, "
+        "as far as a way gave an answer. k is "
         "the power at the lever's knee over that of the reference; with the knee at T_i, of the "
         "nominal doping, the temperature rises in proportion to the power. "
         "benchmarks/twins.py makes 200 levers, also in air and with Raman temperatures.",
