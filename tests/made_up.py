@@ -1,4 +1,4 @@
-"""Fits of levers, and files with a fault, made up for tests."""
+"""Fits of levers, judged twins, and files with a fault, made up for tests."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from hotlever.datasets import labelled
 from hotlever.fitting.levers import compare_levers
 from hotlever.materials import PARAMETERS
+from hotlever.studies.twins import WAYS, together
 
 #: Not there, which is something else than null.
 GONE = object()
@@ -47,3 +49,23 @@ def levers(count: int, held: tuple[str, ...] = ()) -> xr.Dataset:
             for number in range(count)
         }
     )
+
+
+def twins(other_law: bool = False) -> xr.Dataset:
+    """Return twins with errors of 0.5, 1.5 and 3 stated ones throughout, and one refused."""
+    shape, rows = (len(WAYS), 101), np.arange(101)
+    judged = []
+    for number, sigma in enumerate((0.5, 1.5, 3.0, np.nan)):
+        off = np.full(shape, 10.0 * sigma) * np.arange(1, len(WAYS) + 1)[:, None]
+        off[:, :20] = np.nan
+        columns = {
+            "off_K": (("way", "row"), off),
+            "tip_K": ("row", 300.0 + 5.0 * rows),
+            "tip_stderr_K": ("row", np.full(rows.size, 10.0)),
+            "seconds": 1.0,
+            "refused": "" if np.isfinite(sigma) else "no lever like this",
+            "doubted": "",
+        }
+        coordinates = {"way": list(WAYS), "twin": number, "other_law": other_law}
+        judged.append(labelled(columns, (), coordinates))
+    return together(judged)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
+import made_up
 from hotlever import figures
 from hotlever.errors import InputError
 from hotlever.figures import save_figure
@@ -39,11 +41,12 @@ def made(coarse):
             ["c_kappa", "p"], np.array([[1, -0.9], [-0.9, 1]])
         ),
         "band": figures.tip_band(sweep.assign(tip_stderr_K=0.01 * sweep.tip_K), data),
+        "twins": figures.twins(xr.concat([made_up.twins(), made_up.twins(True)], "twin")),
     }
 
 
 NAMES = ["probe", "u_shape", "overview", "iv", "temperature_power", "resistances"]
-NAMES += ["doping", "profiles", "maps", "fit", "correlation", "band"]
+NAMES += ["doping", "profiles", "maps", "fit", "correlation", "band", "twins"]
 
 
 def texts(figure):

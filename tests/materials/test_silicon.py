@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from hotlever.materials.silicon import (
     impurity_mobility,
     intrinsic_density,
     inversion_temperature,
+    minimos_mobility,
     mobility,
     phonon_mobility,
     thermal_conductivity,
@@ -44,6 +46,15 @@ CARRIERS = [
     for law, arguments in LAWS
     if law in (carrier_density, phonon_mobility, mobility)
 ]
+#: Of another reference than the paper.
+MINIMOS = [
+    (law, {"n": 5.75e17, "p": 2.65, **more})
+    for law, more in (
+        (minimos_mobility, {}),
+        (minimos_mobility, {"carrier": "hole"}),
+        (partial(conductivity_low_doped, mobility_law=minimos_mobility), {}),
+    )
+]
 
 
 def numerical_derivative(function, at, step):
@@ -53,7 +64,7 @@ def numerical_derivative(function, at, step):
     return (4 * fine - coarse) / 3
 
 
-@pytest.mark.parametrize(("law", "arguments"), LAWS + CARRIERS)
+@pytest.mark.parametrize(("law", "arguments"), LAWS + CARRIERS + MINIMOS)
 @pytest.mark.parametrize("T", [*TEMPERATURES, *BEYOND])
 def test_every_partial_derivative_is_exact(law, arguments, T):
     value, partials = law(T, **arguments)
@@ -160,3 +171,17 @@ def test_limited_temperature_is_monotone_and_the_identity_inside(T, rise):
 def test_thermal_conductivity_falls_with_temperature(T, rise):
     # the tanh step is not monotone itself: it lowers 1/κ by 1.5e-4 of its value near 680 K
     assert thermal_conductivity(T + rise)[0] <= thermal_conductivity(T)[0]
+
+
+def test_minimos_mobility_is_that_of_the_lattice_without_doping_and_lowest_at_the_highest():
+    """Published: 1430 and 460 cm²/Vs at 300 K, exponents 2 and 2.18; 80 and 45 cm²/Vs."""
+    for carrier, lattice, exponent, lowest in (
+        ("electron", 1430.0, 2.0, 80.0),
+        ("hole", 460.0, 2.18, 45.0),
+    ):
+        pure = minimos_mobility(np.array([300.0, 600.0]), 1e6, 2.0, carrier)[0]
+        assert pure == pytest.approx([lattice, lattice * 2.0**-exponent], rel=1e-6)
+        assert minimos_mobility(300.0, 1e30, 2.0, carrier)[0] == pytest.approx(lowest, rel=1e-6)
+    # half of what is between at the reference doping, which grows as T^3.2
+    half = minimos_mobility(450.0, 1.12e17 * 1.5**3.2, 2.0)[0]
+    assert half == pytest.approx(0.5 * (1430.0 * 1.5**-2 + 80.0 * 1.5**-0.45))

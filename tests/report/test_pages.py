@@ -1,14 +1,18 @@
-"""Pages of fits have words, tables and figures."""
+"""Pages have words, tables and figures."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+import made_up
 from hotlever.fitting import Measurement, fit
 from hotlever.fitting.models import full_model
 from hotlever.fitting.uncertainty import examine
 from hotlever.report.fit_pages import fit_page
+from hotlever.report.reproduce import LONG_SECTIONS, SECTIONS, TWINS, twins
+from hotlever.report.reproduce.findings import Findings
+from hotlever.studies.twins import WAYS
 
 
 @pytest.fixture(scope="module")
@@ -27,3 +31,48 @@ def test_a_fit_s_page_tells_what_was_found_and_how_sure_it_is(result):
     assert page.blocks[0]["rows"][0][0] == "c_kappa"
     assert "How sure" in [block.get("text") for block in page.blocks]
     assert page.blocks[-1]["name"] == "profiles"
+
+
+@pytest.fixture
+def judged(monkeypatch):
+    """Twins that need not be solved: each of the page's is one of those made up."""
+    asked = []
+
+    def judge(number, departures):
+        other = "mobility" in departures
+        asked.append((number, other))
+        return made_up.twins(other).isel(twin=number % 3).assign_coords(twin=number)
+
+    monkeypatch.setattr(twins, "judge", judge)
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("section", "count"), [(twins.twins_section, 12), (twins.few_twins_section, 2)]
+)
+def test_levers_never_seen_are_made_with_both_laws_and_counted(coarse, judged, section, count):
+    told = []
+    page = Findings(coarse, lambda done, total: told.append((done, total)))
+    section(page)
+    assert judged == [(n, law) for law in (False, True) for n in range(count)]
+    assert told[-1] == (2 * count, 2 * count)
+    why, same_law, other_law = (one["text"] for one in page.blocks if one["kind"] == "text")
+    assert f"{count} levers" in why
+    assert "With the mobility of Eq. 8" in same_law
+    assert "With the other law" in other_law
+    [table] = [one for one in page.blocks if one["kind"] == "table"]
+    assert [row[0] for row in table["rows"]] == list(WAYS)
+    assert all(len(row) == len(table["columns"]) for row in table["rows"])
+
+
+def test_the_page_says_when_the_stated_errors_do_not_hold(coarse, judged):
+    page = Findings(coarse)
+    twins.twins_section(page)
+    # a third of the made-up twins is off by three stated errors
+    assert "do not cover this departure" in page.blocks[1]["text"]
+    assert "67% in its 95 % band" in page.blocks[1]["text"]
+
+
+def test_the_quick_page_has_the_headings_of_the_long_one_in_the_same_order():
+    assert list(SECTIONS | LONG_SECTIONS)[: len(SECTIONS)] == list(SECTIONS)
+    assert SECTIONS[TWINS] is not LONG_SECTIONS[TWINS]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typer import Option
 
 from hotlever.cli.application import app
-from hotlever.cli.output import give, progress
+from hotlever.cli.output import give, progress_bars
 from hotlever.files import Outputs
 
 
@@ -17,7 +17,9 @@ def reproduce_command(
         Path("reproduce"), "-o", "--output", help="Folder for the page and its figures."
     ),
     quick: bool = Option(
-        False, "--quick", help="Leave out what takes longest: k by geometry, the tip, the mesh."
+        False,
+        "--quick",
+        help="Leave out what takes longest: k by geometry, the tip, the mesh; fewer twins.",
     ),
 ) -> None:
     """Compute the paper's tables and figures and put them on one page."""
@@ -25,8 +27,8 @@ def reproduce_command(
 
     outputs = Outputs()
     outputs.folder(output)
-    with progress("reproduce") as update:
-        page = reproduce_page(quick=quick, progress=update)
+    with progress_bars("reproduce", "levers") as (update, within):
+        page = reproduce_page(quick=quick, progress=update, within=within)
     with outputs.together():
         written = page.write(output)
     give(f"{written}\n")

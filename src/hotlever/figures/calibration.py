@@ -21,9 +21,13 @@ from hotlever.figures.style import (
     figure,
 )
 from hotlever.studies.design import label_of
+from hotlever.studies.twins import ESTIMATE, LEVELS, WAYS
 
 if TYPE_CHECKING:
     import xarray as xr
+
+#: Colour of each way of calibrating.
+_BY_WAY = (BLUE, GREEN, ORANGE, VERMILION)
 
 
 def calibration_curves(calibration: Calibration) -> Figure:
@@ -65,6 +69,53 @@ def calibration_curves(calibration: Calibration) -> Figure:
         budget.plot(tip, table.tip_stderr_K, color=BLACK, lw=2.0, label="together")
         budget.set(xlabel="tip temperature (K)", ylabel="standard error (K)", ylim=(0, None))
         budget.legend(loc="upper left")
+    return made
+
+
+def twins(found: xr.Dataset) -> Figure:
+    """Draw how wrong each way of calibrating is, and whether the stated errors hold.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        From `hotlever.studies.twins.together`.
+    """
+    largest, other = abs(found.off_K).max("row"), found.other_law.values
+    ratio = (found.off_K.sel(way=ESTIMATE) / found.tip_stderr_K).transpose("twin", "row")
+    laws = [law for law in (False, True) if law in other]
+    with figure(8.0, 3.8, 1, 2, letters=True) as (made, (by_way, by_bias)):
+        beside: Any = {"transform": by_way.get_yaxis_transform(), "va": "center", "fontsize": 8}
+        for place, (way, colour) in enumerate(zip(WAYS, _BY_WAY, strict=True)):
+            for law in laws:
+                at = place + (0.2 if law else -0.2) * (len(laws) - 1)
+                here = largest.sel(way=way).values[other == law]
+                marks: Any = {"color": colour, "mfc": "white" if law else colour}
+                by_way.plot(here, np.linspace(-0.12, 0.12, here.size) + at, "o", ms=4, **marks)
+                middle = float(np.nanmedian(here))
+                by_way.plot([middle] * 2, [at - 0.18, at + 0.18], color=BLACK, lw=2)
+                by_way.text(1.01, at, f"{middle:.0f} K", **beside)
+        by_way.set(xscale="log", xlabel="largest error above 400 K (K); bar, right: median")
+        by_way.set(yticks=range(len(WAYS)), ylim=(len(WAYS) - 0.4, -0.6))
+        by_way.set_yticklabels([way.replace(" at ", "\nat ") for way in WAYS])
+        by_way.xaxis.set_major_formatter("{x:g}")
+        for level, limit in reversed(LEVELS.items()):
+            by_bias.axhspan(-limit, limit, color=SKY, alpha=0.3, lw=0)
+            by_bias.annotate(f"stated {level:.0%} ", (1, limit), ha="right", va="top", fontsize=7)
+        for law in laws:
+            marks = {"color": BLACK, "mfc": "white" if law else BLACK, "ls": "--" if law else "-"}
+            label = "another law" if law else "mobility of Eq. 8"
+            by_way.plot([], [], "o", label=label, **{**marks, "ls": "none"})
+            for one in ratio.values[other == law]:
+                known = one[np.isfinite(one)]
+                share = np.linspace(0.0, 1.0, known.size)
+                by_bias.plot(share, known, color=_BY_WAY[0], ls=marks["ls"], lw=0.9)
+            by_bias.plot([], [], color=_BY_WAY[0], ls=marks["ls"], label=label)
+        by_bias.axhline(0.0, color=BLACK, lw=0.8)
+        by_bias.set(xlim=(0, 1), xlabel="bias V$_b$ (above 400 K)")
+        by_bias.set(ylabel="error of the estimate (stated errors)")
+        by_bias.set_xticks([0, 1], ["400 K", "hottest"])
+        for axes in (by_way, by_bias):
+            axes.legend(loc="lower left", bbox_to_anchor=(0.1, 1.0), ncols=2, borderpad=0.1)
     return made
 
 

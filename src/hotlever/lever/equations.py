@@ -25,9 +25,11 @@ from hotlever.lever.space import LEVER, TIP, Factors, Fields, Fluxes, Pin, Space
 from hotlever.materials import Material
 from hotlever.materials.air import kirchhoff_variable, thermal_conductivity_of_air
 from hotlever.materials.doping import tapered_doping
+from hotlever.materials.laws import Law
 from hotlever.materials.silicon import (
     conductivity_high_doped,
     conductivity_low_doped,
+    mobility,
     thermal_conductivity,
 )
 from hotlever.types import Array
@@ -76,6 +78,8 @@ class LeverEquations:
     base_temperature_K : float
     motions : mapping of str to Motion, optional
         Of the dimensions by which derivatives may be asked for.
+    mobility_law : Law
+        Of the carriers in low-doped silicon; Eq. 8 by default.
 
     Attributes
     ----------
@@ -90,8 +94,10 @@ class LeverEquations:
         material: Material,
         base_temperature_K: float,
         motions: Mapping[str, Motion] | None = None,
+        mobility_law: Law = mobility,
     ) -> None:
         self.space, self.material, self.motions = space, material, motions or {}
+        self.mobility_law = mobility_law
         self.base_temperature_K = base_temperature_K
         self._sheet = PER_CM_TO_MILLI_PER_UM * space.thickness_um
         self._latest: tuple[Array, tuple[Fields, Conductivities]] | None = None
@@ -123,7 +129,8 @@ class LeverEquations:
                 GAS: -air.filling * of_air,
             }
         sigma, sigma_by = conductivity_high_doped(T, material.a0, material.a1)
-        sigma[here], low_by = conductivity_low_doped(T[here], self._doping, material.p)
+        low_doped = T[here], self._doping, material.p, self.mobility_law
+        sigma[here], low_by = conductivity_low_doped(*low_doped)
         low_by |= {name: low_by["n"] * by for name, by in self._doping_by.items()}
 
         def sheet_by(name: str) -> Array:

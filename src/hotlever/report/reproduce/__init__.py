@@ -7,12 +7,13 @@ from collections.abc import Callable
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 from hotlever.report.page import Page
-from hotlever.report.reproduce import air, fits, thermometer, vacuum
+from hotlever.report.reproduce import air, fits, thermometer, twins, vacuum
 from hotlever.report.reproduce.findings import Findings
 from hotlever.spieser2017 import published
 from hotlever.steps import each
 from hotlever.types import Progress
 
+TWINS = "A lever never seen: how wrong is its calibration?"
 #: Headings and sections, in the order of the page.
 SECTIONS: dict[str, Callable[[Findings], None]] = {
     "The reference probe": vacuum.probe_section,
@@ -28,17 +29,19 @@ SECTIONS: dict[str, Callable[[Findings], None]] = {
     "Characteristics in air (Figs. 9 and 10)": air.characteristics_section,
     "Is air one factor of the power? (Fig. 10b)": air.scale_section,
     "Where the heat goes": air.map_section,
+    TWINS: twins.few_twins_section,
     "Balances": vacuum.balance_section,
 }
-#: Left out of the quick form.
+#: Left out of the quick form, or shorter there.
 LONG_SECTIONS: dict[str, Callable[[Findings], None]] = {
     "k by size, gap and pressure": air.geometry_section,
     "The missing tip": air.tip_section,
     "Mesh": vacuum.mesh_section,
+    TWINS: twins.twins_section,
 }
 
 
-def reproduce_page(quick: bool, progress: Progress) -> Page:
+def reproduce_page(quick: bool, progress: Progress, within: Progress | None = None) -> Page:
     """Compute everything and return the page, the claims of the paper first.
 
     Parameters
@@ -47,8 +50,11 @@ def reproduce_page(quick: bool, progress: Progress) -> Page:
         Leave out `LONG_SECTIONS`.
     progress : callable
         Called with the sections done and their number.
+    within : callable, optional
+        Called with the steps done and their number, where a section takes long.
     """
-    page = Findings(Lever(Probe.reference().with_(**published("option III").material.model_dump())))
+    material = published("option III").material
+    page = Findings(Lever(Probe.reference().with_(**material.model_dump())), within)
     sections = SECTIONS if quick else SECTIONS | LONG_SECTIONS
     for heading, section in each(sections.items(), progress):
         page.heading(heading)

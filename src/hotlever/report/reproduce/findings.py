@@ -10,6 +10,7 @@ import xarray as xr
 from hotlever.lever import Lever
 from hotlever.report.page import Page
 from hotlever.spieser2017 import DOI, RAMP
+from hotlever.types import Progress
 
 #: Biases (V) of a curve without visible corners.
 MANY = np.linspace(0.1, RAMP[-1], 110)
@@ -22,6 +23,8 @@ class Findings(Page):
     ----------
     lever : Lever
         The reference lever in vacuum, with the published option III.
+    progress : callable, optional
+        For a section that takes long: called with its steps done and their number.
 
     Attributes
     ----------
@@ -31,14 +34,14 @@ class Findings(Page):
         Where the paper says what, the verdict, and what was found in this run.
     """
 
-    def __init__(self, lever: Lever) -> None:
+    def __init__(self, lever: Lever, progress: Progress | None = None) -> None:
         super().__init__(
             "Joule-heated cantilever probes: the published results, computed",
             f"Spieser et al., J. Appl. Phys. 121, 174503 (2017), doi:{DOI}, with hotlever's "
             "reference probe, whose dimensions are inferred: no drawing of the published lever "
             "exists.",
         )
-        self.lever, self.air = lever, lever.in_medium("air")
+        self.lever, self.air, self.progress = lever, lever.in_medium("air"), progress
         self.claims: list[tuple[str, str, str, str]] = []
 
     def claim(

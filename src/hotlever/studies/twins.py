@@ -1,0 +1,249 @@
+"""Levers never seen: how wrong their calibrations are, and whether the stated errors hold.
+
+A twin is a lever that is solved with more physics than the model that calibrates it has, so that
+its tip temperature is known. It differs from that model by `DEPARTURES`, in its material, and in
+what its data suffer on the way. The calibration knows the drawing, the nominal doping, the usual
+priors (`hotlever.probe.priors`), and the measured data. Beside it stand the paper's ways.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
+from functools import lru_cache
+
+import numpy as np
+import xarray as xr
+
+from hotlever.calibration.knee import IVCurve, find_knee
+from hotlever.calibration.power_law import EQ12
+from hotlever.calibration.procedure import calibrate
+from hotlever.calibration.transfer import curve_of_law, curve_of_model
+from hotlever.datasets import labelled
+from hotlever.errors import BranchEndError, HotleverError
+from hotlever.fitting import Measurement
+from hotlever.lever import Branch, Lever
+from hotlever.lever.equations import LeverEquations
+from hotlever.materials.silicon import inversion_temperature, minimos_mobility
+from hotlever.probe import MeshOptions, Probe
+from hotlever.probe.priors import default_priors
+from hotlever.probe.tip import Tip
+from hotlever.types import Array
+
+#: What a twin has and the model that calibrates it has not; each can be left out.
+DEPARTURES = {
+    "mesh": "elements 1.3 times finer",
+    "tip": "a cone on the heater",
+    "drawing": "every dimension off by its tolerance",
+    "jump": "in air, a temperature jump at the surface (accommodation 0.9)",
+    "mobility": "carriers as in MINIMOS, scattered less by impurities when hot, instead of Eq. 8",
+    "drift": "a gain that drifts by 0.05 % over the ramp",
+    "outliers": "in a third of the twins, one or two currents off by 10 to 50 times the noise",
+}
+ALL = tuple(DEPARTURES)
+KINDS = ("iv", "reader", "raman")
+#: Ways of calibrating; all but the estimate need the knee.
+ESTIMATE = "estimate with priors"
+WAYS = (ESTIMATE, "model of the drawing at k", "Eq. 12 at k", "knee at T_i")
+POINTS, NOISE, DRIFT = 40, 2e-3, 5e-4
+#: Share of the twins that have outliers, and how far these are off, in standard deviations.
+_SOME, _FAR = 1 / 3, (10.0, 50.0)
+#: Errors of Raman temperatures, as shares of the rise: of each, and common to all.
+RAMAN, RAMAN_POINTS = (0.01, 0.02), 5
+HIGHEST_V = {"vacuum": 11.0, "air": 13.0}
+#: Tip temperature (K) above which errors count.
+HOT = 400.0
+_FINER = MeshOptions(refinement=1.3)
+#: Levels of confidence, and their limits in standard deviations.
+LEVELS = {0.68: 0.994, 0.95: 1.960}
+PERCENTILES = (50, 90, 100)
+_DECILES, _ROWS = 10, 101  # of the bias, and of a calibration's table
+
+
+class MinimosLever(Lever):
+    """A lever whose carriers move as in MINIMOS where it is low-doped."""
+
+    def _prepare(self) -> None:
+        super()._prepare()
+        base, material = self.circuit.base_temperature_K, self.probe.material
+        self.equations = LeverEquations(self.space, material, base, mobility_law=minimos_mobility)
+
+
+def drawn(
+    rng: np.random.Generator, number: int, medium: str, departures: Collection[str] = ALL
+) -> tuple[Probe, Probe]:
+    """Draw a twin from the priors; return its probe, and the one that is known beforehand.
+
+    Twins of even `number` have three legs, the others are U-shaped.
+    """
+    nominal = (Probe.reference() if number % 2 == 0 else Probe.u_shape()).in_medium(medium)
+    values = {
+        name: prior.at(float(rng.standard_normal()))
+        for name, prior in default_priors(nominal).items()
+        if name != "series_resistance_ohm"
+    }
+    if "drawing" not in departures:
+        values = {name: values[name] for name in values if name not in nominal.shape.dimensions()}
+    true = nominal.with_(**values)
+    height = float(rng.uniform(0.3, 0.8))
+    tip = Tip(height_um=height, half_angle_deg=float(rng.uniform(10, 25)))
+    room = tip.base_radius_um < 0.45 * true.shape.layout().heater.sides.min()
+    if "tip" in departures and room:
+        true = true.model_copy(update={"tip": tip})
+    if medium == "air" and "jump" in departures:
+        true = true.with_(accommodation=0.9)
+    return true, nominal
+
+
+def measured(
+    true: Probe, rng: np.random.Generator, what: str, departures: Collection[str] = ALL
+) -> tuple[Measurement, Array, Lever]:
+    """Measure a twin over even biases, as far as it goes; return its true temperatures (K) too.
+
+    Of ``KINDS``, the current is measured alone, with the reader, or with five Raman temperatures.
+
+    Raises
+    ------
+    ComputationError
+        If a state of the twin was not found.
+    """
+    kind = MinimosLever if "mobility" in departures else Lever
+    lever = kind(true, _FINER if "mesh" in departures else None)
+    highest = HIGHEST_V[true.surroundings.medium]
+    try:
+        sweep = lever.sweep(np.linspace(highest / POINTS, highest, POINTS))
+    except BranchEndError as error:
+        highest = 0.97 * error.bias_reached
+        sweep = lever.sweep(np.linspace(highest / POINTS, highest, POINTS))
+    tip, drifting = sweep.tip_K.values, DRIFT * ("drift" in departures)
+
+    def noisy(values: Array) -> Array:
+        drift = drifting * rng.standard_normal() * np.linspace(0.0, 1.0, POINTS)
+        return np.asarray(values * (1.0 + NOISE * rng.standard_normal(POINTS) + drift))
+
+    nothing = np.full(POINTS, np.nan)
+    reader = noisy(sweep.reader_V.values) if what == "reader" else nothing
+    tips, errors = nothing.copy(), nothing.copy()
+    if what == "raman":
+        at = np.linspace(HOT, 0.98 * tip.max(), RAMAN_POINTS)
+        some = np.searchsorted(tip, at).clip(0, POINTS - 1)
+        (alone, common), base = RAMAN, true.circuit.base_temperature_K
+        scale = 1.0 + common * rng.standard_normal()
+        rise = (tip - base)[some] * scale * (1.0 + alone * rng.standard_normal(some.size))
+        tips[some], errors[some] = base + rise, np.hypot(alone, common) * (tip[some] - base)
+    current = noisy(sweep.current_mA.values)
+    if "outliers" in departures and rng.random() < _SOME:
+        places = rng.choice(POINTS, rng.integers(1, 3), replace=False)
+        off = rng.choice((-1.0, 1.0), places.size) * rng.uniform(*_FAR, places.size)
+        current[places] *= 1.0 + NOISE * off
+    return Measurement(sweep.bias.values, current, reader, tips, errors), tip, lever
+
+
+def paper_ways(data: Measurement, nominal: Probe) -> list[Callable[[Array], Array]]:
+    """Return the tip temperature (K) by power (mW) as the paper's rules have it, as in ``WAYS``.
+
+    Raises
+    ------
+    HotleverError
+        If data or drawing have no knee.
+    """
+    model, base = _in_vacuum(nominal), nominal.circuit.base_temperature_K
+    knee = find_knee(IVCurve.of(data.bias_V, data.current_mA, nominal.circuit), model).power_mW
+    inversion = float(inversion_temperature(nominal.material.n_d, nominal.material.p))
+    law, drawing = curve_of_law(EQ12, base), curve_of_model(model)
+    return [
+        lambda power: drawing.at(power, knee),
+        lambda power: law.at(power, knee),
+        lambda power: base + (inversion - base) * power / knee,
+    ]
+
+
+@lru_cache(maxsize=2)
+def _in_vacuum(nominal: Probe) -> Branch:
+    return Lever(nominal.in_medium("vacuum")).branch()
+
+
+def judge(
+    number: int, medium: str = "vacuum", what: str = "iv", departures: Collection[str] = ALL
+) -> xr.Dataset:
+    """Make the twin of a number, calibrate it, and compare with its true temperature.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``off_K`` on ``way`` and ``row`` (of the calibration's table), the error above 400 K, NaN
+        below, and throughout for a way that gave no answer; ``tip_K``, the truth, and
+        ``tip_stderr_K``, as the estimate states it; ``seconds`` of processor; as texts ``refused``,
+        why there is no estimate, and ``doubted``, why it says that the data are not described; as
+        coordinates ``twin``, the number, and ``other_law``, whether the mobility is not Eq. 8's.
+
+    Raises
+    ------
+    ComputationError
+        If the twin could not be solved.
+    """
+    rng = np.random.default_rng(number)
+    true, nominal = drawn(rng, number, medium, departures)
+    data, _, lever = measured(true, rng, what, departures)
+    off, refused, doubted = np.full((len(WAYS), _ROWS), np.nan), "", ""
+    tip, stated = off[0], off[0]
+    began = time.process_time()
+    try:
+        found = calibrate(data, probe=nominal)
+    except HotleverError as error:
+        refused = str(error)
+    seconds = time.process_time() - began
+    if not refused:
+        rows, doubted = found.table, found.reason
+        tip, stated = lever.sweep(rows.bias_V.values).tip_K.values, rows.tip_stderr_K.values
+        off[0] = rows.tip_K.values - tip
+        with suppress(HotleverError):
+            for place, way in enumerate(paper_ways(data, nominal), start=1):
+                off[place] = way(rows.power_mW.values) - tip
+    columns = {
+        "off_K": (("way", "row"), np.where(tip > HOT, off, np.nan)),
+        "tip_K": ("row", tip),
+        "tip_stderr_K": ("row", stated),
+        "seconds": seconds,
+        "refused": refused,
+        "doubted": doubted,
+    }
+    coordinates = {"way": list(WAYS), "twin": number, "other_law": "mobility" in departures}
+    return labelled(columns, (), coordinates)
+
+
+def together(judged: Sequence[xr.Dataset]) -> xr.Dataset:
+    """Return judged twins as one dataset, on the dimension ``twin``."""
+    return xr.concat(judged, "twin", coords="all", combine_attrs="override")
+
+
+def summary(found: xr.Dataset) -> xr.Dataset:
+    """Sum judged twins up; those without an answer are left out.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``largest_K`` by ``way`` and ``percentile``; ``held``, the share within the stated band, by
+        ``level`` and ``decile`` of the bias above 400 K; as attributes ``rms``, the pooled one of
+        error over stated error, ``everywhere``, the share of twins within two stated errors at
+        every bias, and how many were ``answered``.
+    """
+    answered = found.isel(twin=(found.refused == "").values)
+    ratio = abs(answered.off_K.sel(way=ESTIMATE) / answered.tip_stderr_K).values
+    largest = abs(answered.off_K).max("row").transpose("way", "twin").values
+    parts = [np.array_split(one[np.isfinite(one)], _DECILES) for one in ratio]
+    held = [
+        np.mean([[np.mean(part < limit) for part in one] for one in parts], axis=0)
+        for limit in LEVELS.values()
+    ]
+    return labelled(
+        {
+            "largest_K": (("way", "percentile"), np.nanpercentile(largest, PERCENTILES, axis=1).T),
+            "held": (("level", "decile"), held),
+        },
+        coordinates={"way": list(WAYS), "percentile": list(PERCENTILES), "level": list(LEVELS)},
+        rms=float(np.sqrt(np.nanmean(ratio**2))),
+        everywhere=float(np.mean(np.nanmax(ratio, axis=1) < 2.0)),
+        answered=int(answered.sizes["twin"]),
+    )

@@ -1,0 +1,137 @@
+"""Twins depart from the model in what they are said to, and are judged by their own truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import made_up
+from hotlever.lever import Lever
+from hotlever.lever.lever import COARSE
+from hotlever.materials.silicon import minimos_mobility, mobility
+from hotlever.probe import Probe
+from hotlever.studies import twins
+from hotlever.studies.twins import ALL, ESTIMATE, WAYS, MinimosLever, drawn, judge, measured
+
+
+@pytest.fixture(autouse=True)
+def coarse_levers(monkeypatch):
+    """What is tested here does not depend on the mesh."""
+    monkeypatch.setattr(twins, "_FINER", COARSE)
+
+
+@pytest.fixture
+def solved_once(monkeypatch):
+    """A lever that is not solved for every twin anew."""
+    sweep = Lever(Probe.reference(), COARSE).sweep(np.linspace(0.275, 11.0, twins.POINTS))
+    monkeypatch.setattr(Lever, "sweep", lambda *_: sweep)
+    return sweep
+
+
+def data_of(number, departures, what="iv", probe=None):
+    rng = np.random.default_rng(number)
+    return measured(probe or Probe.reference(), rng, what, departures)[0]
+
+
+def test_a_departure_that_is_left_out_changes_nothing_else():
+    everything, nominal = drawn(np.random.default_rng(0), 0, "vacuum")
+    probes = {
+        name: drawn(np.random.default_rng(0), 0, "vacuum", [one for one in ALL if one != name])[0]
+        for name in ("tip", "drawing")
+    }
+    assert all(one.material == everything.material != nominal.material for one in probes.values())
+    assert everything.tip is not None
+    assert probes["tip"].tip is None
+    assert probes["tip"].shape == everything.shape != nominal.shape
+    assert probes["drawing"].shape == nominal.shape
+    assert probes["drawing"].tip == everything.tip
+
+
+def test_the_jump_is_of_twins_in_air_alone():
+    rng = np.random.default_rng
+    assert drawn(rng(1), 1, "air")[0].surroundings.accommodation == 0.9
+    without = drawn(rng(1), 1, "air", ["drawing"])[0]
+    assert without.surroundings.accommodation == Probe.reference().surroundings.accommodation
+    assert drawn(rng(1), 1, "vacuum")[0].surroundings.accommodation != 0.9
+
+
+def test_outliers_are_far_off_few_and_in_a_third_of_the_twins(solved_once):
+    some = 0
+    for number in range(300):
+        with_, without = (data_of(number, more).current_mA for more in (["outliers"], []))
+        off = np.abs(with_ / without - 1.0) / twins.NOISE
+        moved = off[off > 1e-9]
+        assert moved.size <= 2
+        assert np.all((moved > 9.9) & (moved < 50.1))
+        some += moved.size > 0
+    assert 80 <= some <= 120
+
+
+def test_drift_grows_over_the_ramp(solved_once):
+    off = [
+        data_of(number, ["drift"]).current_mA / data_of(number, []).current_mA - 1.0
+        for number in range(100)
+    ]
+    spread = np.std(off, axis=0)
+    assert spread[0] == pytest.approx(0.0, abs=1e-12)
+    assert spread[-1] == pytest.approx(twins.DRIFT, rel=0.25)
+
+
+def test_another_mobility_changes_the_lever_and_nobody_else_s():
+    probe = Probe.reference()
+    before = Lever(probe, COARSE).sweep([5.0, 9.0])
+    other = MinimosLever(probe, COARSE)
+    assert other.equations.mobility_law is minimos_mobility
+    assert abs(other.sweep([5.0, 9.0]).current_mA / before.current_mA - 1).max() > 5e-3
+    again = Lever(probe, COARSE)
+    assert again.equations.mobility_law is mobility
+    xr.testing.assert_allclose(again.sweep([5.0, 9.0]).current_mA, before.current_mA)
+    assert isinstance(other.with_probe(probe.with_(n_d=4e17)), MinimosLever)
+
+
+def test_raman_temperatures_have_the_errors_that_they_state(solved_once):
+    data, tip = data_of(0, [], "raman"), solved_once.tip_K.values
+    known = np.isfinite(data.tip_K)
+    assert known.sum() == twins.RAMAN_POINTS
+    assert np.all(np.abs(data.tip_K - tip)[known] < 4 * data.tip_error_K[known])
+    assert tip[known].min() > 390
+
+
+def test_a_reader_is_measured_where_there_is_one():
+    assert np.isfinite(data_of(0, ["mesh"], "reader").reader_V).all()
+    assert np.isnan(data_of(0, ["mesh"], "reader", Probe.u_shape()).reader_V).all()
+
+
+def test_a_twin_like_the_model_is_calibrated_within_the_stated_error():
+    found = judge(0, departures=["mesh"])
+    assert found.refused == ""
+    hot = found.tip_K.values > twins.HOT
+    estimate = found.off_K.sel(way=ESTIMATE).values
+    assert np.array_equal(np.isfinite(estimate), hot)
+    assert np.nanmax(np.abs(estimate / found.tip_stderr_K.values)) < 3.0
+    largest = np.abs(found.off_K).max("row")
+    assert largest.sel(way=ESTIMATE) < largest.sel(way="knee at T_i")
+    assert not found.other_law
+
+
+def test_a_twin_without_an_answer_is_kept_with_the_reason(monkeypatch):
+    def refuse(*_, **__):
+        raise twins.HotleverError("no lever like this")
+
+    monkeypatch.setattr(twins, "calibrate", refuse)
+    found = judge(0, departures=["mesh"])
+    assert found.refused == "no lever like this"
+    assert found.off_K.isnull().all()
+
+
+def test_a_summary_counts_what_the_bands_hold():
+    """Errors of 0.5, 1.5 and 3 stated ones throughout; the last twin was refused."""
+    total = twins.summary(made_up.twins())
+    assert total.answered == 3
+    assert total.largest_K.sel(way=ESTIMATE).values == pytest.approx([15.0, 27.0, 30.0])
+    assert total.largest_K.sel(way=WAYS[1], percentile=100) == pytest.approx(60.0)
+    assert total.held.sel(level=0.68).values == pytest.approx(np.full(10, 1 / 3))
+    assert total.held.sel(level=0.95).values == pytest.approx(np.full(10, 2 / 3))
+    assert total.everywhere == pytest.approx(2 / 3)
+    assert total.rms == pytest.approx(np.sqrt((0.5**2 + 1.5**2 + 3**2) / 3))
