@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hotlever.errors import InputError
-from hotlever.raman.block import find_block
+from hotlever.raman.block import find_blocks
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.spectrum import read_file, read_spectra, read_spectrum, spectrum_files
 from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
@@ -173,7 +173,7 @@ def test_any_table_of_two_columns_is_read_back(
     text = end.join(lines)
     if comma:
         text = text.replace(".", ",")
-    table = find_block(decode(text.encode(encoding), "f").splitlines(), "f")
+    (table,) = find_blocks(decode(text.encode(encoding), "f").splitlines(), "f")
     np.testing.assert_allclose(table.values[order], np.stack([x, y], axis=1), atol=1e-9)
 
 
