@@ -7,6 +7,7 @@ file rows of numbers.
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -20,7 +21,8 @@ from hotlever.errors import InputError
 from hotlever.tables import LARGEST_NUMBER, cells_of, key_and_value, number, shown
 from hotlever.types import Array
 
-MOST_NUMBERS = 10_000_000
+#: Of a file; a map of 500 spectra below each other has half a million lines.
+MOST_LINES, MOST_NUMBERS = 600_000, 10_000_000
 
 
 @dataclass(frozen=True)
@@ -193,8 +195,10 @@ def _row(line: str, dialect: Dialect) -> Array | None:
     # nearly every line has nothing but numbers, and maps have millions
     if plain:
         with suppress(ValueError):
-            row = np.array(list(map(float, cells)))
-            return row if np.abs(row).max() <= LARGEST_NUMBER else None
+            row = np.array([float(cell) if cell else math.nan for cell in cells])
+            # fmax leaves NaN out
+            largest = np.fmax.reduce(np.abs(row))
+            return row if largest <= LARGEST_NUMBER else None
     values = [dialect.number(cell) for cell in dialect.cells(line) or [""]]
     row = np.array(values, dtype=float)
     return None if None in values or np.isnan(row).all() else row
@@ -212,6 +216,9 @@ def _names(above: list[str], dialect: Dialect, width: int) -> tuple[list[str], i
         while len(cells) > width and not cells[-1]:
             cells.pop()
         setting = line.lstrip().startswith("#") and "=" in line
+        numbers = [dialect.number(cell) for cell in cells]
+        # 'Laser (nm)  532' is no heading, while a map's headings, or temperatures, are numbers
+        setting = setting or (numbers[-1:] != [None] and (len(cells) == 2 or used > 0))
         if len(cells) != width or setting or not any(cells):
             break
         names = [f"{cell} {name}".strip() for cell, name in zip(cells, names, strict=True)]

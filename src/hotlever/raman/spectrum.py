@@ -14,7 +14,7 @@ import numpy as np
 from hotlever.errors import InputError
 from hotlever.files import LARGEST_TEXT, read_bytes
 from hotlever.raman import wdf
-from hotlever.raman.block import find_blocks
+from hotlever.raman.block import MOST_LINES, find_blocks
 from hotlever.raman.columns import require_line
 from hotlever.raman.layout import pick_spectra
 from hotlever.raman.noise import zeros
@@ -28,6 +28,7 @@ from hotlever.types import Array, Progress
 
 SKIPPED_SUFFIXES = {".md", ".json", ".toml", ".yaml", ".yml", ".py", ".ipynb", ".html", ".pdf"}
 SKIPPED_SUFFIXES |= {".png", ".jpg", ".jpeg", ".svg", ".tif", ".tiff", ".bmp", ".log", ".zip"}
+_GZIP = b"\x1f\x8b"
 
 
 @dataclass(frozen=True)
@@ -97,16 +98,22 @@ def read_file(path: str | os.PathLike[str]) -> list[Spectrum]:
 
 def _unpacked(raw: bytes, file: Path) -> bytes:
     """A file's content, as it was before gzip if that is what made it."""
-    if not raw.startswith(b"\x1f\x8b"):
+    if not raw.startswith(_GZIP):
         return raw
-    unpacking = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
-    try:
-        content = unpacking.decompress(raw, LARGEST_TEXT)
-    except zlib.error as error:
-        raise InputError(f"{file}: not a readable gzip file ({error})") from None
-    if not unpacking.eof:
-        found = "more than a file may have" if unpacking.unconsumed_tail else "cut short"
-        raise InputError(f"{file}: {len(content)} bytes unpacked, {found}")
+    content = b""
+    while raw.startswith(_GZIP):
+        unpacking = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
+        try:
+            content += unpacking.decompress(raw, LARGEST_TEXT + 1 - len(content))
+        except zlib.error as error:
+            raise InputError(f"{file}: not a readable gzip file ({error})") from None
+        if len(content) > LARGEST_TEXT:
+            raise InputError(
+                f"{file}: unpacked, larger than the {LARGEST_TEXT / 1e6:.3g} MB it may have"
+            )
+        if not unpacking.eof:
+            raise InputError(f"{file}: not a readable gzip file (cut short)")
+        raw = unpacking.unused_data
     return content
 
 
@@ -125,7 +132,7 @@ def _in_text(file: Path, raw: bytes) -> list[Part]:
     """Spectra of a text file; a block of numbers beside them may be something else."""
     parts: list[Part] = []
     errors: list[tuple[int, InputError]] = []
-    for block in find_blocks(text_lines(raw, str(file)), str(file)):
+    for block in find_blocks(text_lines(raw, str(file), MOST_LINES), str(file)):
         try:
             found = pick_spectra(block, str(file))
         except InputError as error:

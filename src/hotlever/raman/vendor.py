@@ -22,7 +22,7 @@ import numpy as np
 from hotlever.errors import InputError
 from hotlever.raman.part import Part, positions
 from hotlever.raman.wdf import read_wdf
-from hotlever.tables import LARGEST_NUMBER
+from hotlever.tables import LARGEST_NUMBER, shown
 
 _NPOINTS = re.compile(r"NPOINTS\s*=\s*(\d+)", re.I)
 _XYDATA = re.compile(r"##\s*XYDATA\s*=[^\n]*([^#]*)", re.I)
@@ -72,9 +72,11 @@ def read_vendor(kind: str, file: Path, raw: bytes) -> list[Part]:
         parts = maker.read(raw, library)
         for part in parts:
             _require_numbers(part)
+        if all(np.ptp(part.y) == 0.0 for part in parts):
+            raise ValueError("all its intensities are alike")
         return parts
     except Exception as error:
-        reason = " ".join(str(error).split())[:160] or type(error).__name__
+        reason = shown(" ".join(str(error).split()), 160) or type(error).__name__
         raise InputError(f"{file}: not a readable {maker.name} file ({reason})") from error
 
 
