@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 import struct
-import time
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,7 +17,7 @@ from hotlever.raman.series import measure
 from hotlever.raman.spectrum import Spectrum, read_file
 from spectrometer_files import jcamp_bytes, spc_bytes, wdf_bytes
 
-LIMIT_S = 2.0
+LIMIT_S = 5.0  # of a machine with other work to do; it takes some 10 ms
 LIBRARIES = {".spc": "spc_io", ".jdx": "jcamp"}
 KINDS = [".wdf", ".spc", "log.spc", ".jdx", ".txt", ".txt.gz"]
 
@@ -136,7 +135,7 @@ def test_a_million_empty_blocks_or_spectra_take_no_time(whole, tmp_path):
     x = np.linspace(440.0, 600.0, 20)
     head = wdf_bytes(x, [x])[:512]
     blocks = head + struct.pack("<4sIQ", b"NONE", 0, 16) * 1_000_000
-    assert "no room for" in spectra_or_line(blocks, ".wdf", tmp_path)
+    assert "its blocks do not follow" in spectra_or_line(blocks, ".wdf", tmp_path)
     many = bytearray(whole(".spc") + bytes(4_000_000))
     struct.pack_into("<I", many, 4, 0)
     struct.pack_into("<I", many, 24, 100_000)
@@ -178,9 +177,8 @@ def test_a_damaged_file_ends_the_command_with_a_line_and_status_2(run, silicon, 
         ("half.wdf", raw[:600] + bytes(len(raw) - 600)),
     ):
         (tmp_path / name).write_bytes(content)
-        began = time.perf_counter()
-        status, out, err = run("raman", tmp_path / name)
-        assert time.perf_counter() - began < LIMIT_S
+        with time_limit(LIMIT_S):
+            status, out, err = run("raman", tmp_path / name)
         assert (status, out) == (2, "")
         (line,) = err.splitlines()
         assert f"{name}: not a readable WiRE file (cut short or damaged" in line

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gzip import compress
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +77,32 @@ DIALECTS = {
     "laser and wavelength": lambda x, y: (
         "Laser wavelength: 532.0 nm\nWavelength (nm)\tCounts\n"
         + "".join(f"{1e7 / (1e7 / 532.0 - a):.7f}\t{b:.1f}\n" for a, b in zip(x, y, strict=True))
+    ).encode(),
+    "intensity first": lambda x, y: "".join(
+        f"{b:.1f}\t{a:.3f}\n" for a, b in zip(x, y, strict=True)
+    ).encode(),
+    "laser above the headings": lambda x, y: (
+        "Laser (nm)\t532.0\nWavelength (nm)\tCounts\n"
+        + "".join(f"{1e7 / (1e7 / 532.0 - a):.7f}\t{b:.1f}\n" for a, b in zip(x, y, strict=True))
+    ).encode(),
+    "gzip": lambda x, y: compress(rows(x, y).encode()),
+    "andor, header below": lambda x, y: (
+        rows(x, y, ",") + "\n\nTemperature (C):\t-70\nModel:\tDU401\nExposure Time (secs):\t10\n"
+    ).encode(),
+    "witec ascii": lambda x, y: (
+        "//Exported ASCII-File\r\n\r\n[Header]\r\nFileName = Tip\r\nSizeGraph = 304\r\n\r\n"
+        "[Data]\r\n" + rows(x, y, end="\r\n")
+    ).encode(),
+    "excel": lambda x, y: (
+        "sep=;\r\nVerschiebung;Intensität\r\n" + rows(x, y, ";", comma=True, end="\r\n")
+    ).encode("cp1252"),
+    "a comment amid": lambda x, y: rows(x, y).replace("\n", "\n# stage moved\n", 1).encode(),
+    "raw, dark and fit beside": lambda x, y: (
+        "shift\tDark counts\traw\tRaw-Dark\tfit\n"
+        + "".join(
+            f"{a:.3f}\t{900 + i % 3}\t{b + 901:.1f}\t{b:.1f}\t{b + 1:.1f}\n"
+            for i, (a, b) in enumerate(zip(x, y, strict=True))
+        )
     ).encode(),
     "bwtek": lambda x, y: (
         "File Version;BWRam4.11_11\nlaser_wavelength;532,02\n"
@@ -212,6 +239,17 @@ BAD = {
     ),
     "flat": (b"".join(b"%d 7\n" % i for i in range(450, 600)), "no column of intensities"),
     "truncated wdf": (b"WDF1" + bytes(40), "not a readable WiRE file"),
+    "decimal commas between commas": (
+        b"".join(b"%d,%02d,%d,%02d\n" % (i // 2, 50 * (i % 2), i % 7, i % 100) for i in range(900)),
+        "decimal commas between commas",
+    ),
+    "two tables": (
+        b"".join(b"%d %d\n" % (i, i % 7) for i in range(450, 600))
+        + b"".join(b"%d %d %d\n" % (i, i % 7, i % 5) for i in range(450, 600)),
+        "150 rows of 2 numbers and 150 of 3",
+    ),
+    "gzip of nothing": (compress(b""), "the file is empty"),
+    "gzip cut short": (compress(b"500 1\n" * 99)[:-9], "not a readable gzip file .cut short"),
     "million lines": (b"520 1\n" * 1_000_000, "1000000 lines, expected at most 600000"),
     "one line": (b"1 " * 100_000, "line 1: 200000 characters"),
     "huge jcamp": (

@@ -199,8 +199,9 @@ def _read(paths: list[Path]) -> list[Spectrum]:
     with progress("reading") as update:
         found = read_spectra(paths, skipped, update)
     _few_notes([f"passed over {line}" for line in skipped])
-    files = Counter((one.folder, file_and_label(one.name)[0]) for one in found)
-    several = {name: count for (_, name), count in files.items() if count > 1}
+    names = {(one.folder, one.name) for one in found}
+    files = Counter((folder, file_and_label(name)[0]) for folder, name in names)
+    several = {name: count for (_, name), count in sorted(files.items()) if count > 1}
     _few_notes([f"{name}: {count} spectra in one file" for name, count in several.items()])
     return found
 

@@ -12,7 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
@@ -37,9 +37,11 @@ class Dialect:
         """Return a cell's number, NaN for a blank, None if it is something else."""
         found = number(cell, self.comma)
         if found is None and self.grouped:
-            sign, other = (",", r"\.") if self.comma else (r"\.", ",")
-            if re.fullmatch(rf"[+-]?[1-9]\d{{0,2}}(?:{other}\d{{3}})+(?:{sign}\d*)?", cell[:60]):
-                return number(cell.replace(other[-1], ""), self.comma)
+            sign, other = ",." if self.comma else ".,"
+            if re.fullmatch(
+                rf"[+-]?[1-9]\d{{0,2}}([{other}'’\s]\d{{3}})+([{sign}]\d*)?", cell[:60]
+            ):
+                return number(re.sub(rf"[^\d{sign}+-]", "", cell), self.comma)
         return found
 
     def cells(self, line: str) -> list[str] | None:
@@ -51,13 +53,15 @@ class Dialect:
 
 
 _DIALECTS = [
-    Dialect(separator, comma, grouped)
-    for grouped in (False, True)
+    Dialect(separator, comma)
     for separator in ("\t", ";", ",", "|", None)
     for comma in (False, True)
     if (separator, comma) != (",", True)
 ]
 _SAMPLE_LINES = 40
+_RIVAL = 0.25  # part of the rows that may be of another width
+_MOST_GAPS = 0.1  # of rows; where more have no number, the file means something else
+_SPLIT = re.compile(r",0\d+(,|$)")  # a decimal comma's digits, taken for a cell
 _FEWEST_ROWS = 12  # of a further block; a spectrum has more
 _PLAIN = re.compile(r"[-+.0-9eE\s;,|]*", re.ASCII)
 
@@ -104,17 +108,32 @@ def find_blocks(lines: list[str], where: str) -> list[Block]:
         size += 0 if row is None else row.size
         if size > MOST_NUMBERS:
             raise InputError(f"{where}: more than {MOST_NUMBERS} numbers, expected fewer")
+    split = [line for line in lines if "." not in line and _SPLIT.search(line)]
+    if dialect.separator == "," and len(split) > 1:
+        raise InputError(
+            f"{where}: decimal commas between commas (line '{shown(split[0])}'), expected decimal "
+            "points or another separator"
+        )
     widths = Counter(row.size for row in rows if row is not None)
     if widths.total() < 2:
         raise InputError(
             f"{where}: no table of numbers found (first line: '{shown(lines[0])}'), expected "
             "columns of numbers"
         )
-    width = _to_one_width(lines, rows, widths.most_common(1)[0][0], dialect)
+    width, count = widths.most_common(1)[0]
+    for other, rivals in widths.items():
+        if other != width > 1 < other and rivals > max(_FEWEST_ROWS, _RIVAL * count):
+            raise InputError(
+                f"{where}: {count} rows of {width} numbers and {rivals} of {other}, expected rows "
+                "of as many cells"
+            )
+    width = _to_one_width(lines, rows, width, dialect, where)
     return list(_blocks(lines, rows, width, dialect))
 
 
-def _to_one_width(lines: list[str], rows: list[Array | None], width: int, dialect: Dialect) -> int:
+def _to_one_width(
+    lines: list[str], rows: list[Array | None], width: int, dialect: Dialect, where: str
+) -> int:
     """Bring the rows to the width of most of them, less columns that are blank to the right.
 
     Rows of another width become None. Between two rows a line of as many cells, of which the first
@@ -127,12 +146,20 @@ def _to_one_width(lines: list[str], rows: list[Array | None], width: int, dialec
             fits = row.size >= width and bool(np.isnan(row[width:]).all())
             rows[place] = row[:width] if fits else None
     inside = [place for place, row in enumerate(rows) if row is not None]
+    odd = ""
+    count = 0
     for place in range(inside[0], inside[-1]):
         if rows[place] is None:
-            cells = dialect.cells(lines[place]) or [""]
-            numbers = [dialect.number(cell) for cell in cells]
-            if len(cells) == width and numbers[0] is not None and not np.isnan(numbers[0]):
+            cells = dialect.cells(lines[place]) or []
+            numbers = [dialect.number(cell) for cell in cells] if len(cells) == width else [None]
+            if numbers[0] is not None and not np.isnan(numbers[0]):
                 rows[place] = np.array(numbers, dtype=float)
+                odd, count = odd or cells[numbers.index(None)], count + 1
+    if count > max(_FEWEST_ROWS, _MOST_GAPS * len(inside)):
+        raise InputError(
+            f"{where}: {count} rows of {len(inside) + count} have a cell that is no number, the "
+            f"first '{shown(odd)}'; expected numbers"
+        )
     return width
 
 
@@ -175,14 +202,14 @@ def _dialect(lines: list[str]) -> Dialect:
     tail = lines[len(lines) // 4 :] if len(lines) > 8 else lines
     sample = tail[:: max(len(tail) // _SAMPLE_LINES, 1)]
 
-    def fit(dialect: Dialect) -> tuple[bool, int, int]:
+    def fit(dialect: Dialect) -> tuple[int, int]:
         rows = [row for line in sample if (row := _row(line, dialect)) is not None]
-        wide = sum(int(np.count_nonzero(~np.isnan(row)) >= 2) for row in rows)
-        # 1,234 is a number with a decimal comma before it is one in the thousands
-        return not dialect.grouped and wide > 0, wide, len(rows)
+        return sum(int(np.count_nonzero(~np.isnan(row)) >= 2) for row in rows), len(rows)
 
     best = max(_DIALECTS, key=fit)
-    return Dialect(best.separator, best.comma, grouped=True)
+    grouped = [replace(dialect, grouped=True) for dialect in _DIALECTS]
+    # 1,234 is a number with a decimal comma before it is one in the thousands
+    return replace(best, grouped=True) if fit(best)[0] else max(grouped, key=fit)
 
 
 def _row(line: str, dialect: Dialect) -> Array | None:
@@ -199,9 +226,14 @@ def _row(line: str, dialect: Dialect) -> Array | None:
             # fmax leaves NaN out
             largest = np.fmax.reduce(np.abs(row))
             return row if largest <= LARGEST_NUMBER else None
-    values = [dialect.number(cell) for cell in dialect.cells(line) or [""]]
-    row = np.array(values, dtype=float)
-    return None if None in values or np.isnan(row).all() else row
+        cells = dialect.cells(line) or []
+    values = []
+    for cell in cells:
+        if (value := dialect.number(cell)) is None:
+            return None
+        values.append(value)
+    row = np.array(values)
+    return None if np.isnan(row).all() else row
 
 
 def _names(above: list[str], dialect: Dialect, width: int) -> tuple[list[str], int]:

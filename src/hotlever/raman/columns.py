@@ -25,7 +25,7 @@ _ABSOLUTE = re.compile(r"wave\s*numbers?", re.I)
 _WAVELENGTH = re.compile(r"wave\s*length|lambda|\bnm\b|\(nm\)|\[nm\]", re.I)
 #: What intensities are called: the first of these kinds that a table has are the spectra.
 _WANTED = (
-    re.compile(r"dark\s*subtracted|corrected", re.I),
+    re.compile(r"(dark|baseline|background)\s*subtracted|corrected|raw\s*[-−–]\s*dark", re.I),
     re.compile(r"intensity|counts|cts|signal|ccd|raman\s*int", re.I),
     # raw ones, where the file has no others, or any that a user has named
     re.compile(r"raw|spectrum|sample|data|\by\b", re.I),
@@ -34,7 +34,7 @@ _OTHER, _PLAIN, _UNNAMED = -1, 2, 3  # kinds of columns beside the places in _WA
 _LASER = re.compile(r"laser|excitation", re.I)
 _NO_WAVELENGTH = re.compile(r"pol|power|level", re.I)
 _UNWANTED = re.compile(
-    r"pixel|index|^dark$|^reference$|%|absorb|irrad|transm|reflect|wave|^#?[xz]\b|time|background"
+    r"pixel|index|^dark\b(?!\s*sub)|^reference$|%|absorb|irrad|transm|reflect|wave|^#?[xz]\b|time|background"
     r"|baseline|std|\berr|error|sigma|uncert|±|\bfit|model|resid|weight|smooth|mask|flag",
     re.I,
 )
@@ -177,7 +177,7 @@ def intensities(table: Block, others: list[int], where: str) -> list[int]:
 
 def _kind(name: str) -> int:
     """Place in `_WANTED` of what a column is named as, `_UNNAMED` if in none, or `_OTHER`."""
-    if _UNWANTED.search(name):
+    if _UNWANTED.search(name) and not _WANTED[0].search(name):
         return _OTHER
     found = next((i for i, wanted in enumerate(_WANTED) if wanted.search(name)), _UNNAMED)
     quantity = _OTHER_QUANTITY.search(name) and temperature_in_name(name) is None

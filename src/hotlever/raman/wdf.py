@@ -30,7 +30,7 @@ _ORIGIN = struct.Struct("<II16s")
 _PRIMARY = 0x8000_0000  # marks the kinds by which a map or a series runs
 _NAMES = {3: "X", 4: "Y", 5: "Z", 9: "T", 11: "t"}
 _TO_KELVIN = {10: 0.0, 21: ZERO_CELSIUS_K}  # by unit
-_MOST_ORIGINS = 100
+_MOST_BLOCKS, _MOST_ORIGINS = 10_000, 100
 _FILE_TIME = 24  # a unit whose values are no floating-point numbers
 
 _NANOMETRE = 3
@@ -75,12 +75,13 @@ def read_wdf(raw: bytes) -> list[Part]:
 def _blocks(raw: bytes) -> dict[bytes, bytes]:
     """Content by name, of the first block of each; ValueError if blocks do not fill the file."""
     blocks: dict[bytes, bytes] = {}
-    place = 0
+    place = count = 0
     while place < len(raw):
+        count += 1
         name, size = b"", 0
         if place + _BLOCK.size <= len(raw):
             name, size = _BLOCK.unpack_from(raw, place)
-        if not _BLOCK.size <= size <= len(raw) - place:
+        if count > _MOST_BLOCKS or not _BLOCK.size <= size <= len(raw) - place:
             raise ValueError(
                 f"cut short or damaged: its blocks do not follow each other at byte {place} of "
                 f"{len(raw)}"
