@@ -20,7 +20,7 @@ from hotlever.errors import InputError
 from hotlever.files import read_bytes
 from hotlever.types import Array
 
-MOST_LINES = 100_000  #: of a file
+MOST_LINES = 100_000  #: of a file, unless its reader says otherwise
 LARGEST_NUMBER = 1e30  #: no quantity is larger in any unit
 LONGEST_LINE = 2**17  #: characters; a spectrometer's map has some 40 000
 
@@ -78,8 +78,8 @@ def decode(raw: bytes, where: str) -> str:
     raise InputError(f"{where}: a binary file, not a text file")
 
 
-def text_lines(raw: bytes, where: str) -> list[str]:
-    """Decode a file's content, and split it into lines.
+def text_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[str]:
+    """Decode a file's content, and split it into at most as many lines.
 
     Raises
     ------
@@ -87,8 +87,8 @@ def text_lines(raw: bytes, where: str) -> list[str]:
         If it is no text, or has too many lines or too long a line.
     """
     lines = decode(raw, where).splitlines()
-    if len(lines) > MOST_LINES:
-        raise InputError(f"{where}: {len(lines)} lines, expected at most {MOST_LINES}")
+    if len(lines) > most:
+        raise InputError(f"{where}: {len(lines)} lines, expected at most {most}")
     for number, line in enumerate(lines, start=1):
         if len(line) > LONGEST_LINE:
             raise InputError(

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import struct
-import sys
+from gzip import compress
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hotlever.errors import InputError
-from hotlever.raman.block import find_block
+from hotlever.raman.block import find_blocks
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.spectrum import read_file, read_spectra, read_spectrum, spectrum_files
 from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
@@ -78,6 +77,32 @@ DIALECTS = {
     "laser and wavelength": lambda x, y: (
         "Laser wavelength: 532.0 nm\nWavelength (nm)\tCounts\n"
         + "".join(f"{1e7 / (1e7 / 532.0 - a):.7f}\t{b:.1f}\n" for a, b in zip(x, y, strict=True))
+    ).encode(),
+    "intensity first": lambda x, y: "".join(
+        f"{b:.1f}\t{a:.3f}\n" for a, b in zip(x, y, strict=True)
+    ).encode(),
+    "laser above the headings": lambda x, y: (
+        "Laser (nm)\t532.0\nWavelength (nm)\tCounts\n"
+        + "".join(f"{1e7 / (1e7 / 532.0 - a):.7f}\t{b:.1f}\n" for a, b in zip(x, y, strict=True))
+    ).encode(),
+    "gzip": lambda x, y: compress(rows(x, y).encode()),
+    "andor, header below": lambda x, y: (
+        rows(x, y, ",") + "\n\nTemperature (C):\t-70\nModel:\tDU401\nExposure Time (secs):\t10\n"
+    ).encode(),
+    "witec ascii": lambda x, y: (
+        "//Exported ASCII-File\r\n\r\n[Header]\r\nFileName = Tip\r\nSizeGraph = 304\r\n\r\n"
+        "[Data]\r\n" + rows(x, y, end="\r\n")
+    ).encode(),
+    "excel": lambda x, y: (
+        "sep=;\r\nVerschiebung;Intensität\r\n" + rows(x, y, ";", comma=True, end="\r\n")
+    ).encode("cp1252"),
+    "a comment amid": lambda x, y: rows(x, y).replace("\n", "\n# stage moved\n", 1).encode(),
+    "raw, dark and fit beside": lambda x, y: (
+        "shift\tDark counts\traw\tRaw-Dark\tfit\n"
+        + "".join(
+            f"{a:.3f}\t{900 + i % 3}\t{b + 901:.1f}\t{b:.1f}\t{b + 1:.1f}\n"
+            for i, (a, b) in enumerate(zip(x, y, strict=True))
+        )
     ).encode(),
     "bwtek": lambda x, y: (
         "File Version;BWRam4.11_11\nlaser_wavelength;532,02\n"
@@ -173,7 +198,7 @@ def test_any_table_of_two_columns_is_read_back(
     text = end.join(lines)
     if comma:
         text = text.replace(".", ",")
-    table = find_block(decode(text.encode(encoding), "f").splitlines(), "f")
+    (table,) = find_blocks(decode(text.encode(encoding), "f").splitlines(), "f")
     np.testing.assert_allclose(table.values[order], np.stack([x, y], axis=1), atol=1e-9)
 
 
@@ -214,7 +239,18 @@ BAD = {
     ),
     "flat": (b"".join(b"%d 7\n" % i for i in range(450, 600)), "no column of intensities"),
     "truncated wdf": (b"WDF1" + bytes(40), "not a readable WiRE file"),
-    "million lines": (b"520 1\n" * 1_000_000, "1000000 lines, expected at most 100000"),
+    "decimal commas between commas": (
+        b"".join(b"%d,%02d,%d,%02d\n" % (i // 2, 50 * (i % 2), i % 7, i % 100) for i in range(900)),
+        "decimal commas between commas",
+    ),
+    "two tables": (
+        b"".join(b"%d %d\n" % (i, i % 7) for i in range(450, 600))
+        + b"".join(b"%d %d %d\n" % (i, i % 7, i % 5) for i in range(450, 600)),
+        "150 rows of 2 numbers and 150 of 3",
+    ),
+    "gzip of nothing": (compress(b""), "the file is empty"),
+    "gzip cut short": (compress(b"500 1\n" * 99)[:-9], "not a readable gzip file .cut short"),
+    "million lines": (b"520 1\n" * 1_000_000, "1000000 lines, expected at most 600000"),
     "one line": (b"1 " * 100_000, "line 1: 200000 characters"),
     "huge jcamp": (
         b"##TITLE=a\n##NPOINTS=1000000000\n##FIRSTX=0\n##LASTX=9\n##XYDATA=(X++(Y..Y))\n0 1\n",
@@ -291,6 +327,9 @@ def test_temperature_in_a_file_name(stem, kelvin):
         ("Temperature", "450 K", 450.0),
         ("Temperature", "0", None),
         ("Detector temperature (°C)", "-75", None),
+        ("Temperature (C)", "-70", None),  # Andor's detector
+        ("Stage temperature (C)", "-70", 203.15),
+        ("Temperature (K)", "77", 77.0),
         ("T (K)", "abc", None),
     ],
 )
@@ -298,137 +337,10 @@ def test_temperature_in_a_header(key, value, kelvin):
     assert temperature_in_metadata({key: value}) == kelvin
 
 
-# --- makers' own formats -------------------------------------------------------------------
-
-
-def wdf_bytes(
-    x: np.ndarray, spectra: list[np.ndarray], units: int = 1, laser: float = 0.0
-) -> bytes:
-    """A WiRE file as Renishaw's reader expects it: header, data, axis."""
-    header = struct.pack(
-        "<IIQQ16s12xIIIQQIIII24s4HIIQQIf48x32s160s48x32x32x",
-        *(0x31464457, 1, 512, 0, b"", 1, 0, x.size, len(spectra), len(spectra), 1, 1, x.size, 0),
-        *(b"test", 1, 0, 0, 0, 1, 1, 0, 0, 0, laser, b"", b""),
-    )
-    data = np.concatenate(spectra).astype("<f4").tobytes()
-    axis = struct.pack("<II", 1, units) + x.astype("<f4").tobytes()
-    return (
-        header
-        + struct.pack("<4sIQ", b"DATA", 0, 16 + len(data))
-        + data
-        + struct.pack("<4sIQ", b"XLST", 0, 16 + len(axis))
-        + axis
-    )
-
-
-def test_wire_file_with_two_spectra(silicon, tmp_path):
-    pytest.importorskip("wdf", reason="needs the raman extra")
-    x, y = silicon
-    file = tmp_path / "map.wdf"
-    file.write_bytes(wdf_bytes(x[::-1], [y[::-1], 2 * y[::-1]]))
-    first, second = read_file(file)
-    assert first.name == "map.wdf[0]"
-    np.testing.assert_allclose(first.x, x, rtol=1e-6)
-    np.testing.assert_allclose(second.y, 2 * y, rtol=1e-6)
-    with pytest.raises(InputError, match="holds 2 spectra"):
-        read_spectrum(file)
-
-
-@pytest.mark.parametrize(
-    ("place", "value", "words"),
-    [
-        (8, 0, "blocks do not follow each other"),
-        (60, 0xFFFF, "65535 samples|not a readable WiRE file"),
-        (60, 256, "304 Raman shifts and 256 intensities"),
-        (72, 0xFFFFFFFF, "spectra of|not a readable WiRE file"),
-    ],
-)
-def test_damaged_wire_files_are_refused_at_once(silicon, tmp_path, place, value, words):
-    pytest.importorskip("wdf", reason="needs the raman extra")
-    raw = bytearray(wdf_bytes(*silicon[:1], [silicon[1]]))
-    struct.pack_into("<I", raw, place, value)
-    (tmp_path / "a.wdf").write_bytes(raw)
-    with pytest.raises(InputError, match=words):
-        read_file(tmp_path / "a.wdf")
-
-
-def test_wire_file_on_a_wavelength_axis(silicon, tmp_path):
-    pytest.importorskip("wdf", reason="needs the raman extra")
-    x, y = silicon
-    laser = 1e7 / 532.0
-    file = tmp_path / "nm.wdf"
-    file.write_bytes(wdf_bytes(1e7 / (laser - x), [y], units=3, laser=laser))
-    # the axis is stored in single precision
-    np.testing.assert_allclose(read_spectrum(file).x, x, atol=5e-3)
-
-
-def spc_bytes(x: np.ndarray, y: np.ndarray, units: int = 13, log: bytes = b"") -> bytes:
-    """A GRAMS file (new format, least significant byte first): shared axis, one spectrum."""
-    end_of_data = 512 + 4 * x.size + 32 + 4 * y.size
-    header = struct.pack(
-        "<BBBbIddIBBBBI9s9sH8f130s30sIIBBHf48sfIfB187s",
-        *(0x80, 0x4B, 9, -128, x.size, x[0], x[-1], 1, units, 4, 0, 0, 0, b"", b"", 0),
-        *([0.0] * 8),
-        *(b"", b"", end_of_data if log else 0, 0, 0, 0, 0, 0.0, b"", 0.0, 0, 0.0, 0, b""),
-    )
-    subheader = struct.pack("<BbHfffIIf4s", 0, -128, 0, 0.0, 0.0, 0.0, y.size, 0, 0.0, b"")
-    data = header + x.astype("<f4").tobytes() + subheader + y.astype("<f4").tobytes()
-    if log:
-        data += struct.pack("<5I44s", 64 + len(log), 4096, 64, 0, 0, b"") + log
-    return data
-
-
-@pytest.mark.parametrize("log", [b"", b"Laser=532\r\nTemperature=295\r\n\x00"])
-def test_spc_file(silicon, tmp_path, log):
-    pytest.importorskip("spc_io", reason="needs the raman extra")
-    x, y = silicon
-    file = tmp_path / "si.spc"
-    file.write_bytes(spc_bytes(x, y, log=log))
-    found = read_spectrum(file)
-    np.testing.assert_allclose(found.x, x, rtol=1e-6)
-    np.testing.assert_allclose(found.y, y, rtol=1e-6)
-    file.write_bytes(spc_bytes(x, y, units=3))
-    with pytest.raises(InputError, match=r"si\.spc.*the axis is a wavelength"):
-        read_spectrum(file)
-
-
 def test_text_under_a_makers_suffix_is_read_as_text(silicon, tmp_path):
     file = tmp_path / "si.spc"
     file.write_bytes(DIALECTS["tab"](*silicon))
     np.testing.assert_allclose(read_spectrum(file).y, silicon[1])
-
-
-def test_jcamp_file(silicon, tmp_path):
-    pytest.importorskip("jcamp", reason="needs the raman extra")
-    x, y = silicon
-    file = tmp_path / "si.jdx"
-    points = "\n".join(f"{a:.3f}, {b:.1f}" for a, b in zip(x, y, strict=True))
-    file.write_text(
-        "##TITLE=Si\n##JCAMP-DX=4.24\n##DATA TYPE=RAMAN SPECTRUM\n##XUNITS=1/CM\n"
-        f"##YUNITS=COUNTS\n##XFACTOR=1\n##YFACTOR=1\n##NPOINTS={x.size}\n"
-        f"##XYPOINTS=(XY..XY)\n{points}\n##END=\n"
-    )
-    found = read_spectrum(file)
-    np.testing.assert_allclose(found.x, x)
-    np.testing.assert_allclose(found.y, y)
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "package"),
-    [
-        ("a.wdf", b"WDF1" + bytes(600), "renishaw-wdf"),
-        ("a.spc", b"\x00\x4b" + bytes(600), "spc-io"),
-        ("a.jdx", b"##TITLE=Si\n##END=\n", "jcamp"),
-    ],
-)
-def test_missing_library_is_named_with_the_way_to_get_it(
-    name, content, package, tmp_path, monkeypatch
-):
-    for module in ("wdf", "spc_io", "jcamp"):
-        monkeypatch.setitem(sys.modules, module, None)
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(InputError, match=rf"{package}.*hotlever\[raman\]"):
-        read_spectrum(tmp_path / name)
 
 
 # --- real files ----------------------------------------------------------------------------

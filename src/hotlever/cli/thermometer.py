@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -192,11 +193,16 @@ def _describe(calibration: RamanCalibration) -> None:
 
 def _read(paths: list[Path]) -> list[Spectrum]:
     from hotlever.raman import read_spectra
+    from hotlever.raman.part import file_and_label
 
     skipped: list[str] = []
     with progress("reading") as update:
         found = read_spectra(paths, skipped, update)
     _few_notes([f"passed over {line}" for line in skipped])
+    names = {(one.folder, one.name) for one in found}
+    files = Counter((folder, file_and_label(name)[0]) for folder, name in names)
+    several = {name: count for (_, name), count in sorted(files.items()) if count > 1}
+    _few_notes([f"{name}: {count} spectra in one file" for name, count in several.items()])
     return found
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hotlever.errors import InputError
+from hotlever.raman.part import file_and_label
 from hotlever.tables import Table, name_and_unit, read_table, shown
 
 if TYPE_CHECKING:
@@ -100,10 +101,9 @@ def _match(log: Table, names: list[str]) -> list[int | None]:
     if at is not None:
         return _by_name(log, at, names)
     bias = _bias(log)
-    stated = [_IN_NAME.search(Path(name).stem) for name in names]
+    stated = [_bias_in_name(name) for name in names]
     if bias is not None and None not in stated:
-        written = [match[1].replace(",", ".").replace("p", ".") for match in stated if match]
-        return _by_bias(log, bias, list(map(float, written)), names)
+        return _by_bias(log, bias, [value for value in stated if value is not None], names)
     if len(names) == len(log.rows):
         return list(range(len(names)))
     raise InputError(
@@ -112,11 +112,21 @@ def _match(log: Table, names: list[str]) -> list[int | None]:
     )
 
 
+def _bias_in_name(name: str) -> float | None:
+    """Bias (V) that a spectrum's own name in its file states, else the file's name."""
+    file, label = file_and_label(Path(name).name)
+    found = _IN_NAME.search(label) or _IN_NAME.search(Path(file).stem)
+    return float(found[1].replace(",", ".").replace("p", ".")) if found else None
+
+
 def _by_name(log: Table, at: int, names: list[str]) -> list[int | None]:
     stems, files = defaultdict[str, list[int]](list), defaultdict[str, list[int]](list)
     for place, path in enumerate(map(Path, names)):
-        stems[path.stem].append(place)
+        file, label = file_and_label(path.name)
+        stems[Path(file).stem + (f"[{label}]" if label else "")].append(place)
         files[path.name].append(place)
+        if label:
+            files[file].append(place)
     matched: list[int | None] = []
     for row, cells in enumerate(log.rows):
         name = Path(cells[at]).name

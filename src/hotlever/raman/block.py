@@ -1,4 +1,4 @@
-"""The block of numbers in a spectrum's text file, and what stands above it.
+"""The blocks of numbers in a spectrum's text file, and what stands above them.
 
 No dialect is assumed: the separator and the decimal sign are those that make the most lines of the
 file rows of numbers.
@@ -7,9 +7,12 @@ file rows of numbers.
 from __future__ import annotations
 
 import csv
+import math
 import re
+from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
@@ -18,17 +21,48 @@ from hotlever.errors import InputError
 from hotlever.tables import LARGEST_NUMBER, cells_of, key_and_value, number, shown
 from hotlever.types import Array
 
-MOST_NUMBERS = 10_000_000
+#: Of a file; a map of 500 spectra below each other has half a million lines.
+MOST_LINES, MOST_NUMBERS = 600_000, 10_000_000
 
-# The separator (None is any run of blanks), and whether the decimal sign is a comma.
-Dialect = tuple[str | None, bool]
-_DIALECTS: list[Dialect] = [
-    (separator, comma)
+
+@dataclass(frozen=True)
+class Dialect:
+    """How lines are cells and cells numbers."""
+
+    separator: str | None  #: None is any run of blanks
+    comma: bool  #: the decimal sign
+    grouped: bool = False  #: whether the other sign may stand between thousands
+
+    def number(self, cell: str) -> float | None:
+        """Return a cell's number, NaN for a blank, None if it is something else."""
+        found = number(cell, self.comma)
+        if found is None and self.grouped:
+            sign, other = ",." if self.comma else ".,"
+            if re.fullmatch(
+                rf"[+-]?[1-9]\d{{0,2}}([{other}'’\s]\d{{3}})+([{sign}]\d*)?", cell[:60]
+            ):
+                return number(re.sub(rf"[^\d{sign}+-]", "", cell), self.comma)
+        return found
+
+    def cells(self, line: str) -> list[str] | None:
+        """Return a line's cells, None if quotes do not end."""
+        try:
+            return cells_of(line.strip(" "), self.separator)
+        except csv.Error:
+            return None
+
+
+_DIALECTS = [
+    Dialect(separator, comma)
     for separator in ("\t", ";", ",", "|", None)
     for comma in (False, True)
     if (separator, comma) != (",", True)
 ]
 _SAMPLE_LINES = 40
+_RIVAL = 0.25  # part of the rows that may be of another width
+_MOST_GAPS = 0.1  # of rows; where more have no number, the file means something else
+_SPLIT = re.compile(r",0\d+(,|$)")  # a decimal comma's digits, taken for a cell
+_FEWEST_ROWS = 12  # of a further block; a spectrum has more
 _PLAIN = re.compile(r"[-+.0-9eE\s;,|]*", re.ASCII)
 
 
@@ -45,13 +79,21 @@ class Block:
     metadata: dict[str, str]
 
 
-def find_block(lines: list[str], where: str) -> Block:
-    """Find the longest block of numbers, or raise InputError.
+def find_blocks(lines: list[str], where: str) -> list[Block]:
+    """Find the blocks of numbers that have the commonest number of columns.
+
+    A block goes on beyond lines that say nothing, such as a comment; what has a header of its own
+    is another block, to which the first header applies too where its own says nothing else.
+
+    Raises
+    ------
+    InputError
+        If there is none, or there are too many numbers.
 
     Examples
     --------
     >>> text = "#Laser (nm)=\\t532\\nshift;counts\\n1,5;10\\n2,5;20\\n3,5;30"
-    >>> block = find_block(text.splitlines(), "")
+    >>> (block,) = find_blocks(text.splitlines(), "")
     >>> block.values.tolist(), block.names, block.metadata
     ([[1.5, 10.0], [2.5, 20.0], [3.5, 30.0]], ['shift', 'counts'], {'Laser (nm)': '532'})
     """
@@ -62,30 +104,97 @@ def find_block(lines: list[str], where: str) -> Block:
     rows: list[Array | None] = []
     size = 0
     for line in lines:
-        rows.append(row := _row(line, *dialect))
+        rows.append(row := _row(line, dialect))
         size += 0 if row is None else row.size
         if size > MOST_NUMBERS:
             raise InputError(f"{where}: more than {MOST_NUMBERS} numbers, expected fewer")
-    widths = [row.size for row in rows if row is not None]
-    if len(widths) < 2:
+    split = [line for line in lines if "." not in line and _SPLIT.search(line)]
+    if dialect.separator == "," and len(split) > 1:
+        raise InputError(
+            f"{where}: decimal commas between commas (line '{shown(split[0])}'), expected decimal "
+            "points or another separator"
+        )
+    widths = Counter(row.size for row in rows if row is not None)
+    if widths.total() < 2:
         raise InputError(
             f"{where}: no table of numbers found (first line: '{shown(lines[0])}'), expected "
             "columns of numbers"
         )
-    width = max(set(widths), key=widths.count)
-    # the longest run of rows of one width with nothing else between them
-    runs = groupby(enumerate(rows), key=lambda one: one[1] is not None and one[1].size == width)
-    run = max((list(run) for fits, run in runs if fits), key=len)
-    values = np.array([row for _, row in run])
-    above = lines[: run[0][0]]
-    names, used = _names(above, dialect[0], width)
-    header = [key_and_value(line) for line in above[: len(above) - used]]
-    full = ~np.all(np.isnan(values), axis=0)
-    return Block(
-        values[:, full],
-        [name for name, keep in zip(names, full, strict=True) if keep],
-        {key: value for key, value in reversed(header) if value},
-    )
+    width, count = widths.most_common(1)[0]
+    for other, rivals in widths.items():
+        if other != width > 1 < other and rivals > max(_FEWEST_ROWS, _RIVAL * count):
+            raise InputError(
+                f"{where}: {count} rows of {width} numbers and {rivals} of {other}, expected rows "
+                "of as many cells"
+            )
+    width = _to_one_width(lines, rows, width, dialect, where)
+    return list(_blocks(lines, rows, width, dialect))
+
+
+def _to_one_width(
+    lines: list[str], rows: list[Array | None], width: int, dialect: Dialect, where: str
+) -> int:
+    """Bring the rows to the width of most of them, less columns that are blank to the right.
+
+    Rows of another width become None. Between two rows a line of as many cells, of which the first
+    is a number, is a row with gaps: it has an overflow or an error code in a cell.
+    """
+    full = np.array([row for row in rows if row is not None and row.size == width])
+    width = int(np.flatnonzero(~np.isnan(full).all(axis=0)).max()) + 1
+    for place, row in enumerate(rows):
+        if row is not None:
+            fits = row.size >= width and bool(np.isnan(row[width:]).all())
+            rows[place] = row[:width] if fits else None
+    inside = [place for place, row in enumerate(rows) if row is not None]
+    odd = ""
+    count = 0
+    for place in range(inside[0], inside[-1]):
+        if rows[place] is None:
+            cells = dialect.cells(lines[place]) or []
+            numbers = [dialect.number(cell) for cell in cells] if len(cells) == width else [None]
+            if numbers[0] is not None and not np.isnan(numbers[0]):
+                rows[place] = np.array(numbers, dtype=float)
+                odd, count = odd or cells[numbers.index(None)], count + 1
+    if count > max(_FEWEST_ROWS, _MOST_GAPS * len(inside)):
+        raise InputError(
+            f"{where}: {count} rows of {len(inside) + count} have a cell that is no number, the "
+            f"first '{shown(odd)}'; expected numbers"
+        )
+    return width
+
+
+def _blocks(
+    lines: list[str], rows: list[Array | None], width: int, dialect: Dialect
+) -> Iterator[Block]:
+    """Blocks in their order, of the longest and those that could be spectra too."""
+    runs = [
+        list(run) for fits, run in groupby(range(len(rows)), lambda i: rows[i] is not None) if fits
+    ]
+    fewest = min(_FEWEST_ROWS, max(map(len, runs)))
+    found: list[tuple[list[int], list[str], dict[str, str]]] = []
+    end = 0
+    for run in runs:
+        above = lines[end : run[0]]
+        names, used = _names(above, dialect, width)
+        header = [key_and_value(line) for line in above[: len(above) - used]]
+        metadata = {key: value for key, value in reversed(header) if value}
+        end = run[-1] + 1
+        if found and not (any(names) or metadata):
+            found[-1][0].extend(run)
+        else:
+            found.append((run, names, metadata))
+    first = found[0]
+    for run, names, metadata in found:
+        if len(run) < fewest:
+            continue
+        values = np.array([rows[place] for place in run])
+        names = names if any(names) else first[1]
+        full = ~np.all(np.isnan(values), axis=0)
+        yield Block(
+            values[:, full],
+            [name for name, keep in zip(names, full, strict=True) if keep],
+            {**first[2], **metadata},
+        )
 
 
 def _dialect(lines: list[str]) -> Dialect:
@@ -94,46 +203,54 @@ def _dialect(lines: list[str]) -> Dialect:
     sample = tail[:: max(len(tail) // _SAMPLE_LINES, 1)]
 
     def fit(dialect: Dialect) -> tuple[int, int]:
-        rows = [row for line in sample if (row := _row(line, *dialect)) is not None]
-        wide = [row for row in rows if np.count_nonzero(~np.isnan(row)) >= 2]
-        return len(wide), len(rows)
+        rows = [row for line in sample if (row := _row(line, dialect)) is not None]
+        return sum(int(np.count_nonzero(~np.isnan(row)) >= 2) for row in rows), len(rows)
 
-    return max(_DIALECTS, key=fit)
+    best = max(_DIALECTS, key=fit)
+    grouped = [replace(dialect, grouped=True) for dialect in _DIALECTS]
+    # 1,234 is a number with a decimal comma before it is one in the thousands
+    return replace(best, grouped=True) if fit(best)[0] else max(grouped, key=fit)
 
 
-def _row(line: str, separator: str | None, comma: bool) -> Array | None:
+def _row(line: str, dialect: Dialect) -> Array | None:
     """The numbers of a line, NaN for blank cells, or None if it holds anything else."""
+    comma = dialect.comma
     plain = _PLAIN.fullmatch(line) and not (comma and "." in line)
-    if plain and comma:
-        line, comma = line.replace(",", "."), False
-    try:
-        cells = cells_of(line.strip(" "), separator)
-    except csv.Error:
+    cells = dialect.cells(line.replace(",", ".") if plain and comma else line)
+    if not cells:
         return None
-    while cells and not cells[-1]:
-        cells.pop()
     # nearly every line has nothing but numbers, and maps have millions
-    if cells and plain:
+    if plain:
         with suppress(ValueError):
-            row = np.array(list(map(float, cells)))
-            return row if np.abs(row).max() <= LARGEST_NUMBER else None
-    values = [number(cell, comma) for cell in cells]
-    row = np.array(values, dtype=float)
-    return None if None in values or np.isnan(row).all() else row
+            row = np.array([float(cell) if cell else math.nan for cell in cells])
+            # fmax leaves NaN out
+            largest = np.fmax.reduce(np.abs(row))
+            return row if largest <= LARGEST_NUMBER else None
+        cells = dialect.cells(line) or []
+    values = []
+    for cell in cells:
+        if (value := dialect.number(cell)) is None:
+            return None
+        values.append(value)
+    row = np.array(values)
+    return None if np.isnan(row).all() else row
 
 
-def _names(above: list[str], separator: str | None, width: int) -> tuple[list[str], int]:
+def _names(above: list[str], dialect: Dialect, width: int) -> tuple[list[str], int]:
     """Column names from the last lines above the block, and how many lines they took."""
     names = [""] * width
     used = 0
     for line in reversed(above[-2:]):
-        cells = [cell.strip(' "') for cell in line.strip(" ").split(separator)]
-        if separator is None:
+        cells = [cell.strip(' "') for cell in line.strip(" ").split(dialect.separator)]
+        if dialect.separator is None:
             wide = [cell for cell in re.split(r"\t+|\s{2,}", line.strip()) if cell]
             cells = wide if len(wide) == width else cells
         while len(cells) > width and not cells[-1]:
             cells.pop()
         setting = line.lstrip().startswith("#") and "=" in line
+        numbers = [dialect.number(cell) for cell in cells]
+        # 'Laser (nm)  532' is no heading, while a map's headings, or temperatures, are numbers
+        setting = setting or (numbers[-1:] != [None] and (len(cells) == 2 or used > 0))
         if len(cells) != width or setting or not any(cells):
             break
         names = [f"{cell} {name}".strip() for cell, name in zip(cells, names, strict=True)]

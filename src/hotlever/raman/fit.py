@@ -42,6 +42,7 @@ _MIN_FWHM_SAMPLES = 0.5
 _COARSE = 1.5  # samples; a narrower line is hardly seen
 _LONE = 1.2  # samples; a narrower line is no more than one of them
 _NARROWEST = 1.2  # cm⁻¹; silicon's line is wider at any temperature
+_NARROWEST_SEEN = 0.5  # cm⁻¹; far below any line of silicon's, with noise
 _SPIKE_MAX_STEP = 1.2  # cm⁻¹; on a coarser axis a cosmic ray is no narrower than the line
 _MAX_FWHM = 45.0
 _FLAT = 1e-20  # in whatever unit the intensity is
@@ -299,7 +300,8 @@ def _peak(solution: Solution) -> Peak | None:
     clipped = problem.clipped
     if not (
         LINE_RANGE[0] < centre < LINE_RANGE[1]
-        and _MIN_FWHM_SAMPLES * step < width < _MAX_FWHM
+        # on an axis in nm, which looks alike, a line is forty times narrower
+        and max(_MIN_FWHM_SAMPLES * step, _NARROWEST_SEEN) < width < _MAX_FWHM
         # a clipped line has no known height, but it is there
         and (clipped is not None or area > DETECTION_SIGMAS * area_error)
         and area > 0.0

@@ -17,6 +17,8 @@ SPIKE_LINE_TOLERANCE = (0.01, 0.04)
 SPIKE_MAX_SAMPLES = 5  #: a cosmic ray hits no more neighbouring samples than this
 PLATEAU_TOLERANCE = 0.006  #: part of the line's height within which a clipped top is flat
 PLATEAU_MIN_SAMPLES = 4
+ZEROS_MIN_SAMPLES = 6  #: fewer zeros in a row may be counts
+ZEROS_STEPS = 3.0  #: a signal so many times larger than its steps does not fall to zero
 
 _OFFSETS = np.array([0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 1e6])
 _POISSON_PREFERENCE = 12.0
@@ -106,6 +108,32 @@ def plateau(y: Array, candidates: Mask, base: float) -> slice | None:
     above_half = int(np.count_nonzero(candidates & (y > base + 0.5 * height)))
     expected = 1.0 + np.sqrt(PLATEAU_TOLERANCE) * above_half
     return longest if _length(longest) >= max(PLATEAU_MIN_SAMPLES, 2.5 * expected) else None
+
+
+def zeros(y: Array) -> slice | None:
+    """The longest run of zeros that no detector gives, or None.
+
+    Beside it the signal is many times larger than its steps from sample to sample; zeros of a
+    background that was subtracted, or of single photons, have small neighbours.
+
+    Examples
+    --------
+    >>> counts = np.random.default_rng(0).poisson(95.0, 300).astype(float)
+    >>> counts[100:180] = 0.0
+    >>> zeros(counts), zeros(np.maximum(counts - 95.0, 0.0))
+    (slice(100, 180, None), None)
+    """
+    # of a number cut in two a part may be left, too small for any detector
+    nothing = np.abs(y) <= 1e-12 * np.abs(y).max(initial=0.0)
+    gap = max(runs(nothing), key=_length, default=slice(0, 0))
+    if _length(gap) < ZEROS_MIN_SAMPLES or not y.any():
+        return None
+    # the nearest of three is small on the flank of a line, and beside a cosmic ray
+    sides = (y[max(gap.start - 3, 0) : gap.start], y[gap.stop : gap.stop + 3])
+    beside = max(float(np.abs(side).min()) for side in sides if side.size)
+    steps = np.abs(np.diff(np.delete(y, gap)))
+    steps = steps[steps > 0.0]
+    return gap if steps.size and beside > ZEROS_STEPS * np.median(steps) else None
 
 
 def runs(mask: Mask) -> list[slice]:

@@ -15,6 +15,7 @@ from hotlever.datasets import labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.raman.calibration import Point, RamanCalibration, calibrate_raman
 from hotlever.raman.fit import fit_peak
+from hotlever.raman.part import file_and_label
 from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.stated import sample_temperature
@@ -155,7 +156,11 @@ def _temperature(spectrum: Spectrum, table: dict[str, float]) -> float:
             f"{name}: no temperature in its header or name; expected e.g. "
             "'#Temperature (K)=\t295', a name like si_450K.txt, or a table of temperatures"
         )
-    found = table.get(name, table.get(Path(name).stem)) if table else spectrum.temperature
+    file, label = file_and_label(name)
+    named = [f"{one}[{label}]" if label else one for one in (file, Path(file).stem)]
+    # a table may name a file whose spectra were all taken at one temperature
+    found = next((table[one] for one in (*named, file, Path(file).stem) if one in table), None)
+    found = found if table else spectrum.temperature
     if found is None:
         raise unknown_name("spectrum in the temperature table", name, table)
     return found

@@ -4,25 +4,31 @@ from __future__ import annotations
 
 import os
 import re
+import zlib
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from hotlever.errors import InputError
-from hotlever.files import read_bytes
-from hotlever.raman.block import find_block
-from hotlever.raman.columns import pick_spectra, require_line
+from hotlever.files import LARGEST_TEXT, read_bytes
+from hotlever.raman import wdf
+from hotlever.raman.block import MOST_LINES, find_blocks
+from hotlever.raman.columns import require_line
+from hotlever.raman.layout import pick_spectra
+from hotlever.raman.noise import zeros
+from hotlever.raman.part import Part, part_names
 from hotlever.raman.peak import in_window
 from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
-from hotlever.raman.vendor import KINDS, read_vendor
+from hotlever.raman.vendor import READERS, read_vendor
 from hotlever.steps import each
 from hotlever.tables import text_lines
 from hotlever.types import Array, Progress
 
 SKIPPED_SUFFIXES = {".md", ".json", ".toml", ".yaml", ".yml", ".py", ".ipynb", ".html", ".pdf"}
 SKIPPED_SUFFIXES |= {".png", ".jpg", ".jpeg", ".svg", ".tif", ".tiff", ".bmp", ".log", ".zip"}
+_GZIP = b"\x1f\x8b"
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,8 @@ class Spectrum:
 
     x: Array  #: Raman shift, cm⁻¹, strictly ascending
     y: Array  #: intensity, counts (or in proportion to them less a constant)
-    name: str = ""  #: the file, with a number where it holds several spectra
+    #: the file, with position, column or number in brackets where it holds several spectra
+    name: str = ""
     metadata: dict[str, str] = field(default_factory=dict)  #: what the file's header says
     temperature: float | None = None  #: of the sample, K, by the header or the file's name
     folder: str = ""
@@ -44,8 +51,8 @@ def read_spectrum(path: str | os.PathLike[str]) -> Spectrum:
     ----------
     path : path
         A text table (LabSpec, BWTek, WiRE, WITec, Ocean Optics, plain columns; any common
-        encoding, separator and decimal sign), or ``.wdf``, ``.spc`` or JCAMP-DX with the
-        ``raman`` extra installed.
+        encoding, separator and decimal sign), ``.wdf``, or ``.spc`` or JCAMP-DX with the
+        ``raman`` extra installed; as it is or packed by gzip.
 
     Raises
     ------
@@ -71,31 +78,48 @@ def read_spectrum(path: str | os.PathLike[str]) -> Spectrum:
 def read_file(path: str | os.PathLike[str]) -> list[Spectrum]:
     """Read every spectrum of one file; see `read_spectrum`."""
     file = Path(path)
-    raw = read_bytes(file)
+    raw = _unpacked(read_bytes(file), file)
     if not raw.strip():
         raise InputError(f"{file}: the file is empty, expected a Raman spectrum")
-    temperature, metadata = temperature_in_name(file.stem), {}
-    kind = _kind(file, raw)
-    if kind in KINDS:
-        parts = read_vendor(kind, file, raw)
-    else:
-        table = find_block(text_lines(raw, str(file)), str(file))
-        parts, metadata = pick_spectra(table, str(file)), table.metadata
-        stated = temperature_in_metadata(metadata)
-        temperature = temperature if stated is None else stated
+    inside = Path(file.stem) if file.suffix.lower() == ".gz" else file
+    kind = _kind(inside, raw)
+    parts = read_vendor(kind, file, raw) if kind in READERS else _in_text(file, raw)
     if not parts:
         raise InputError(f"{file}: holds no spectrum")
-    names = [file.name] if len(parts) == 1 else [f"{file.name}[{i}]" for i in range(len(parts))]
-    folder = str(file.parent)
-    return [
-        Spectrum(*_checked(x, y, file.with_name(name)), name, metadata, temperature, folder)
-        for name, (x, y) in zip(names, parts, strict=True)
-    ]
+    of_file = temperature_in_name(inside.stem)
+    found = []
+    for name, part in zip(part_names(file.name, [one.label for one in parts]), parts, strict=True):
+        x, y = _checked(part.x, part.y, str(file.with_name(name)))
+        stated = (part.temperature, temperature_in_metadata(part.metadata), of_file)
+        temperature = next((kelvin for kelvin in stated if kelvin is not None), None)
+        found.append(Spectrum(x, y, name, part.metadata, temperature, str(file.parent)))
+    return found
+
+
+def _unpacked(raw: bytes, file: Path) -> bytes:
+    """A file's content, as it was before gzip if that is what made it."""
+    if not raw.startswith(_GZIP):
+        return raw
+    content = b""
+    while raw.startswith(_GZIP):
+        unpacking = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
+        try:
+            content += unpacking.decompress(raw, LARGEST_TEXT + 1 - len(content))
+        except zlib.error as error:
+            raise InputError(f"{file}: not a readable gzip file ({error})") from None
+        if len(content) > LARGEST_TEXT:
+            raise InputError(
+                f"{file}: unpacked, larger than the {LARGEST_TEXT / 1e6:.3g} MB it may have"
+            )
+        if not unpacking.eof:
+            raise InputError(f"{file}: not a readable gzip file (cut short)")
+        raw = unpacking.unused_data
+    return content
 
 
 def _kind(file: Path, raw: bytes) -> str:
     """What kind of file it is, by its content, then by its name; empty for text."""
-    if raw.startswith(b"WDF1"):
+    if raw.startswith(wdf.SIGNATURE):
         return ".wdf"
     if raw.lstrip(b"\xef\xbb\xbf \r\n").upper().startswith(b"##TITLE="):
         return ".jdx"
@@ -104,16 +128,39 @@ def _kind(file: Path, raw: bytes) -> str:
     return file.suffix.lower() if binary else ""
 
 
-def _checked(x: Array, y: Array, where: Path) -> tuple[Array, Array]:
+def _in_text(file: Path, raw: bytes) -> list[Part]:
+    """Spectra of a text file; a block of numbers beside them may be something else."""
+    parts: list[Part] = []
+    errors: list[tuple[int, InputError]] = []
+    for block in find_blocks(text_lines(raw, str(file), MOST_LINES), str(file)):
+        try:
+            found = pick_spectra(block, str(file))
+        except InputError as error:
+            errors.append((len(block.values), error))
+            continue
+        parts += [replace(part, metadata=block.metadata) for part in found]
+    if not parts and errors:
+        raise max(errors, key=lambda one: one[0])[1]
+    return parts
+
+
+def _checked(x: Array, y: Array, where: str) -> tuple[Array, Array]:
     """Sort, merge repeated axis values, and make sure there is a silicon line to look for."""
     if len(x) != len(y):
         raise InputError(f"{where}: {len(x)} Raman shifts and {len(y)} intensities")
     good = np.isfinite(x) & np.isfinite(y)
     x, y = np.asarray(x, dtype=float)[good], np.asarray(y, dtype=float)[good]
-    require_line(x, str(where))
+    require_line(x, where)
     x, inverse, counts = np.unique(x, return_inverse=True, return_counts=True)
-    in_window(x, f"{where}: ")
-    return x, np.bincount(inverse, weights=y) / counts
+    y = np.bincount(inverse, weights=y) / counts
+    inside = in_window(x, f"{where}: ")
+    if (gap := zeros(y[inside])) is not None:
+        low, high = x[inside][[gap.start, gap.stop - 1]]
+        raise InputError(
+            f"{where}: the intensities from {low:g} to {high:g} cm⁻¹ are zero beside others that "
+            "are not: a damaged or padded file? Expected a spectrum without gaps"
+        )
+    return x, y
 
 
 def spectrum_files(paths: Iterable[str | os.PathLike[str]]) -> list[tuple[Path, bool]]:

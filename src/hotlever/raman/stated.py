@@ -7,13 +7,15 @@ import re
 from hotlever.tables import ZERO_CELSIUS_K, quantity
 
 HOTTEST = 2000.0  #: K; a higher number with the unit of a temperature is something else
+#: K; what a header calls "Temperature (C)", no more, and is lower is a detector's: Andor writes so.
+COLDEST_UNNAMED = 253.0
 
 _NUMBER = r"(-?\d+(?:[.,]\d+)?)"
 _UNIT = r"(K|kelvin|°C|ºC|degC|deg\s?C|C|celsius)"
 _IN_NAME = re.compile(rf"T?{_NUMBER}{_UNIT}")
 _SPACED = re.compile(rf"(?<![A-Za-z0-9]){_NUMBER}[\s_]{_UNIT}(?![A-Za-z0-9])")
 _KEY = re.compile(
-    r"^\W*(?:sample|stage|hot\s?-?plate|linkam|actual|measured|nominal|set)?[\s_]*"
+    r"^\W*(sample|stage|hot\s?-?plate|linkam|actual|measured|nominal|set)?[\s_]*"
     rf"(?:temperature|temp\.?|T)[\s_]*(?:[\[(]?\s*{_UNIT}\s*[\])]?)?\s*$",
     re.I,
 )
@@ -46,8 +48,14 @@ def temperature_in_metadata(metadata: dict[str, str]) -> float | None:
     """
     for key, value in metadata.items():
         match = _KEY.match(key[:80])
+        if match is None:
+            continue
         number, unit = quantity(value)
-        if match and (found := _kelvin(number, unit.strip() or match[1] or "")) is not None:
+        unit = unit.strip() or match[2] or ""
+        if (found := _kelvin(number, unit)) is None:
+            continue
+        whose, in_kelvin = match[1], unit[0] in "kK"
+        if whose or in_kelvin or found > COLDEST_UNNAMED:
             return found
     return None
 
