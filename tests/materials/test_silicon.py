@@ -37,14 +37,15 @@ LAWS = [
     (intrinsic_density, {"n": 5.75e17}),
     (carrier_density, {"n": 5.75e17}),
     (phonon_mobility, {"p": 2.65}),
-    (mobility, {"n": 5.75e17, "p": 2.65}),
-    (conductivity_low_doped, {"n": 5.75e17, "p": 2.65}),
+    (impurity_mobility, {"n": 5.75e17, "impurity_exponent": 0.75}),
+    (mobility, {"n": 5.75e17, "p": 2.65, "impurity_exponent": 0.75}),
+    (conductivity_low_doped, {"n": 5.75e17, "p": 2.65, "impurity_exponent": 0.75}),
     (conductivity_high_doped, {"a0": 9.34e-4, "a1": 1.11e-6}),
 ]
 CARRIERS = [
     (law, {**arguments, "carrier": "hole"})
     for law, arguments in LAWS
-    if law in (carrier_density, phonon_mobility, mobility)
+    if law in (carrier_density, impurity_mobility, phonon_mobility, mobility)
 ]
 #: Of another reference than the paper.
 MINIMOS = [
@@ -52,7 +53,10 @@ MINIMOS = [
     for law, more in (
         (minimos_mobility, {}),
         (minimos_mobility, {"carrier": "hole"}),
-        (partial(conductivity_low_doped, mobility_law=minimos_mobility), {}),
+        (
+            partial(conductivity_low_doped, mobility_law=minimos_mobility),
+            {"impurity_exponent": 0.5},
+        ),
     )
 ]
 
@@ -77,14 +81,6 @@ def test_every_partial_derivative_is_exact(law, arguments, T):
             lambda x, name=name: law(T, **{**arguments, name: x})[0], number, 1e-3 * number
         )
         assert partials[name] == pytest.approx(slope, rel=1e-6)
-
-
-@pytest.mark.parametrize("carrier", ["electron", "hole"])
-@pytest.mark.parametrize("n", DOPING)
-def test_impurity_mobility_derivative_is_exact(n, carrier):
-    _, partials = impurity_mobility(n, carrier)
-    slope = numerical_derivative(lambda x: impurity_mobility(x, carrier)[0], n, 1e-3 * n)
-    assert partials["n"] == pytest.approx(slope, rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -179,9 +175,9 @@ def test_minimos_mobility_is_that_of_the_lattice_without_doping_and_lowest_at_th
         ("electron", 1430.0, 2.0, 80.0),
         ("hole", 460.0, 2.18, 45.0),
     ):
-        pure = minimos_mobility(np.array([300.0, 600.0]), 1e6, 2.0, carrier)[0]
+        pure = minimos_mobility(np.array([300.0, 600.0]), 1e6, 2.0, carrier=carrier)[0]
         assert pure == pytest.approx([lattice, lattice * 2.0**-exponent], rel=1e-6)
-        assert minimos_mobility(300.0, 1e30, 2.0, carrier)[0] == pytest.approx(lowest, rel=1e-6)
+        assert minimos_mobility(300.0, 1e30, 2.0, carrier=carrier)[0] == pytest.approx(lowest, rel=1e-6)
     # half of what is between at the reference doping, which grows as T^3.2
     half = minimos_mobility(450.0, 1.12e17 * 1.5**3.2, 2.0)[0]
     assert half == pytest.approx(0.5 * (1430.0 * 1.5**-2 + 80.0 * 1.5**-0.45))

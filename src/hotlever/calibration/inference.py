@@ -19,7 +19,7 @@ from hotlever.fitting import Fit, FitOptions, Measurement
 from hotlever.fitting.estimation import Estimate, estimate
 from hotlever.lever import Branch
 from hotlever.lever.dataset import OBSERVABLES
-from hotlever.materials import PARAMETERS
+from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import Probe
 from hotlever.probe.priors import (
     SCALES,
@@ -237,4 +237,4 @@ def _error_of_model(medium: str, bias: Array, rise: Array) -> Array:
 
 
 def _source(name: str) -> str:
-    return _CIRCUIT.get(name, "material" if name in PARAMETERS else "geometry")
+    return _CIRCUIT.get(name, "material" if name in Material.model_fields else "geometry")

@@ -162,7 +162,7 @@ class Fit:
     def inversion_temperature_K(self) -> float:
         """Inversion temperature T_i of the heater's doping concentration (K)."""
         material = self.probe.material
-        return float(inversion_temperature(material.n_d, material.p))
+        return float(inversion_temperature(material.n_d, material.p, material.impurity_exponent))
 
     @cached_property
     def inversion_temperature_stderr_K(self) -> float:
@@ -171,7 +171,9 @@ class Fit:
         for name in {"n_d", "p"} & set(self.names):
             ends = getattr(material, name) * np.array([1 - 1e-4, 1 + 1e-4])
             at = {"n_d": material.n_d, "p": material.p, name: ends}
-            rise = np.diff(inversion_temperature(at["n_d"], at["p"])).item()
+            rise = np.diff(
+                inversion_temperature(at["n_d"], at["p"], material.impurity_exponent)
+            ).item()
             slope[self.names.index(name)] = rise / np.ptp(ends)
         return float(np.sqrt(slope @ self.covariance @ slope))
 

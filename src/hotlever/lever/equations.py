@@ -129,8 +129,8 @@ class LeverEquations:
                 GAS: -air.filling * of_air,
             }
         sigma, sigma_by = conductivity_high_doped(T, material.a0, material.a1)
-        low_doped = T[here], self._doping, material.p, self.mobility_law
-        sigma[here], low_by = conductivity_low_doped(*low_doped)
+        carriers = material.p, material.impurity_exponent, self.mobility_law
+        sigma[here], low_by = conductivity_low_doped(T[here], self._doping, *carriers)
         low_by |= {name: low_by["n"] * by for name, by in self._doping_by.items()}
 
         def sheet_by(name: str) -> Array:

@@ -159,11 +159,11 @@ def heater_profile(state: State, count: int = 161) -> xr.Dataset:
     n, _ = tapered_doping(
         position, material.n_d, material.delta, length=taper.length_um, n_hd=material.n_hd
     )
-    sigma, sigma_by = conductivity_low_doped(T, n, material.p)
+    sigma, sigma_by = conductivity_low_doped(T, n, material.p, material.impurity_exponent)
     columns = {
         "temperature": T,
         "doping": n,
-        "inversion_temperature": inversion_temperature(n, material.p),
+        "inversion_temperature": inversion_temperature(n, material.p, material.impurity_exponent),
         "resistivity": 1.0 / sigma,
         "resistivity_slope": -sigma_by["T"] / sigma**2,
     }

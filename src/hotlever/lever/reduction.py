@@ -106,6 +106,7 @@ def _file(lever: Lever) -> Path | None:
         "base_temperature_K": lever.circuit.base_temperature_K,
         "gas_conductivity": lever.probe.surroundings.gas_conductivity,
         "n_hd": lever.probe.material.n_hd,
+        "impurity_exponent": lever.probe.material.impurity_exponent,
         "options": asdict(ReductionOptions()),
         # a change of Netgen's mesh makes a new file instead of a wrong answer
         "nodes": elements.nodes,

@@ -1,4 +1,4 @@
-"""The material parameters of a lever: the six that a fit finds, and n_hd."""
+"""The material parameters of a lever: the six that a fit finds, and two that it is told."""
 
 from __future__ import annotations
 
@@ -79,6 +79,12 @@ class Material(Record):
         ge=1e18,
         le=1e22,
         description="doping concentration of the high-doped silicon (cm⁻³)",
+    )
+    impurity_exponent: float = Field(
+        default=0.0,
+        ge=-2.0,
+        le=4.0,
+        description="mobility limited by impurities rises as (T / 300 K) to this power; 0: Eq. 9",
     )
 
     @model_validator(mode="after")

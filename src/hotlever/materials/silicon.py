@@ -126,17 +126,29 @@ def _carriers(T: ArrayLike, n: ArrayLike) -> dict[Carrier, Evaluated]:
     }
 
 
-def impurity_mobility(n: ArrayLike, carrier: Carrier = "electron") -> Evaluated:
+@law(meant_for=(290.0, 1300.0), source="Eq. 9")
+def impurity_mobility(
+    T: ArrayLike, n: ArrayLike, impurity_exponent: float = 0.0, carrier: Carrier = "electron"
+) -> Evaluated:
     """Mobility limited by impurity scattering, in cm² V⁻¹ s⁻¹ (Eq. 9).
+
+    It does not depend on the temperature in the paper. Ionised impurities scatter fast carriers
+    less, as T^1.5 without screening (Brooks and Herring): an `impurity_exponent` s other than 0
+    multiplies by (T / 300 K)^s.
 
     Examples
     --------
-    >>> impurity_mobility(1e18)[0].item()
-    410.0
+    >>> impurity_mobility(600.0, 1e18)[0].item(), impurity_mobility(600.0, 1e18, 1.0)[0].item()
+    (410.0, 820.0)
     """
-    n = np.asarray(n, dtype=float)
-    mobility = IMPURITY_RATIO[carrier] * 4.1e11 / np.sqrt(n)
-    return mobility, {"n": -0.5 * mobility / n}
+    T, n = np.asarray(T, dtype=float), np.asarray(n, dtype=float)
+    hot = T / 300.0
+    mobility = IMPURITY_RATIO[carrier] * 4.1e11 / np.sqrt(n) * hot**impurity_exponent
+    return mobility, {
+        "T": impurity_exponent * mobility / T,
+        "n": -0.5 * mobility / n,
+        "impurity_exponent": mobility * np.log(hot),
+    }
 
 
 @law(meant_for=(290.0, 1300.0), source="Eq. 10; Dürig, J. Appl. Phys. 98, 044906 (2005)")
@@ -155,16 +167,23 @@ def phonon_mobility(T: ArrayLike, p: float, carrier: Carrier = "electron") -> Ev
 
 
 @law(meant_for=(290.0, 1300.0), source="Eq. 8")
-def mobility(T: ArrayLike, n: ArrayLike, p: float, carrier: Carrier = "electron") -> Evaluated:
+def mobility(
+    T: ArrayLike,
+    n: ArrayLike,
+    p: float,
+    impurity_exponent: float = 0.0,
+    carrier: Carrier = "electron",
+) -> Evaluated:
     """Carrier mobility by Matthiessen's rule, in cm² V⁻¹ s⁻¹ (Eq. 8)."""
-    impurity, d_impurity = impurity_mobility(n, carrier)
+    impurity, d_impurity = impurity_mobility.formula(T, n, impurity_exponent, carrier)
     phonon, d_phonon = phonon_mobility.formula(T, p, carrier)
     share = 1.0 / (impurity + phonon)
     by_phonon, by_impurity = (impurity * share) ** 2, (phonon * share) ** 2
     return impurity * phonon * share, {
-        "T": by_phonon * d_phonon["T"],
+        "T": by_phonon * d_phonon["T"] + by_impurity * d_impurity["T"],
         "p": by_phonon * d_phonon["p"],
         "n": by_impurity * d_impurity["n"],
+        "impurity_exponent": by_impurity * d_impurity["impurity_exponent"],
     }
 
 
@@ -181,7 +200,7 @@ _MINIMOS: dict[Carrier, tuple[float, float, float, float]] = {
     source="MINIMOS; Selberherr et al., Solid-State Electron. 33, 1425 (1990)",
 )
 def minimos_mobility(
-    T: ArrayLike, n: ArrayLike, p: float, carrier: Carrier = "electron"
+    T: ArrayLike, n: ArrayLike, p: float, _: float = 0.0, carrier: Carrier = "electron"
 ) -> Evaluated:
     """Carrier mobility as in MINIMOS, in cm² V⁻¹ s⁻¹: impurities scatter less when it is hot.
 
@@ -214,17 +233,22 @@ def minimos_mobility(
 
 @law(meant_for=(290.0, 1300.0), source="Eq. 5")
 def conductivity_low_doped(
-    T: ArrayLike, n: ArrayLike, p: float, mobility_law: Law = mobility
+    T: ArrayLike,
+    n: ArrayLike,
+    p: float,
+    impurity_exponent: float = 0.0,
+    mobility_law: Law = mobility,
 ) -> Evaluated:
     """Electrical conductivity of the low-doped heater and reader, in S cm⁻¹ (Eq. 5)."""
     sigma: Array = np.zeros(np.broadcast(T, n).shape)
-    total: Partials = {"T": sigma, "n": sigma, "p": sigma}
+    total: Partials = dict.fromkeys(("T", "n", "p", "impurity_exponent"), sigma)
     for carrier, (density, d_density) in _carriers(T, n).items():
-        speed, d_speed = mobility_law.formula(T, n, p, carrier)
+        speed, d_speed = mobility_law.formula(T, n, p, impurity_exponent, carrier)
         sigma = sigma + ELEMENTARY_CHARGE * density * speed
         total = {
             name: total[name]
-            + ELEMENTARY_CHARGE * (density * d_speed[name] + d_density.get(name, 0.0) * speed)
+            + ELEMENTARY_CHARGE
+            * (density * d_speed.get(name, 0.0) + d_density.get(name, 0.0) * speed)
             for name in total
         }
     return sigma, total
@@ -259,13 +283,13 @@ def conductivity_high_doped(T: ArrayLike, a0: float, a1: float) -> Evaluated:
     }
 
 
-def inversion_temperature(n: ArrayLike, p: ArrayLike) -> Array:
+def inversion_temperature(n: ArrayLike, p: ArrayLike, impurity_exponent: ArrayLike = 0.0) -> Array:
     """Temperature T_i (K) at which the resistivity of low-doped silicon is highest, dρ/dT = 0.
 
     Returns
     -------
     ndarray
-        Of the common shape of `n` and `p`; NaN where the resistivity has no maximum between 300
+        Of the common shape of the arguments; NaN where the resistivity has no maximum between 300
         and 1700 K, as at very high doping.
 
     Examples
@@ -273,12 +297,14 @@ def inversion_temperature(n: ArrayLike, p: ArrayLike) -> Array:
     >>> inversion_temperature([4.10e17], p=2.64).round(0).tolist()
     [805.0]
     """
-    n, p = np.broadcast_arrays(np.asarray(n, dtype=float), np.asarray(p, dtype=float))
+    n, p, exponent = np.broadcast_arrays(
+        *(np.asarray(one, dtype=float) for one in (n, p, impurity_exponent))
+    )
     cold, hot = np.full(n.shape, 300.0), np.full(n.shape, FORMULA_TO)
 
-    def slope(T: Array, n: Array, p: Any) -> Array:
-        sigma, partials = conductivity_low_doped(T, n, p)
+    def slope(T: Array, n: Array, p: Any, exponent: Any) -> Array:
+        sigma, partials = conductivity_low_doped(T, n, p, exponent)
         return partials["T"] / sigma
 
-    root = elementwise.find_root(slope, (cold, hot), args=(n, p))
+    root = elementwise.find_root(slope, (cold, hot), args=(n, p, exponent))
     return np.where(root.success, root.x, np.nan)

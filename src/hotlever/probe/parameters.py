@@ -15,6 +15,11 @@ if TYPE_CHECKING:
 #: Shares of a dimension or a resistance, of a base temperature, and of what a gas conducts, within
 #: which a fit stays.
 _OF_THE_VALUE, _OF_THE_BASE, _OF_THE_GAS = (0.5, 1.5), (0.8, 1.2), (0.2, 5.0)
+#: What the paper takes as 0: it is varied if it has a prior.
+_IMPURITIES = Parameter(
+    *("impurity_exponent", "s", "1", 10.0, -2.0, 4.0),
+    "power of the temperature in mobility limited by impurities",
+)
 #: Dimensions of a tip that matter to its lever.
 OF_THE_TIP = ("height_um", "half_angle_deg")
 
@@ -45,7 +50,7 @@ def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Paramete
             shares["surface_gap_um"] = _OF_THE_VALUE
     parts = (probe.shape, probe.tip, probe.circuit, probe.surroundings)
     meaning = {name: text for part in parts if part for name, text in part.description().items()}
-    found = dict(PARAMETERS)
+    found = {**PARAMETERS, _IMPURITIES.name: _IMPURITIES}
     for (name, (least, most)), value in zip(shares.items(), probe.at(list(shares)), strict=True):
         found[name] = parameter_named(name)._replace(
             scale=float(value),

@@ -36,6 +36,9 @@ SCATTER_OF, _WIDENED = ("lever 1", "lever 2", "lever 3", "lever 4"), 1.5
 _DIMENSIONS, RESISTANCE = 0.05, 1e-3
 #: Of the base temperature (K): a room, or a hot plate and its thermocouple.
 _BASE_K = 1.0
+#: Of the exponent of the temperature in mobility limited by impurities: half of what it is without
+#: screening, 1.5. The paper takes 0.
+_IMPURITIES = 0.75
 #: Of a tip, as far as it is stated: its height and half-angle, from a micrograph.
 _TIP = 0.2
 #: Of what air takes up: humidity, what is around, and dimensions as far as they matter to it.
@@ -179,7 +182,8 @@ def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) ->
     """Return what is known of a lever of which nothing but the probe file is known.
 
     The material scatters about the probe's as that of the published levers does, half as much
-    again; the doping is nominal within 15 %, dimensions are within 5 %, those of a tip within
+    again; mobility limited by impurities goes with a power of the temperature, 0 as in the paper
+    within 0.75; the doping is nominal within 15 %, dimensions are within 5 %, those of a tip within
     20 %, the series resistance within 0.1 %, the base temperature within 1 K; what air takes up and
     the gap to a surface below are known to 10 %. What is known of the material instead may be
     given; what the probe file states wins.
@@ -201,8 +205,8 @@ def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) ->
         for (name, spread), value in zip(spreads.items(), values, strict=True)
         if value > 0
     }
-    base = Prior(probe.circuit.base_temperature_K, _BASE_K, relative=False)
-    found["base_temperature_K"] = base
+    for name, spread in (("base_temperature_K", _BASE_K), ("impurity_exponent", _IMPURITIES)):
+        found[name] = Prior(float(probe.at([name])[0]), spread, relative=False)
     return found | {**(material or {})} | priors_of(probe.stated_priors, probe, "[prior]")
 
 

@@ -81,7 +81,7 @@ def drawn(
     values = {
         name: prior.at(float(rng.standard_normal()))
         for name, prior in default_priors(nominal).items()
-        if name != "series_resistance_ohm"
+        if name not in ("series_resistance_ohm", "impurity_exponent")
     }
     if "drawing" not in departures:
         values = {name: values[name] for name in values if name not in nominal.shape.dimensions()}
