@@ -61,10 +61,10 @@ def drawn(rng: np.random.Generator, number: int, medium: str) -> tuple[Probe, Pr
 
 
 def measured(
-    true: Probe, rng: np.random.Generator, what: str
+    true: Probe, rng: np.random.Generator, what: str, highest: float | None = None
 ) -> tuple[Measurement, np.ndarray, Lever]:
-    """Measure a twin as far as it goes; return its true temperatures too."""
-    lever, highest = Lever(true, MESH), HIGHEST_V[true.surroundings.medium]
+    """Measure a twin up to a bias (V), or as far as it goes; return its true temperatures too."""
+    lever, highest = Lever(true, MESH), highest or HIGHEST_V[true.surroundings.medium]
     try:
         sweep = lever.sweep(np.linspace(highest / POINTS, highest, POINTS))
     except BranchEndError as error:

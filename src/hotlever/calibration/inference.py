@@ -218,7 +218,8 @@ def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Pr
         tip_K=predicted.values[2],
         parts={source: np.sqrt(variance) for source, variance in parts.items()},
         priors=use,
-        reason=misfit(residuals, found.optimum.prediction.values, use),
+        reason=misfit(residuals, found.optimum.prediction.values, use)
+        or ("" if found.problem.settled else "the search for one does not settle"),
         notes=[*found.notes, *residuals.suspicious(found.optimum.prediction.values, robust=True)],
         _estimate=found,
     )

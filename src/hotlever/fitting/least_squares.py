@@ -34,6 +34,9 @@ _EXACT = 1e-10
 _AT_HAND = 3
 #: Most rounds, and as many as most fits need, for a progress bar to fill.
 _MOST_ROUNDS, _USUAL_ROUNDS = 60, 8
+#: Branches after which a search with priors ends where it is: data of such a lever take half as
+#: many, data that contradict what is known beforehand would go on and on.
+_MOST_BRANCHES = 20
 #: With priors, whose squares count standard deviations, a round that gains no more is the last.
 #: So is one that promises a little more and does not keep it.
 _LITTLE, _DOUBTFUL = 1e-2, 0.2
@@ -93,6 +96,8 @@ class LeastSquares:
         As confirmed last.
     evaluations, steps : int
         Branches solved, and rounds that led nearer to the optimum.
+    settled : bool
+        Whether the search came to its end by itself.
     """
 
     def __init__(
@@ -117,7 +122,7 @@ class LeastSquares:
         self._scale = np.array([one.scale for one in known])
         self._bounds = np.array([[one.lower, one.upper] for one in known]).T / self._scale
         self._at_hand = {} if near is None else {near.probe: near}
-        self.evaluations, self.steps = 0, 0
+        self.evaluations, self.steps, self.settled = 0, 0, True
 
     def solve_and_confirm(self, robust: bool) -> Optimum:
         """Find the optimum, make the model exact there, and go on until that matters no more.
@@ -141,7 +146,7 @@ class LeastSquares:
             self.model = confirmed
             self._at_hand = {found.probe: confirmed.predict(found.probe, found.prediction)}
             previous, found = found, self.solve(found.probe)
-            if self._settled(previous, found):
+            if not self.settled or self._settled(previous, found):
                 return found
         raise ComputationError(
             f"the fit did not settle: after {_MOST_CONFIRMATIONS} confirmations by full solves the "
@@ -162,7 +167,7 @@ class LeastSquares:
             # outliers can drive the first fit onto a bound, where it would stay without priors
             origin = self._start if at_first and not self._informed else found.probe
             previous, found = found, self.solve(origin)
-            if not at_first and self._settled(previous, found):
+            if not self.settled or (not at_first and self._settled(previous, found)):
                 break
         return found
 
@@ -201,7 +206,8 @@ class LeastSquares:
             here = self._values(probe)
             near = np.maximum(_FOUND * found.stderr, _NEAR * np.abs(here))
             gain = squares - found.squares if self._informed else np.inf
-            if gain < _LITTLE:
+            self.settled = not self._informed or self.evaluations < _MOST_BRANCHES
+            if gain < _LITTLE or not self.settled:
                 return replace(found, probe=probe, prediction=prediction)
             # the optimum is where the branch was solved
             if far < _NEAR or np.all(np.abs(self._values(found.probe) - here) <= near):
