@@ -38,6 +38,8 @@ _ROWS = 101
 _CIRCUIT = {"series_resistance_ohm": "electronics", "gas_conductivity": "air"}
 #: Data that are enough to tell which of them are outliers.
 _ENOUGH = 15
+#: Sum of squares, which count standard deviations, that a search must not leave.
+_UNSETTLED = 3.0
 #: How far (standard errors) along each axis of the estimate the knee is looked at.
 _ASIDE = 0.5
 
@@ -219,7 +221,7 @@ def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Pr
         parts={source: np.sqrt(variance) for source, variance in parts.items()},
         priors=use,
         reason=misfit(residuals, found.optimum.prediction.values, use)
-        or ("" if found.problem.settled else "the search for one does not settle"),
+        or ("the search for one does not settle" if found.problem.left > _UNSETTLED else ""),
         notes=[*found.notes, *residuals.suspicious(found.optimum.prediction.values, robust=True)],
         _estimate=found,
     )

@@ -10,6 +10,7 @@ from scipy.special import chdtrc
 from hotlever.calibration.causes import Causes
 from hotlever.errors import InputError
 from hotlever.fitting.measurement import Measurement
+from hotlever.fitting.misfit import undescribed
 from hotlever.fitting.residuals import Residuals
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.probe import Probe
@@ -25,9 +26,11 @@ _COLDER_K, _COLDER_ERRORS = 20.0, 4.0
 _COARSE, _EVEN = 0.01, 0.02
 #: A lever is cold that was never hotter (K).
 _COLD_K = 400.0
-#: Data are not described where they scatter about the model by more than this share of the largest,
-#: and neighbours together; or where parameters are as far from their priors as one lever in 500 is.
-SCATTER, _TOGETHER, _UNLIKELY = 0.004, 0.6, 2e-3
+#: Data are not described where parameters are as far from their priors as one lever in 500 is.
+_UNLIKELY = 2e-3
+#: What is known better than this share is hardly moved by data that contradict it. How far they are
+#: from it, in standard deviations, tells that; with a least share that they must tell of it.
+_NARROW, _PULL, _LEAST = 0.01, 4.0, 1e-3
 
 
 def check_plausible(measured: Measurement, probe: Probe, causes: Causes) -> None:
@@ -106,20 +109,18 @@ def remarks(measured: Measurement, tip_K: np.ndarray) -> list[str]:
 
 def misfit(residuals: Residuals, values: np.ndarray, priors: Mapping[str, PriorUse]) -> str:
     """Return why data are not described by what was fitted to them; empty if they are."""
-    difference = residuals.difference(values) / residuals.largest
-    for name, whole in zip(residuals.observables, difference, strict=True):
-        if name == "tip":
-            continue  # a thermometer's scale may be off by more than its readings scatter
-        row = whole[np.isfinite(whole)]
-        rms = float(np.sqrt(np.mean(row**2)))
-        # of white noise neighbours differ by twice its variance
-        together = np.mean(np.diff(row) ** 2) / max(2.0 * np.mean(row**2), 1e-300)
-        if rms > SCATTER and together < _TOGETHER and row.size > 6:
-            worst = int(np.nanargmax(np.abs(whole)))
-            return (
-                f"{name} differs by {rms:.1%} of its largest value (rms), and not at random; most "
-                f"at {residuals.bias[worst]:.3g} V"
-            )
+    reason = undescribed(residuals, values)
+    if reason:
+        return reason
+    for name, use in priors.items():
+        if use.spread < _NARROW * use.value:
+            told = 1.0 - (use.posterior_spread / use.spread) ** 2
+            pull = (use.posterior_value - use.value) / (use.spread * np.sqrt(max(told, _LEAST)))
+            if abs(pull) > _PULL:
+                return (
+                    f"{name}, known to {use.spread / use.value:.1%}, would have to be another; the "
+                    f"data are {abs(pull):.1f} σ from it"
+                )
     away = {name: (use.posterior_value - use.value) / use.spread for name, use in priors.items()}
     # as many are free to be away as the data tell of
     told = sum(1.0 - (use.posterior_spread / use.spread) ** 2 for use in priors.values())

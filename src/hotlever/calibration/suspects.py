@@ -15,10 +15,11 @@ from hotlever.probe import Probe
 from hotlever.text import parameter_named
 from hotlever.types import Array
 
-#: A current that stands at its highest value in so many rows, within this share, is clipped.
-_LEVEL_ROWS, _LEVEL = 2, 1e-4
-#: A meter may be off by such a share; more is another unit.
-_AN_ERROR = 0.5
+#: A current that stands at its highest value in so many rows, within this share, is clipped, if it
+#: is below that in so many.
+_LEVEL_ROWS, _LEVEL, _BELOW = 2, 1e-4, 5
+#: The range of a meter may be off by such a factor, and its zero by such a share.
+_FACTOR, _OF_THE_ZERO = 50.0, 0.5
 #: How much warmer than stated the base may be (K).
 _WARMER = (30.0, 60.0, 100.0)
 
@@ -106,11 +107,15 @@ def _of_the_meter(rows: Rows) -> list[Suspect]:
         return replace(rows, current_mA=rows.current_mA - share * largest * pattern)
 
     def asks(question: str) -> Callable[[float], str]:
-        return lambda share: f"{question} by {share:+.1%}?" if abs(share) < _AN_ERROR else ""
+        return lambda share: f"{question} by {share:+.1%}?" if abs(share) < _OF_THE_ZERO else ""
+
+    def times(more: float) -> str:
+        known = 1.0 / _FACTOR < 1.0 + more < _FACTOR  # or else it is another unit
+        return f"is the current {1.0 + more:.3g} times what it should be?" if known else ""
 
     zero = "of its largest value"
     return [
-        Suspect(asks("is the current off"), scaled, free=True),
+        Suspect(times, scaled, free=True),
         Suspect(asks(f"is the zero of the current off, {zero},"), partial(raised, 1.0), free=True),
         Suspect(
             asks(f"does the zero of the current drift, {zero},"), partial(raised, along), free=True
@@ -139,7 +144,7 @@ def _of_the_rows(rows: Rows) -> list[Suspect]:
     bias, current, place = rows.bias_V, rows.current_mA, np.arange(rows.bias_V.size)
     found = []
     level = current >= current.max() * (1.0 - _LEVEL)
-    if level.sum() >= _LEVEL_ROWS:
+    if level.sum() >= _LEVEL_ROWS and (~level).sum() >= _BELOW:
         text = f"is the current clipped at {current.max():.3g} mA, by the range of its meter?"
         found.append(Suspect(lambda _: text, lambda rows, _: replace(rows, kept=~level)))
 

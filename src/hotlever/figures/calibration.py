@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hotlever.calibration.calibration import Calibration
-from hotlever.calibration.plausibility import SCATTER
 from hotlever.figures.style import (
     BLACK,
     BLUE,
@@ -22,6 +21,7 @@ from hotlever.figures.style import (
     VERMILION,
     figure,
 )
+from hotlever.fitting.misfit import SCATTER
 from hotlever.studies.design import label_of
 
 if TYPE_CHECKING:

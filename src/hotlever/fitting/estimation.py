@@ -14,6 +14,7 @@ import numpy as np
 from hotlever.errors import BranchEndError, ComputationError, InputError, unknown_name
 from hotlever.fitting.least_squares import LeastSquares, Optimum
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement
+from hotlever.fitting.misfit import undescribed
 from hotlever.fitting.models import ForwardModel, Prediction, forward_model
 from hotlever.fitting.options import FitOptions
 from hotlever.fitting.residuals import Residuals
@@ -245,6 +246,11 @@ def _first_found(
         try:
             return problem, problem.solve_and_confirm(options.robust)
         except ComputationError as error:
+            if problem.ended:
+                raise ComputationError(
+                    f"the search for a lever that shows these data was ended after "
+                    f"{problem.evaluations} branches: {error}"
+                ) from error
             failures.append(error)
     raise failures[0]
 
@@ -283,6 +289,7 @@ def _found(estimate: Estimate) -> Fit:
         ),
         evaluations=problem.evaluations,
         steps=problem.steps,
+        reason=undescribed(residuals, values),
         seconds=estimate.seconds,
         notes=notes,
     )

@@ -44,8 +44,9 @@ def outcome(fit: Fit) -> list[str]:
 
 
 def fit_text(fit: Fit) -> str:
-    """Return the result of a fit as lines of text."""
-    return "\n".join([*aligned(parameter_rows(fit)), *outcome(fit)])
+    """Return the result of a fit as lines of text; first that it describes no data, if so."""
+    doubt = [] if fit.describes_data else [f"no such lever shows these data: {fit.reason}"]
+    return "\n".join([*doubt, *aligned(parameter_rows(fit)), *outcome(fit)])
 
 
 def lever_rows(levers: xr.Dataset) -> list[list[str]]:
