@@ -23,15 +23,11 @@ from hotlever.studies.twins import (
     DEPARTURES,
     HIGHEST_V,
     KINDS,
-    drawn,
     judge,
-    measured,
     summary,
     together,
 )
 from problems import table
-
-__all__ = ["drawn", "measured"]
 
 
 def judged(number: int, medium: str, what: str, departures: list[str]) -> xr.Dataset | str:

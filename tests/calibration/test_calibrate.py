@@ -168,35 +168,6 @@ def test_a_power_law_is_used_by_the_paper_s_rule(calibrated, lever_3):
     assert with_law.power_law == law
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"current_mA": 1e3}, r"is the current given in µA"),
-        ({"current_mA": 1e-3}, r"is the current given in A"),
-        ({"current_mA": 7.0}, r"series resistance left out"),
-        ({"current_mA": 0.2}, r"rather 33\.\d kΩ, the doping lower, or a terminal open"),
-    ],
-)
-def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
-    reference, change, message
-):
-    curve = measured_curve(reference, np.random.default_rng(4))
-    (factor,) = change.values()
-    wrong = IVCurve(curve.bias_V, factor * curve.current_mA, curve.circuit)
-    with pytest.raises(InputError, match=message):
-        calibrate(measurement_of(wrong))
-
-
-def test_data_that_no_such_lever_shows_are_said_to_be(reference):
-    """A curve whose current sags by a few per cent at its hot end."""
-    curve = measured_curve(reference, np.random.default_rng(5))
-    wrong = curve.current_mA * (1.0 - 0.15 * np.clip(curve.bias_V - 9.0, 0.0, None))
-    found = calibrate(measurement_of(IVCurve(curve.bias_V, wrong, curve.circuit)))
-    assert not found.describes_data
-    assert found.text().startswith("no lever like this one shows these data: ")
-    assert found.content()["describes_data"] is False
-
-
 def test_calibration_files(calibrated, tmp_path):
     path = tmp_path / "cal.json"
     calibrated.write(path)

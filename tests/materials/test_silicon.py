@@ -177,7 +177,9 @@ def test_minimos_mobility_is_that_of_the_lattice_without_doping_and_lowest_at_th
     ):
         pure = minimos_mobility(np.array([300.0, 600.0]), 1e6, 2.0, carrier=carrier)[0]
         assert pure == pytest.approx([lattice, lattice * 2.0**-exponent], rel=1e-6)
-        assert minimos_mobility(300.0, 1e30, 2.0, carrier=carrier)[0] == pytest.approx(lowest, rel=1e-6)
+        assert minimos_mobility(300.0, 1e30, 2.0, carrier=carrier)[0] == pytest.approx(
+            lowest, rel=1e-6
+        )
     # half of what is between at the reference doping, which grows as T^3.2
     half = minimos_mobility(450.0, 1.12e17 * 1.5**3.2, 2.0)[0]
     assert half == pytest.approx(0.5 * (1430.0 * 1.5**-2 + 80.0 * 1.5**-0.45))

@@ -47,6 +47,8 @@ _CIRCUIT = {
 _MODEL = {"vacuum": 3e-4, "air": 7e-4}
 #: Data that are enough to tell which of them are outliers.
 _ENOUGH = 15
+#: Sum of squares, which count standard deviations, that a search must not leave.
+_UNSETTLED = 3.0
 #: How far (standard errors) along each axis of the estimate the knee is looked at.
 _ASIDE = 0.5
 
@@ -223,7 +225,8 @@ def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Pr
         tip_K=predicted.values[2],
         parts={source: np.sqrt(variance) for source, variance in parts.items()},
         priors=use,
-        reason=misfit(residuals, found.optimum.prediction.values, use),
+        reason=misfit(residuals, found.optimum.prediction.values, use)
+        or ("the search for one does not settle" if found.problem.left > _UNSETTLED else ""),
         notes=[*found.notes, *residuals.suspicious(found.optimum.prediction.values, robust=True)],
         _estimate=found,
     )

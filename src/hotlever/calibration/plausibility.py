@@ -7,8 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import chdtrc
 
+from hotlever.calibration.causes import Causes
 from hotlever.errors import InputError
 from hotlever.fitting.measurement import Measurement
+from hotlever.fitting.misfit import undescribed
 from hotlever.fitting.residuals import Residuals
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.probe import Probe
@@ -16,13 +18,23 @@ from hotlever.probe.priors import PriorUse
 
 #: The resistance of a cold lever is within this factor of its model's.
 _WITHIN = 2.5
-#: Data are not described where they scatter about the model by more than this share of the largest,
-#: and neighbours together; or where parameters are as far from their priors as one lever in 500 is.
-_SCATTER, _TOGETHER, _UNLIKELY = 0.004, 0.6, 2e-3
+#: Rows that a calibration needs, and those that are not few.
+_FEWEST, _FEW = 3, 6
+#: K, and standard errors, by which a tip may seem colder than its base.
+_COLDER_K, _COLDER_ERRORS = 20.0, 4.0
+#: Currents are coarse in steps of this share of the largest, each a multiple within so much.
+_COARSE, _EVEN = 0.01, 0.02
+#: A lever is cold that was never hotter (K).
+_COLD_K = 400.0
+#: Data are not described where parameters are as far from their priors as one lever in 500 is.
+_UNLIKELY = 2e-3
+#: What is known better than this share is hardly moved by data that contradict it. How far they are
+#: from it, in standard deviations, tells that; with a least share that they must tell of it.
+_NARROW, _PULL, _LEAST = 0.01, 4.0, 1e-3
 
 
-def check_plausible(measured: Measurement, probe: Probe) -> None:
-    """Refuse data whose resistance at low bias is far from the lever's.
+def check_plausible(measured: Measurement, probe: Probe, causes: Causes) -> None:
+    """Refuse data whose resistance at low bias, or whose temperatures, are far from the lever's.
 
     Raises
     ------
@@ -31,12 +43,14 @@ def check_plausible(measured: Measurement, probe: Probe) -> None:
     """
     where = measured.path or "measurement"
     here = np.isfinite(measured.current_mA) & (measured.bias_V > 0) & (measured.current_mA > 0)
-    if here.sum() < 3:
+    if here.sum() < _FEWEST:
         raise InputError(
-            f"{where}: {here.sum()} rows with a bias and a current above 0, expected 3 or more"
+            f"{where}: {here.sum()} rows with a bias and a current above 0, expected {_FEWEST} or "
+            "more"
         )
+    _check_temperatures(measured, probe, where)
     bias, current = measured.bias_V[here], measured.current_mA[here]
-    low = np.argsort(bias)[: max(3, bias.size // 8)]
+    low = np.argsort(bias)[: max(_FEWEST, bias.size // 8)]
     found = float(np.median(bias[low] / current[low]))
     # what a cold lever shows does not depend on what is around it
     cold = Lever(probe.in_medium("vacuum"), COARSE).branch_to(0.0).values[1]
@@ -45,56 +59,73 @@ def check_plausible(measured: Measurement, probe: Probe) -> None:
     ratio = found / (lever + series)
     if 1 / _WITHIN < ratio < _WITHIN and found > series:
         return
+    cause = causes.likeliest() or (
+        "is a terminal open, or the meter at another one?"
+        if ratio > 1
+        else "is another part in parallel, or are columns swapped?"
+    )
     raise InputError(
         f"{where}: V_b / I_h is {found:.4g} kΩ at low bias, expected about {lever + series:.4g} kΩ "
-        f"({series:g} kΩ in series and {lever:.3g} kΩ of the lever): {_cause(found, lever, series)}"
+        f"({series:g} kΩ in series and {lever:.3g} kΩ of the lever): {cause}"
     )
 
 
-def _cause(found: float, lever: float, series: float) -> str:
-    """Return the likeliest cause of a resistance (kΩ) that is not the lever's."""
-    for factor, units in (
-        (1e3, "the current given in A, or the bias in mV"),
-        (1e-3, "the current given in µA, or the bias in kV"),
-    ):
-        if 1 / _WITHIN < found / factor / (lever + series) < _WITHIN:
-            return f"is {units}, by their headings?"
-    if 1 / _WITHIN < found / lever < _WITHIN:
-        return "is the series resistance left out, or is V_b the lever's own voltage?"
-    if found <= series:
-        return "is the series resistance smaller than stated, or are columns swapped?"
-    if found / (lever + series) > 1:
-        return (
-            f"is the series resistance rather {found - lever:.3g} kΩ, the doping lower, or a "
-            "terminal open?"
+def _check_temperatures(measured: Measurement, probe: Probe, where: str) -> None:
+    """Refuse tips that are colder than the base of the lever."""
+    base, error = probe.circuit.base_temperature_K, np.nan_to_num(measured.tip_error_K)
+    colder = measured.tip_K < base - np.maximum(_COLDER_K, _COLDER_ERRORS * error)
+    if colder.any():
+        row = int(np.argmax(colder))
+        raise InputError(
+            f"{where}: T_tip is {measured.tip_K[row]:.4g} K at {measured.bias_V[row]:.4g} V, "
+            f"expected more than the base temperature, {base:g} K: is it in °C, or another column?"
         )
-    return "is the doping higher, or another part in parallel?"
+
+
+def remarks(measured: Measurement, tip_K: np.ndarray) -> list[str]:
+    """Say what the data lack, to tell more of a lever."""
+    found, current = [], measured.current_mA[np.isfinite(measured.current_mA)]
+    if current.size < _FEW:
+        found.append(
+            f"{current.size} rows say little of a lever: the answer leans on what was known "
+            f"beforehand; {_FEW} or more would tell"
+        )
+    levels = np.unique(current)
+    step = float(np.diff(levels).min()) if levels.size > 1 else 0.0
+    share = step / float(levels[-1])
+    if share > _COARSE and np.allclose(levels / step, np.round(levels / step), atol=_EVEN):
+        found.append(
+            f"I_h has a resolution of {step:.2g} mA only, {share:.1%} of its largest value, in "
+            f"{levels.size} steps"
+        )
+    hottest = float(np.nanmax(tip_K))
+    if hottest < _COLD_K:
+        found.append(
+            f"the lever was measured only up to a tip of {hottest:.0f} K; what it does beyond is "
+            "not known"
+        )
+    return found
 
 
 def misfit(residuals: Residuals, values: np.ndarray, priors: Mapping[str, PriorUse]) -> str:
     """Return why data are not described by what was fitted to them; empty if they are."""
-    difference = residuals.difference(values) / residuals.largest
-    for name, whole in zip(residuals.observables, difference, strict=True):
-        if name == "tip":
-            continue  # a thermometer's scale may be off by more than its readings scatter
-        row = whole[np.isfinite(whole)]
-        rms = float(np.sqrt(np.mean(row**2)))
-        # of white noise neighbours differ by twice its variance
-        together = np.mean(np.diff(row) ** 2) / max(2.0 * np.mean(row**2), 1e-300)
-        if rms > _SCATTER and together < _TOGETHER and row.size > 6:
-            worst = int(np.nanargmax(np.abs(whole)))
-            return (
-                f"{name} differs by {rms:.1%} of its largest value (rms), and not at random; most "
-                f"at {residuals.bias[worst]:.3g} V"
-            )
+    reason = undescribed(residuals, values)
+    if reason:
+        return reason
+    for name, use in priors.items():
+        if use.spread < _NARROW * use.value:
+            told = 1.0 - (use.posterior_spread / use.spread) ** 2
+            pull = (use.posterior_value - use.value) / (use.spread * np.sqrt(max(told, _LEAST)))
+            if abs(pull) > _PULL:
+                return (
+                    f"{name}, known to {use.spread / use.value:.1%}, would have to be another; the "
+                    f"data are {abs(pull):.1f} σ from it"
+                )
     away = {name: (use.posterior_value - use.value) / use.spread for name, use in priors.items()}
     # as many are free to be away as the data tell of
     told = sum(1.0 - (use.posterior_spread / use.spread) ** 2 for use in priors.values())
     if told > 0 and chdtrc(told, sum(one**2 for one in away.values())) < _UNLIKELY:
         most = sorted(away, key=lambda name: -abs(away[name]))[:3]
         moved = ", ".join(f"{name} by {away[name]:+.1f} σ" for name in most)
-        return (
-            f"what was known beforehand would have to be wrong by too much together, {moved}; is "
-            "it another lever, medium or resistor?"
-        )
+        return f"what was known beforehand would have to be wrong by too much together, {moved}"
     return ""

@@ -10,14 +10,15 @@ import numpy as np
 import xarray as xr
 
 from hotlever.calibration.calibration import TABLE_COLUMNS, Calibration, table_of
+from hotlever.calibration.causes import Causes
 from hotlever.calibration.inference import Estimated, estimated
 from hotlever.calibration.knee import IVCurve
-from hotlever.calibration.plausibility import check_plausible
+from hotlever.calibration.plausibility import check_plausible, remarks
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.power_law_fit import fit_power_law
 from hotlever.calibration.rule import by_rule
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
-from hotlever.errors import InputError
+from hotlever.errors import ComputationError, InputError
 from hotlever.fitting import Fit, Measurement, read_fit
 from hotlever.fitting.estimation import with_measured_circuit
 from hotlever.lever import Branch, Lever
@@ -94,8 +95,15 @@ def calibrate(
     probe, notes = with_measured_circuit(origin, known, medium if law is None else "vacuum")
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
         return _by_rule(measured, probe, law, route, notes)
-    check_plausible(measured, probe)
-    return _by_estimate(measured, estimated(measured, probe, fit, priors, progress), route, notes)
+    causes = Causes(measured, probe, priors)
+    check_plausible(measured, probe, causes)
+    try:
+        found = estimated(measured, probe, fit, priors, progress)
+    except ComputationError as error:
+        raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
+    if found.reason:
+        found = replace(found, reason=f"{found.reason}; {causes.named(fit is not None)}")
+    return _by_estimate(measured, found, route, [*notes, *remarks(measured, found.tip_K)])
 
 
 def _by_estimate(

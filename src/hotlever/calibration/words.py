@@ -49,7 +49,7 @@ def calibration_text(calibration: Calibration) -> str:
         lines = [
             f"no lever like this one shows these data: {calibration.reason}",
             f"what comes nearest is {lines[0]}:",
-            *_knee_lines(calibration)[:1],
+            *_nearest_knee(calibration),
             *prior_lines(calibration.priors)[:1],
         ]
     if np.isfinite(calibration.measured_rms_K):
@@ -84,6 +84,17 @@ def _knee_lines(calibration: Calibration) -> list[str]:
         f"{value_with_error(knee.bias_V, knee.bias_V_stderr)} V, "
         f"tip {calibration.knee_tip_K:.0f} K",
         factor,
+    ]
+
+
+def _nearest_knee(calibration: Calibration) -> list[str]:
+    """Return the knee of a lever that does not show the data, without errors."""
+    knee = calibration.knee
+    if np.isnan(knee.power_mW):
+        return []
+    return [
+        f"its knee: {knee.lever_V:.3g} V, {knee.current_mA:.3g} mA, {knee.power_mW:.3g} mW at a "
+        f"bias of {knee.bias_V:.3g} V, tip {calibration.knee_tip_K:.0f} K"
     ]
 
 

@@ -149,6 +149,8 @@ def _fit_one(
     give("\n".join([*texts, ""]))
     if failure is not None:
         raise failure
+    if not result.describes_data:
+        raise ComputationError(f"{data}: no such lever shows these data: {result.reason}")
 
 
 def _fit_several(

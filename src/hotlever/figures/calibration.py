@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hotlever.calibration.calibration import Calibration
@@ -20,6 +21,7 @@ from hotlever.figures.style import (
     VERMILION,
     figure,
 )
+from hotlever.fitting.misfit import SCATTER
 from hotlever.studies.design import label_of
 from hotlever.studies.twins import ESTIMATE, LEVELS, WAYS
 
@@ -31,9 +33,13 @@ _BY_WAY = (BLUE, GREEN, ORANGE, VERMILION)
 
 
 def calibration_curves(calibration: Calibration) -> Figure:
-    """Draw the tip temperature against power and bias with its band, the knee and the budget."""
-    table, knee = calibration.table, calibration.knee
-    power, tip, half = table.power_mW, table.tip_K, 1.96 * table.tip_stderr_K
+    """Draw the tip temperature against power and bias with its band, the knee and the budget.
+
+    Where the lever does not show what was measured, the difference stands in place of the budget,
+    with the rows marked that are off, and no band is drawn.
+    """
+    table, knee, described = calibration.table, calibration.knee, calibration.describes_data
+    power, tip = table.power_mW, table.tip_K
     measured = calibration.measurement.dataset(calibration.probe.circuit)
     with figure(8.0, 6.0, 2, 2, letters=True) as (made, grid):
         by_power, by_bias, iv, budget = grid.ravel()
@@ -41,8 +47,11 @@ def calibration_curves(calibration: Calibration) -> Figure:
             (by_power, "power_mW", "power P$_l$ (mW)"),
             (by_bias, "bias_V", "bias V$_b$ (V)"),
         ):
-            axes.fill_between(table[along], tip - half, tip + half, color=SKY, alpha=0.6, lw=0)
-            axes.plot(table[along], tip, color=BLUE, label="calibration and 95 % band")
+            if described:
+                low, high = table.tip_low_K, table.tip_high_K
+                axes.fill_between(table[along], low, high, color=SKY, alpha=0.6, lw=0)
+            text = "calibration and 95 % band" if described else "the nearest lever"
+            axes.plot(table[along], tip, color=BLUE, label=text)
             axes.set(xlabel=label, ylabel="tip temperature (K)")
             if measured.tip_K.notnull().any():
                 axes.plot(measured[along], measured.tip_K, **MEASURED)
@@ -56,7 +65,8 @@ def calibration_curves(calibration: Calibration) -> Figure:
             by_power.annotate(" knee", (knee.power_mW, base), color=VERMILION)
         by_power.legend(loc="upper left")
         iv.plot(measured.lever_V, measured.current_mA, **MEASURED)
-        iv.plot(table.lever_V, table.current_mA, color=BLUE, label="calibrated lever")
+        text = "calibrated lever" if described else "the nearest lever"
+        iv.plot(table.lever_V, table.current_mA, color=BLUE, label=text)
         if calibration.knee_measured:
             across, up = 1.96 * knee.lever_V_stderr, 1.96 * knee.current_mA_stderr
             style: Any = {"fmt": "s", "color": VERMILION, "label": "knee, 95 %"}
@@ -64,11 +74,10 @@ def calibration_curves(calibration: Calibration) -> Figure:
         iv.set(xlabel="lever voltage V$_l$ (V)", ylabel="heater current I$_h$ (mA)")
         iv.set(xlim=(0, None), ylim=(0, None))
         iv.legend(loc="upper left")
-        for source, colour in zip(table.source.values, COLOURS, strict=False):
-            budget.plot(tip, table.budget_K.sel(source=source), color=colour, label=source)
-        budget.plot(tip, table.tip_stderr_K, color=BLACK, lw=2.0, label="together")
-        budget.set(xlabel="tip temperature (K)", ylabel="standard error (K)", ylim=(0, None))
-        budget.legend(loc="upper left")
+        if described:
+            _budget(budget, table)
+        else:
+            _difference(budget, calibration, measured)
     return made
 
 
@@ -117,6 +126,29 @@ def twins(found: xr.Dataset) -> Figure:
         for axes in (by_way, by_bias):
             axes.legend(loc="lower left", bbox_to_anchor=(0.1, 1.0), ncols=2, borderpad=0.1)
     return made
+
+
+def _budget(axes: Axes, table: xr.Dataset) -> None:
+    """Draw the standard error of the tip temperature by source."""
+    for source, colour in zip(table.source.values, COLOURS, strict=False):
+        axes.plot(table.tip_K, table.budget_K.sel(source=source), color=colour, label=source)
+    axes.plot(table.tip_K, table.tip_stderr_K, color=BLACK, lw=2.0, label="together")
+    axes.set(xlabel="tip temperature (K)", ylabel="standard error (K)", ylim=(0, None))
+    axes.legend(loc="upper left")
+
+
+def _difference(axes: Axes, calibration: Calibration, measured: xr.Dataset) -> None:
+    """Draw data minus the nearest lever, and mark the rows that are off."""
+    table, known = calibration.table, measured.dropna("bias", subset=["current_mA"])
+    largest = float(np.abs(known.current_mA).max())
+    shown = np.interp(known.bias_V, table.bias_V, table.current_mA)
+    share = (known.current_mA - shown) / largest
+    off = np.abs(share) > SCATTER
+    axes.axhspan(-100 * SCATTER, 100 * SCATTER, color="0.9", lw=0, label="as usual")
+    axes.plot(known.bias_V, 100 * share, "o", color=BLACK, ms=3.0, label="measured")
+    axes.plot(known.bias_V[off], 100 * share[off], "o", color=VERMILION, ms=5.0, label="off")
+    axes.set(xlabel="bias V$_b$ (V)", ylabel="I$_h$: data − lever (% of the largest)")
+    axes.legend(loc="best")
 
 
 def design_sweep(data: xr.Dataset) -> Figure:

@@ -15,6 +15,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import chdtri, ndtri
 
 from hotlever.figures.style import (
+    BLACK,
     BLUE,
     MEASURED,
     ORANGE,
@@ -24,6 +25,7 @@ from hotlever.figures.style import (
     figure,
     panel_letters,
 )
+from hotlever.fitting.misfit import SCATTER
 from hotlever.text import parameter_named
 from hotlever.types import Array
 
@@ -67,6 +69,13 @@ def data_and_model(measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str
                 error = measured.tip_error_K
                 lower.fill_between(bias, -error, error, color="0.9", label="± dT")
             lower.plot(bias, (data - values) * factor, "o-", color=VERMILION, lw=0.8, ms=3.5)
+            off = np.abs(data - values) > SCATTER * np.nanmax(np.abs(data), initial=0.0)
+            if name != "tip" and off.any():
+                style: Any = {"color": BLACK, "label": f"off by more than {SCATTER:.1%}"}
+                lower.plot(
+                    bias[off], (data - values)[off] * factor, "o", ms=5.5, mfc="none", **style
+                )
+                lower.legend(loc="best")
             upper.set(ylabel=label)
             if name not in fitted:
                 where = (0.96, 0.05)

@@ -15,6 +15,7 @@ from hotlever.errors import BranchEndError, ComputationError, InputError, unknow
 from hotlever.fitting.common_errors import errors_of_scales
 from hotlever.fitting.least_squares import LeastSquares, Optimum
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement
+from hotlever.fitting.misfit import undescribed
 from hotlever.fitting.models import ForwardModel, Prediction, forward_model
 from hotlever.fitting.options import FitOptions
 from hotlever.fitting.residuals import Residuals
@@ -243,6 +244,11 @@ def _first_found(
         try:
             return problem, problem.solve_and_confirm(options.robust)
         except ComputationError as error:
+            if problem.ended:
+                raise ComputationError(
+                    f"the search for a lever that shows these data was ended after "
+                    f"{problem.evaluations} branches: {error}"
+                ) from error
             failures.append(error)
     raise failures[0]
 
@@ -281,6 +287,7 @@ def _found(estimate: Estimate) -> Fit:
         ),
         evaluations=problem.evaluations,
         steps=problem.steps,
+        reason=undescribed(residuals, values),
         seconds=estimate.seconds,
         priors=estimate.priors(priors) if (priors := estimate.known) else {},
         notes=notes,

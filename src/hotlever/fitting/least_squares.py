@@ -34,6 +34,9 @@ _EXACT = 1e-10
 _AT_HAND = 3
 #: Most rounds, and as many as most fits need, for a progress bar to fill.
 _MOST_ROUNDS, _USUAL_ROUNDS = 60, 8
+#: Branches after which a search with priors ends where it is: most data of such a lever take half
+#: as many, data that contradict what is known beforehand would go on and on.
+_MOST_BRANCHES = 20
 #: With priors, whose squares count standard deviations, a round that gains no more is the last.
 #: So is one that promises a little more and does not keep it.
 _LITTLE, _DOUBTFUL = 1e-2, 0.2
@@ -94,6 +97,10 @@ class LeastSquares:
         As confirmed last.
     evaluations, steps : int
         Branches solved, and rounds that led nearer to the optimum.
+    ended : bool
+        Whether the search was ended there, not by itself.
+    left : float
+        By how much it would then have lowered the sum of squares in one more round.
     """
 
     def __init__(
@@ -118,7 +125,7 @@ class LeastSquares:
         self._scale = np.array([one.scale for one in known])
         self._bounds = np.array([[one.lower, one.upper] for one in known]).T / self._scale
         self._at_hand = {} if near is None else {near.probe: near}
-        self.evaluations, self.steps = 0, 0
+        self.evaluations, self.steps, self.ended, self.left = 0, 0, False, 0.0
 
     def solve_and_confirm(self, robust: bool) -> Optimum:
         """Find the optimum, make the model exact there, and go on until that matters no more.
@@ -142,7 +149,7 @@ class LeastSquares:
             self.model = confirmed
             self._at_hand = {found.probe: confirmed.predict(found.probe, found.prediction)}
             previous, found = found, self.solve(found.probe)
-            if self._settled(previous, found):
+            if self.ended or self._settled(previous, found):
                 return found
         raise ComputationError(
             f"the fit did not settle: after {_MOST_CONFIRMATIONS} confirmations by full solves the "
@@ -163,7 +170,7 @@ class LeastSquares:
             # outliers can drive the first fit onto a bound, where it would stay without priors
             origin = self._start if at_first and not self._informed else found.probe
             previous, found = found, self.solve(origin)
-            if not at_first and self._settled(previous, found):
+            if self.ended or (not at_first and self._settled(previous, found)):
                 break
         return found
 
@@ -202,7 +209,9 @@ class LeastSquares:
             here = self._values(probe)
             near = np.maximum(_FOUND * found.stderr, _NEAR * np.abs(here))
             gain = squares - found.squares if self._informed else np.inf
-            if gain < _LITTLE:
+            self.ended = self._informed and self.evaluations >= _MOST_BRANCHES
+            self.left = gain if self.ended else 0.0
+            if gain < _LITTLE or self.ended:
                 return replace(found, probe=probe, prediction=prediction)
             # the optimum is where the branch was solved
             if far < _NEAR or np.all(np.abs(self._values(found.probe) - here) <= near):

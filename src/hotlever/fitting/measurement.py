@@ -42,6 +42,8 @@ COLUMNS = {
 OBSERVABLE_SYMBOLS = {"current": "I_h", "reader": "V_r", "tip": "T_tip"}
 #: Where the largest value of a column can lie, in the unit inside; else its unit is wrong.
 _PLAUSIBLE = {"V_b": (1e-3, 1e3), "I_h": (1e-9, 1e3), "V_r": (1e-9, 1e3), "T_tip": (0.0, 5e3)}
+#: Units a thousand times smaller.
+_SMALLER = {"V": "mV", "mA": "µA"}
 #: A standard error this much smaller than the largest value is none.
 _LEAST_ERROR = 1e-9
 #: Part of the largest value by which noise and drift may push a current or voltage below 0.
@@ -369,8 +371,12 @@ def _check(
 
 
 def _plausible(where: str, unit: str, value: float, low: float, high: float) -> None:
-    if not low <= value <= high:
-        raise InputError(
-            f"{where}: found {value:g} {unit}, expected {low:g} to {high:g} {unit}; is the unit "
-            "or the sign wrong?"
-        )
+    if low <= value <= high:
+        return
+    expected = f"{where}: found {value:g} {unit}, expected {low:g} to {high:g} {unit}"
+    if value < 0:
+        raise InputError(f"{expected}; is the sign wrong?")
+    smaller = _SMALLER.get(unit)
+    if value > high and smaller and value / 1e3 <= high:
+        raise InputError(f"{expected}; is it in {smaller}, which would be {value / 1e3:g} {unit}?")
+    raise InputError(f"{expected}; is the unit wrong?")

@@ -40,12 +40,14 @@ from hotlever.types import Array
 
 #: A parameter is called poorly determined from this relative standard error.
 _POOR = 0.15
+#: A parameter is at its bound within this share of it.
+_AT_THE_BOUND = 1e-3
 #: Two parameters are called hard to tell apart from this correlation.
 _ENTANGLED = 0.95
 #: What a fit file holds just as a fit does.
 _AS_THEY_ARE = (
     *("options", "residual_rms", "sum_of_squares"),
-    *("evaluations", "steps", "seconds", "priors", "notes"),
+    *("evaluations", "steps", "seconds", "priors", "reason", "notes"),
 )
 #: Variables of `Fit.band`.
 BAND = ("bias_V", "power_mW", "tip_K", "tip_stderr_K")
@@ -98,6 +100,8 @@ class Fit:
     seconds : float
     priors : dict of str to PriorUse
         What was known of parameters and scales before, and what the data made of it, by name.
+    reason : str
+        Where the data are not described by any such lever; empty if they are.
     notes : list of str
         What the user should know beside the numbers.
     """
@@ -117,7 +121,13 @@ class Fit:
     steps: int
     seconds: float
     priors: dict[str, PriorUse] = field(default_factory=dict)
+    reason: str = ""
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def describes_data(self) -> bool:
+        """Whether such a lever shows what was measured."""
+        return not self.reason
 
     def __repr__(self) -> str:
         return f"<Fit of {self.measurement.path or 'a measurement'}>\n{fit_text(self)}"
@@ -208,6 +218,8 @@ class Fit:
             "evaluations": self.evaluations,
             "steps": self.steps,
             "seconds": round(self.seconds, 3),
+            "describes_data": self.describes_data,
+            "reason": self.reason,
             "probe": self.probe.values(),
             "data": {**embed(self.measurement), "weights": self.data_weights.tolist()},
             "options": self.options.values(),
@@ -265,6 +277,7 @@ class _FitFile(Section):
     sum_of_squares: float
     band: dict[str, list[Number]]
     priors: dict[str, PriorUse] = Field(default_factory=dict)
+    reason: str = ""
     notes: list[str]
 
 
@@ -318,11 +331,24 @@ def statements(fit: Fit) -> list[str]:
         fitted = fit.parameters[name]
         if fitted.stderr is None:
             found.append(f"{name}: no standard error could be estimated")
+        elif fitted.stderr > abs(fitted.value):
+            found.append(
+                f"{name} is not determined by these data: its standard error is larger than its "
+                "value"
+            )
         elif (share := fitted.stderr / abs(fitted.value)) > _POOR:
             found.append(
                 f"{name} is poorly determined by these data: its standard error is {share:.0%} of "
                 "its value"
             )
+    for name in set(fit.names) & PARAMETERS.keys():
+        known, value = PARAMETERS[name], fit.parameters[name].value
+        for bound in (known.lower, known.upper):
+            if abs(value - bound) < _AT_THE_BOUND * abs(bound):
+                found.append(
+                    f"{name} ended at the bound of what it may be, {bound:g} {known.unit}: these "
+                    "data would have it beyond"
+                )
     correlation = np.tril(fit.correlation, -1)
     for first, second in np.argwhere(np.abs(correlation) > _ENTANGLED):
         found.append(

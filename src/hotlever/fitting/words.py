@@ -66,8 +66,10 @@ def prior_lines(priors: Mapping[str, PriorUse]) -> list[str]:
 
 
 def fit_text(fit: Fit) -> str:
-    """Return the result of a fit as lines of text."""
-    return "\n".join([*aligned(parameter_rows(fit)), *outcome(fit), *prior_lines(fit.priors)])
+    """Return the result of a fit as lines of text; first that it describes no data, if so."""
+    doubt = [] if fit.describes_data else [f"no such lever shows these data: {fit.reason}"]
+    found = [*aligned(parameter_rows(fit)), *outcome(fit), *prior_lines(fit.priors)]
+    return "\n".join([*doubt, *found])
 
 
 def lever_rows(levers: xr.Dataset) -> list[list[str]]:

@@ -41,7 +41,7 @@ def add_fit(page: Page, fit: Fit) -> None:
         parameter_rows(fit),
         "Material parameters; standard errors in units of the last digits.",
     )
-    for text in fit.notes:
+    for text in [f"no such lever shows these data: {fit.reason}"] * bool(fit.reason) + fit.notes:
         page.text(sentence(text))
     page.text(f"{'; '.join(outcome(fit))}.")
     page.figure(

@@ -97,9 +97,13 @@ def drawn(
 
 
 def measured(
-    true: Probe, rng: np.random.Generator, what: str, departures: Collection[str] = ALL
+    true: Probe,
+    rng: np.random.Generator,
+    what: str,
+    departures: Collection[str] = ALL,
+    highest: float | None = None,
 ) -> tuple[Measurement, Array, Lever]:
-    """Measure a twin over even biases, as far as it goes; return its true temperatures (K) too.
+    """Measure a twin up to a bias (V), or as far as it goes; return its true temperatures (K) too.
 
     Of ``KINDS``, the current is measured alone, with the reader, or with five Raman temperatures.
 
@@ -110,7 +114,7 @@ def measured(
     """
     kind = MinimosLever if "mobility" in departures else Lever
     lever = kind(true, _FINER if "mesh" in departures else None)
-    highest = HIGHEST_V[true.surroundings.medium]
+    highest = highest or HIGHEST_V[true.surroundings.medium]
     try:
         sweep = lever.sweep(np.linspace(highest / POINTS, highest, POINTS))
     except BranchEndError as error:

@@ -1,0 +1,39 @@
+"""Whether a model describes the data that it was fitted to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hotlever.fitting.residuals import Residuals
+from hotlever.types import Array
+
+#: Data are not described where they scatter about the model by more than this share of the largest,
+#: and neighbours together: of white noise they differ by twice its variance.
+SCATTER, _TOGETHER = 0.004, 0.6
+#: Fewer rows tell nothing of their neighbours.
+_ROWS = 7
+
+
+def undescribed(residuals: Residuals, values: Array) -> str:
+    """Return where data are not described by predicted values (3, n); empty if they are.
+
+    Tip temperatures are left out: a thermometer's scale may be off by more than its readings
+    scatter.
+    """
+    difference = residuals.difference(values) / residuals.largest
+    by_bias = np.argsort(residuals.bias, kind="stable")
+    for name, whole in zip(residuals.observables, difference, strict=True):
+        known = np.isfinite(whole)
+        if name == "tip" or known.sum() < _ROWS:
+            continue
+        square = float(np.mean(whole[known] ** 2))
+        # a drift shows in the order of the rows, another lever in that of the bias
+        rows = (whole[known], whole[by_bias][known[by_bias]])
+        together = min(float(np.mean(np.diff(row) ** 2)) for row in rows)
+        if square > SCATTER**2 and together < _TOGETHER * 2.0 * square:
+            worst = int(np.nanargmax(np.abs(whole)))
+            return (
+                f"{name} differs by {np.sqrt(square):.1%} of its largest value (rms), and not at "
+                f"random; most at {residuals.bias[worst]:.3g} V"
+            )
+    return ""

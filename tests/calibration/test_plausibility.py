@@ -1,0 +1,124 @@
+"""Data that contradict a probe: refused or doubted, and the likeliest cause is named."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hotlever.calibration.causes import Causes
+from hotlever.calibration.knee import IVCurve
+from hotlever.calibration.procedure import calibrate
+from hotlever.errors import InputError
+from hotlever.figures import calibration_curves
+from hotlever.fitting import Measurement
+from hotlever.probe import Probe
+from synthetic_curves import measured_curve
+
+
+@pytest.fixture(scope="module")
+def curve(reference) -> IVCurve:
+    """The reference lever, measured with noise."""
+    return measured_curve(reference, np.random.default_rng(4))
+
+
+def shown(curve: IVCurve, rows: slice = slice(None), **changed: np.ndarray) -> Measurement:
+    """Return some rows of a curve as a measurement, with other values in some columns."""
+    nothing = np.full(curve.bias_V.size, np.nan)
+    data = Measurement(curve.bias_V, curve.current_mA, nothing, nothing, nothing)
+    data = replace(data, **changed)
+    some = {name: values[rows] for name, values in vars(data).items() if np.ndim(values)}
+    return replace(data, **some)
+
+
+@pytest.mark.parametrize(
+    ("bias", "current", "probe", "message"),
+    [
+        (lambda v, i: v, lambda v, i: 1e3 * i, {}, r"kΩ at low bias, expected about 6\.9.*in µA"),
+        (lambda v, i: v, lambda v, i: 1e-3 * i, {}, r"is the current given in A"),
+        (lambda v, i: v, lambda v, i: 5.0 * i, {}, r"is the current (5|4.99|5.01) times"),
+        (lambda v, i: i, lambda v, i: v, {}, r"are bias and current swapped"),
+        (lambda v, i: v - 5.6 * i, lambda v, i: i, {}, r"is V_b the lever's own voltage"),
+        (lambda v, i: v, lambda v, i: i, {"series_resistance_ohm": 0.0}, r"rather 5\.[56]\d* than"),
+        (lambda v, i: v, lambda v, i: 1e-5 + 0.0 * i, {}, r"is a terminal open"),
+    ],
+)  # fmt: skip
+def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
+    curve, bias, current, probe, message
+):
+    volts, mA = curve.bias_V, curve.current_mA
+    wrong = shown(curve, bias_V=bias(volts, mA), current_mA=current(volts, mA))
+    with pytest.raises(InputError, match=message):
+        calibrate(wrong, probe=Probe.reference().with_(**probe))
+
+
+@pytest.mark.parametrize(
+    ("current", "probe", "question"),
+    [
+        (lambda i, n: i + 0.04 * i.max() * n, {}, "zero of the current drift"),
+        (lambda i, n: i + 0.03 * i.max(), {}, "zero of the current off"),
+        (lambda i, n: i, {"medium": "air"}, "in vacuum, not in air"),
+        (lambda i, n: i, {"thickness_um": 0.8}, "thickness rather 0.[34]"),
+        (lambda i, n: i, {"series_resistance_ohm": 5000.0}, r"resistance, .* rather 5\.[56]"),
+        (lambda i, n: np.minimum(i, 0.8 * i.max()), {}, "is the current clipped"),
+        (lambda i, n: np.where(n < 0.5, i, 0.9 * i), {}, "two sweeps, a new one from row"),
+    ],
+)  # fmt: skip
+def test_the_likeliest_cause_is_found_by_the_model(curve, current, probe, question):
+    wrong = current(curve.current_mA, np.linspace(0.0, 1.0, curve.bias_V.size))
+    causes = Causes(shown(curve, current_mA=wrong), Probe.reference().with_(**probe))
+    assert re.search(question, causes.likeliest())
+
+
+def test_good_data_have_no_cause(curve):
+    assert Causes(shown(curve), Probe.reference()).likeliest() == ""
+
+
+def test_a_fit_that_is_another_lever_s_is_said_to_be(curve):
+    assert Causes(shown(curve), Probe.reference()).named(fitted=True) == (
+        "is it the fit of another lever?"
+    )
+
+
+def test_data_that_no_such_lever_shows_are_said_to_be(curve):
+    """A curve whose current sags by a few per cent at its hot end."""
+    wrong = curve.current_mA * (1.0 - 0.15 * np.clip(curve.bias_V - 9.0, 0.0, None))
+    found = calibrate(shown(curve, current_mA=wrong))
+    assert not found.describes_data
+    assert found.text().startswith("no lever like this one shows these data: ")
+    # no error bars, since they would not hold
+    assert not re.search(r"\d\(\d", found.text())
+    assert found.content()["describes_data"] is False
+
+
+def test_the_picture_shows_which_rows_are_off(curve):
+    wrong = np.minimum(curve.current_mA, 0.8 * curve.current_mA.max())
+    found = calibrate(shown(curve, current_mA=wrong))
+    drawn = {line.get_label(): line for line in calibration_curves(found).axes[3].lines}
+    clipped = curve.bias_V[curve.current_mA > 1.02 * wrong.max()]
+    assert clipped.size > 3
+    assert set(clipped) <= set(drawn["off"].get_xdata())
+    assert drawn["measured"].get_xdata().size == curve.bias_V.size
+
+
+def test_temperatures_in_degrees_celsius_are_refused(curve):
+    tips = np.full(curve.bias_V.size, np.nan)
+    tips[[5, 20]] = 80.0, 400.0
+    with pytest.raises(InputError, match=r"T_tip is 80 K at .* is it in °C, or another column"):
+        calibrate(shown(curve, tip_K=tips))
+
+
+@pytest.mark.parametrize(
+    ("rows", "step", "remark"),
+    [
+        (slice(20, 24), 0.0, "4 rows say little of a lever"),
+        (slice(None), 0.05, "a resolution of 0.05 mA only"),
+        (slice(None, 12), 0.0, "measured only up to a tip of 3"),
+    ],
+)
+def test_what_the_data_lack_is_remarked(curve, rows, step, remark):
+    current = np.round(curve.current_mA / step) * step if step else curve.current_mA
+    notes = calibrate(shown(curve, rows, current_mA=current)).notes
+    assert [text for text in notes if remark in text]
