@@ -8,8 +8,8 @@ import numpy as np
 
 from hotlever.errors import InputError
 from hotlever.raman.block import Block
-from hotlever.tables import quantity
 from hotlever.types import Array
+from hotlever.units import quantity
 
 #: cm⁻¹; a spectrum must reach the line, and go on so far on both sides.
 SILICON_LINE, MARGIN = 520.0, 5.0

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hotlever.cells import text_lines
 from hotlever.errors import InputError
 from hotlever.files import read_bytes
 from hotlever.raman.block import find_block
@@ -18,7 +19,6 @@ from hotlever.raman.peak import in_window
 from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
 from hotlever.raman.vendor import KINDS, read_vendor
 from hotlever.steps import each
-from hotlever.tables import text_lines
 from hotlever.types import Array, Progress
 
 SKIPPED_SUFFIXES = {".md", ".json", ".toml", ".yaml", ".yml", ".py", ".ipynb", ".html", ".pdf"}
