@@ -29,8 +29,9 @@ from hotlever.units import (
     unknown_unit,
 )
 
-#: Lines among which a header row is looked for, and characters of a heading.
-_MOST_ABOVE, _LONGEST_HEADING = 2000, 100
+#: Lines among which a header row is looked for, how near to the numbers a comment is one, and
+#: characters of a heading.
+_MOST_ABOVE, _NEAR, _LONGEST_HEADING = 2000, 20, 100
 
 #: A number with a mark of thousands, or with three decimals; and a small whole number.
 _GROUPED, _SMALL = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}"), re.compile(r"[+-]?[1-9]\d{0,2}")
@@ -149,7 +150,7 @@ def read_table(
     """
     raw = read_bytes(path)
     numbered = enumerate(text_lines(raw, str(path)), start=1)
-    lines = [(place, line) for place, line in numbered if line.strip(' \t,;"')]
+    lines = [(place, line) for place, line in numbered if line.strip(' \t,;"\u00a0')]
     first = next((at for at, (_, line) in enumerate(lines) if not _is_comment(line)), None)
     if first is None:
         raise InputError(f"{path}: no header row and no rows, expected {expected}")
@@ -315,31 +316,34 @@ def _headings(line: str) -> list[str]:
             names[-1] += f" {word}"
         else:
             names.append(word)
-    return names
+    return names or [""]
 
 
 def _header_row(lines: list[tuple[int, str]], known: Callable[[str], bool]) -> int | None:
     """Return the place of the header row, None if there are numbers only (see `read_table`)."""
-    texts: list[int] = []
+
+    def width(at: int) -> int:
+        names = _headings(lines[at][1])
+        asked = [name for name in names if len(name) <= _LONGEST_HEADING]
+        return len(names) if sum(map(known, asked)) >= 2 else 0
+
+    plain = [at for at, (_, line) in enumerate(lines) if not _is_comment(line)]
     named: list[int] = []
-    for at, (_, line) in enumerate(lines[:_MOST_ABOVE]):
-        comment = _is_comment(line)
-        names = [name for name in _headings(line) if len(name) <= _LONGEST_HEADING]
-        if sum(map(known, names)) >= 2:
-            below = next((text for _, text in lines[at + 1 :] if not _is_comment(text)), "")
-            cells = _headings(below)
-            if _row_of_numbers(below, len(names)):
-                return at
-            if not comment and len(cells) == len(names) and any(map(_begins_number, cells)):
-                return at
-            if not comment:
-                named.append(at)
-        if not comment and _row_of_numbers(line):
+    for order, at in enumerate(plain[:_MOST_ABOVE]):
+        if _row_of_numbers(lines[at][1]):
+            above = range(max(plain[order - 1] + 1 if order else 0, at - _NEAR), at)
+            for comment in reversed(above):
+                if _row_of_numbers(lines[at][1], width(comment) or -1):
+                    return comment
             break
-        if not comment:
-            texts.append(at)
+        if count := width(at):
+            cells = _headings(lines[plain[order + 1]][1]) if order + 1 < len(plain) else []
+            if len(cells) == count and any(map(_begins_number, cells)):
+                return at
+            named.append(at)
     else:
-        return (named or texts)[0]
+        return (named or plain)[0]
+    texts = plain[:order]
     if len(texts) > 1 and any(map(is_unit, _headings(lines[texts[-1]][1]))):
         texts.pop()
     return next(iter(named or texts[-1:]), None)

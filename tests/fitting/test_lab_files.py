@@ -49,8 +49,8 @@ KEITHLEY = (
     '"Model","2450"\r\n"Serial Number","04412345"\r\n"Firmware Version","1.7.3b"\r\n'
     '"Start Time","05/04/2023 16:20:11"\r\n"Series resistance","5.6 kOhm"\r\n\r\n'
 )
-seconds = np.arange(8.0)
-amps, volts = CURRENT / 1000, READER / 1000
+SECONDS = np.arange(8.0)
+AMPS, VOLTS = CURRENT / 1000, READER / 1000
 
 
 def lab(text, encoding="utf-8", columns=None):
@@ -122,68 +122,68 @@ FILES = {
     "units below in brackets": lab(
         "V_b;I_h\n(V);(µA)\n" + rows(BIAS, CURRENT * 1e3, sep=";", comma=True), "cp1252"
     ),
-    "units below, some": lab("n,V_b,I_h\n,V,A\n" + rows(seconds, BIAS, amps)),
+    "units below, some": lab("n,V_b,I_h\n,V,A\n" + rows(SECONDS, BIAS, AMPS)),
     "Origin": lab(
         "V_b\tI_h\tT_stage\nV\tµA\t°C\nlever 7\tup\t\n"
-        + rows(BIAS, CURRENT * 1e3, seconds + 20, sep="\t"),
+        + rows(BIAS, CURRENT * 1e3, SECONDS + 20, sep="\t"),
         "cp1252",
     ),
     "Origin with short names": lab("A(X)\tB(Y)\nV_b\tI_h\nV\tmA\n" + rows(BIAS, CURRENT, sep="\t")),
     "LabVIEW": lab(
-        LVM.format(".", "One") + SEGMENT + rows(seconds, BIAS, amps, sep="\t", end="\r\n"), "cp1252"
+        LVM.format(".", "One") + SEGMENT + rows(SECONDS, BIAS, AMPS, sep="\t", end="\r\n"), "cp1252"
     ),
     "LabVIEW with decimal commas": lab(
         LVM.format(",", "One")
         + SEGMENT
-        + rows(seconds, BIAS, amps, sep="\t", end="\r\n", number="{:.9f}", comma=True),
+        + rows(SECONDS, BIAS, AMPS, sep="\t", end="\r\n", number="{:.9f}", comma=True),
         "cp1252",
     ),
     "LabVIEW without x": lab(
-        LVM.format(".", "No") + SEGMENT + rows(BIAS, amps, sep="\t", start="\t", last="\t")
+        LVM.format(".", "No") + SEGMENT + rows(BIAS, AMPS, sep="\t", start="\t", last="\t")
     ),
     "LabVIEW, its own names": lab(
         LVM.format(".", "One")
         + SEGMENT.replace("V_b\tI_h", "Untitled\tUntitled 1")
-        + rows(seconds, BIAS, amps, sep="\t"),
+        + rows(SECONDS, BIAS, AMPS, sep="\t"),
         columns={"V_b": "Untitled", "I_h": "Untitled 1"},
     ),
     "LabVIEW in two segments": lab(
         LVM.format(".", "One")
         + SEGMENT
-        + rows(seconds[:4], BIAS[:4], amps[:4], sep="\t")
+        + rows(SECONDS[:4], BIAS[:4], AMPS[:4], sep="\t")
         + "\n\n"
         + SEGMENT
-        + rows(seconds[4:], BIAS[4:], amps[4:], sep="\t")
+        + rows(SECONDS[4:], BIAS[4:], AMPS[4:], sep="\t")
     ),
     "plain LabVIEW": lab(
-        rows(BIAS, amps, sep="\t", comma=True, number="{:.9f}"),
+        rows(BIAS, AMPS, sep="\t", comma=True, number="{:.9f}"),
         columns={"V_b (V)": "1", "I_h (A)": "2"},
     ),
-    "B1500": lab(B1500 + rows(BIAS, amps, volts, sep=", ", start="DataValue, ", end="\r\n")),
+    "B1500": lab(B1500 + rows(BIAS, AMPS, VOLTS, sep=", ", start="DataValue, ", end="\r\n")),
     "B1500, other names": lab(
         B1500.replace("DataName, Vb, Ih, Vr", "DataName, V1, I1, V2")
-        + rows(BIAS, amps, volts, sep=", ", start="DataValue, "),
+        + rows(BIAS, AMPS, VOLTS, sep=", ", start="DataValue, "),
         columns={"V_b": "V1", "I_h": "I1", "V_r": "V2"},
     ),
     "B1500, two records": lab(
         B1500
-        + rows(BIAS[:4], amps[:4], volts[:4], sep=", ", start="DataValue, ")
+        + rows(BIAS[:4], AMPS[:4], VOLTS[:4], sep=", ", start="DataValue, ")
         + B1500
-        + rows(BIAS[4:], amps[4:], volts[4:], sep=", ", start="DataValue, ")
+        + rows(BIAS[4:], AMPS[4:], VOLTS[4:], sep=", ", start="DataValue, ")
     ),
     "Keithley": lab(
         KEITHLEY
         + "Index,Source (V),Reading (A),Relative Time (s)\r\n"
-        + rows(seconds + 1, BIAS, amps, seconds),
+        + rows(SECONDS + 1, BIAS, AMPS, SECONDS),
         columns={"V_b": "Source", "I_h": "Reading"},
     ),
     "Keithley with a missing value": lab(
         KEITHLEY
         + "V_b (V),I_h (A),V_r (V)\r\n"
-        + rows(BIAS, amps, volts).replace("0.0601", "+9.910000E+37")
+        + rows(BIAS, AMPS, VOLTS).replace("0.0601", "+9.910000E+37")
     ),
     "Keithley 4200": lab(
-        "AI,AV\n" + rows(amps, BIAS, number="{:.6E}"), columns={"V_b (V)": "AV", "I_h (A)": "AI"}
+        "AI,AV\n" + rows(AMPS, BIAS, number="{:.6E}"), columns={"V_b (V)": "AV", "I_h (A)": "AI"}
     ),
     "told by number": lab(
         "V,V,I\n" + rows(BIAS, LEVER, CURRENT), columns={"V_b (V)": "1", "I_h (mA)": "3"}
@@ -203,7 +203,7 @@ FILES = {
     "both voltages": lab("V_b (V),V_l (V),I_h (mA)\n" + rows(BIAS, LEVER, CURRENT)),
     "own sweep": lab(
         "bias_V,current_mA,lever_V,reader_V,tip_K,power_mW,heater_ohm,legs_ohm\n"
-        + rows(BIAS, CURRENT, LEVER, volts, TIP, BIAS, BIAS, BIAS)
+        + rows(BIAS, CURRENT, LEVER, VOLTS, TIP, BIAS, BIAS, BIAS)
     ),
     "negative": lab("V_b (V),I_h (mA)\n" + rows(-BIAS, -CURRENT)),
     "celsius": lab("V_b (V),I_h (mA),T_tip (°C)\n" + rows(BIAS, CURRENT, TIP - 273.15), "cp1252"),
@@ -223,7 +223,7 @@ def test_the_same_curve_from_every_file(tmp_path, name):
     data = read_measurement(write(tmp_path, text, encoding), columns)
     np.testing.assert_allclose(data.bias_V, BIAS, rtol=1e-5)
     np.testing.assert_allclose(data.current_mA, CURRENT, rtol=1e-5)
-    for found, known in ((data.reader_V, volts), (data.tip_K, TIP)):
+    for found, known in ((data.reader_V, VOLTS), (data.tip_K, TIP)):
         there = np.isfinite(found)
         np.testing.assert_allclose(found[there], known[there], rtol=1e-5)
     assert data.series_resistance_ohm in (None, pytest.approx(5600, rel=1e-3))

@@ -204,7 +204,7 @@ def test_other_comments_are_no_matter(tmp_path, comment):
         ("medium: air\n# medium: vacuum", "line 2: medium is vacuum, but air further up"),
         ("medium: helium", "line 1: medium is 'helium', expected vacuum, air or nitrogen"),
         ("medium: no air", "line 1: medium is 'no air', expected vacuum, air or nitrogen"),
-        ("medium: forming gas, 5 % H2", "line 1: medium is 'forming gas', expected vacuum"),
+        ("medium: forming gas, 5 % H2", "line 1: medium is 'forming gas, 5 % H2', expected vacuum"),
         ("gas: argon", "line 1: medium is 'argon'"),
         ("100 mbar He", "line 1: medium is '100 mbar He'"),
         ("pressure (mbar): 100", "line 1: the pressure is 100 mbar and no gas is named"),

@@ -57,12 +57,12 @@ def calibrate_command(
     check_plot(outputs, plot)
     fit = None if fit_file is None else read_fit(fit_file)
     probe = load_probe(probe_file) if fit is None else fit.probe
+    priors = parse_priors(prior, probe)
     measurement = read_measurement(data, columns, probe.circuit)
     tell_table(measurement.understood)
     note(*measurement.notes)
     if "current" not in measurement.observables:
         raise InputError(f"{data}: no values of I_h, which a calibration needs beside V_b")
-    priors = parse_priors(prior, probe)
     with progress("calibrate") as update:
         result = calibrate(
             measurement,

@@ -20,7 +20,7 @@ from hotlever.cli.options import (
     parse_priors,
     parse_values,
 )
-from hotlever.cli.output import fail, give, note, progress, progress_bars, tell_table
+from hotlever.cli.output import fail, give, note, progress, progress_bars, tell, tell_table
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.files import Outputs, write_text
 
@@ -194,7 +194,8 @@ def _fit_several(
             fitting(count, total)
 
         def show(measurement: Measurement) -> None:
-            tell_table(measurement.understood)
+            (name, *_, rows), *found = measurement.understood
+            tell(f"{name}: {rows}; {'; '.join(f'{what} {value}' for what, value, _ in found)}")
             note(*measurement.notes)
 
         bars: Any = {"reading": show, "reducing": reducing, "progress": update}

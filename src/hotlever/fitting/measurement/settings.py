@@ -70,6 +70,7 @@ VACUUM_MBAR = 0.05
 #: A number with a unit, in text of a limited length.
 _WITH_UNIT = re.compile(r"([-+]?\d[\d.,]*(?:e[-+]?\d+)?)\s*([A-Za-z]+)", re.I | re.ASCII)
 _LONGEST = 200  # characters of a medium
+_LONGEST_COMMENT = 2000
 
 
 @dataclass
@@ -94,8 +95,11 @@ class Settings:
         found = cls()
         gas: list[tuple[int, str]] = []
         for line, text in table.comments:
+            where = f"{table.path}: line {line}"
+            if len(text) > _LONGEST_COMMENT:
+                notes.append(f"{where}: more than {_LONGEST_COMMENT} characters, no settings")
+                continue
             for part in _parts(text):
-                where = f"{table.path}: line {line}"
                 given = _setting(part, where)
                 if given is None:
                     notes.append(
@@ -144,20 +148,27 @@ class Settings:
 
 
 def _parts(text: str) -> Iterator[str]:
-    """Split a comment at ``; `` and ``, ``, and at tabs where a cell is a setting of its own."""
-    for part in re.split(r"[;,]\s", text):
-        cells = part.split("\t")
-        yield from cells if any("=" in cell or ":" in cell for cell in cells[1:]) else [part]
+    """Split a comment at ``; ``, and at ``, `` and tabs where another setting follows."""
+    for part in re.split(r";\s", text):
+        mark = "\t" if "\t" in part else ", "
+        first, *others = part.split(mark)
+        for other in others:
+            if "=" in other or ":" in other:
+                yield first
+                first = other
+            else:
+                first += mark + other
+        yield first
 
 
 def _setting(text: str, where: str) -> dict[str, Any] | None:
     """Return what a comment sets, nothing where it is another comment, None where it is unclear."""
-    line = text
-    if "," in text and not re.search(r"[=:;\t]", text):
-        line = text.replace(",", "=", 1)  # cells of a file with commas
-    key, value = key_and_value(line)
+    key, value = key_and_value(text)
     if not value and _words(key) & {*_MEDIA, *_PRESSURES} and not _words(key) - _PLAIN:
         return _medium(key, where)  # as in 100 mbar N2
+    if not value:
+        # cells of a file with commas
+        key, value = (part.strip(' ,"') for part in (*key.split(",", 1), "")[:2])
     name, unit = name_and_unit(key)
     known = re.sub(r"[\W_]+", "", name[:40]).lower()
     setting = value and ("pressure" if known.endswith("pressure") else _SPELLINGS.get(known))
