@@ -209,6 +209,7 @@ def test_other_comments_are_no_matter(tmp_path, comment):
         ("100 mbar He", "line 1: medium is '100 mbar He'"),
         ("pressure (mbar): 100", "line 1: the pressure is 100 mbar and no gas is named"),
         ("medium: vacuum, 10 mbar", "line 1: the pressure is 10 mbar and this is no vacuum"),
+        ("medium: air, 1,013 mbar", "line 1: found '1,013 mbar', expected no mark of thousands"),
         ("medium: air, -5 mbar", "line 1: pressure: found -5 mbar"),
         ("pressure (K): 5", "line 1: pressure: unit 'K' is not understood here"),
     ],

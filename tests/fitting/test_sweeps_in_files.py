@@ -167,11 +167,11 @@ def test_a_current_driven_measurement_is_fitted_as_a_voltage_driven_one(tmp_path
         ("air, 100 mbar", "air", None, 100.0),
         ("medium: air, 1 atm", "air", None, 1013.25),
         ("gas: dry air\n# pressure (Torr): 760", "air", None, 1013.25),
-        ("medium: 1e-5 mbar", "vacuum", None, 1e-5),
-        ("chamber pressure = 2x10^-6 mbar", "vacuum", None, 2e-6),
-        ("p = 10⁻⁴ Pa", "vacuum", None, 1e-6),
-        ("medium: helium, 1e-6 mbar", "vacuum", None, 1e-6),
-        ("vacuum (3 · 10^-6 Torr)", "vacuum", None, 4e-6),
+        ("medium: 1e-5 mbar", "vacuum", None, None),
+        ("chamber pressure = 2x10^-6 mbar", "vacuum", None, None),
+        ("p = 10⁻⁴ Pa", "vacuum", None, None),
+        ("medium: helium, 1e-6 mbar", "vacuum", None, None),
+        ("vacuum (3 · 10^-6 Torr)", "vacuum", None, None),
         ("medium: vacuum; 10 s settling per point", "vacuum", None, None),
     ],
 )
@@ -201,6 +201,14 @@ def test_the_probe_takes_gas_and_pressure_of_the_data(tmp_path):
     assert with_measured_circuit(Probe.reference(), dense)[0].surroundings.medium == "air"
     # whoever asks for vacuum knows
     assert with_measured_circuit(probe, data, "vacuum")[0].surroundings.gas_conductivity == 1.0
+
+
+def test_the_pressure_of_a_vacuum_is_shown_and_is_no_matter(tmp_path):
+    data = read(tmp_path, f"# medium: vacuum, 1e-2 mbar\n{IV}", [1.0], [0.14])
+    assert ("medium", "vacuum", "line 1, 0.01 mbar") in data.understood
+    assert data.notes == ()
+    data = read(tmp_path, f"# medium: helium, 1e-6 mbar\n{IV}", [1.0], [0.14])
+    assert said(data) == ["line 1: 1e-06 mbar of any gas count as vacuum"]
 
 
 # --- what is told ---------------------------------------------------------------------------------

@@ -69,6 +69,8 @@ NITROGEN = 0.975
 VACUUM_MBAR = 0.05
 #: A number with a unit, in text of a limited length.
 _WITH_UNIT = re.compile(r"([-+]?\d[\d.,]*(?:e[-+]?\d+)?)\s*([A-Za-z]+)", re.I | re.ASCII)
+#: What may be ten or ten thousand.
+_THOUSANDS = re.compile(r"[-+]?\d{1,3},\d{3}(?!\d)", re.ASCII)
 _LONGEST = 200  # characters of a medium
 _LONGEST_COMMENT = 2000
 
@@ -125,9 +127,11 @@ class Settings:
         where = f"{table.path}: {origin.get('pressure_mbar', '')}"
         if pressure is not None and pressure <= VACUUM_MBAR:
             if medium != "vacuum":
-                origin["medium"] = f"{origin['pressure_mbar']}, by the pressure"
                 notes.append(f"{where}: {pressure:g} mbar of any gas count as vacuum")
+            # the vacuum of the model has no pressure
+            del values["pressure_mbar"]
             values["medium"] = "vacuum"
+            origin["medium"] = f"{origin['pressure_mbar']}, {pressure:g} mbar"
         elif pressure is not None and medium in (None, "vacuum"):
             said = "no gas is named" if medium is None else "this is no vacuum"
             raise InputError(
@@ -204,14 +208,14 @@ def _medium(value: str, where: str) -> dict[str, Any]:
     InputError
         If it is another medium than the known ones, unless its pressure is that of a vacuum.
     """
-    pressure = _pressure(value)
+    pressure = _pressure(value, where)
     found: dict[str, Any] = {} if pressure is None else {"pressure_mbar": pressure}
     if pressure is not None:
         plausible(f"{where}: pressure", "mbar", pressure, 0.0, _SETTINGS["pressure"][2])
-        if pressure <= VACUUM_MBAR:
-            return found
     words = _words(value)
     known = {_MEDIA[word] for word in words & set(_MEDIA)}
+    if pressure is not None and pressure <= VACUUM_MBAR:
+        return {**found, "medium": "vacuum"} if "vacuum" in known else found
     first = re.match(r"[\W\d_]*([a-z]+\d?)", value[:_LONGEST].lower())
     denied = words & _NOT and (first is None or first[1] not in _MEDIA)
     if len(known) > 1 or denied or words & _OTHER_GASES or not (known or found):
@@ -230,11 +234,13 @@ def _powers(text: str) -> str:
     return re.sub(r"(?<![\d.,])10\^(?=[-+]?\d)", "1e", text)
 
 
-def _pressure(text: str) -> float | None:
+def _pressure(text: str, where: str) -> float | None:
     """Return the pressure (mbar) that a text names, None if there is none."""
     for number, unit in _WITH_UNIT.findall(_powers(text)):
         scale, value = conversion(unit, "mbar"), quantity(number)[0]
         if scale is not None and value is not None:
+            if _THOUSANDS.match(number):
+                raise InputError(f"{where}: found '{number} {unit}', expected no mark of thousands")
             return float(scale[0] * value)
     return ATMOSPHERE if "atmospheric pressure" in text.lower() else None
 
@@ -246,7 +252,7 @@ def _value(text: str, unit: str | None, inside: str, where: str) -> float | None
     """
     number, rest = quantity(text.replace("deg C", "degC").replace("° C", "°C"))
     behind = conversion(_unit_of(rest), inside)
-    if (behind is None and rest[:1].strip(" ,;([±")) or re.match(r"[-+]?\d{1,3},\d{3}(?!\d)", text):
+    if (behind is None and rest[:1].strip(" ,;([±")) or _THOUSANDS.match(text):
         number = None  # as in 5.6x; 10,000 may be ten or ten thousand
     named = behind if unit is None else conversion(unit, inside)
     if unit is not None and named is None:

@@ -66,9 +66,10 @@ def described(bias: Array, parts: list[slice]) -> str:
     words = []
     for part in parts:
         first, last = bias[part][0], bias[part][-1]
-        way = "up" if abs(last) > abs(first) else "down"
+        way = "up" if abs(last) >= abs(first) else "down"
         sign = "negative, " if min(first, last) < 0.0 else ""
-        words.append(f"{sign}{way} ({part.stop - part.start} rows)")
+        count = part.stop - part.start
+        words.append(f"{sign}{way} ({count} row{'s' * (count != 1)})")
     return ", ".join(words) if len(words) < 7 else f"{len(words)} sweeps"
 
 
