@@ -43,6 +43,9 @@ REFUSED = {
     "voltages disagree": lab(
         "# R_s: 56 kOhm\nV_b (V),V_l (V),I_h (mA)\n1,0.2,0.143\n2,0.4,0.285\n"
     ),
+    "no such resistor": lab("V_b (V),V_l (V),I_h (nA)\n1,0.2,20\n2,0.4,40\n"),
+    "no such lever": lab("# R_s: 0 ohm\nV_l (V),I_h (nA)\n3,1\n2,2\n4,3\n"),
+    "two settings in one": lab("# R_s (kOhm): 5 R_s (kOhm): 5.6\n" + IV + "1,0.14\n"),
     "signs disagree": lab(IV + "-2,0.2849\n-1,0.1434\n1,0.1434\n2,0.2849\n"),
     "text among numbers": lab(IV + "1,0.14\noverflow,0.28\n"),
     "a row too short": lab(IV + "1,0.14\n2\n"),
@@ -85,6 +88,9 @@ WORDS = {
     "lever voltage without R_s": r"V_l without R_s, .*expected a line like '# R_s \(kOhm\): 5.6'",
     "lever voltage with a hole": "line 4: I_h is '', expected a number, since V_b follows from V_l",
     "voltages disagree": "V_b - V_l is 5.* kOhm times I_h, expected R_s = 5.6e.04 ohm",
+    "no such resistor": "V_b - V_l over I_h: series_resistance_ohm = 40000000.0: input",
+    "no such lever": "the resistance that V_l over I_h asks for: series_resistance_ohm = ",
+    "two settings in one": "line 1: R_s: found '5 R_s .kOhm.: 5.6', expected a number",
     "signs disagree": "line 2: V_b is '-2' and I_h is '0.2849', expected the same sign",
     "text among numbers": "line 3: V_b: found 'overflow', expected a number",
     "a row too short": "line 3: 1 cells, expected 2 as in the header",

@@ -64,7 +64,9 @@ def find_bias(
             "nothing that a lever shows"
         )
         settings.origin["series_resistance_ohm"] = "reckoned with"
-    settings.values["series_resistance_ohm"] = kohm * 1000.0
+    found = {"series_resistance_ohm": kohm * 1000.0}
+    Circuit.of(found, f"{table.path}: the resistance that {LEVER} over I_h asks for")
+    settings.values.update(found)
     values["V_b"] = lever + kohm * current
 
 
@@ -102,7 +104,9 @@ def _compare_voltages(
             f"{ohm:.4g} ohm; is a unit wrong?"
         )
     if "series_resistance_ohm" not in settings.values:
-        settings.values["series_resistance_ohm"] = float(f"{1000.0 * kohm:.4g}")
+        found = {"series_resistance_ohm": float(f"{1000.0 * kohm:.4g}")}
+        Circuit.of(found, f"{table.path}: V_b - {LEVER} over I_h")
+        settings.values.update(found)
         settings.origin["series_resistance_ohm"] = f"V_b - {LEVER} over I_h"
 
 

@@ -252,8 +252,9 @@ def _value(text: str, unit: str | None, inside: str, where: str) -> float | None
     """
     number, rest = quantity(text.replace("deg C", "degC").replace("° C", "°C"))
     behind = conversion(_unit_of(rest), inside)
-    if (behind is None and rest[:1].strip(" ,;([±")) or _THOUSANDS.match(text):
-        number = None  # as in 5.6x; 10,000 may be ten or ten thousand
+    odd = behind is None and rest[:1].strip(" ,;([±")
+    if odd or "=" in rest or ":" in rest or _THOUSANDS.match(text):
+        number = None  # as in 5.6x, or with another setting behind it
     named = behind if unit is None else conversion(unit, inside)
     if unit is not None and named is None:
         raise unknown_unit(unit, inside, where)
