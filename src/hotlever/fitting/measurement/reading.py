@@ -68,7 +68,8 @@ def read_measurement(
     table = read_table(path, "one like 'V_b (V),I_h (mA),V_r (mV)'", known=known)
     notes: list[str] = []
     settings = Settings.of(table, notes)
-    found = find_columns(table, told, notes)
+    unused: list[str] = []
+    found = find_columns(table, told, unused)
     for line, text in table.remarks:
         notes.append(f"{table.path}: line {line}: '{shown(text)}' is taken for a comment")
     values = dict.fromkeys(QUANTITIES, np.full(len(table.rows), np.nan))
@@ -86,6 +87,7 @@ def read_measurement(
         notes.append(f"{path}: {len(parts)} sweeps, all of them used: {described(bias, parts)}")
         data = {symbol: values[symbol] for symbol in OBSERVABLE_SYMBOLS.values()}
         notes += [f"{path}: {text}" for text in disagreements(bias, parts, data)]
+    notes += unused
     more = len(notes) - _MOST_NOTES
     if more > 0:
         notes[_MOST_NOTES:] = [f"{path}: {more} more such notes"]
