@@ -30,7 +30,7 @@ import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.fitting import fit, read_measurement
-from hotlever.fitting.estimation import with_measured_circuit
+from hotlever.fitting.measurement import with_measured_circuit
 from hotlever.lever import Lever
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.reduction import cached_reduction

@@ -63,6 +63,12 @@ def quoted(found: object) -> str:
     return text if len(text) <= _QUOTED else f"{text[: _QUOTED - 2]}…"
 
 
+def shown(text: str, limit: int = 40) -> str:
+    """Shorten a text, and leave out what does not print, to quote it in an error."""
+    text = "".join(mark if mark.isprintable() else " " for mark in text[: 2 * limit].strip())
+    return text if len(text) <= limit else text[: limit - 1] + "…"
+
+
 def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") -> InputError:
     """Return the error for a name that does not exist, with the nearest one that does.
 

@@ -1,200 +1,46 @@
-"""Tables in text files, whoever wrote them: from bytes to lines, cells, numbers and units.
+"""Tables in text files, whoever wrote them.
 
-Encoding, separator and decimal sign are found, not asked for; what the columns and the lines above
-them mean is for the caller to know.
+Encoding, separator, decimal sign and header row are found, not asked for; what the columns and
+the lines above them mean is for the caller to know.
 """
 
 from __future__ import annotations
 
 import csv
 import hashlib
-import math
 import os
 import re
-import unicodedata
-from dataclasses import dataclass
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from hotlever.errors import InputError
+from hotlever.cells import cells_of, number, text_lines
+from hotlever.errors import InputError, shown
 from hotlever.files import read_bytes
 from hotlever.types import Array
+from hotlever.units import (
+    LONGEST_NUMBER,
+    NUMBER,
+    conversion,
+    is_unit,
+    name_and_unit,
+    unknown_unit,
+)
 
-MOST_LINES = 100_000  #: of a file, unless its reader says otherwise
-LARGEST_NUMBER = 1e30  #: no quantity is larger in any unit
-LONGEST_LINE = 2**17  #: characters; a spectrometer's map has some 40 000
+#: Lines among which a header row is looked for, how near to the numbers a comment is one, and
+#: characters of a heading.
+_MOST_ABOVE, _NEAR, _LONGEST_HEADING = 2000, 20, 100
 
-_MISSING = {"", "nan", "-", "--", "n/a", "na"}
-_NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
-_LONGEST_NUMBER = 60  # characters
-
-_EXPONENTS = {"": 0, "p": -12, "n": -9, "u": -6, "μ": -6, "m": -3, "k": 3, "K": 3, "M": 6, "G": 9}
-_SPELLINGS = {"V": "V", "A": "A", "ohm": "ohm", "Ohm": "ohm", "OHM": "ohm", "Ω": "ohm", "K": "K"}
-_UNITS = {
-    prefix + spelling: (unit, exponent)
-    for prefix, exponent in _EXPONENTS.items()
-    for spelling, unit in _SPELLINGS.items()
-}
-_CELSIUS = {"°C", "degC", "C", "oC", "celsius", "Celsius"}
-ZERO_CELSIUS_K = 273.15
-
-
-# --- text ----------------------------------------------------------------------------------
-
-
-def shown(text: str, limit: int = 40) -> str:
-    """Shorten a text, and leave out what does not print, to quote it in an error."""
-    text = "".join(mark if mark.isprintable() else " " for mark in text[: 2 * limit].strip())
-    return text if len(text) <= limit else text[: limit - 1] + "…"
-
-
-def decode(raw: bytes, where: str) -> str:
-    """Decode UTF-8 (with or without mark), UTF-16 or, failing those, Windows' Latin-1.
-
-    Raises
-    ------
-    InputError
-        If the bytes are no text.
-
-    Examples
-    --------
-    >>> decode("µm".encode("utf-16"), ""), decode(b"\\xb5m", "")
-    ('µm', 'µm')
-    """
-    head = raw[:4096]
-    marked = head.startswith((b"\xff\xfe", b"\xfe\xff"))
-    encoding = "utf-16" if marked else "utf-8-sig"
-    if b"\x00" in head and not marked:
-        # UTF-16 without its mark: every other byte of western text is zero
-        zeros = {"utf-16-le": head[1::2], "utf-16-be": head[0::2]}
-        encoding = next((e for e, part in zeros.items() if part.count(0) > 0.8 * len(part)), "")
-    try:
-        if encoding:
-            return raw.decode(encoding)
-    except UnicodeDecodeError:
-        control = sum(byte < 9 or 13 < byte < 32 for byte in head)
-        if not marked and control <= 0.02 * len(head):
-            return raw.removeprefix(b"\xef\xbb\xbf").decode("cp1252", errors="replace")
-    raise InputError(f"{where}: a binary file, not a text file")
-
-
-def text_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[str]:
-    """Decode a file's content, and split it into at most as many lines.
-
-    Raises
-    ------
-    InputError
-        If it is no text, or has too many lines or too long a line.
-    """
-    lines = decode(raw, where).splitlines()
-    if len(lines) > most:
-        raise InputError(f"{where}: {len(lines)} lines, expected at most {most}")
-    for number, line in enumerate(lines, start=1):
-        if len(line) > LONGEST_LINE:
-            raise InputError(
-                f"{where}: line {number}: {len(line)} characters, expected at most {LONGEST_LINE}"
-            )
-    return lines
-
-
-def cells_of(line: str, separator: str | None) -> list[str]:
-    """Cells of a line (between any blanks without a separator); csv.Error if quotes do not end."""
-    if separator is None:
-        return [cell.strip('"') for cell in line.split()]
-    if '"' in line:
-        quoted = csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True)
-        return [cell.strip() for cell in next(quoted)]
-    return [cell.strip() for cell in line.split(separator)]
-
-
-def number(cell: str, decimal_comma: bool = False) -> float | None:
-    """Return a cell's number: NaN where it says that there is none, None if it is something else.
-
-    Examples
-    --------
-    >>> number("1.5e3"), number("1,5", decimal_comma=True), number("--"), number("1_000")
-    (1500.0, 1.5, nan, None)
-    """
-    if len(cell) <= _LONGEST_NUMBER and _NUMBER.fullmatch(cell):
-        sign, other = (",", ".") if decimal_comma else (".", ",")
-        if other in cell:
-            return None
-        value = float(cell.replace(sign, ".").lower().replace("d", "e"))
-        return value if abs(value) <= LARGEST_NUMBER else None
-    return math.nan if cell.lower() in _MISSING else None
-
-
-# --- names, settings and units -------------------------------------------------------------
-
-
-def name_and_unit(heading: str) -> tuple[str, str | None]:
-    """Split a heading such as ``V_b (V)`` or ``I_h [mA]``; None where it gives no unit.
-
-    Examples
-    --------
-    >>> name_and_unit("V_b (V)"), name_and_unit("file")
-    (('V_b', 'V'), ('file', None))
-    """
-    bracket = re.search(r"[(\[]", heading)
-    if bracket is None or heading[-1:] not in (")", "]"):
-        return heading.strip(), None
-    return heading[: bracket.start()].strip(), heading[bracket.end() : -1].strip()
-
-
-def key_and_value(line: str) -> tuple[str, str]:
-    """Split a line such as ``# medium: air``; the value is empty where there is none.
-
-    Examples
-    --------
-    >>> key_and_value("# R_s (kOhm) = 5.6"), key_and_value("#Laser (nm)=\\t532;")
-    (('R_s (kOhm)', '5.6'), ('Laser (nm)', '532'))
-    """
-    key, *value = re.split(r"[=:;\t]", line.strip().lstrip('#;%!*" '), maxsplit=1)
-    return key.strip(' "'), value[0].strip(' =:;,\t"') if value else ""
-
-
-def quantity(text: str) -> tuple[float | None, str]:
-    """Split ``5.6 kOhm`` into number and what follows; None if no number begins the text.
-
-    Examples
-    --------
-    >>> quantity("5,6e3 Ohm"), quantity("20°C"), quantity("many")
-    ((5600.0, ' Ohm'), (20.0, '°C'), (None, 'many'))
-    """
-    found = _NUMBER.match(text[:_LONGEST_NUMBER])
-    if found is None:
-        return None, text
-    return number(found[0].replace(",", ".")), text[found.end() :]
-
-
-def conversion(unit: str, inside: str, difference: bool = False) -> tuple[float, float] | None:
-    """Return factor and offset that turn a value in one unit into another's; None if they differ.
-
-    Units are V, A, ohm or K with an SI prefix, or degrees Celsius. Differences of temperatures
-    have the same zero on any scale.
-
-    Examples
-    --------
-    >>> conversion("µA", "mA"), conversion("°C", "K"), conversion("degC", "K", difference=True)
-    ((0.001, 0.0), (1.0, 273.15), (1.0, 0.0))
-    """
-    # one spelling for the two signs of micro, of ohm, and for the compact degree
-    known = unicodedata.normalize("NFKC", unit[:20]).replace(" ", "") if len(unit) < 20 else ""
-    wanted, ours = _UNITS[inside]
-    if known in _CELSIUS and wanted == "K":
-        return 10.0**-ours, 0.0 if difference else ZERO_CELSIUS_K * 10.0**-ours
-    measured, theirs = _UNITS.get(known, ("", 0))
-    return (10.0 ** (theirs - ours), 0.0) if measured == wanted else None
-
-
-def unknown_unit(unit: str, inside: str, where: str) -> InputError:
-    """Return the error for a unit that `conversion` does not know."""
-    return InputError(
-        f"{where}: unit '{shown(unit)}' is not understood here, expected one like {inside}"
-    )
-
-
-# --- a table with a header row -------------------------------------------------------------
+#: A number with a mark of thousands, or with three decimals; and a small whole number.
+_GROUPED, _SMALL = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}"), re.compile(r"[+-]?[1-9]\d{0,2}")
+#: First cells of what stands between the sweeps of LabVIEW and of B1500 files, up to the next
+#: header row; and of a row with the units of the columns.
+_BETWEEN = {"channels", "setuptitle", "labview measurement"}
+_UNIT_ROWS = {"y_unit_label", "unit", "units"}
+#: Marks of a comment, around it, and quotes.
+_MARKS = ' \t"#%!'
 
 
 @dataclass(frozen=True)
@@ -203,21 +49,53 @@ class Table:
 
     path: str
     sha256: str  #: of the very bytes that were read
-    comments: list[tuple[int, str]]  #: the lines that start with ``#``, with their numbers
-    names: list[str]  #: the header row; empty if the table was read without one
+    #: Lines that start with ``#``, and those above the header row, with their numbers.
+    comments: list[tuple[int, str]]
+    #: The header row, with units that stand in a row of their own; empty if there is none.
+    names: list[str]
     rows: list[list[str]]  #: each as long as `names`
-    lines: list[int]  #: numbers of the header row, if there is one, and of each row
+    lines: list[int]  #: numbers of the header row (or the first) and of each row
     separator: str | None  #: None is any run of blanks
     decimal_comma: bool
+    #: Rows without numbers between header and data, with their numbers.
+    remarks: list[tuple[int, str]] = field(default_factory=list)
 
     def where(self, row: int) -> str:
         """Name file and line of a row (-1: the header row), to begin an error with."""
         return f"{self.path}: line {self.lines[row - len(self.rows)]}"
 
-    def values(
-        self, column: int, inside: str, name: str, unit: str = "", difference: bool = False
-    ) -> Array:
-        """Return a column's numbers, NaN where there is none.
+    def numbers(self, column: int, name: str) -> Array:
+        """Return a column's numbers as they stand there, NaN where there is none.
+
+        Raises
+        ------
+        InputError
+            If a cell is something else, or may be of thousands; it names the quantity as `name`.
+        """
+        cells = [row[column] for row in self.rows]
+        values = [number(cell, self.decimal_comma) for cell in cells]
+        if None in values:
+            row = values.index(None)
+            hint = " with a decimal comma, as elsewhere in the file" * self.decimal_comma
+            raise InputError(
+                f"{self.where(row)}: {name}: found '{shown(cells[row])}', expected a number{hint}"
+            )
+        if self.decimal_comma:
+            commas = [row for row, cell in enumerate(cells) if "," in cell]
+            if (
+                commas
+                and all(_GROUPED.fullmatch(cells[row]) for row in commas)
+                and any(map(_SMALL.fullmatch, cells))
+            ):
+                found = cells[commas[0]]
+                raise InputError(
+                    f"{self.where(commas[0])}: {name}: '{found}' may be {found.replace(',', '.')} "
+                    f"or {found.replace(',', '')}, expected numbers without marks of thousands"
+                )
+        return np.array(values, dtype=float)
+
+    def values(self, column: int, inside: str, name: str, unit: str = "") -> Array:
+        """Return a column's numbers in the unit `inside`, NaN where there is none.
 
         Parameters
         ----------
@@ -226,8 +104,6 @@ class Table:
             The unit wanted, and the quantity's name for errors.
         unit : str
             Of the column where its heading gives none.
-        difference : bool
-            See `conversion`.
 
         Raises
         ------
@@ -236,25 +112,22 @@ class Table:
         """
         heading = self.names[column] if self.names else ""
         unit = name_and_unit(heading)[1] or unit
-        converted = conversion(unit, inside, difference)
+        converted = conversion(unit, inside)
         if converted is None:
             raise unknown_unit(unit, inside, f"{self.where(-1)}: {shown(heading)}")
-        values = [number(cells[column], self.decimal_comma) for cells in self.rows]
-        if None in values:
-            row = values.index(None)
-            hint = " with a decimal comma, as elsewhere in the file" * self.decimal_comma
-            raise InputError(
-                f"{self.where(row)}: {name}: found '{shown(self.rows[row][column])}', expected a "
-                f"number{hint}"
-            )
-        return converted[0] * np.array(values, dtype=float) + converted[1]
+        return converted[0] * self.numbers(column, name) + converted[1]
 
 
-def read_table(path: str | os.PathLike[str], expected: str, header: bool = True) -> Table:
-    """Read a table of cells separated by tabs, semicolons or commas.
+def read_table(
+    path: str | os.PathLike[str],
+    expected: str,
+    header: bool = True,
+    known: Callable[[str], bool] | None = None,
+) -> Table:
+    """Read a table of cells separated by tabs, semicolons, commas or, some, by blanks.
 
-    With tabs and semicolons numbers may have decimal commas. Lines that start with ``#`` are
-    comments.
+    Numbers may have decimal commas unless these separate the cells. Lines that start with ``#``
+    are comments.
 
     Parameters
     ----------
@@ -264,6 +137,11 @@ def read_table(path: str | os.PathLike[str], expected: str, header: bool = True)
     header : bool
         Whether there must be a header row. Else a first row with a number is none, and blanks
         may separate cells.
+    known : callable, optional
+        Whether a heading is one of those looked for. The header row is then the first with two of
+        them, a comment if numbers follow; without such a row, the one above the first row of
+        numbers. Lines above it are comments; units may stand in a row below it, and the header
+        row may be repeated. Numbers alone have no header row.
 
     Raises
     ------
@@ -271,42 +149,201 @@ def read_table(path: str | os.PathLike[str], expected: str, header: bool = True)
         If there is no such table; the text names file and line.
     """
     raw = read_bytes(path)
-    comments: list[tuple[int, str]] = []
-    lines: list[int] = []
-    rows: list[list[str]] = []
-    separator = None
-    for place, line in enumerate(text_lines(raw, str(path)), start=1):
-        if line.lstrip(' "').startswith("#"):
+    numbered = enumerate(text_lines(raw, str(path)), start=1)
+    lines = [(place, line) for place, line in numbered if line.strip(' \t,;"\u00a0')]
+    first = next((at for at, (_, line) in enumerate(lines) if not _is_comment(line)), None)
+    if first is None:
+        raise InputError(f"{path}: no header row and no rows, expected {expected}")
+    at = first if known is None else _header_row(lines, known)
+    start = first if at is None else at
+    reader = _Reader(str(path), lines[start:], at is not None, header, known is not None)
+    comments = lines[:start]
+    for place, line in lines[start if at is None else start + 1 :]:
+        if _is_comment(line) or not reader.takes(place, line):
             comments.append((place, line))
-            continue
-        if not line.strip(' \t,;"'):
-            continue
-        if not rows:
-            separator = next((mark for mark in "\t;," if mark in line), "," if header else None)
+    names, rows, places = reader.names, reader.rows, [lines[start][0], *reader.places]
+    if not header and (not rows or any(map(NUMBER.fullmatch, names))):
+        names, rows, places = [], [names, *rows], [places[0], *places]
+    if reader.skipping or not rows:
+        where = f"line {reader.skipping}: another table" if reader.skipping else "no data rows"
+        raise InputError(f"{path}: {where} after the header")
+    comma = any("," in cell and number(cell, True) is not None for row in rows for cell in row)
+    return Table(
+        path=str(path),
+        sha256=hashlib.sha256(raw).hexdigest(),
+        comments=comments,
+        names=[] if at is None else reader.with_units(comments) if known else names,
+        rows=rows,
+        lines=places,
+        separator=reader.separator,
+        decimal_comma=comma,
+        remarks=reader.remarks,
+    )
+
+
+class _Reader:
+    """The rows below a header row, or of numbers alone.
+
+    `lines` begin with the header row, or the first row if there is none.
+    """
+
+    def __init__(
+        self, path: str, lines: list[tuple[int, str]], named: bool, header: bool, loose: bool
+    ) -> None:
+        self._path, self._loose = path, loose
+        self.rows: list[list[str]] = []
+        self.places: list[int] = []
+        self.remarks: list[tuple[int, str]] = []
+        self.skipping = 0  # the line since which the next header row is waited for
+        self._units: list[str] = []
+        place, line = lines[0]
+        separator = next((mark for mark in "\t;," if mark in line), None)
+        if not named or _is_comment(line):
+            # the heading may be separated in another way than the rows
+            row = next(text for _, text in lines if not _is_comment(text))
+            self.names = _headings(line) if named else []
+            separator, width = _row_of_numbers(row, len(self.names) or None) or (separator, 0)
+            self.names = self.names or [""] * width
+        elif separator is None and loose:
+            self.names = _headings(line)
+            separator = None if len(self.names) > 1 else ","
+        else:
+            separator = separator or ("," if header else None)
+            self.names = self._cells(place, line, separator)
+        self.separator = separator
+        while named and len(self.names) > 1 and not self.names[-1]:
+            self.names.pop()
+        if named and loose:
+            self.names[0] = self.names[0].lstrip(_MARKS)
+
+    def _cells(self, place: int, line: str, separator: str | None) -> list[str]:
+        try:
+            return cells_of(line, separator)
+        except csv.Error:
+            raise InputError(
+                f"{self._path}: line {place}: found '{shown(line)}', expected quotes in pairs "
+                "around a cell"
+            ) from None
+
+    def takes(self, place: int, line: str) -> bool:
+        """Take a line as a row if it is one; return whether it has been used."""
+        if self.skipping and self.separator is not None and self.names[-1] not in line:
+            return False
+        cells = self._cells(place, line, self.separator)
+        width = len(self.names)
+        while len(cells) > width and not cells[-1]:
+            cells.pop()
+        if self._loose:
+            if cells == self.names:
+                self.skipping = 0  # a further sweep
+                return True
+            if self.skipping or cells[0].lower() in _BETWEEN:
+                self.skipping = self.skipping or place
+                return False
+            if len(cells) < width and self.names[-1].lower() == "comment":
+                cells += [""] * (width - len(cells))  # LabVIEW's column for remarks
+            if not self.rows and len(cells) <= width and not any(map(_begins_number, cells)):
+                self._remark(place, line, cells)
+                return True
+        if len(cells) != width:
+            halves = self.separator == "," and len(cells) == 2 * width
+            hint = "; with decimal commas, tabs or semicolons must separate the cells" * halves
+            raise InputError(
+                f"{self._path}: line {place}: {len(cells)} cells, expected {width} as in the "
+                f"header{hint}"
+            )
+        self.places.append(place)
+        self.rows.append(cells)
+        return True
+
+    def _remark(self, place: int, line: str, cells: list[str]) -> None:
+        units = [cell.strip("()[]{}<> ") for cell in cells]
+        if not self._units and any(map(is_unit, units)):
+            self._units = units
+        else:
+            self.remarks.append((place, line))
+
+    def with_units(self, comments: list[tuple[int, str]]) -> list[str]:
+        """Return the headings with the units that stand in a row of their own."""
+        rows = [self._units]
+        for place, line in comments:
+            if line[:20].strip(_MARKS).lower().startswith(tuple(_UNIT_ROWS)):
+                rows.append(self._cells(place, line, self.separator))
+        units = next((row for row in rows if any(map(is_unit, row))), [])
+        units += [""] * (len(self.names) - len(units))
+        return [
+            f"{name} ({unit})" if is_unit(unit) and name_and_unit(name)[1] is None else name
+            for name, unit in zip(self.names, units, strict=False)
+        ]
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip(' "').startswith("#")
+
+
+def _begins_number(cell: str) -> bool:
+    return (cell[:1] in set("0123456789+-.,") and len(cell) > 1) or cell.isdigit()
+
+
+def _row_of_numbers(line: str, width: int | None = None) -> tuple[str | None, int] | None:
+    """Return separator and number of cells of a row of nothing but numbers; None if it is not."""
+    if not NUMBER.match(line.lstrip('" \t;,')[:LONGEST_NUMBER]):
+        return None
+    for separator in ("\t", ";", ",", None):
         try:
             cells = cells_of(line, separator)
         except csv.Error:
-            raise InputError(
-                f"{path}: line {place}: found '{shown(line)}', expected quotes in pairs around a "
-                "cell"
-            ) from None
-        while len(cells) > (len(rows[0]) if rows else 0) and not cells[-1]:
+            continue
+        while width and len(cells) > width and not cells[-1]:
             cells.pop()
-        if rows and len(cells) != len(rows[0]):
-            raise InputError(
-                f"{path}: line {place}: {len(cells)} cells, expected {len(rows[0])} as in the "
-                f"{'header' if header else 'first row'}"
-            )
-        lines.append(place)
-        rows.append(cells)
-    if not rows:
-        raise InputError(f"{path}: no header row and no rows, expected {expected}")
-    bare = not header and (len(rows) == 1 or any(map(_NUMBER.fullmatch, rows[0])))
-    names = [] if bare else rows.pop(0)
-    if not rows:
-        raise InputError(f"{path}: no data rows after the header")
-    comma = separator != "," and any(
-        "," in cell and number(cell, True) is not None for cells in rows for cell in cells
-    )
-    sha256 = hashlib.sha256(raw).hexdigest()
-    return Table(str(path), sha256, comments, names, rows, lines, separator, comma)
+        values = [value for cell in cells for value in (number(cell), number(cell, True))]
+        pairs = list(zip(values[::2], values[1::2], strict=True))
+        if len(cells) == (width or len(cells)) > 1 and all(pair != (None, None) for pair in pairs):
+            return separator, len(cells)
+    return None
+
+
+def _headings(line: str) -> list[str]:
+    """Split a header row; one without separators between its names, not before a unit."""
+    line = line.strip(_MARKS)
+    separator = next((mark for mark in "\t;," if mark in line), None)
+    if separator is not None:
+        with suppress(csv.Error):
+            return cells_of(line, separator)
+    names: list[str] = []
+    for word in line.split():
+        if names and (word[0] in "([{</" or names[-1].endswith("/")):
+            names[-1] += f" {word}"
+        else:
+            names.append(word)
+    return names or [""]
+
+
+def _header_row(lines: list[tuple[int, str]], known: Callable[[str], bool]) -> int | None:
+    """Return the place of the header row, None if there are numbers only (see `read_table`)."""
+
+    def width(at: int) -> int:
+        names = _headings(lines[at][1])
+        asked = [name for name in names if len(name) <= _LONGEST_HEADING]
+        return len(names) if sum(map(known, asked)) >= 2 else 0
+
+    plain = [at for at, (_, line) in enumerate(lines) if not _is_comment(line)]
+    named: list[int] = []
+    for order, at in enumerate(plain[:_MOST_ABOVE]):
+        if _row_of_numbers(lines[at][1]):
+            above = range(max(plain[order - 1] + 1 if order else 0, at - _NEAR), at)
+            for comment in reversed(above):
+                if _row_of_numbers(lines[at][1], width(comment) or -1):
+                    return comment
+            break
+        if count := width(at):
+            cells = _headings(lines[plain[order + 1]][1]) if order + 1 < len(plain) else []
+            if len(cells) == count and any(map(_begins_number, cells)):
+                return at
+            named.append(at)
+    else:
+        return (named or plain)[0]
+    texts = plain[:order]
+    if len(texts) > 1 and any(map(is_unit, _headings(lines[texts[-1]][1]))):
+        texts.pop()
+    return next(iter(named or texts[-1:]), None)

@@ -11,7 +11,7 @@ import pytest
 
 from hotlever.errors import BranchEndError, ComputationError, InputError
 from hotlever.fitting import Measurement, fit, read_measurement
-from hotlever.fitting.estimation import with_measured_circuit
+from hotlever.fitting.measurement import with_measured_circuit
 from hotlever.fitting.models import full_model, reduced_model
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE

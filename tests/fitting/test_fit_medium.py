@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from hotlever.fitting import read_measurement
-from hotlever.fitting.estimation import with_measured_circuit
+from hotlever.fitting.measurement import with_measured_circuit
 from hotlever.probe import Probe
 
 

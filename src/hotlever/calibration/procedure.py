@@ -20,7 +20,7 @@ from hotlever.calibration.rule import by_rule
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting import Fit, Measurement, read_fit
-from hotlever.fitting.estimation import with_measured_circuit
+from hotlever.fitting.measurement import with_measured_circuit
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Circuit, Probe

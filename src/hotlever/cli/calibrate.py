@@ -8,16 +8,18 @@ from typer import Argument, Option
 
 from hotlever.cli.application import app
 from hotlever.cli.options import (
+    ColumnOption,
     File,
     MediumOption,
     PlotFile,
     PriorOption,
     check_medium,
     check_plot,
+    column_files,
     load_probe,
     parse_priors,
 )
-from hotlever.cli.output import give, note, progress
+from hotlever.cli.output import give, note, progress, tell_table
 from hotlever.errors import ComputationError, InputError
 from hotlever.files import Outputs, write_text
 
@@ -30,6 +32,7 @@ def calibrate_command(
         None, "--probe", help="Probe like this lever; the reference probe if left out."
     ),
     power_law: File = Option(None, help="Power law in vacuum (JSON), or a calibration file."),
+    column: ColumnOption = None,
     medium: MediumOption = None,
     prior: PriorOption = None,
     output: File = Option(None, "-o", "--output", help="Calibration file (JSON)."),
@@ -40,23 +43,26 @@ def calibrate_command(
     from hotlever.calibration.power_law import read_power_law
     from hotlever.calibration.procedure import calibrate
     from hotlever.fitting import read_fit, read_measurement
+    from hotlever.fitting.measurement import parse_columns
 
     given = {"--fit": fit_file, "--probe": probe_file, "--power-law": power_law}
     several = [name for name, path in given.items() if path is not None]
     if len(several) > 1:
         raise InputError(f"{' and '.join(several)}: expected at most one of {', '.join(given)}")
     check_medium(medium)
-    outputs = Outputs(data, *given.values())
+    columns = parse_columns(column or [])
+    outputs = Outputs(data, *given.values(), *column_files(column))
     outputs.file(output)
     outputs.file(table, ".csv")
     check_plot(outputs, plot)
-    measurement = read_measurement(data)
-    note(*measurement.notes)
-    if "current" not in measurement.observables:
-        raise InputError(f"{data}: no values of I_h, which a calibration needs beside V_b")
     fit = None if fit_file is None else read_fit(fit_file)
     probe = load_probe(probe_file) if fit is None else fit.probe
     priors = parse_priors(prior, probe)
+    measurement = read_measurement(data, columns, probe.circuit)
+    tell_table(measurement.understood)
+    note(*measurement.notes)
+    if "current" not in measurement.observables:
+        raise InputError(f"{data}: no values of I_h, which a calibration needs beside V_b")
     with progress("calibrate") as update:
         result = calibrate(
             measurement,

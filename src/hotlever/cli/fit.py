@@ -10,20 +10,22 @@ from typer import Argument, Option
 
 from hotlever.cli.application import app
 from hotlever.cli.options import (
+    ColumnOption,
     File,
     MediumOption,
     PriorOption,
     check_number,
+    column_files,
     load_probe,
     parse_priors,
     parse_values,
 )
-from hotlever.cli.output import fail, give, note, progress, progress_bars
+from hotlever.cli.output import fail, give, note, progress, progress_bars, tell, tell_table
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.files import Outputs, write_text
 
 if TYPE_CHECKING:
-    from hotlever.fitting import FitOptions
+    from hotlever.fitting import FitOptions, Measurement
     from hotlever.fitting.uncertainty import Uncertainty
     from hotlever.probe import Probe
 
@@ -50,6 +52,7 @@ def fit_command(
     weights: str = Option(
         "maximum", help="maximum: of each observable, as in the paper; or errors, as measured."
     ),
+    column: ColumnOption = None,
     prior: PriorOption = None,
     medium: MediumOption = None,
     output: File = Option(
@@ -74,6 +77,7 @@ def fit_command(
     command again goes on where it was stopped.
     """
     from hotlever.fitting import FitOptions
+    from hotlever.fitting.measurement import parse_columns
 
     check_number("--samples", samples, 1, 1_000_000)
     check_number("--processes", processes, 1, 256)
@@ -93,14 +97,16 @@ def fit_command(
         priors=stated if given is None else {**stated, **given} if given else {},
         **chosen,
     )
-    outputs = Outputs(*data, probe_file)
+    columns = parse_columns(column or [])
+    outputs = Outputs(*data, probe_file, *column_files(column))
     to = Destination(outputs, output, report)
     where: Any = {"processes": processes}
     if len(data) > 1:
-        _fit_several(data, probe, options, {**where, "scheduler": scheduler}, to)
+        where |= {"scheduler": scheduler, "columns": columns}
+        _fit_several(data, probe, options, where, to)
     else:
         asked = {"samples": samples if posterior else None, "profiles": profiles}
-        _fit_one(data[0], probe, options, where | asked, to)
+        _fit_one(data[0], columns, probe, options, where | asked, to)
 
 
 class Destination(NamedTuple):
@@ -112,14 +118,20 @@ class Destination(NamedTuple):
 
 
 def _fit_one(
-    data: Path, probe: Probe, options: FitOptions, examined: dict[str, Any], to: Destination
+    data: Path,
+    columns: dict[str, str],
+    probe: Probe,
+    options: FitOptions,
+    examined: dict[str, Any],
+    to: Destination,
 ) -> None:
     from hotlever.fitting import fit, read_measurement
     from hotlever.fitting.words import fit_text, uncertainty_text
 
     to.outputs.file(to.output)
     to.outputs.folder(to.report)
-    measurement = read_measurement(data)
+    measurement = read_measurement(data, columns, probe.circuit)
+    tell_table(measurement.understood)
     note(*measurement.notes)
     with progress("fit") as update:
         result = fit(measurement, probe, options, progress=update)
@@ -178,7 +190,12 @@ def _fit_several(
             done = count
             fitting(count, total)
 
-        bars: Any = {"reducing": reducing, "progress": update}
+        def show(measurement: Measurement) -> None:
+            (name, *_, rows), *found = measurement.understood
+            tell(f"{name}: {rows}; {'; '.join(f'{what} {value}' for what, value, _ in found)}")
+            note(*measurement.notes)
+
+        bars: Any = {"reading": show, "reducing": reducing, "progress": update}
         try:
             batch = fit_many(data, folder, probe, options, **where, **bars)
         except KeyboardInterrupt:

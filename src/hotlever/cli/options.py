@@ -31,6 +31,15 @@ PlotFile = Annotated[File, Option("--plot", help="Draw to this file: .png, .svg 
 SweepPlot = Annotated[
     File, Option("--plot", help="Draw the sweep to this file: .png, .svg or .pdf.")
 ]
+ColumnOption = Annotated[
+    list[str] | None,
+    Option(
+        "--column",
+        metavar="'QUANTITY (UNIT)=NAME'",
+        help="Which column of the data is which quantity, as 'I_h (uA)=Current' or by its number; "
+        "or a file of such lines; repeated.",
+    ),
+]
 PriorOption = Annotated[
     list[str] | None,
     Option(
@@ -83,6 +92,11 @@ def check_medium(medium: str | None) -> None:
 
     if medium is not None and medium not in get_args(Medium):
         raise InputError(f"--medium {medium}: expected {' or '.join(get_args(Medium))}")
+
+
+def column_files(columns: list[str] | None) -> list[Path]:
+    """Return the files among the values of ``--column``."""
+    return [Path(text) for text in columns or [] if "=" not in text]
 
 
 def parse_bias(text: str) -> Array:
@@ -179,6 +193,42 @@ def parse_priors(texts: list[str] | None, probe: Probe) -> dict[str, str] | None
     return pairs
 
 
+def parse_settings(settings: list[str] | None, probe: Probe) -> dict[str, Any]:
+    """Parse ``NAME=VALUE`` for any key of a probe file: numbers, switches and words.
+
+    A key may have its section before it, and ``none`` leaves out what a file may leave out.
+
+    Examples
+    --------
+    >>> from hotlever import Probe
+    >>> probe = Probe.reference()
+    >>> parse_settings(["a0=9e-4", "chip=true", "medium=air", "tip.height_um=0.7"], probe)
+    {'a0': 0.0009, 'chip': True, 'medium': 'air', 'tip.height_um': 0.7}
+    """
+    values: dict[str, Any] = {}
+    for setting in settings or []:
+        name, equals, text = (part.strip() for part in setting.partition("="))
+        where = f"--set {name}"
+        if not equals:
+            raise InputError(f"--set {setting}: expected NAME=VALUE")
+        section, key, record = probe.field(name)
+        if any(probe.field(other)[:2] == (section, key) for other in values):
+            raise InputError(f"{where}: given twice, expected once")
+        field = record.model_fields.get(key)
+        kinds = () if field is None else (field.annotation, *get_args(field.annotation))
+        if bool in kinds:
+            if text not in ("true", "false"):
+                raise InputError(f"{where}: found {quoted(text)}, expected true or false")
+            values[name] = text == "true"
+        elif type(None) in kinds and text == "none":
+            values[name] = None
+        elif float in kinds or (field is None and section == "probe"):
+            values[name] = parse_number(text, where)
+        else:
+            values[name] = text.strip("\"'")
+    return values
+
+
 def check_number(option: str, value: float | None, least: float, most: float) -> None:
     """Refuse a number out of bounds."""
     if value is not None and not least <= value <= most:
@@ -192,8 +242,6 @@ def parse_values(
 
     Examples
     --------
-    >>> parse_values("--set", ["a0=9e-4"])
-    {'a0': 0.0009}
     >>> parse_values("--fix", ["n_d=3.3e17", "p"], bare=True)
     {'n_d': 3.3e+17, 'p': None}
     """

@@ -6,7 +6,7 @@ Nothing heavy is imported above a bar of progress.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, cast
 
@@ -56,9 +56,20 @@ _stderr = _StandardError()
 
 def tell(text: str) -> None:
     """Say something in one line on standard error."""
-    # what a file or its name holds must not steer the terminal
-    line = "".join(char if char.isprintable() else " " for char in text)
-    print(" ".join(line.split()), file=cast(Any, _stderr), flush=True)
+    print(" ".join(_printable(text).split()), file=cast(Any, _stderr), flush=True)
+
+
+def tell_table(rows: Sequence[Sequence[str]]) -> None:
+    """Show rows of cells on standard error."""
+    from hotlever.text import aligned
+
+    for line in aligned([[_printable(cell) for cell in row] for row in rows]):
+        print(line, file=cast(Any, _stderr), flush=True)
+
+
+def _printable(text: str) -> str:
+    """Leave out what would steer the terminal; files and their names may hold anything."""
+    return "".join(char if char.isprintable() else " " for char in text)
 
 
 def note(*texts: str) -> None:

@@ -18,7 +18,7 @@ from hotlever.cli.options import (
     check_plot,
     load_probe,
     parse_bias,
-    parse_values,
+    parse_settings,
 )
 from hotlever.cli.output import give, note, progress
 from hotlever.errors import ComputationError, unknown_name
@@ -61,7 +61,8 @@ def sweep_command(
     outputs.file(output, ".csv", ".nc")
     check_plot(outputs, plot)
     outputs.folder(fields)
-    probe = load_probe(probe_file).with_(**parse_values("--set", settings))
+    probe = load_probe(probe_file)
+    probe = probe.with_(**parse_settings(settings, probe))
     lever = _lever(probe if medium is None else probe.in_medium(medium), model)
     states: list[State] = []
     with progress("sweep") as update:

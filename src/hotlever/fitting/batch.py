@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,8 @@ from hotlever import __version__
 from hotlever.cluster import guarded, local_client, remote_client, run_all
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import Outputs, json_text, output_folder, read_json, write_text
-from hotlever.fitting.estimation import fit, with_measured_circuit
-from hotlever.fitting.measurement import Measurement, read_measurement
+from hotlever.fitting.estimation import fit
+from hotlever.fitting.measurement import Measurement, read_measurement, with_measured_circuit
 from hotlever.fitting.options import FitOptions
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduction import cached_reduction
@@ -57,6 +57,8 @@ def fit_many(
     *,
     processes: int | None = None,
     scheduler: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    reading: Callable[[Measurement], None] | None = None,
     reducing: Progress | None = None,
     progress: Progress | None = None,
 ) -> Batch:
@@ -80,6 +82,10 @@ def fit_many(
         spawn: a script needs ``if __name__ == "__main__"``.
     scheduler : str, optional
         Address of a running Dask scheduler to use instead.
+    columns : mapping of str to str, optional
+        Names of the columns in all files, see `read_measurement`.
+    reading : callable, optional
+        Called with each measurement that was read.
     reducing, progress : callable, optional
         Called with the steps done and their number: while a geometry is reduced, and with the
         levers done.
@@ -111,13 +117,15 @@ def fit_many(
 
     for name, path in data.items():
         try:
-            measurement = read_measurement(path)
+            measurement = read_measurement(path, columns, probe.circuit)
+            if reading is not None:
+                reading(measurement)
             if target.is_dir():
                 outputs.target(files[name])
         except InputError as error:
             failed(path, error)
             continue
-        content = _written_before(files[name], _request(measurement, probe, options))
+        content = _written_before(files[name], _request(measurement, probe, options, columns))
         if content is None:
             waiting[name] = measurement
         else:
@@ -136,7 +144,7 @@ def fit_many(
                 try:
                     if isinstance(result, HotleverError):
                         raise result
-                    content = {**result, "request": _request(measurement, probe, options)}
+                    content = {**result, "request": _request(measurement, probe, options, columns)}
                     output_folder(target)
                     write_text(files[name], json_text(content))
                     batch.fits[name] = content
@@ -192,13 +200,19 @@ def _written_before(file: Path, record: dict[str, Any]) -> dict[str, Any] | None
     return content if content.get("request") == record else None
 
 
-def _request(measurement: Measurement, probe: Probe, options: FitOptions) -> dict[str, Any]:
+def _request(
+    measurement: Measurement,
+    probe: Probe,
+    options: FitOptions,
+    columns: Mapping[str, str] | None,
+) -> dict[str, Any]:
     """Return all that a fit depends on, for its file: the same again need not be fitted."""
     record = {
         "sha256": measurement.sha256,
         "probe": probe.values(),
         "options": options.values(),
         "version": __version__,
+        **({"columns": dict(columns)} if columns else {}),
     }
     return dict(json.loads(json.dumps(record)))
 

@@ -17,7 +17,10 @@ from hotlever.records import explained
 from hotlever.types import Array
 
 #: What else is kept of a measurement.
-_NAMED = ("path", "sha256", "series_resistance_ohm", "base_temperature_K", "medium")
+_NAMED = (
+    *("path", "sha256", "series_resistance_ohm", "base_temperature_K", "medium"),
+    *("gas_conductivity", "pressure_mbar"),
+)
 _OR_NOTHING = WrapValidator(lambda found, check: np.nan if found is None else check(found))
 # A number, and a standard error; NaN where the file has none.
 Number = Annotated[float, _OR_NOTHING]
@@ -52,6 +55,8 @@ class EmbeddedMeasurement(Section):
     series_resistance_ohm: float | None = None
     base_temperature_K: float | None = None
     medium: Medium | None = None
+    gas_conductivity: float | None = None
+    pressure_mbar: float | None = None
     columns: dict[str, list[Number]]
 
     def measurement(self, where: str) -> Measurement:

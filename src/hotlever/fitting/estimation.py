@@ -14,7 +14,7 @@ import numpy as np
 from hotlever.errors import BranchEndError, ComputationError, InputError, unknown_name
 from hotlever.fitting.common_errors import errors_of_scales
 from hotlever.fitting.least_squares import LeastSquares, Optimum
-from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement
+from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement, with_measured_circuit
 from hotlever.fitting.misfit import undescribed
 from hotlever.fitting.models import ForwardModel, Prediction, forward_model
 from hotlever.fitting.options import FitOptions
@@ -307,30 +307,6 @@ def chosen_options(options: FitOptions | None, choices: dict[str, Any]) -> FitOp
         if name not in known:
             raise unknown_name("option", name, known, "fit")
     return replace(options or FitOptions(), **choices)
-
-
-def with_measured_circuit(
-    probe: Probe, measurement: Measurement, medium: str | None = None
-) -> tuple[Probe, list[str]]:
-    """Return the probe in circuit and medium of the measurement, and a note on each difference.
-
-    A `medium` that is asked for wins over both.
-    """
-    notes = []
-    measured_in, assumed_in = measurement.medium, probe.surroundings.medium
-    changes: dict[str, Any] = {"medium": medium or measured_in or assumed_in}
-    if measured_in not in (None, changes["medium"]):
-        notes.append(f"medium: {medium}, as asked, although the data file says {measured_in}")
-    elif medium is None and changes["medium"] != assumed_in:
-        notes.append(f"medium: the data file's {measured_in} is used, not the probe's {assumed_in}")
-    for name in ("series_resistance_ohm", "base_temperature_K"):
-        measured, assumed = getattr(measurement, name), getattr(probe.circuit, name)
-        if measured is not None and not np.isclose(measured, assumed, rtol=1e-9):
-            changes[name] = measured
-            notes.append(
-                f"{name}: the data file's {measured:g} is used, not the probe's {assumed:g}"
-            )
-    return probe.with_(**changes), notes
 
 
 def _observables(

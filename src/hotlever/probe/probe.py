@@ -18,7 +18,7 @@ from hotlever.materials import Material
 from hotlever.probe.circuit import Circuit
 from hotlever.probe.layout import Layout
 from hotlever.probe.priors import PriorTexts, priors_of
-from hotlever.probe.shapes import Shape, ThreeLeg, UShape, shape_of
+from hotlever.probe.shapes import SHAPES, Shape, ThreeLeg, UShape, shape_of
 from hotlever.probe.surroundings import Surroundings
 from hotlever.probe.tip import Tip
 from hotlever.records import Record
@@ -188,8 +188,31 @@ class Probe(Record):
         """Return the sections as plain values: what `from_values` takes."""
         return {name: part.model_dump(exclude_none=True) for name, part in self._sections.items()}
 
+    def field(self, name: str) -> tuple[str, str, type[Record]]:
+        """Return section, key and record of a name such as ``n_d`` or ``tip.height_um``.
+
+        Raises
+        ------
+        InputError
+            If it is no key of a probe file; the nearest one is given.
+        """
+        section, dot, key = name.rpartition(".")
+        records = {"probe": type(self.shape), **_PARTS}
+        if dot and section not in records:
+            raise unknown_name("section", section, SECTIONS)
+        known = {part: _keys(record, part) for part, record in records.items()}
+        for part in [section] if dot else [*self._sections, *records]:
+            if key in known[part] or (dot and records[part] is PriorTexts):
+                return part, key, records[part]
+        # a prior has the name of what it is of
+        choices = known[section] if dot else [key for keys in known.values() for key in keys]
+        raise unknown_name("name", key, dict.fromkeys(choices))
+
     def with_(self, **changes: Any) -> Probe:
         """Return a copy with some values changed, each named by its key in a probe file.
+
+        Keys may have their section before them (``**{"tip.height_um": 0.7}``). With another
+        `shape`, dimensions that it does not have are left out.
 
         Raises
         ------
@@ -198,11 +221,14 @@ class Probe(Record):
         """
         sections = {name: part.model_dump() for name, part in self._sections.items()}
         for name, value in changes.items():
-            section = next((values for values in sections.values() if name in values), None)
-            if section is None:
-                known = [key for values in sections.values() for key in values]
-                raise unknown_name("name", name, known)
-            section[name] = value
+            section, key, _ = self.field(name)
+            sections.setdefault(section, {})[key] = value
+        shape = SHAPES.get(str(sections["probe"]["shape"]))
+        if shape is not None and not isinstance(self.shape, shape):
+            own = {
+                key: value for key, value in sections["probe"].items() if key in shape.model_fields
+            }
+            sections["probe"] = own
         return Probe.from_values(sections, "probe")
 
     def at(self, names: Sequence[str]) -> Array:
@@ -268,6 +294,12 @@ class Probe(Record):
     def to_file(self, path: str | os.PathLike[str]) -> None:
         """Write the probe as a commented probe file, whole or not at all."""
         write_text(path, self.to_toml())
+
+
+def _keys(record: type[Record], section: str) -> list[str]:
+    """Return the keys of a section; in ``[probe]`` those of all shapes, its own first."""
+    shapes = SHAPES.values() if section == "probe" else ()
+    return [key for one in (record, *shapes) for key in one.model_fields]
 
 
 def _entries(part: Record, start: str = "") -> list[str]:

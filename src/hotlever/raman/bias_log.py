@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hotlever.errors import InputError
+from hotlever.errors import InputError, shown
 from hotlever.raman.part import file_and_label
-from hotlever.tables import Table, name_and_unit, read_table, shown
+from hotlever.tables import Table, read_table
+from hotlever.units import name_and_unit
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -17,9 +17,10 @@ from itertools import groupby
 
 import numpy as np
 
-from hotlever.errors import InputError
-from hotlever.tables import LARGEST_NUMBER, cells_of, key_and_value, number, shown
+from hotlever.cells import cells_of, number
+from hotlever.errors import InputError, shown
 from hotlever.types import Array
+from hotlever.units import LARGEST_NUMBER, key_and_value
 
 #: Of a file; a map of 500 spectra below each other has half a million lines.
 MOST_LINES, MOST_NUMBERS = 600_000, 10_000_000

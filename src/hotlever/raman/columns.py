@@ -7,12 +7,12 @@ from itertools import combinations
 
 import numpy as np
 
-from hotlever.errors import InputError
+from hotlever.errors import InputError, shown
 from hotlever.raman.block import Block
 from hotlever.raman.peak import MIN_SAMPLES, WINDOW, in_window
 from hotlever.raman.stated import temperature_in_name
-from hotlever.tables import quantity, shown
 from hotlever.types import Array
+from hotlever.units import quantity
 
 #: cm⁻¹; a spectrum must reach the line, and go on so far on both sides.
 SILICON_LINE, MARGIN = 520.0, 5.0

@@ -21,8 +21,8 @@ from hotlever.raman.columns import (
 from hotlever.raman.part import Part, positions
 from hotlever.raman.peak import MIN_SAMPLES
 from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
-from hotlever.tables import quantity
 from hotlever.types import Array
+from hotlever.units import quantity
 
 Rows = NDArray[np.intp]
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hotlever.datasets import labelled
-from hotlever.errors import InputError, unknown_name
+from hotlever.errors import InputError, shown, unknown_name
 from hotlever.raman.calibration import Point, RamanCalibration, calibrate_raman
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.part import file_and_label
@@ -21,7 +21,7 @@ from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.stated import sample_temperature
 from hotlever.raman.thermometer import Thermometer
 from hotlever.steps import each
-from hotlever.tables import read_table, shown
+from hotlever.tables import read_table
 from hotlever.types import Progress
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hotlever.cells import text_lines
 from hotlever.errors import InputError
 from hotlever.files import LARGEST_TEXT, read_bytes
 from hotlever.raman import wdf
@@ -23,7 +24,6 @@ from hotlever.raman.peak import in_window
 from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
 from hotlever.raman.vendor import READERS, read_vendor
 from hotlever.steps import each
-from hotlever.tables import text_lines
 from hotlever.types import Array, Progress
 
 SKIPPED_SUFFIXES = {".md", ".json", ".toml", ".yaml", ".yml", ".py", ".ipynb", ".html", ".pdf"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from hotlever.tables import ZERO_CELSIUS_K, quantity
+from hotlever.units import ZERO_CELSIUS_K, quantity
 
 HOTTEST = 2000.0  #: K; a higher number with the unit of a temperature is something else
 #: K; what a header calls "Temperature (C)", no more, and is lower is a detector's: Andor writes so.

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError
+from hotlever.errors import InputError, shown
 from hotlever.raman.part import Part, positions
 from hotlever.raman.wdf import read_wdf
-from hotlever.tables import LARGEST_NUMBER, shown
+from hotlever.units import LARGEST_NUMBER
 
 _NPOINTS = re.compile(r"NPOINTS\s*=\s*(\d+)", re.I)
 _XYDATA = re.compile(r"##\s*XYDATA\s*=[^\n]*([^#]*)", re.I)

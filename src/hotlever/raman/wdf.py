@@ -13,8 +13,8 @@ import numpy as np
 
 from hotlever.raman.part import Part, positions
 from hotlever.raman.stated import sample_temperature
-from hotlever.tables import LARGEST_NUMBER, ZERO_CELSIUS_K
 from hotlever.types import Array
+from hotlever.units import LARGEST_NUMBER, ZERO_CELSIUS_K
 
 SIGNATURE = b"WDF1"
 

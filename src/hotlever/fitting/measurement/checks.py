@@ -1,0 +1,78 @@
+"""What no lever can show is refused; what it hardly can is noted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hotlever.errors import InputError, shown
+from hotlever.fitting.measurement.columns import Column
+from hotlever.fitting.measurement.data import COLUMNS
+from hotlever.fitting.measurement.settings import plausible
+from hotlever.probe import Circuit
+from hotlever.tables import Table
+from hotlever.types import Array
+
+#: Where the largest value of a column can lie, in the unit inside; else its unit is wrong.
+_PLAUSIBLE = {"V_b": (1e-3, 1e3), "I_h": (1e-9, 1e3), "V_r": (1e-9, 1e3), "T_tip": (0.0, 5e3)}
+#: A standard error this much smaller than the largest value is none.
+_LEAST_ERROR = 1e-9
+#: Part of the largest value by which noise and drift may push a current or voltage below 0.
+NOISE = 0.05
+#: K, and standard errors, by which a tip may seem colder than its base.
+_COLDER_K, _COLDER_ERRORS = 20.0, 4.0
+#: K; probe files take no colder base.
+_COLDEST_BASE_K = 250.0
+
+
+def note_rows(notes: list[str], table: Table, odd: NDArray[np.bool_], text: str) -> None:
+    """Note what is odd about some rows, if there are any."""
+    if odd.any():
+        others = f", and in {odd.sum() - 1} more rows" if odd.sum() > 1 else ""
+        notes.append(f"{table.where(int(np.argmax(odd)))}: {text}{others}")
+
+
+def check(
+    table: Table,
+    columns: dict[str, Column],
+    values: dict[str, Array],
+    settings: dict[str, Any],
+    notes: list[str],
+) -> None:
+    """Refuse what no lever can show, and note what it hardly can."""
+    for symbol in (symbol for symbol in COLUMNS if symbol in columns):
+        of, data = symbol.removeprefix("d"), values[symbol]
+        unit, (low, high) = COLUMNS[of][1], _PLAUSIBLE[of]
+        size = np.nanmax(np.abs(values[of]), initial=0.0)
+        if symbol != of:
+            wrong = (data <= _LEAST_ERROR * size) | (data > high)
+            expected = f"a standard error above 0 and up to {high:g} {unit}, or an empty cell"
+        else:
+            wrong, expected = (data <= 0.0) & (symbol == "T_tip"), "a temperature above 0 K"
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            cell = shown(table.rows[row][columns[symbol].place])
+            raise InputError(f"{table.where(row)}: {symbol} is '{cell}', expected {expected}")
+        if symbol == of and not np.isnan(data).all():
+            for largest in (np.nanmax(data), size):
+                plausible(f"{table.path}: the largest {symbol}", unit, largest, low, high)
+            note_rows(notes, table, data < -NOISE * size, f"{symbol} is negative")
+
+    base = settings.get("base_temperature_K", _COLDEST_BASE_K)
+    margin = np.fmax(_COLDER_K, _COLDER_ERRORS * values["dT_tip"])
+    text = f"T_tip is below the base temperature ({base:g} K), perhaps in another unit"
+    note_rows(notes, table, values["T_tip"] < base - margin, text)
+
+    bias, current = values["V_b"], values["I_h"]
+    ohm = settings.get("series_resistance_ohm", 0.0)
+    lever = Circuit(series_resistance_ohm=ohm).lever_voltage(bias, current)
+    below = lever < -NOISE * bias.max()
+    if below.any():
+        row = int(np.argmax(below))
+        raise InputError(
+            f"{table.where(row)}: V_b = {bias[row]:g} V and I_h = {current[row]:g} mA leave "
+            f"{lever[row]:.3g} V for the lever behind R_s = {ohm:g} ohm, expected a voltage above "
+            "0; is a unit wrong?"
+        )
