@@ -137,7 +137,7 @@ class _Sizes:
         fine = 1.0 / options.refinement
         self._growth = fine * _GROWTH
         self._edge = fine * options.edge * layout.thickness_um
-        self._narrow = fine * options.heater * float(layout.heater.sides.min())
+        self._narrow = fine * options.heater * layout.heater.narrow_um
         self._largest = fine * _LARGEST * float(np.ptp(layout.box, axis=0).max())
 
     def breaks(self, low: float, high: float, axis: int, edges: Sequence[bool]) -> Array:
