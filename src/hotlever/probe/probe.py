@@ -7,6 +7,7 @@ import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from hotlever.materials import Material
 from hotlever.probe.circuit import Circuit
 from hotlever.probe.layout import Layout
 from hotlever.probe.priors import PriorTexts, priors_of
-from hotlever.probe.shapes import Shape, ThreeLeg, UShape, shape_of
+from hotlever.probe.shapes import SHAPE_SECTIONS, Shape, ThreeLeg, UShape, shape_of
 from hotlever.probe.surroundings import Surroundings
 from hotlever.probe.tip import Tip
 from hotlever.records import Record
@@ -37,7 +38,7 @@ _PARTS: dict[str, type[Record]] = {
     "tip": Tip,
     "prior": PriorTexts,
 }
-SECTIONS = ("probe", *_PARTS)
+SECTIONS = (*SHAPE_SECTIONS, *_PARTS)
 
 
 class Probe(Record):
@@ -65,7 +66,7 @@ class Probe(Record):
     @model_validator(mode="after")
     def _tip_stands_on_the_heater(self) -> Probe:
         if self.tip is not None:
-            room = self.shape.layout().heater.sides.min() / 2
+            room = self.shape.layout().heater.narrow_um / 2
             if not self.tip.base_radius_um < room:
                 raise ValueError(
                     f"the tip's base has a radius of {self.tip.base_radius_um:.4g} µm, expected "
@@ -125,8 +126,17 @@ class Probe(Record):
         raise InputError(f"found {type(probe).__name__}, expected a Probe or a probe file")
 
     @classmethod
-    def from_values(cls, values: dict[str, Any], where: str) -> Probe:
-        """Make a probe of the sections of a probe file; `where` names it in an error.
+    def from_values(cls, values: dict[str, Any], where: str, folder: Path | None = None) -> Probe:
+        """Make a probe of the sections of a probe file.
+
+        Parameters
+        ----------
+        values : dict
+            Sections by name.
+        where : str
+            Names the file in an error.
+        folder : path, optional
+            What the name of a drawing's file is relative to.
 
         Raises
         ------
@@ -134,13 +144,19 @@ class Probe(Record):
             Naming the section and key, what was found and what is expected.
         """
         for name, section in values.items():
+            if name == "materials":
+                raise InputError(
+                    f"{where}: [materials]: other materials than the paper's silicon cannot be "
+                    "simulated yet; expected [material]"
+                )
             if name not in SECTIONS:
                 raise unknown_name("section", name, SECTIONS, where)
             if not isinstance(section, dict):
                 raise InputError(f"{where}: [{name}] must be a section, found {quoted(section)}")
         if "probe" not in values:
             raise InputError(f"{where}: section [probe] is missing")
-        parts: dict[str, Any] = {"shape": shape_of(values["probe"], f"{where}: [probe]")}
+        drawn = {name: values[name] for name in SHAPE_SECTIONS if name in values}
+        parts: dict[str, Any] = {"shape": shape_of(drawn, where, folder)}
         usual = {"material": published("option III").material.model_dump()}
         for name, part in _PARTS.items():
             if name in values:
@@ -176,17 +192,24 @@ class Probe(Record):
             # a number of thousands of digits is a ValueError too
             reason = str(error).partition(";")[0]
             raise InputError(f"{path}: not valid TOML: {reason}") from None
-        return cls.from_values(values, str(path))
+        return cls.from_values(values, str(path), Path(path).parent)
 
     @property
-    def _sections(self) -> dict[str, Record]:
-        """The sections of its file."""
-        present = {name: getattr(self, name) for name in _PARTS if getattr(self, name)}
-        return {"probe": self.shape, **present}
+    def _records(self) -> dict[str, Record]:
+        """What it is made of, beside the shape, by the section of its file."""
+        return {name: getattr(self, name) for name in _PARTS if getattr(self, name)}
+
+    def _sections(self) -> dict[str, dict[str, Any]]:
+        """Return the sections of its file, with the keys that have no value."""
+        rest = {name: part.model_dump() for name, part in self._records.items()}
+        return self.shape.sections() | rest
 
     def values(self) -> dict[str, dict[str, Any]]:
         """Return the sections as plain values: what `from_values` takes."""
-        return {name: part.model_dump(exclude_none=True) for name, part in self._sections.items()}
+        return {
+            name: {key: value for key, value in section.items() if value is not None}
+            for name, section in self._sections().items()
+        }
 
     def with_(self, **changes: Any) -> Probe:
         """Return a copy with some values changed, each named by its key in a probe file.
@@ -196,7 +219,7 @@ class Probe(Record):
         InputError
             If a name exists in no section (the nearest one is given) or a value is impossible.
         """
-        sections = {name: part.model_dump() for name, part in self._sections.items()}
+        sections = self._sections()
         for name, value in changes.items():
             section = next((values for values in sections.values() if name in values), None)
             if section is None:
@@ -221,7 +244,8 @@ class Probe(Record):
         return self.model_copy(update=parts)
 
     def _part_with(self, name: str) -> Record:
-        return next(part for part in self._sections.values() if name in type(part).model_fields)
+        parts = (self.shape, *self._records.values())
+        return next(part for part in parts if name in type(part).model_fields)
 
     def __repr__(self) -> str:
         # the probe file without its comments
@@ -257,12 +281,15 @@ class Probe(Record):
                 "# The reference probe. No drawing of the published lever exists: these dimensions"
                 f"\n# are inferred from the operating points in doi:{DOI}."
             )
-        for name, part in self._sections.items():
-            lines += ["", f"[{name}]", *_entries(part)]
+        for name, section in self.shape.sections().items():
+            given = {key: value for key, value in section.items() if value is not None}
+            lines += ["", f"[{name}]", *_entries(given, self.shape.description())]
+        for name, part in self._records.items():
+            lines += ["", f"[{name}]", *_entries(part.model_dump(), part.description())]
         if self.tip is None:
             example = Tip(height_um=0.7, half_angle_deg=20, apex_radius_um=0.02)
             lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]
-            lines += ["# [tip]", *_entries(example, "# ")]
+            lines += ["# [tip]", *_entries(example.model_dump(), example.description(), "# ")]
         return "\n".join(lines) + "\n"
 
     def to_file(self, path: str | os.PathLike[str]) -> None:
@@ -270,11 +297,11 @@ class Probe(Record):
         write_text(path, self.to_toml())
 
 
-def _entries(part: Record, start: str = "") -> list[str]:
+def _entries(section: dict[str, Any], meaning: dict[str, str], start: str = "") -> list[str]:
     """Return the lines of a section, each with what its value is."""
-    meaning, lines = part.description(), []
-    for key, value in part.model_dump(exclude_none=isinstance(part, Shape)).items():
-        # JSON writes texts and truth as TOML does
+    lines = []
+    for key, value in section.items():
+        # JSON writes texts, truth and lists as TOML does
         text = json.dumps(value, ensure_ascii=False)
         written = f"{value:.12g}" if isinstance(value, float) else text
         entry = f"# {key} =" if value is None else f"{start}{key} = {written}"
