@@ -15,7 +15,7 @@ from hotlever.drawing.contacts import REQUIRED
 from hotlever.drawing.fault import DrawingError, Point, Ring
 from hotlever.drawing.healing import without_nested
 from hotlever.drawing.making import HEATER, SILICON, layout_of
-from hotlever.drawing.sheet import Sheet, read_sheet
+from hotlever.drawing.sheet import Layer, Sheet, read_sheet
 from hotlever.errors import InputError, quoted
 from hotlever.probe.layout import Layout
 from hotlever.probe.shapes import Shape, thickness
@@ -160,21 +160,26 @@ def _sheet(values: dict[str, Any], where: str, folder: Path | None, tolerance: A
     return read_sheet(os.fspath(path), cell, unit_um=unit, tolerance_um=float(tolerance))
 
 
+def rings_of(sheet: Sheet, layer: Layer, *, lines: bool = False) -> Rings:
+    """Return the outlines of a layer; with `lines` the steps of open ones too."""
+    closed = layer.rings if sheet.kind == "DXF" else without_nested(layer.rings)
+    steps = (step for line in layer.lines for step in pairwise(line))
+    return (*closed, *steps) if lines else closed
+
+
 def _rings(sheet: Sheet | None, given: Any, name: str, where: str, section: str) -> Rings:
     """Return the outlines of a layer, of a list of points or of a list of such lists."""
     if sheet is not None and isinstance(given, str):
         layer = sheet.layer(given, where)
-        closed = layer.rings if sheet.kind == "DXF" else without_nested(layer.rings)
         if section == "terminals":
-            steps = [step for line in layer.lines for step in pairwise(line)]
-            return (*closed, *steps)
+            return rings_of(sheet, layer, lines=True)
         if layer.lines:
             x, y = layer.lines[0][0]
             raise InputError(
                 f"{sheet.file}: {name} (layer {given}), at ({x:.3f}, {y:.3f}) µm: an outline that "
                 "is not closed"
             )
-        return closed
+        return rings_of(sheet, layer)
     if isinstance(given, Mapping):
         raise InputError(
             f"{where}: found a section, expected a layer or points; layers of other materials than "

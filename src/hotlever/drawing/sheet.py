@@ -11,6 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+from shapely import LineString
+
 from hotlever.drawing.fault import Point, Ring
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_bytes
@@ -111,10 +116,10 @@ def read_sheet(
     """
     content = read_bytes(path, _LARGEST)
     found = _read_apart(content, str(path), cell, unit_um, tolerance_um)
-    layers = {
-        name: Layer(_points(one["rings"], str(path)), _points(one["lines"], str(path)))
-        for name, one in sorted(found["layers"].items())
-    }
+    layers = {}
+    for name, one in sorted(found["layers"].items()):
+        joined, lines = _joined(_points(one["lines"], str(path)), tolerance_um)
+        layers[name] = Layer((*_points(one["rings"], str(path)), *joined), lines)
     labels = tuple((layer, text, (x, y)) for layer, text, x, y in found["labels"])
     rest = {name: found[name] for name in ("unit_um", "unit_stated", "left_out") if name in found}
     cells, top = tuple(found["cells"]), tuple(found["top"])
@@ -183,3 +188,21 @@ def _points(rings: list[list[list[float]]], path: str) -> tuple[Ring, ...]:
                     f"{path}: a corner at ({x:g}, {y:g}) µm, expected less than {_FARTHEST:g} µm"
                 )
     return tuple(tuple((x, y) for x, y in ring) for ring in rings)
+
+
+def _joined(lines: tuple[Ring, ...], tolerance: float) -> tuple[tuple[Ring, ...], tuple[Ring, ...]]:
+    """Return the closed outlines that lines make whose ends meet, and the lines that are left."""
+    if not lines:
+        return (), ()
+    places = np.array([place for line in lines for place in (line[0], line[-1])])
+    # each end goes to the first of those near it
+    near = cKDTree(places).query_ball_point(places, tolerance)
+    ends = iter([tuple(places[min(some)].tolist()) for some in near])
+    met = [(next(ends), *line[1:-1], next(ends)) for line in lines]
+    some = [LineString(line) for line in met if len(set(line)) > 1]
+    closed, cuts, dangles, _ = shapely.polygonize_full(some)
+    rings = tuple(
+        tuple((x, y) for x, y in one.exterior.coords[:-1]) for one in shapely.get_parts(closed)
+    )
+    rest = [line for group in (cuts, dangles) for line in shapely.get_parts(group)]
+    return rings, tuple(tuple((x, y) for x, y in line.coords) for line in rest)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -24,6 +23,7 @@ from hotlever.probe.surroundings import Surroundings
 from hotlever.probe.tip import Tip
 from hotlever.records import Record
 from hotlever.spieser2017 import DOI, published
+from hotlever.text import as_toml
 from hotlever.types import Array
 
 #: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
@@ -281,9 +281,15 @@ class Probe(Record):
                 "# The reference probe. No drawing of the published lever exists: these dimensions"
                 f"\n# are inferred from the operating points in doi:{DOI}."
             )
+        meaning = self.shape.description()
         for name, section in self.shape.sections().items():
             given = {key: value for key, value in section.items() if value is not None}
-            lines += ["", f"[{name}]", *_entries(given, self.shape.description())]
+            lines += ["", f"[{name}]", *_entries(given, meaning)]
+        return "\n".join(lines) + "\n" + self.other_sections()
+
+    def other_sections(self) -> str:
+        """Return the sections of its file beside those of its shape."""
+        lines = []
         for name, part in self._records.items():
             lines += ["", f"[{name}]", *_entries(part.model_dump(), part.description())]
         if self.tip is None:
@@ -301,9 +307,7 @@ def _entries(section: dict[str, Any], meaning: dict[str, str], start: str = "") 
     """Return the lines of a section, each with what its value is."""
     lines = []
     for key, value in section.items():
-        # JSON writes texts, truth and lists as TOML does
-        text = json.dumps(value, ensure_ascii=False)
-        written = f"{value:.12g}" if isinstance(value, float) else text
+        written = f"{value:.12g}" if isinstance(value, float) else as_toml(value)
         entry = f"# {key} =" if value is None else f"{start}{key} = {written}"
         lines.append(f"{entry:<32}# {meaning[key]}" if key in meaning else entry)
     return lines
