@@ -183,8 +183,7 @@ def _rectangle(region: Region) -> Array:
     if len(outline) != 4 or not at_corner:
         raise InputError(
             f"air: region '{region.name}' has {len(outline)} corners, expected a rectangle "
-            "parallel to the axes; a drawn lever can be simulated in vacuum, or with the model "
-            "full-3d"
+            "parallel to the axes; a drawn lever can be simulated in vacuum only so far"
         )
     return box
 

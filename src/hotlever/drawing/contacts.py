@@ -36,17 +36,23 @@ def contacts(
     found: list[Terminal] = []
     for name, rings in terminals.items():
         lines = [ring for ring in rings if len(ring) == 2]
-        areas = polygons(name, [ring for ring in rings if len(ring) != 2], tolerance)
+        part, closed = terminal_part(name), [ring for ring in rings if len(ring) != 2]
+        areas = polygons(part, closed, tolerance)
         wider = [area.buffer(tolerance) for area in areas]
         own = [edge for area in wider for edge in edges if area.covers(LineString(edge))]
         for line in lines:
-            own += [part for edge in edges if (part := _along(edge, line, tolerance)) is not None]
+            own += [some for edge in edges if (some := _along(edge, line, tolerance)) is not None]
         if not own:
             raise _touches_nothing(name, rings, silicon, edges, bool(areas))
         for start, end in dict.fromkeys(own):
             found.append(Terminal(name, start, end))
     _check_apart(found)
     return found
+
+
+def terminal_part(name: str) -> str:
+    """Return how a terminal is named among the parts of a drawing."""
+    return f"terminal '{name}'"
 
 
 def outline_edges(silicon: Polygon) -> list[tuple[Point, Point]]:
@@ -97,7 +103,7 @@ def _touches_nothing(
         what = f"it touches no edge of the silicon; the nearest is {away[nearest]:.3g} µm away"
     else:
         what = "no edge of the silicon lies inside it from corner to corner"
-    return DrawingError(what, name, nearest + 1, (place[0], place[1]))
+    return DrawingError(what, terminal_part(name), nearest + 1, (place[0], place[1]))
 
 
 def _check_apart(terminals: list[Terminal]) -> None:
@@ -106,4 +112,5 @@ def _check_apart(terminals: list[Terminal]) -> None:
             a, b = LineString([one.start, one.end]), LineString([other.start, other.end])
             if one.name != other.name and a.distance(b) < 1e-6:
                 at = shapely.shortest_line(a, b).coords[0]
-                raise DrawingError(f"it touches '{other.name}'", one.name, None, (at[0], at[1]))
+                what, part = f"it touches '{other.name}'", terminal_part(one.name)
+                raise DrawingError(what, part, None, (at[0], at[1]))

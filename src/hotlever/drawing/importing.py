@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hotlever.drawing.contacts import REQUIRED
+from hotlever.drawing.contacts import REQUIRED, terminal_part
 from hotlever.drawing.fault import Point, Ring
 from hotlever.drawing.making import HEATER, SILICON
 from hotlever.drawing.proposal import Drawn, Proposal, proposed
@@ -48,7 +48,7 @@ class Imported:
     @property
     def outlines(self) -> dict[str, tuple[Ring, ...]]:
         """All that is drawn, by what it is and by layer."""
-        roles = self.proposal.layers | self.proposal.terminals
+        roles = _by_part(self.proposal)
         of_layer = {one: role for role, one in roles.items() if isinstance(one, str)}
         found = {}
         for name, layer in self.sheet.layers.items():
@@ -87,6 +87,12 @@ def import_drawing(path: Path, cell: str | None, folder: Path) -> Imported:
     return Imported(sheet, proposal, listing, text, fault)
 
 
+def _by_part(proposal: Proposal) -> dict[str, Drawn]:
+    """Return what is drawn by what it is taken as."""
+    ends = {terminal_part(name): one for name, one in proposal.terminals.items()}
+    return proposal.layers | ends
+
+
 def _relative(path: Path, folder: Path) -> str:
     try:
         return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
@@ -105,8 +111,8 @@ def _listing(sheet: Sheet, proposal: Proposal) -> list[str]:
         lines.append("the file states no unit: taken to be in µm; see unit_um")
     else:
         lines.append(f"one unit of the file is {sheet.unit_um:g} µm")
-    of_layer = {one: role for role, one in proposal.layers.items() if isinstance(one, str)}
-    of_layer |= {one: role for role, one in proposal.terminals.items() if isinstance(one, str)}
+    roles = _by_part(proposal)
+    of_layer = {one: role for role, one in roles.items() if isinstance(one, str)}
     rows = [["layer", "outlines", "area (µm²)", "x (µm)", "y (µm)", "taken as"]]
     for name, layer in list(sheet.layers.items())[:_MOST_LISTED]:
         points = np.array([place for ring in (*layer.rings, *layer.lines) for place in ring])
@@ -150,7 +156,7 @@ def _probe_file(sheet: Sheet, proposal: Proposal, listing: list[str], name: str)
         lines.append(_entry(role, proposal.layers.get(role), reasons.get(role), "1/0"))
     lines += ["", "[terminals]"]
     for role in dict.fromkeys((*REQUIRED, *proposal.terminals)):
-        reason = reasons.get(f"{role} terminal")
+        reason = reasons.get(terminal_part(role))
         lines.append(_entry(role, proposal.terminals.get(role), reason, "10/0"))
     return "\n".join(lines) + "\n" + reference.other_sections()
 

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from hotlever.drawing.contacts import REQUIRED, contacts
+from hotlever.drawing.contacts import REQUIRED, contacts, terminal_part
 from hotlever.drawing.cutting import Cut, cut, taper_of
 from hotlever.drawing.fault import DrawingError, Point, Ring
 from hotlever.drawing.healing import (
@@ -164,7 +164,7 @@ def _parts(whole: Cut, at: dict[str, set[int]]) -> list[Part]:
     if not supply or not ground:
         name = REQUIRED[0] if not supply else REQUIRED[1]
         place = whole.pieces[min(at[name])].shape.representative_point()
-        raise DrawingError("it lies on the heater", name, None, (place.x, place.y))
+        raise DrawingError("it lies on the heater", terminal_part(name), None, (place.x, place.y))
     if supply & ground:
         place = whole.pieces[min(heaters)].shape.representative_point()
         raise DrawingError(

@@ -11,7 +11,7 @@ import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.drawing.contacts import contacts, outline_edges
+from hotlever.drawing.contacts import contacts, outline_edges, terminal_part
 from hotlever.drawing.cutting import Cut, cut
 from hotlever.drawing.fault import DrawingError, Point, Ring
 from hotlever.drawing.healing import healed, parts_of, polygons, snapped
@@ -36,7 +36,7 @@ class Proposal:
     layers, terminals : dict of str to layer's name or rings
     tip : tuple of float or None
     reasons : dict of str to str
-        By name in `layers` and `terminals`, and for the ``tip``.
+        By the names that parts have in errors, and for the ``tip``.
     doubts : list of str
         What could not be told.
     unused : list of str
@@ -223,7 +223,7 @@ def _terminals(best: _Silicon, sheet: Sheet, found: Proposal) -> None:
         }
     for role, (name, reason) in named.items():
         found.terminals[role] = given[name]
-        found.reasons[f"{role} terminal"] = "; ".join(filter(None, (why, reason)))
+        found.reasons[terminal_part(role)] = "; ".join(filter(None, (why, reason)))
 
 
 def _named(

@@ -11,7 +11,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hotlever.drawing.contacts import REQUIRED
+from hotlever.drawing.contacts import REQUIRED, terminal_part
 from hotlever.drawing.fault import DrawingError, Point, Ring
 from hotlever.drawing.healing import without_nested
 from hotlever.drawing.making import HEATER, SILICON, layout_of
@@ -59,13 +59,6 @@ class Drawing(Shape):
 
     @model_validator(mode="after")
     def _can_be_meshed(self) -> Self:
-        for names, section, expected in (
-            (self.layers, "layers", (SILICON, HEATER)),
-            (self.terminals, "terminals", REQUIRED),
-        ):
-            for name in expected:
-                if not names.get(name):
-                    raise ValueError(f"[{section}]: {name} is missing")
         self.layout()
         return self
 
@@ -114,11 +107,13 @@ class Drawing(Shape):
         """
         values = dict(sections["probe"])
         tolerance = values.get("tolerance_um", TOLERANCE_UM)
-        if isinstance(values.get("tip_um"), list):
-            values["tip_um"] = tuple(values["tip_um"])
+        tip = values.get("tip_um")
+        if tip is not None:
+            if not _is_points([tip, tip]):
+                raise InputError(f"{where}: [probe]: tip_um = {quoted(tip)}: expected [x, y] (µm)")
+            values["tip_um"] = (float(tip[0]), float(tip[1]))
         given = {name: _section(sections, name, where) for name in ("layers", "terminals")}
-        entries = [entry for section in given.values() for entry in section.items()]
-        named = {name: layer for name, layer in entries if type(layer) is str}
+        named = {part: layer for part, layer in _by_part(given).items() if isinstance(layer, str)}
         sheet = None
         if named:
             sheet = _sheet(values, where, folder, tolerance)
@@ -129,17 +124,25 @@ class Drawing(Shape):
             }
             for section, drawn in given.items()
         }
-        everything = outlines["layers"] | outlines["terminals"]
         try:
             return cls.of(values | outlines, f"{where}: [probe]")
         except DrawingError as error:
             file = where if sheet is None else sheet.file
-            raise error.of_file(file, named, everything) from None
+            raise error.of_file(file, named, _by_part(outlines)) from None
+
+
+def _by_part(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what is drawn by the name that it has in an error."""
+    ends = {terminal_part(name): drawn for name, drawn in sections["terminals"].items()}
+    return {**sections["layers"], **ends}
 
 
 def _section(sections: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
     if name not in sections:
         raise InputError(f"{where}: section [{name}] is missing")
+    for key in (SILICON, HEATER) if name == "layers" else REQUIRED:
+        if key not in sections[name]:
+            raise InputError(f"{where}: [{name}]: {key} is missing")
     return dict(sections[name])
 
 

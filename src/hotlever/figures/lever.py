@@ -58,7 +58,7 @@ def probe_drawing(layout: Layout, title: str = "") -> Figure:
                 colour, label = low_doped["heater" if region.part == "heater" else "reader"]
             axes.add_patch(_patch(region, facecolor=colour, edgecolor="0.55", lw=0.6))
             handles.setdefault(label, Patch(facecolor=colour, edgecolor="0.55", label=label))
-        middle = layout.box.mean(axis=0)
+        middle, labelled = layout.box.mean(axis=0), set[tuple[int, bool]]()
         for name, edges in groupby(layout.terminals, lambda terminal: terminal.name):
             ends = np.array([(edge.start, edge.end) for edge in edges])
             axes.plot(*ends.T, color=BLUE, lw=4, solid_capstyle="butt")
@@ -66,6 +66,7 @@ def probe_drawing(layout: Layout, title: str = "") -> Figure:
             # away from the middle of the lever, along the nearer axis
             along = int(np.argmax(np.abs(at - middle) / np.ptp(layout.box, axis=0)))
             low = bool(at[along] < middle[along])
+            labelled.add((along, low))
             shift = [0, 0]
             shift[along] = -8 if low else 8
             beside: Any = {"xytext": shift, "textcoords": "offset points", "color": BLUE}
@@ -77,9 +78,17 @@ def probe_drawing(layout: Layout, title: str = "") -> Figure:
         handles["terminal"] = Line2D([], [], color=BLUE, lw=4, label="terminal (base temperature)")
         (tip,) = axes.plot(*layout.tip, marker="^", color=BLACK, ls="none", label="tip")
         handles["tip"] = tip
-        (left, low), (right, high) = layout.box
-        margin = 0.04 * max(right - left, high - low)
-        axes.set(xlim=(left - 5 * margin, right + margin), ylim=(low - margin, high + margin))
+        (left, bottom), (right, high) = layout.box
+        margin = 0.04 * max(right - left, high - bottom)
+        wider = {True: 5, False: 1}
+        axes.set_xlim(
+            left - wider[(0, True) in labelled] * margin,
+            right + wider[(0, False) in labelled] * margin,
+        )
+        axes.set_ylim(
+            bottom - wider[(1, True) in labelled] * margin,
+            high + wider[(1, False) in labelled] * margin,
+        )
         axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)", title=title)
         made.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
     return made
