@@ -80,7 +80,7 @@ def cut(silicon: Polygon, low_doped: Mapping[str, BaseGeometry]) -> Cut:
                 at = both.representative_point()
                 raise DrawingError(f"it overlaps with '{other}'", name, None, (at.x, at.y))
     outlines = [silicon.boundary, *(shape.boundary for shape in low_doped.values())]
-    noded = shapely.union_all(outlines, GRID)
+    noded = shapely.union_all(outlines, grid_size=GRID)
     kinds: dict[str | None, list[Polygon]] = defaultdict(list)
     for face in shapely.get_parts(shapely.polygonize(list(shapely.get_parts(noded)))):
         at = face.representative_point()

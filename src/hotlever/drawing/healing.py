@@ -75,7 +75,9 @@ def together(found: list[Polygon]) -> BaseGeometry:
     depth = np.bincount(inner[inner != outer], minlength=len(unique))
     whole: BaseGeometry = Polygon()
     for level in range(depth.max() + 1):
-        here = shapely.union_all([unique[one] for one in np.flatnonzero(depth == level)], GRID)
+        here = shapely.union_all(
+            [unique[one] for one in np.flatnonzero(depth == level)], grid_size=GRID
+        )
         whole = whole.difference(here) if level % 2 else whole.union(here)
     return whole
 
@@ -107,7 +109,9 @@ def healed(part: str, found: list[Polygon], tolerance: float) -> BaseGeometry:
         if one.area > GRID * (one.length + tolerance)
     ]
     if added:
-        whole = shapely.union_all([whole, *(one.buffer(GRID, **style) for one in added)], GRID)
+        whole = shapely.union_all(
+            [whole, *(one.buffer(GRID, **style) for one in added)], grid_size=GRID
+        )
     whole = whole.simplify(_STANDS_OUT * tolerance)
     corners = shapely.count_coordinates(whole)
     if corners > _MOST_CORNERS:

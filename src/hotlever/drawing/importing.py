@@ -53,7 +53,7 @@ class Imported:
         found = {}
         for name, layer in self.sheet.layers.items():
             role = of_layer.get(name)
-            label = name if role is None else f"{role} ({name})"
+            label = name if role in (None, name) else f"{role} ({name})"
             found[label] = (*layer.rings, *layer.lines)
         return found | {role: one for role, one in roles.items() if not isinstance(one, str)}
 

@@ -125,15 +125,17 @@ class _Silicon:
         self.merit = (bool(self.cutters), min(len(self.touching), 2), self.shape.area)
 
     def _is_cut_by(self, other: BaseGeometry) -> bool:
-        inside = self.shape.intersection(other)
-        if not 0 < inside.area < _LARGEST_SHARE * self.shape.area:
+        """Whether the silicon falls apart, or has one more hole, without another layer."""
+        inside = self._sizable(self.shape.intersection(other))
+        area = sum(one.area for one in inside)
+        if not 0 < area < _LARGEST_SHARE * self.shape.area:
             return False
-        rest = [
-            one
-            for one in parts_of(self.shape.difference(other.buffer(self.tolerance)))
-            if one.area > 10 * self.tolerance * one.length
-        ]
-        return len(rest) > 1 or any(one.interiors for one in rest)
+        rest = self._sizable(self.shape.difference(other.buffer(self.tolerance)))
+        holes = sum(len(one.interiors) for one in rest)
+        return len(rest) > 1 or holes > len(self.shape.interiors)
+
+    def _sizable(self, shape: BaseGeometry) -> list[Polygon]:
+        return [one for one in parts_of(shape) if one.area > 10 * self.tolerance * one.length]
 
     def ends_of(self, name: str, sheet: Sheet, layer: Layer) -> bool:
         """Whether a layer touches the outline along an edge."""

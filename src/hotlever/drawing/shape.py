@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -35,6 +35,8 @@ class Drawing(Shape):
     inside another is a hole in it; a terminal of two points is a line.
     """
 
+    outline_moves: ClassVar[bool] = False
+
     shape: Literal["drawing"] = "drawing"
     file: str | None = Field(default=None, description="GDSII, OASIS or DXF, relative to this file")
     cell: str | None = Field(
@@ -61,6 +63,10 @@ class Drawing(Shape):
     def _can_be_meshed(self) -> Self:
         self.layout()
         return self
+
+    def __hash__(self) -> int:
+        parts = (*self.layers.items(), *self.terminals.items())
+        return hash((parts, self.tip_um, self.tolerance_um, self.thickness_um))
 
     def dimensions(self) -> dict[str, float]:
         """Return the thickness: the outline is as it is drawn."""

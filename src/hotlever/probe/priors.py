@@ -222,6 +222,11 @@ def priors_of(stated: Mapping[str, Prior | str], probe: Probe, where: str) -> di
             continue
         value, spread, relative = _parsed(text, f"{where}: {name}")
         if name == ALL_DIMENSIONS:
+            if not probe.shape.outline_moves:
+                raise InputError(
+                    f"{where}: {name}: the outline of a drawing is taken as exact so far; expected "
+                    "thickness_um alone"
+                )
             if value is not None or not relative:
                 raise InputError(f"{where}: {name} = '{text}', expected a share such as '± 5%'")
             # those that are named have their own

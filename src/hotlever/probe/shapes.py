@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -37,6 +37,9 @@ def thickness() -> Any:
 
 class Shape(Record):
     """What a probe is made to look like (section ``[probe]`` of a probe file); lengths in µm."""
+
+    #: Whether the outline follows dimensions, which can be uncertain or varied.
+    outline_moves: ClassVar[bool] = True
 
     shape: str
     thickness_um: float
