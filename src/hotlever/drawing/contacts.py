@@ -19,7 +19,7 @@ REQUIRED = ("supply", "ground")
 _ENDS = 2.0
 
 
-def contacts(
+def terminal_edges(
     silicon: Polygon, terminals: Mapping[str, tuple[Ring, ...]], tolerance: float
 ) -> list[Terminal]:
     """Return the edges of the silicon that belong to each terminal.

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from hotlever.drawing.contacts import REQUIRED, contacts, terminal_part
+from hotlever.drawing.contacts import REQUIRED, terminal_edges, terminal_part
 from hotlever.drawing.cutting import Cut, cut, taper_of
 from hotlever.drawing.fault import DrawingError, Point, Ring
 from hotlever.drawing.healing import (
@@ -65,7 +65,7 @@ def layout_of(layers: Outlines, terminals: Outlines, tip: Point, tolerance_um: f
             shape = healed(name, areas, tolerance_um)
             _check_on_silicon(name, areas, silicon, tolerance_um)
             low_doped[name] = snapped(shape, silicon, _SNAP * tolerance_um)
-    ends = contacts(silicon, dict(terminals), tolerance_um)
+    ends = terminal_edges(silicon, dict(terminals), tolerance_um)
     whole = cut(_with_corners(silicon, ends), low_doped)
     for piece in whole.pieces:
         name = piece.kind or SILICON

@@ -11,7 +11,7 @@ import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.drawing.contacts import contacts, outline_edges, terminal_part
+from hotlever.drawing.contacts import outline_edges, terminal_edges, terminal_part
 from hotlever.drawing.cutting import Cut, cut
 from hotlever.drawing.fault import DrawingError, Point, Ring
 from hotlever.drawing.healing import healed, parts_of, polygons, snapped
@@ -140,7 +140,7 @@ class _Silicon:
     def ends_of(self, name: str, sheet: Sheet, layer: Layer) -> bool:
         """Whether a layer touches the outline along an edge."""
         try:
-            return bool(contacts(self.shape, {name: _terminal(sheet, layer)}, self.tolerance))
+            return bool(terminal_edges(self.shape, {name: _terminal(sheet, layer)}, self.tolerance))
         except DrawingError:
             return False
 
@@ -239,7 +239,7 @@ def _named(
     }
     whole = cut(best.shape, low)
     at: dict[str, set[int]] = {}
-    for end in contacts(best.shape, rings, best.tolerance):
+    for end in terminal_edges(best.shape, rings, best.tolerance):
         middle = shapely.Point(np.mean([end.start, end.end], axis=0))
         away = [piece.shape.distance(middle) for piece in whole.pieces]
         at.setdefault(end.name, set()).add(int(np.argmin(away)))
