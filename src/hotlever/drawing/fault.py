@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from hotlever.errors import InputError
 
 Point = tuple[float, float]
-#: A polygon, or a line of two points.
+# A polygon, or a line of two points.
 Ring = tuple[Point, ...]
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import shapely
-from scipy.spatial import cKDTree
+from scipy import spatial
 from shapely import LineString
 
 from hotlever.drawing.fault import Point, Ring
@@ -196,7 +196,7 @@ def _joined(lines: tuple[Ring, ...], tolerance: float) -> tuple[tuple[Ring, ...]
         return (), ()
     places = np.array([place for line in lines for place in (line[0], line[-1])])
     # each end goes to the first of those near it
-    near = cKDTree(places).query_ball_point(places, tolerance)
+    near = spatial.cKDTree(places).query_ball_point(places, tolerance)
     ends = iter([tuple(places[min(some)].tolist()) for some in near])
     met = [(next(ends), *line[1:-1], next(ends)) for line in lines]
     some = [LineString(line) for line in met if len(set(line)) > 1]
