@@ -16,6 +16,7 @@ from typing import Any
 
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.probe import Probe, ProbeMesh
+from hotlever.probe.layout import BorderTaper
 from hotlever.spieser2017 import RAMP
 
 BIAS = RAMP
@@ -32,7 +33,9 @@ def peer_problem(
     regions: dict[str, dict[str, Any]] = {}
     for index, region in enumerate(layout.regions):
         regions[str(index)] = {"name": region.name, "doping": "high"}
-        if region.taper is not None:
+        if isinstance(region.taper, BorderTaper):
+            regions[str(index)] |= {"doping": "bordered", "borders_um": region.taper.borders}
+        elif region.taper is not None:
             regions[str(index)] |= {
                 "doping": "tapered",
                 "centre_um": region.taper.centre,

@@ -22,7 +22,7 @@ MODULES = sorted(
 )
 #: From the ground up: a layer imports none of those behind it.
 LAYERS = (
-    ("materials", "probe"),
+    ("materials", "probe", "drawing"),
     ("air",),
     ("lever",),
     ("lever3d", "raman", "fitting"),

@@ -34,6 +34,7 @@ import dataclasses
 import json
 import sys
 import time
+from itertools import pairwise
 
 import dolfin as df
 import numpy as np
@@ -111,6 +112,23 @@ def tapered_doping(distance, length, material):
     return material["n_d"] + (material["n_hd"] - material["n_d"]) * (1.0 + edges)
 
 
+def bordered_doping(position, borders, material):
+    """Return the same for a region of any outline, from its distances to lines of points [um]."""
+    share = 0.0
+    for border in borders:
+        squares = []
+        for start, end in pairwise(border):
+            a, along = df.Constant(start), df.Constant([end[0] - start[0], end[1] - start[1]])
+            where = df.dot(position - a, along) / df.dot(along, along)
+            away = position - a - ufl.max_value(0.0, ufl.min_value(1.0, where)) * along
+            squares.append(df.dot(away, away))
+        nearest = squares[0]
+        for square in squares[1:]:
+            nearest = ufl.min_value(nearest, square)
+        share += (1.0 - ufl.erf(ufl.sqrt(nearest) / material["delta"])) / 2.0
+    return material["n_d"] + (material["n_hd"] - material["n_d"]) * ufl.min_value(share, 1.0)
+
+
 def low_doped_conductivity(temperature, doping, material):
     """Return sigma_ld [mA/(V um)], Eqs. 5-10, for a doping [cm^-3]."""
     relative = temperature / REFERENCE_TEMPERATURE_K
@@ -186,7 +204,7 @@ def coupled_forms(space, state, cells, tapered, material, thickness, quadrature_
 
     The laws of each material are integrated over their own cells only.  `tapered` lists the
     centre, axis and length of the tapered regions as dolfin constants, so that the compiled code
-    serves every probe with the same number of them.
+    serves every probe with the same number of them; or, for a region of any outline, its borders.
     """
     temperature, voltage = df.split(state)
     temperature_test, voltage_test = df.TestFunctions(space)
@@ -210,8 +228,12 @@ def coupled_forms(space, state, cells, tapered, material, thickness, quadrature_
         return thickness * integrand * dx(tag)
 
     residual = balance(high_doped_conductivity(temperature, material), HIGH_DOPED)
-    for tag, (centre, axis, length) in enumerate(tapered, start=1):
-        doping = tapered_doping(df.dot(position - centre, axis), length, material)
+    for tag, taper in enumerate(tapered, start=1):
+        if isinstance(taper, dict):
+            doping = bordered_doping(position, taper["borders_um"], material)
+        else:
+            centre, axis, length = taper
+            doping = tapered_doping(df.dot(position - centre, axis), length, material)
         residual += balance(low_doped_conductivity(temperature, doping, material), tag)
     return residual, df.derivative(residual, state)
 
@@ -257,7 +279,7 @@ class Lever:
         """Build mesh, space, forms and linear solver from the problem dictionary."""
         mesh = dolfin_mesh(problem["points_um"], problem["triangles"])
         regions = problem["regions"]
-        tapered = [name for name, region in regions.items() if region["doping"] == "tapered"]
+        tapered = [name for name, region in regions.items() if region["doping"] != "high"]
         cells = cell_markers(mesh, problem["region"], regions, tapered)
         edges = edge_markers(mesh, problem["terminals"])
         element = df.VectorElement("P", mesh.ufl_cell(), problem["degree"], dim=2)
@@ -270,7 +292,9 @@ class Lever:
             self.state,
             cells,
             [
-                [df.Constant(regions[name][key]) for key in ("centre_um", "axis", "length_um")]
+                regions[name]
+                if regions[name]["doping"] == "bordered"
+                else [df.Constant(regions[name][key]) for key in ("centre_um", "axis", "length_um")]
                 for name in tapered
             ],
             self.material,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Sequence
@@ -12,6 +13,8 @@ from hotlever.materials.material import Parameter
 INVERSION = "inversion_temperature"
 #: Numbers between these are written without a power of ten.
 _PLAIN = 1e-4, 1e6
+#: Characters beyond which a list takes several lines.
+_LONG = 100
 #: Units by the endings of names in probe files.
 _UNITS = {"um": "µm", "ohm": "Ω", "K": "K", "deg": "°"}
 
@@ -120,3 +123,19 @@ def aligned(rows: Sequence[Sequence[str]], right: bool = False) -> list[str]:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     adjust = str.rjust if right else str.ljust
     return ["  ".join(map(adjust, row, widths)).rstrip() for row in rows]
+
+
+def as_toml(value: object) -> str:
+    """Return a text, a truth, a number or a list as TOML writes it; long lists on several lines.
+
+    Examples
+    --------
+    >>> as_toml("1/0"), as_toml(((0.0, -1.5), (0.0, 1.5))), as_toml(True)
+    ('"1/0"', '[[0.0, -1.5], [0.0, 1.5]]', 'true')
+    """
+    # JSON writes all of these as TOML does
+    text = json.dumps(value, ensure_ascii=False)
+    if len(text) <= _LONG or not isinstance(value, list | tuple):
+        return text
+    inner = ",\n".join(as_toml(one) for one in value)
+    return f"[\n{inner},\n]"

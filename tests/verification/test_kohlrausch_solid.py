@@ -23,7 +23,7 @@ def highest(voltage, refinement):
     layout = Layout((Region("all", "heater", OUTLINE),), (SUPPLY, GROUND), (0.5, 0.5), 0.3)
     # there is no air, so nothing asks for small edges along the rim
     sizes = SolidMeshOptions(
-        heater=0.2, lever=0.2, corner=0.05, rim=100.0, grading=0.4, refinement=refinement
+        heater=0.4, lever=0.2, corner=0.1, rim=100.0, grading=0.4, refinement=refinement
     )
     mesh = mesh_solid(layout, sizes)
     space = FullSpace(mesh, FiniteElements(mesh.elements, ElementTetP2(), 4))

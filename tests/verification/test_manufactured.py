@@ -48,12 +48,10 @@ class Exact:
         T, grad_T, lap_T = self.temperature(x, y)
         _, grad_V, lap_V = self.potential(x, y)
         kappa, kappa_by = thermal_conductivity(T, MATERIAL.c_kappa)
-        n, n_by = tapered_doping(
-            x - 1.0, MATERIAL.n_d, MATERIAL.delta, length=LENGTH, n_hd=MATERIAL.n_hd
-        )
+        n, n_by = tapered_doping([2.0 - x, x], MATERIAL.n_d, MATERIAL.delta, n_hd=MATERIAL.n_hd)
         sigma, sigma_by = conductivity_low_doped(T, n, MATERIAL.p)
         grad_sigma = sigma_by["T"] * grad_T
-        grad_sigma[0] += sigma_by["n"] * n_by["x"]
+        grad_sigma[0] += sigma_by["n"] * (n_by["distances"][1] - n_by["distances"][0])
         heat = (
             -kappa_by["T"] * (grad_T**2).sum(axis=0)
             - kappa * lap_T

@@ -137,7 +137,7 @@ class _Sizes:
         fine = 1.0 / options.refinement
         self._growth = fine * _GROWTH
         self._edge = fine * options.edge * layout.thickness_um
-        self._narrow = fine * options.heater * float(layout.heater.sides.min())
+        self._narrow = fine * options.heater * layout.heater.narrow_um
         self._largest = fine * _LARGEST * float(np.ptp(layout.box, axis=0).max())
 
     def breaks(self, low: float, high: float, axis: int, edges: Sequence[bool]) -> Array:
@@ -183,7 +183,7 @@ def _rectangle(region: Region) -> Array:
     if len(outline) != 4 or not at_corner:
         raise InputError(
             f"air: region '{region.name}' has {len(outline)} corners, expected a rectangle "
-            "parallel to the axes"
+            "parallel to the axes; a drawn lever can be simulated in vacuum only so far"
         )
     return box
 

@@ -125,6 +125,8 @@ def _by_estimate(
     else:
         k = own.knee.power_mW / threshold.power_mW
         k_stderr = k * knee.power_mW_stderr / knee.power_mW
+    if not found.probe.shape.outline_moves:
+        notes = [*notes, "the outline is taken to be as drawn: no error of it is in the result"]
     law, residual = _law_of(vacuum, None if threshold is None else threshold.power_mW)
     circuit = found.probe.circuit
     shown = circuit.power(measured.bias_V, measured.current_mA)

@@ -1,18 +1,26 @@
-"""``hotlever probe``: write, describe and draw probes."""
+"""``hotlever probe``: write, describe and draw probes, and make them of drawings."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import typer
-from typer import Option
+from typer import Argument, Option
 
 from hotlever.cli.application import Commands, app
 from hotlever.cli.options import File, PlotFile, ProbeFile, check_plot, load_probe
-from hotlever.cli.output import give
-from hotlever.errors import unknown_name
+from hotlever.cli.output import give, note
+from hotlever.errors import InputError, unknown_name
 from hotlever.files import Outputs
 
+if TYPE_CHECKING:
+    from hotlever.probe import Layout, Probe
+
 probe_app = typer.Typer(
-    cls=Commands, help="Write, describe and draw probes.", rich_markup_mode=None
+    cls=Commands, help="Write, describe, draw and import probes.", rich_markup_mode=None
 )
 app.add_typer(probe_app, name="probe")
 
@@ -40,25 +48,94 @@ def new(
 @probe_app.command()
 def show(probe_file: ProbeFile = None, plot: PlotFile = None) -> None:
     """Draw and describe a probe."""
+    outputs = Outputs(probe_file)
+    check_plot(outputs, plot)
+    with _fault_drawn(outputs, plot):
+        probe = load_probe(probe_file)
+    name = "reference probe" if probe_file is None else probe_file.name
+    layout = probe.layout()
+    lines = _described(probe, layout, name)
+    if plot is not None:
+        from hotlever import figures
+
+        with outputs.together():
+            figures.save_figure(figures.probe_drawing(layout, name), plot)
+    give("\n".join([*lines, ""]))
+
+
+@probe_app.command("import")
+def import_command(
+    drawing: Path = Argument(metavar="DRAWING", help="GDSII, OASIS or DXF file."),
+    output: File = Option(
+        None, "-o", "--output", help="Probe file to write; standard output if left out."
+    ),
+    cell: str | None = Option(None, help="Of GDSII or OASIS; the top cell if left out."),
+    plot: PlotFile = None,
+) -> None:
+    """Say what a drawing holds, and propose a probe file for it."""
+    from hotlever.drawing.fault import DrawingError
+    from hotlever.drawing.importing import import_drawing
+    from hotlever.files import write_text
+
+    outputs = Outputs(drawing)
+    outputs.file(output, ".toml")
+    check_plot(outputs, plot)
+    found = import_drawing(drawing, cell, Path() if output is None else output.parent)
+    fault = found.fault
+    with outputs.together():
+        if output is not None:
+            write_text(output, found.text)
+        if plot is not None:
+            from hotlever import figures
+
+            place = fault.place if isinstance(fault, DrawingError) else None
+            title, wrong = drawing.name, "" if place is None else str(fault)
+            tip = found.proposal.tip
+            made = figures.outlines_drawing(
+                found.outlines, title, tip=tip, fault=wrong, place=place
+            )
+            figures.save_figure(made, plot)
+    give(found.text if output is None else "\n".join([*found.listing, ""]))
+    if fault is not None:
+        note(f"the probe file needs an edit before it can be solved: {fault}")
+
+
+@contextmanager
+def _fault_drawn(outputs: Outputs, plot: Path | None) -> Iterator[None]:
+    """Draw what is wrong with a drawing, with its place marked, before the error goes on."""
+    try:
+        yield
+    except InputError as error:
+        from hotlever.drawing.fault import DrawingError
+
+        if plot is not None and isinstance(error, DrawingError):
+            from hotlever import figures
+
+            made = figures.outlines_drawing(error.outlines, fault=str(error), place=error.place)
+            with outputs.together():
+                figures.save_figure(made, plot)
+        raise
+
+
+def _described(probe: Probe, layout: Layout, name: str) -> list[str]:
     from hotlever.materials.silicon import inversion_temperature
     from hotlever.probe import mesh_layout
 
-    outputs = Outputs(probe_file)
-    check_plot(outputs, plot)
-    probe = load_probe(probe_file)
-    layout = probe.layout()
-    name = "reference probe" if probe_file is None else probe_file.name
     circuit, material = probe.circuit, probe.material
     x, y = layout.tip
+    given = {key: getattr(probe.shape, key) for key in probe.shape.description()}
     dimensions = [
-        f"  {key:<22} {getattr(probe.shape, key):>8g}  {text}"
+        f"  {key:<22} {given[key]:>8{'g' if isinstance(given[key], float) else ''}}  {text}"
         for key, text in probe.shape.description().items()
-        if getattr(probe.shape, key) is not None
+        if isinstance(given[key], float | str)
     ]
-    lines = [
+    if probe.shape.shape == "drawing":
+        dimensions += [f"  {text}" for text in _regions(layout)]
+    terminals = dict.fromkeys(terminal.name for terminal in layout.terminals)
+    return [
         f"{name}: {probe.shape.shape}, {layout.thickness_um:g} µm thick",
         *dimensions,
-        f"  tip at ({x:g}, {y:g}) µm; terminals {', '.join(t.name for t in layout.terminals)}",
+        f"  tip at ({x:g}, {y:g}) µm; terminals {', '.join(terminals)}",
         f"circuit: series resistance {circuit.series_resistance_ohm:g} ohm, "
         f"base temperature {circuit.base_temperature_K:g} K",
         "material: " + ", ".join(f"{key} {value:g}" for key, value in material),
@@ -66,9 +143,19 @@ def show(probe_file: ProbeFile = None, plot: PlotFile = None) -> None:
         f"{inversion_temperature(material.n_d, material.p):.1f} K",
         f"mesh: {mesh_layout(layout).elements.nelements} triangles",
     ]
-    if plot is not None:
-        from hotlever import figures
 
-        with outputs.together():
-            figures.save_figure(figures.probe_drawing(layout, name), plot)
-    give("\n".join([*lines, ""]))
+
+def _regions(layout: Layout) -> list[str]:
+    """Return what the regions of a drawing are."""
+    from hotlever.probe.layout import Taper
+
+    lines = []
+    for region in layout.regions:
+        kind = "high-doped"
+        if isinstance(region.taper, Taper):
+            kind = f"low-doped strip, {region.taper.length_um:.4g} µm from border to border"
+        elif region.taper is not None:
+            borders = len(region.taper.borders)
+            kind = f"low-doped, doping by the distance to {borders} border{'s' * (borders > 1)}"
+        lines.append(f"{region.name}: {region.part}, {region.area:.4g} µm², {kind}")
+    return lines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Polygon
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
 from matplotlib.tri import Triangulation
 
 from hotlever.calibration.power_law import EQ12, PowerLaw
@@ -25,7 +27,7 @@ from hotlever.figures.style import (
     VERMILION,
     figure,
 )
-from hotlever.probe import Layout
+from hotlever.probe import Layout, Region
 from hotlever.spieser2017 import BASE_TEMPERATURE_K, POWER_LAW_SPREAD_K
 
 if TYPE_CHECKING:
@@ -39,6 +41,12 @@ def _marker(sweep: xr.Dataset, marker: str = "o") -> str:
     return marker if sweep.sizes["bias"] <= 40 else ""
 
 
+def _patch(region: Region, **style: Any) -> PathPatch:
+    """Return a region as it is drawn, its holes left out."""
+    rings = [Path([*ring, ring[0]], closed=True) for ring in region.rings]
+    return PathPatch(Path.make_compound_path(*rings), **style)
+
+
 def probe_drawing(layout: Layout, title: str = "") -> Figure:
     """Draw a probe from above, with heater, reader, terminals and tip marked."""
     low_doped = {"heater": (VERMILION, "heater (low-doped)"), "reader": (SKY, "reader (low-doped)")}
@@ -48,20 +56,39 @@ def probe_drawing(layout: Layout, title: str = "") -> Figure:
             colour, label = "0.82", "high-doped silicon"
             if region.taper is not None:
                 colour, label = low_doped["heater" if region.part == "heater" else "reader"]
-            axes.add_patch(Polygon(region.outline, facecolor=colour, edgecolor="0.55", lw=0.6))
+            axes.add_patch(_patch(region, facecolor=colour, edgecolor="0.55", lw=0.6))
             handles.setdefault(label, Patch(facecolor=colour, edgecolor="0.55", label=label))
-        for terminal in layout.terminals:
-            (x0, y0), (x1, y1) = terminal.start, terminal.end
-            axes.plot([x0, x1], [y0, y1], color=BLUE, lw=4, solid_capstyle="butt")
-            middle = ((x0 + x1) / 2, (y0 + y1) / 2)
-            beside: Any = {"xytext": (-8, 0), "textcoords": "offset points"}
-            axes.annotate(terminal.name, middle, ha="right", va="center", color=BLUE, **beside)
+        middle, labelled = layout.box.mean(axis=0), set[tuple[int, bool]]()
+        for name, edges in groupby(layout.terminals, lambda terminal: terminal.name):
+            ends = np.array([(edge.start, edge.end) for edge in edges])
+            axes.plot(*ends.T, color=BLUE, lw=4, solid_capstyle="butt")
+            at = ends.mean(axis=(0, 1))
+            # away from the middle of the lever, along the nearer axis
+            along = int(np.argmax(np.abs(at - middle) / np.ptp(layout.box, axis=0)))
+            low = bool(at[along] < middle[along])
+            labelled.add((along, low))
+            shift = [0, 0]
+            shift[along] = -8 if low else 8
+            beside: Any = {"xytext": shift, "textcoords": "offset points", "color": BLUE}
+            if along == 0:
+                beside |= {"ha": "right" if low else "left", "va": "center"}
+            else:
+                beside |= {"ha": "center", "va": "top" if low else "bottom"}
+            axes.annotate(name, at, **beside)
         handles["terminal"] = Line2D([], [], color=BLUE, lw=4, label="terminal (base temperature)")
         (tip,) = axes.plot(*layout.tip, marker="^", color=BLACK, ls="none", label="tip")
         handles["tip"] = tip
-        (left, low), (right, high) = layout.box
-        margin = 0.04 * (right - left)
-        axes.set(xlim=(left - 5 * margin, right + margin), ylim=(low - margin, high + margin))
+        (left, bottom), (right, high) = layout.box
+        margin = 0.04 * max(right - left, high - bottom)
+        wider = {True: 5, False: 1}
+        axes.set_xlim(
+            left - wider[(0, True) in labelled] * margin,
+            right + wider[(0, False) in labelled] * margin,
+        )
+        axes.set_ylim(
+            bottom - wider[(1, True) in labelled] * margin,
+            high + wider[(1, False) in labelled] * margin,
+        )
         axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)", title=title)
         made.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
     return made
@@ -70,7 +97,7 @@ def probe_drawing(layout: Layout, title: str = "") -> Figure:
 def outlines(axes: Axes, layout: Layout) -> None:
     """Draw the regions and the tip of a lever over a map of it."""
     for region in layout.regions:
-        axes.add_patch(Polygon(region.outline, fill=False, edgecolor="0.45", lw=0.4))
+        axes.add_patch(_patch(region, fill=False, edgecolor="0.45", lw=0.4))
     axes.plot(*layout.tip, marker="^", mfc="white", mec="black", ms=4)
     axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)")
     axes.grid(False)

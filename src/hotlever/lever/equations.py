@@ -101,12 +101,11 @@ class LeverEquations:
         self.base_temperature_K = base_temperature_K
         self._sheet = PER_CM_TO_MILLI_PER_UM * space.thickness_um
         self._latest: tuple[Array, tuple[Fields, Conductivities]] | None = None
-        along, length_um = space.tapered.along, space.tapered.length_um
         self._doping, by = tapered_doping(
-            along, material.n_d, material.delta, length=length_um, n_hd=material.n_hd
+            space.tapered.distances, material.n_d, material.delta, n_hd=material.n_hd
         )
         self._doping_by = {"n_d": by["n_d"], "delta": by["delta"]} | {
-            name: by["x"] * motion.along + by["length"] * motion.length_um
+            name: (by["distances"] * motion.distances).sum(axis=0)
             for name, motion in self.motions.items()
         }
         self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]

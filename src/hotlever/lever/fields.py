@@ -149,6 +149,11 @@ def heater_profile(state: State, count: int = 161) -> xr.Dataset:
         On the coordinate ``position`` (µm from the heater's centre): ``temperature`` (K),
         ``doping`` (cm⁻³), ``inversion_temperature`` (K; NaN where the doping is too high for
         one below 1700 K), ``resistivity`` (Ω cm), and ``resistivity_slope`` (dρ/dT, Ω cm/K).
+
+    Raises
+    ------
+    InputError
+        If the heater is no strip between two parallel straight borders.
     """
     lever = state.lever
     taper, material = lever.space.mesh.layout.heater_taper, lever.probe.material
@@ -156,9 +161,7 @@ def heater_profile(state: State, count: int = 161) -> xr.Dataset:
     position = np.linspace(-0.5, 0.5, count) * taper.length_um * (1 - 1e-9)
     points = np.reshape(taper.centre, (2, 1)) + np.outer(taper.axis, position)
     T = lever.space.elements.basis.probes(points) @ state.nodal[0]
-    n, _ = tapered_doping(
-        position, material.n_d, material.delta, length=taper.length_um, n_hd=material.n_hd
-    )
+    n, _ = tapered_doping(taper.distances(points), material.n_d, material.delta, n_hd=material.n_hd)
     sigma, sigma_by = conductivity_low_doped(T, n, material.p, material.impurity_exponent)
     columns = {
         "temperature": T,

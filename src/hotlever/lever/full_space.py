@@ -6,7 +6,6 @@ temperature or at ground; the nodes of the supply contact share one unknown, the
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from copy import copy
 from typing import Any, get_args
 
@@ -17,7 +16,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from hotlever.air.operator import AirOperator
 from hotlever.lever.air_loss import AirLoss, AirSolver
 from hotlever.lever.elements import FiniteElements, sums_by_index
-from hotlever.lever.space import LinearMap, Pin, Space, Tangent, Tapered
+from hotlever.lever.space import FAR, LinearMap, Pin, Space, Tangent, Tapered
 from hotlever.probe.layout import Layout, Part
 from hotlever.probe.mesh import ProbeMesh
 from hotlever.probe.solid import SolidMesh
@@ -114,13 +113,18 @@ class FullSpace(Space):
 
     def _tapered_points(self, region: Index) -> Tapered:
         """Find the points in low-doped regions, by the region of each point."""
-        regions = self.mesh.layout.regions
-        points = np.flatnonzero(np.array([one.taper is not None for one in regions])[region])
-        tapers: list[Any] = [regions[index].taper for index in region[points]]
-        offset = self.elements.positions[:2, points].T - _rows(one.centre for one in tapers)
-        along = (offset * _rows(one.axis for one in tapers)).sum(axis=1)
-        lengths = np.array([one.length_um for one in tapers])
-        return Tapered(points, along[:, None], lengths[:, None])
+        tapers = [one.taper for one in self.mesh.layout.regions]
+        points = np.flatnonzero(np.array([one is not None for one in tapers])[region])
+        known = {
+            number: taper.distances(self.elements.positions[:2, points[region[points] == number]])
+            for number, taper in enumerate(tapers)
+            if taper is not None
+        }
+        most = max(map(len, known.values()), default=0)
+        distances = np.full((most, points.size, 1), FAR)
+        for number, found in known.items():
+            distances[: len(found), region[points] == number, 0] = found
+        return Tapered(points, distances)
 
     def nodal(self, x: Array, base_temperature_K: float) -> tuple[Array, Array]:
         """Return temperature (K) and potential (V) of a state at all nodes, each (nodes,)."""
@@ -263,10 +267,6 @@ def thickness_at(layout: Layout, positions: Array) -> float | Array:
         return float(layout.thickness_um)
     distance = np.linalg.norm(positions - np.reshape(layout.tip, (2, 1)), axis=0)
     return np.asarray(layout.thickness_um + layout.cone.thickening_um(distance))[:, None]
-
-
-def _rows(points: Iterable[tuple[float, float]]) -> Array:
-    return np.array(list(points), dtype=float).reshape(-1, 2)
 
 
 def _fill_reducing_order(dofs: Index, size: int) -> Index:

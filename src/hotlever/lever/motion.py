@@ -8,12 +8,12 @@ the point grows with the element. That is all that the equations need for exact 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from hotlever.lever.full_space import FullSpace, thickness_at
 from hotlever.lever.space import Fields, Fluxes
+from hotlever.probe.layout import Taper
 from hotlever.probe.moving import LayoutRate, Movement
 from hotlever.types import Array
 
@@ -31,16 +31,15 @@ class Motion:
         Derivative of the velocity's component i (first axis) along j.
     swelling : ndarray, shape (points, 1)
         Of the weights and of the thickness, relative.
-    along, length_um : ndarray, shape (k, 1)
-        Of what `hotlever.lever.space.Tapered` holds.
+    distances : ndarray, shape (borders, k, 1)
+        Of those that `hotlever.lever.space.Tapered` holds.
     tip : ndarray, shape (nodes,)
         Of the weights that give the rise of the tip temperature.
     """
 
     strain: Array
     swelling: Array
-    along: Array
-    length_um: Array
+    distances: Array
     tip: Array
 
     def strained(self, gradient: Array) -> Array:
@@ -97,20 +96,22 @@ def motion_of(space: FullSpace, movement: Movement) -> Motion:
     return Motion(
         strain,
         np.asarray(strain[0, 0] + strain[1, 1])[:, None] + thicker,
-        *_tapers(space, rate, velocity),
+        _from_borders(space, rate, velocity),
         tip=(rate.tip - at_tip) @ slopes[:, 0],
     )
 
 
-def _tapers(space: FullSpace, rate: LayoutRate, velocity: Array) -> tuple[Array, Array]:
-    """Return how the places along the current and the lengths of tapered regions change."""
-    points = space.tapered.points
-    region = np.repeat(space.mesh.region, space.elements.per_element)[points]
-    pairs: list[Any] = [
-        (rate.now.regions[one].taper, rate.later.regions[one].taper) for one in region
-    ]
-    centres = np.array([rate.of_point(now.centre, later.centre) for now, later in pairs])
-    axes = np.array([now.axis for now, _ in pairs])
-    lengths = np.array([(later.length_um - now.length_um) / rate.step for now, later in pairs])
-    along = ((velocity[:, points].T - centres) * axes).sum(axis=1)
-    return along[:, None], lengths[:, None]
+def _from_borders(space: FullSpace, rate: LayoutRate, velocity: Array) -> Array:
+    """Return how the distances of tapered points from the borders of their regions change."""
+    changes = np.zeros_like(space.tapered.distances)
+    region = np.repeat(space.mesh.region, space.elements.per_element)[space.tapered.points]
+    moved = velocity[:, space.tapered.points]
+    for number, (now, later) in enumerate(zip(rate.now.regions, rate.later.regions, strict=True)):
+        before, after, here = now.taper, later.taper, region == number
+        # borders of any other shape belong to drawings, whose outlines do not move
+        if isinstance(before, Taper) and isinstance(after, Taper):
+            centre = rate.of_point(before.centre, after.centre)
+            along = np.tensordot(before.axis, moved[:, here] - centre[:, None], axes=1)
+            longer = (after.length_um - before.length_um) / rate.step
+            changes[:2, here, 0] = longer / 2 - along, longer / 2 + along
+    return changes

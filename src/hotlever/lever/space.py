@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 
 from hotlever.types import Array, Index
 
+#: As good as infinitely far from a border (µm).
+FAR = 1e6
+
 
 class Factors(Protocol):
     """Factorised Jacobians of some states, the last row being that of the pin."""
@@ -72,21 +75,19 @@ class Tapered:
     Attributes
     ----------
     points : ndarray of int, shape (k,)
-    along : ndarray, shape (k, 1)
-        Position along the current from the centre of each one's region (µm).
-    length_um : ndarray, shape (k, 1)
-        Of its region.
+    distances : ndarray, shape (borders, k, 1)
+        From the borders of each one's region with high-doped silicon (µm); `FAR` where it has
+        fewer than others.
     """
 
     points: Index
-    along: Array
-    length_um: Any
+    distances: Array
 
     def among(self, points: Index) -> Tapered:
         """Return those among some of the quadrature points, by their number there."""
         kept = np.isin(self.points, points)
         place = np.searchsorted(points, self.points[kept])
-        return Tapered(place, self.along[kept], self.length_um[kept])
+        return Tapered(place, self.distances[:, kept])
 
 
 @dataclass(frozen=True)

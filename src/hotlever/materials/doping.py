@@ -1,4 +1,4 @@
-"""The doping profile along a heater that borders high-doped silicon, and what makes it.
+"""The doping profile of a heater that borders high-doped silicon, and what makes it.
 
 The dopant diffuses into the heater while the high-doped silicon is annealed.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import erf
+from scipy.special import erfc
 
 from hotlever.errors import InputError
 from hotlever.materials.laws import Evaluated, law
@@ -17,42 +17,45 @@ from hotlever.types import Array
 _FACTOR, _ACTIVATION = 10.5, 85000.0 / 1.98720
 
 
-def tapered_doping(
-    x: ArrayLike, n_d: float, delta: float, *, length: float, n_hd: float
-) -> Evaluated:
-    """Doping concentration (cm⁻³, from `n_d` to `n_hd`) after diffusion from both ends of a heater.
+def tapered_doping(distances: ArrayLike, n_d: float, delta: float, *, n_hd: float) -> Evaluated:
+    """Doping concentration (cm⁻³, from `n_d` to `n_hd`) after diffusion from a heater's borders.
 
-    The paper's unnumbered equation between Eqs. 4 and 5: the step profile of a heater of
-    `length` between high-doped neighbours, smoothed by 1-D diffusion over the length Δ. The
-    partial derivatives are by ``x``, ``n_d``, ``delta`` and ``length``.
+    Every border with high-doped silicon adds its share ½ erfc(d/Δ) at the distance d. Between two
+    parallel borders, at d = l_h/2 − x and l_h/2 + x, this is the paper's unnumbered equation
+    between Eqs. 4 and 5: a step profile smoothed by 1-D diffusion over the length Δ. The partial
+    derivatives are by ``n_d``, ``delta`` and, for each border, ``distances``.
 
     Parameters
     ----------
-    x : array_like
-        Position along the heater axis from the heater's centre (µm).
+    distances : array_like, shape (borders, ...)
+        From each border into the heater (µm); negative beyond it.
     n_d, n_hd : float
         Doping concentration of the undiffused heater and of the high-doped silicon (cm⁻³).
     delta : float
         Diffusion length Δ = 2 √(D t_a) (µm).
-    length : float
-        Geometrical heater length l_h (µm).
+
+    Notes
+    -----
+    Where more than two borders are near, their shares may add up to more than all: there the
+    doping is `n_hd`.
 
     Examples
     --------
-    >>> n, _ = tapered_doping([0.0, 2.0], 5e17, 0.65, length=4.0, n_hd=2.2e20)
+    In the middle and at an end of a heater of 4 µm:
+
+    >>> n, _ = tapered_doping([[2.0, 0.0], [2.0, 4.0]], 5e17, 0.65, n_hd=2.2e20)
     >>> [f"{value:.3g}" for value in n]
     ['5.03e+17', '1.1e+20']
     """
-    x = np.asarray(x, dtype=float)
-    right, left = (x - length / 2) / delta, (-x - length / 2) / delta
-    high_share = 1.0 + 0.5 * (erf(right) + erf(left))
-    bell_right, bell_left = np.exp(-(right**2)), np.exp(-(left**2))
-    per_unit = (n_hd - n_d) / np.sqrt(np.pi)
-    return n_d + (n_hd - n_d) * high_share, {
-        "n_d": 1.0 - high_share,
-        "delta": -per_unit * (bell_right * right + bell_left * left) / delta,
-        "x": per_unit * (bell_right - bell_left) / delta,
-        "length": -0.5 * per_unit * (bell_right + bell_left) / delta,
+    ratio = np.asarray(distances, dtype=float) / delta
+    share = 0.5 * erfc(ratio).sum(axis=0)
+    full = share >= 1.0
+    bell = np.where(full, 0.0, (n_hd - n_d) / (np.sqrt(np.pi) * delta) * np.exp(-(ratio**2)))
+    share = np.minimum(share, 1.0)
+    return n_d + (n_hd - n_d) * share, {
+        "n_d": 1.0 - share,
+        "delta": (bell * ratio).sum(axis=0),
+        "distances": -bell,
     }
 
 

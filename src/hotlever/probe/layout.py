@@ -1,6 +1,6 @@
 """A probe's layout: named regions, terminals and the tip, all in the plane of the lever.
 
-A parametric shape (`hotlever.probe.shapes`) or any other source makes a `Layout`; meshing,
+A parametric shape (`hotlever.probe.shapes`) or a drawing makes a `Layout`; meshing,
 drawing and solving know only this. Lengths are in µm.
 """
 
@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
+from hotlever.errors import InputError
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
 
@@ -21,10 +23,14 @@ Point = tuple[float, float]
 # the reader branch, which carries no current.
 Part = Literal["heater", "leg 1", "leg 2", "reader branch"]
 
+#: Beyond a straight line by less (rad), a corner is as good as none: there slopes of the fields
+#: grow with the distance r from it as r^−0.08 at most.
+_HARDLY = 0.27
+
 
 @dataclass(frozen=True)
 class Taper:
-    """Axis along which the doping of a low-doped region is tapered.
+    """How the doping of a low-doped strip between two parallel straight borders is tapered.
 
     From its `centre` along the current, `axis` (a unit vector), over the geometrical length l_h.
     """
@@ -33,15 +39,56 @@ class Taper:
     axis: Point
     length_um: float
 
+    def distances(self, points: Array) -> Array:
+        """Return how far points (2, n) are from the lines of both borders (µm), shape (2, n)."""
+        along = np.tensordot(self.axis, points - np.reshape(self.centre, (2, 1)), axes=1)
+        return np.stack([self.length_um / 2 - along, self.length_um / 2 + along])
+
+
+@dataclass(frozen=True)
+class BorderTaper:
+    """How the doping of a low-doped region of any outline is tapered: from its borders.
+
+    Each of the `borders` with high-doped silicon is a line through its points; those that touch
+    are one.
+    """
+
+    borders: tuple[tuple[Point, ...], ...]
+
+    def distances(self, points: Array) -> Array:
+        """Return how far points (2, n) are from each border (µm), shape (borders, n)."""
+        return np.stack([_distance(points, np.array(border)) for border in self.borders])
+
 
 @dataclass(frozen=True)
 class Region:
-    """A polygon of one kind of silicon: high-doped, or low-doped with a taper."""
+    """A polygon, with holes or without, of one kind of silicon: low-doped if it has a taper.
+
+    The outline runs counter-clockwise, holes clockwise.
+    """
 
     name: str
     part: Part
     outline: tuple[Point, ...]
-    taper: Taper | None = None
+    taper: Taper | BorderTaper | None = None
+    holes: tuple[tuple[Point, ...], ...] = ()
+
+    @property
+    def rings(self) -> tuple[tuple[Point, ...], ...]:
+        """The outline and the holes."""
+        return (self.outline, *self.holes)
+
+    @property
+    def edges(self) -> Array:
+        """Both ends of every edge of outline and holes, shape (edges, 2, 2)."""
+        rings = [np.array(ring) for ring in self.rings]
+        return np.concatenate([np.stack([ring, np.roll(ring, -1, 0)], axis=1) for ring in rings])
+
+    @property
+    def area(self) -> float:
+        """µm²."""
+        outline, *holes = (_area(np.array(ring)) for ring in self.rings)
+        return outline - sum(holes)
 
     @property
     def box(self) -> Array:
@@ -51,16 +98,33 @@ class Region:
 
     @property
     def sides(self) -> Array:
-        """Extent along x and y, shape (2,)."""
-        low, high = self.box
-        return np.asarray(high - low)
+        """Short and long side of the smallest rectangle along one of its edges, shape (2,)."""
+        outline = np.array(self.outline)
+        along = np.roll(outline, -1, axis=0) - outline
+        along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        extents = np.ptp(np.stack([outline @ along.T, outline @ across.T]), axis=1)
+        return np.sort(extents[:, extents.prod(axis=0).argmin()])
+
+    @property
+    def narrow_um(self) -> float:
+        """How wide it is where it is a strip, straight or bent.
+
+        The short side of the rectangle of the same area and the same circumference.
+        """
+        short, long = self.sides.tolist()
+        if self.area > (1 - 1e-9) * short * long:
+            return short
+        half = np.linalg.norm(np.diff(self.edges, axis=1), axis=2).sum() / 2
+        return min(short, 2 * self.area / (half + math.sqrt(max(half**2 - 4 * self.area, 0.0))))
 
 
 @dataclass(frozen=True)
 class Terminal:
     """A straight edge held at the base temperature, where current may enter or leave.
 
-    The names ``supply``, ``ground`` and ``reader`` have a meaning for the circuit.
+    The names ``supply``, ``ground`` and ``reader`` have a meaning for the circuit. Edges of the
+    same name are one contact.
     """
 
     name: str
@@ -94,15 +158,24 @@ class Layout:
 
     @property
     def heater(self) -> Region:
-        """The region that heats the tip."""
+        """The region that heats the tip; where there are several, the first."""
         return next(region for region in self.regions if region.part == "heater")
 
     @property
     def heater_taper(self) -> Taper:
-        """Axis and length of the heater."""
+        """Axis and length of the heater.
+
+        Raises
+        ------
+        InputError
+            If it is no strip.
+        """
         taper = self.heater.taper
-        if taper is None:
-            raise ValueError("the heater of a layout must be low-doped, with a taper")
+        if not isinstance(taper, Taper):
+            raise InputError(
+                "the heater is no strip between two parallel straight borders, expected one: its "
+                "profile is along the strip"
+            )
         return taper
 
     @property
@@ -112,15 +185,15 @@ class Layout:
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     def reentrant_corners(self) -> list[Point]:
-        """Corners where the silicon spans more than 180°, at which fields are singular."""
-        corners = {(round(x, 6), round(y, 6)) for region in self.regions for x, y in region.outline}
-        return sorted(
-            corner
-            for corner in corners
-            if math.pi + 1e-6
-            < sum(_angle_at(corner, region.outline) for region in self.regions)
-            < 2 * math.pi - 1e-6
-        )
+        """Corners where the silicon spans more than 180°, at which fields are singular.
+
+        Corners that are hardly any, as where an arc is made of short edges, are left out.
+        """
+        rings = [ring for region in self.regions for ring in region.rings]
+        corners = np.unique(np.concatenate([np.array(ring) for ring in rings]).round(6), axis=0)
+        angle = sum(_angles_at(corners, np.array(ring)) for ring in rings)
+        found = (angle > math.pi + _HARDLY) & (angle < 2 * math.pi - 1e-6)
+        return [(float(x), float(y)) for x, y in corners[found]]
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> tuple[Point, ...]:
@@ -129,15 +202,33 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> tuple[Point, ...]:
     return ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
 
 
-def _angle_at(point: Point, outline: tuple[Point, ...]) -> float:
-    """Angle (rad) that a counter-clockwise polygon spans at `point` on its outline, else 0."""
-    for i, corner in enumerate(outline):
-        before, after = outline[i - 1], outline[(i + 1) % len(outline)]
-        if math.dist(point, corner) < 1e-6:
-            inward = math.atan2(before[1] - corner[1], before[0] - corner[0])
-            outward = math.atan2(after[1] - corner[1], after[0] - corner[0])
-            return (inward - outward) % (2 * math.pi)
-        along = math.dist(corner, point) + math.dist(point, after) - math.dist(corner, after)
-        if abs(along) < 1e-9 and math.dist(point, after) > 1e-6:
-            return math.pi
-    return 0.0
+def _area(ring: Array) -> float:
+    """Return the area that a ring of points (n, 2) encloses."""
+    (x, y), (x1, y1) = ring.T, np.roll(ring, -1, axis=0).T
+    return abs(float((x * y1 - x1 * y).sum())) / 2
+
+
+def _distance(points: Array, line: Array) -> Array:
+    """Return how far points (2, n) are from a line through some points (k, 2), shape (n,)."""
+    away = []
+    for start, end in pairwise(line):
+        along, offset = end - start, points - start[:, None]
+        share = np.clip(along @ offset / (along @ along), 0.0, 1.0)
+        away.append(np.linalg.norm(offset - along[:, None] * share, axis=0))
+    return np.asarray(np.min(away, axis=0))
+
+
+def _angles_at(points: Array, ring: Array) -> Array:
+    """Return the angles (rad) to the left of a ring at points (n, 2) on it, 0 elsewhere."""
+    after = np.roll(ring, -1, axis=0) - ring
+    before = np.roll(-after, 1, axis=0)
+    to_left = np.arctan2(before[:, 1], before[:, 0]) - np.arctan2(after[:, 1], after[:, 0])
+    offset = points[:, None] - ring
+    at_corner = np.linalg.norm(offset, axis=2) < 1e-6
+    length = np.linalg.norm(after, axis=1)
+    # as much longer as the way over the point is than the edge
+    detour = np.linalg.norm(offset, axis=2) + np.linalg.norm(offset - after, axis=2) - length
+    on_edge = (detour < 1e-9) & ~at_corner & ~np.roll(at_corner, -1, axis=1)
+    return np.asarray(
+        (at_corner * (to_left % (2 * math.pi))).sum(axis=1) + math.pi * on_edge.sum(axis=1)
+    )

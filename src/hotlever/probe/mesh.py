@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skfem import MeshTet, MeshTri
 
 from hotlever.errors import ComputationError
-from hotlever.probe.layout import Layout, Region, Terminal
+from hotlever.probe.layout import Layout, Point, Region, Terminal
 from hotlever.types import Array, Index
 
 #: How far off (µm) a point is still on a line.
@@ -95,17 +95,16 @@ def mesh_layout(layout: Layout, options: MeshOptions | None = None) -> ProbeMesh
     except RuntimeError as error:
         raise ComputationError(f"{_NOT_MESHED} ({error})") from error
     # where Netgen fails at a face it says so to the terminal only, and leaves a hole
-    outlines = [np.array(region.outline).T for region in layout.regions]
-    if not np.isclose(_area(mesh.p[:, mesh.t]), sum(map(_area, outlines)), rtol=1e-9):
+    area = sum(region.area for region in layout.regions)
+    if not np.isclose(_area(mesh.p[:, mesh.t]), area, rtol=1e-9):
         raise ComputationError(_NOT_MESHED)
     return ProbeMesh(layout, mesh, region, terminal_facets(mesh, layout))
 
 
 def _area(corners: Array) -> float:
-    """Return the area of polygons whose corners (2, k, ...) go round."""
-    x, y = corners
-    twice = (x * np.roll(y, -1, axis=0) - y * np.roll(x, -1, axis=0)).sum(axis=0)
-    return float(np.abs(twice).sum()) / 2
+    """Return the area of triangles (2, 3, n)."""
+    (ax, ay), (bx, by) = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return float(np.abs(ax * by - ay * bx).sum()) / 2
 
 
 def _netgen(layout: Layout, options: MeshOptions) -> tuple[MeshTri, Index]:
@@ -113,14 +112,14 @@ def _netgen(layout: Layout, options: MeshOptions) -> tuple[MeshTri, Index]:
     # read and drawn without it
     from netgen.occ import Glue, OCCGeometry, WorkPlane
 
-    narrow = layout.heater.sides.min() / options.refinement
+    narrow = layout.heater.narrow_um / options.refinement
     whole = max(region.sides.max() for region in layout.regions) / options.refinement
     faces = []
     for index, region in enumerate(layout.regions):
         face = face_of(region, WorkPlane())
         face.name = f"{index}"
         if region.part == "heater":
-            face.maxh = options.heater * narrow
+            face.maxh = options.heater * region.narrow_um / options.refinement
         faces.append(face)
     shape = Glue(faces)
     corners = layout.reentrant_corners()
@@ -142,11 +141,18 @@ def _netgen(layout: Layout, options: MeshOptions) -> tuple[MeshTri, Index]:
 
 
 def face_of(region: Region, plane: Any) -> Any:
-    """Draw a region's outline on one of Netgen's work planes."""
-    plane.MoveTo(*region.outline[0])
-    for point in region.outline[1:]:
-        plane.LineTo(*point)
-    return plane.Close().Face()
+    """Draw a region on one of Netgen's work planes."""
+
+    def inside(ring: tuple[Point, ...]) -> Any:
+        plane.MoveTo(*ring[0])
+        for point in ring[1:]:
+            plane.LineTo(*point)
+        return plane.Close().Face()
+
+    face = inside(region.outline)
+    for hole in region.holes:
+        face = face - inside(hole)
+    return face
 
 
 def terminal_facets(mesh: MeshTri | MeshTet, layout: Layout) -> dict[str, Index]:
@@ -159,7 +165,10 @@ def terminal_facets(mesh: MeshTri | MeshTet, layout: Layout) -> dict[str, Index]
     """
     facets = mesh.boundary_facets()
     corners = mesh.p[:2, mesh.facets[:, facets]]
-    found = {terminal.name: facets[_on(terminal, corners)] for terminal in layout.terminals}
+    found: dict[str, Index] = {}
+    for terminal in layout.terminals:
+        before = found.get(terminal.name, np.empty(0, dtype=facets.dtype))
+        found[terminal.name] = np.union1d(before, facets[_on(terminal, corners)])
     for name, here in found.items():
         if not here.size:
             kind = "edge" if mesh.dim() == 2 else "face"

@@ -8,7 +8,7 @@ and what it shows is differentiable by its dimensions.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain
 
 import numpy as np
 from scipy.sparse.linalg import splu
@@ -89,7 +89,7 @@ class LayoutRate:
         """Return the velocity of every corner of a region; where two meet, their mean."""
         found: dict[Point, list[Array]] = {}
         for now, later in zip(self.now.regions, self.later.regions, strict=True):
-            for corner, moved in zip(now.outline, later.outline, strict=True):
+            for corner, moved in zip(chain(*now.rings), chain(*later.rings), strict=True):
                 place = (round(corner[0], 9), round(corner[1], 9))
                 found.setdefault(place, []).append(self.of_point(corner, moved))
         return {place: np.mean(velocities, axis=0) for place, velocities in found.items()}
@@ -111,10 +111,9 @@ def vertex_velocity(mesh: ProbeMesh, rate: LayoutRate) -> Array:
     velocity = np.zeros(points.shape)
     held = np.zeros(points.shape[1], dtype=bool)
     for region in rate.now.regions:
-        outline = region.outline
-        for start, end in pairwise([*outline, outline[0]]):
-            along, near = _on_line(np.array(start), np.array(end), points)
-            knots, on = _on_line(np.array(start), np.array(end), places.T)
+        for start, end in region.edges:
+            along, near = _on_line(start, end, points)
+            knots, on = _on_line(start, end, places.T)
             order = np.argsort(knots[on])
             for axis in (0, 1):
                 velocity[axis, near] = np.interp(

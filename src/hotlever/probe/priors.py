@@ -257,6 +257,11 @@ def priors_of(stated: Mapping[str, Prior | str], probe: Probe, where: str) -> di
             found[name] = Prior(1.0, spread)
             continue
         if name == ALL_DIMENSIONS:
+            if not probe.shape.outline_moves:
+                raise InputError(
+                    f"{where}: {name}: the outline of a drawing is taken as exact so far; expected "
+                    "thickness_um alone"
+                )
             # those that are named have their own
             some = [one for one in nuisances(probe) if one not in stated]
         else:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,11 +18,19 @@ from hotlever.materials import Material
 from hotlever.probe.circuit import Circuit
 from hotlever.probe.layout import Layout
 from hotlever.probe.priors import PriorTexts, priors_of
-from hotlever.probe.shapes import SHAPES, Shape, ThreeLeg, UShape, shape_of
+from hotlever.probe.shapes import (
+    PARAMETRIC,
+    SHAPE_SECTIONS,
+    Shape,
+    ThreeLeg,
+    UShape,
+    shape_of,
+)
 from hotlever.probe.surroundings import Surroundings
 from hotlever.probe.tip import Tip
 from hotlever.records import Record
 from hotlever.spieser2017 import DOI, published
+from hotlever.text import as_toml
 from hotlever.types import Array
 
 #: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
@@ -37,7 +45,7 @@ _PARTS: dict[str, type[Record]] = {
     "tip": Tip,
     "prior": PriorTexts,
 }
-SECTIONS = ("probe", *_PARTS)
+SECTIONS = (*SHAPE_SECTIONS, *_PARTS)
 
 
 class Probe(Record):
@@ -65,7 +73,7 @@ class Probe(Record):
     @model_validator(mode="after")
     def _tip_stands_on_the_heater(self) -> Probe:
         if self.tip is not None:
-            room = self.shape.layout().heater.sides.min() / 2
+            room = self.shape.layout().heater.narrow_um / 2
             if not self.tip.base_radius_um < room:
                 raise ValueError(
                     f"the tip's base has a radius of {self.tip.base_radius_um:.4g} µm, expected "
@@ -125,8 +133,17 @@ class Probe(Record):
         raise InputError(f"found {type(probe).__name__}, expected a Probe or a probe file")
 
     @classmethod
-    def from_values(cls, values: dict[str, Any], where: str) -> Probe:
-        """Make a probe of the sections of a probe file; `where` names it in an error.
+    def from_values(cls, values: dict[str, Any], where: str, folder: Path | None = None) -> Probe:
+        """Make a probe of the sections of a probe file.
+
+        Parameters
+        ----------
+        values : dict
+            Sections by name.
+        where : str
+            Names the file in an error.
+        folder : path, optional
+            What the name of a drawing's file is relative to.
 
         Raises
         ------
@@ -134,13 +151,19 @@ class Probe(Record):
             Naming the section and key, what was found and what is expected.
         """
         for name, section in values.items():
+            if name == "materials":
+                raise InputError(
+                    f"{where}: [materials]: other materials than the paper's silicon cannot be "
+                    "simulated yet; expected [material]"
+                )
             if name not in SECTIONS:
                 raise unknown_name("section", name, SECTIONS, where)
             if not isinstance(section, dict):
                 raise InputError(f"{where}: [{name}] must be a section, found {quoted(section)}")
         if "probe" not in values:
             raise InputError(f"{where}: section [probe] is missing")
-        parts: dict[str, Any] = {"shape": shape_of(values["probe"], f"{where}: [probe]")}
+        drawn = {name: values[name] for name in SHAPE_SECTIONS if name in values}
+        parts: dict[str, Any] = {"shape": shape_of(drawn, where, folder)}
         usual = {"material": published("option III").material.model_dump()}
         for name, part in _PARTS.items():
             if name in values:
@@ -176,17 +199,24 @@ class Probe(Record):
             # a number of thousands of digits is a ValueError too
             reason = str(error).partition(";")[0]
             raise InputError(f"{path}: not valid TOML: {reason}") from None
-        return cls.from_values(values, str(path))
+        return cls.from_values(values, str(path), Path(path).parent)
 
     @property
-    def _sections(self) -> dict[str, Record]:
-        """The sections of its file."""
-        present = {name: getattr(self, name) for name in _PARTS if getattr(self, name)}
-        return {"probe": self.shape, **present}
+    def _records(self) -> dict[str, Record]:
+        """What it is made of, beside the shape, by the section of its file."""
+        return {name: getattr(self, name) for name in _PARTS if getattr(self, name)}
+
+    def _sections(self) -> dict[str, dict[str, Any]]:
+        """Return the sections of its file, with the keys that have no value."""
+        rest = {name: part.model_dump() for name, part in self._records.items()}
+        return self.shape.sections() | rest
 
     def values(self) -> dict[str, dict[str, Any]]:
         """Return the sections as plain values: what `from_values` takes."""
-        return {name: part.model_dump(exclude_none=True) for name, part in self._sections.items()}
+        return {
+            name: {key: value for key, value in section.items() if value is not None}
+            for name, section in self._sections().items()
+        }
 
     def field(self, name: str) -> tuple[str, str, type[Record]]:
         """Return section, key and record of a name such as ``n_d`` or ``tip.height_um``.
@@ -201,7 +231,7 @@ class Probe(Record):
         if dot and section not in records:
             raise unknown_name("section", section, SECTIONS)
         known = {part: _keys(record, part) for part, record in records.items()}
-        for part in [section] if dot else [*self._sections, *records]:
+        for part in [section] if dot else ["probe", *self._records, *records]:
             if key in known[part] or (dot and records[part] is PriorTexts):
                 return part, key, records[part]
         # a prior has the name of what it is of
@@ -219,11 +249,11 @@ class Probe(Record):
         InputError
             If a name exists in no section (the nearest one is given) or a value is impossible.
         """
-        sections = {name: part.model_dump() for name, part in self._sections.items()}
+        sections = self._sections()
         for name, value in changes.items():
             section, key, _ = self.field(name)
             sections.setdefault(section, {})[key] = value
-        shape = SHAPES.get(str(sections["probe"]["shape"]))
+        shape = PARAMETRIC.get(str(sections["probe"]["shape"]))
         if shape is not None and not isinstance(self.shape, shape):
             own = {
                 key: value for key, value in sections["probe"].items() if key in shape.model_fields
@@ -247,7 +277,8 @@ class Probe(Record):
         return self.model_copy(update=parts)
 
     def _part_with(self, name: str) -> Record:
-        return next(part for part in self._sections.values() if name in type(part).model_fields)
+        parts = (self.shape, *self._records.values())
+        return next(part for part in parts if name in type(part).model_fields)
 
     def __repr__(self) -> str:
         # the probe file without its comments
@@ -283,12 +314,21 @@ class Probe(Record):
                 "# The reference probe. No drawing of the published lever exists: these dimensions"
                 f"\n# are inferred from the operating points in doi:{DOI}."
             )
-        for name, part in self._sections.items():
-            lines += ["", f"[{name}]", *_entries(part)]
+        meaning = self.shape.description()
+        for name, section in self.shape.sections().items():
+            given = {key: value for key, value in section.items() if value is not None}
+            lines += ["", f"[{name}]", *_entries(given, meaning)]
+        return "\n".join(lines) + "\n" + self.other_sections()
+
+    def other_sections(self) -> str:
+        """Return the sections of its file beside those of its shape."""
+        lines = []
+        for name, part in self._records.items():
+            lines += ["", f"[{name}]", *_entries(part.model_dump(), part.description())]
         if self.tip is None:
             example = Tip(height_um=0.7, half_angle_deg=20, apex_radius_um=0.02)
             lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]
-            lines += ["# [tip]", *_entries(example, "# ")]
+            lines += ["# [tip]", *_entries(example.model_dump(), example.description(), "# ")]
         return "\n".join(lines) + "\n"
 
     def to_file(self, path: str | os.PathLike[str]) -> None:
@@ -298,17 +338,15 @@ class Probe(Record):
 
 def _keys(record: type[Record], section: str) -> list[str]:
     """Return the keys of a section; in ``[probe]`` those of all shapes, its own first."""
-    shapes = SHAPES.values() if section == "probe" else ()
+    shapes = PARAMETRIC.values() if section == "probe" else ()
     return [key for one in (record, *shapes) for key in one.model_fields]
 
 
-def _entries(part: Record, start: str = "") -> list[str]:
+def _entries(section: dict[str, Any], meaning: dict[str, str], start: str = "") -> list[str]:
     """Return the lines of a section, each with what its value is."""
-    meaning, lines = part.description(), []
-    for key, value in part.model_dump(exclude_none=isinstance(part, Shape)).items():
-        # JSON writes texts and truth as TOML does
-        text = json.dumps(value, ensure_ascii=False)
-        written = f"{value:.12g}" if isinstance(value, float) else text
+    lines = []
+    for key, value in section.items():
+        written = f"{value:.12g}" if isinstance(value, float) else as_toml(value)
         entry = f"# {key} =" if value is None else f"{start}{key} = {written}"
         lines.append(f"{entry:<32}# {meaning[key]}" if key in meaning else entry)
     return lines

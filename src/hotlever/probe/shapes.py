@@ -1,12 +1,16 @@
-"""Parametric probe shapes: the dimensions a designer draws with, made into a layout.
+"""Probe shapes: what a layout is made of.
 
-The base of the lever is at x = 0, the legs run along +x, and y = 0 is the line of symmetry.
+A parametric shape is made of the dimensions a designer draws with: the base of the lever is at
+x = 0, the legs run along +x, and y = 0 is the line of symmetry. The other kind of shape is a
+drawing (`hotlever.drawing.shape`).
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, Literal, Self
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -26,22 +30,43 @@ def _length(meaning: str, least: float = 0.05, most: float = 1000.0, **default: 
     return Field(ge=least, le=most, description=meaning, **default)
 
 
+def thickness() -> Any:
+    """Return the bounds of a lever's thickness (µm)."""
+    return _length("of the silicon", 0.01, 20)
+
+
 class Shape(Record):
-    """A parametric shape (section ``[probe]`` of a probe file); lengths in µm."""
+    """What a probe is made to look like (section ``[probe]`` of a probe file); lengths in µm."""
+
+    #: Whether the outline follows dimensions, which can be uncertain or varied.
+    outline_moves: ClassVar[bool] = True
 
     shape: str
+    thickness_um: float
 
+    @abstractmethod
     def dimensions(self) -> dict[str, float]:
-        """Return the dimensions (µm) that are given, by name."""
-        return self.model_dump(exclude={"shape"}, exclude_none=True)
+        """Return the dimensions (µm) that are given and can change, by name."""
 
     def tied(self) -> tuple[str, ...]:
         """Return dimensions that cannot change by themselves, since parts would come apart."""
         return ()
 
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """Return the sections of a probe file that describe it."""
+        return {"probe": self.model_dump()}
+
     @abstractmethod
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
+
+
+class Parametric(Shape):
+    """A shape made of dimensions."""
+
+    def dimensions(self) -> dict[str, float]:
+        """Return the dimensions (µm) that are given, by name."""
+        return self.model_dump(exclude={"shape"}, exclude_none=True)
 
     @abstractmethod
     def _parts_fit(self) -> None:
@@ -71,7 +96,7 @@ def _need(condition: bool, text: str) -> None:
         raise ValueError(text)
 
 
-class ThreeLeg(Shape):
+class ThreeLeg(Parametric):
     """The three-legged lever of the paper: heater on the centre leg, reader on the right one.
 
     Current enters by the centre leg, passes the heater into the front bridge and leaves by
@@ -86,7 +111,7 @@ class ThreeLeg(Shape):
     bridge_width_um: float = _length("front bar, along the lever")
     heater_length_um: float = _length("low-doped part behind the bridge, tip at its centre")
     heater_width_um: float = _length("across the lever")
-    thickness_um: float = _length("of the silicon", 0.01, 20)
+    thickness_um: float = thickness()
     reader_length_um: float = _length("low-doped part of the right leg")
     reader_centre_um: float | None = _length(
         "base to the reader's centre; left out: 2/3 of the length", 0.05, 2000, default=None
@@ -154,7 +179,7 @@ class ThreeLeg(Shape):
         )
 
 
-class UShape(Shape):
+class UShape(Parametric):
     """A two-legged lever: the heater lies across the front, between the legs.
 
     Current enters by the right leg (y < 0), crosses the heater along +y and leaves by the
@@ -171,7 +196,7 @@ class UShape(Shape):
         "low-doped middle of the bar, across the lever, tip at its centre"
     )
     heater_width_um: float = _length("along the lever")
-    thickness_um: float = _length("of the silicon", 0.01, 20)
+    thickness_um: float = thickness()
 
     def _parts_fit(self) -> None:
         _need(
@@ -226,20 +251,42 @@ class UShape(Shape):
         )
 
 
-SHAPES: dict[str, type[Shape]] = {"three-leg": ThreeLeg, "u-shape": UShape}
+PARAMETRIC: dict[str, type[Parametric]] = {"three-leg": ThreeLeg, "u-shape": UShape}
+DRAWING = "drawing"
+SHAPES = (*PARAMETRIC, DRAWING)
+#: Sections of a probe file that describe a shape; those of a drawing come first to last.
+SHAPE_SECTIONS = ("probe", "layers", "terminals")
 
 
-def shape_of(values: dict, where: str) -> Shape:
-    """Make the shape that the section ``[probe]`` of a file describes.
+def shape_of(sections: Mapping[str, Any], where: str, folder: Path | None = None) -> Shape:
+    """Make the shape that some sections of a probe file describe.
+
+    Parameters
+    ----------
+    sections : mapping
+        ``[probe]``, and ``[layers]`` and ``[terminals]`` of a drawing.
+    where : str
+        Names the file in an error.
+    folder : path, optional
+        What the name of a drawing's file is relative to.
 
     Raises
     ------
     InputError
-        If the shape is unknown or a dimension is missing, misspelt or impossible.
+        If the shape is unknown, a dimension is missing, misspelt or impossible, or a drawing is
+        at fault.
     """
+    values, here = sections["probe"], f"{where}: [probe]"
     name = values.get("shape")
     if name is None:
-        raise InputError(f"{where}: shape is missing (one of: {', '.join(SHAPES)})")
+        raise InputError(f"{here}: shape is missing (one of: {', '.join(SHAPES)})")
     if not isinstance(name, str) or name not in SHAPES:
-        raise unknown_name("shape", str(name), SHAPES, where)
-    return SHAPES[name].of(values, where)
+        raise unknown_name("shape", str(name), SHAPES, here)
+    if name == DRAWING:
+        from hotlever.drawing.shape import Drawing  # most probes are drawn by their dimensions
+
+        return Drawing.read(sections, where, folder)
+    for section in SHAPE_SECTIONS[1:]:
+        if section in sections:
+            raise InputError(f'{where}: section [{section}] means nothing with shape = "{name}"')
+    return PARAMETRIC[name].of(values, here)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -126,11 +125,10 @@ def mesh_solid(
 def _check_size(layout: Layout) -> None:
     """Refuse a lever that would take hours and gigabytes with tetrahedra of the default sizes."""
     sizes, thickness = SolidMeshOptions(), layout.thickness_um
-    outlines = [[*region.outline, region.outline[0]] for region in layout.regions]
-    edges = sum(math.dist(a, b) for outline in outlines for a, b in pairwise(outline))
-    narrow, long = sorted(layout.heater.sides.tolist())
+    edges = sum(math.dist(a, b) for region in layout.regions for a, b in region.edges)
+    narrow = layout.heater.narrow_um
     along_rims = edges / (sizes.rim * thickness)
-    in_heater = narrow * long * thickness / (sizes.heater * narrow) ** 3
+    in_heater = layout.heater.area * thickness / (sizes.heater * narrow) ** 3
     if max(along_rims / _MOST_ALONG_RIMS, in_heater / _MOST_IN_HEATER) > 1:
         raise InputError(
             f"full 3-D simulation: with a thickness of {thickness:g} µm, edges of {edges:.4g} µm "
@@ -143,7 +141,7 @@ def _silicon(layout: Layout, options: SolidMeshOptions) -> Any:
     """The regions as solids, named by their number; the tip belongs to the heater."""
     from netgen.occ import Axes, Axis, Glue, Pnt, WorkPlane, X, Y, Z
 
-    narrow = layout.heater.sides.min() / options.refinement
+    narrow = layout.heater.narrow_um / options.refinement
     whole = np.ptp(layout.box, axis=0).max() / options.refinement
     bottom = -layout.thickness_um / 2
     solids = []

@@ -1,0 +1,255 @@
+"""From outlines as they are drawn to polygons that can be cut and meshed.
+
+Whatever is nearer than the drawing's tolerance is the same: slits are closed, corners that are
+hardly any are dropped, and the outlines of low-doped parts snap to that of the silicon. What is
+wrong by more is an error that says where.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
+
+from hotlever.drawing.fault import DrawingError, Point, Ring
+from hotlever.types import Array
+
+#: Coordinates are rounded to this (µm) where outlines cross: far less than matters.
+GRID = 1e-9
+#: No part of a lever is narrower than this many tolerances, nor are two that do not touch nearer.
+NARROWEST = 5.0
+#: Corners of a healed outline beyond which its mesh takes minutes.
+_MOST_CORNERS = 2000
+#: Share of the tolerance by which a corner must stand out.
+_STANDS_OUT = 0.25
+
+
+def polygons(part: str, rings: Iterable[Ring], tolerance: float) -> list[Polygon]:
+    """Return each outline as a valid polygon.
+
+    An outline may run along itself to enclose a hole, as those of GDSII do.
+
+    Raises
+    ------
+    DrawingError
+        If an outline is not closed, has no area, or crosses itself.
+    """
+    found = []
+    for number, ring in enumerate(rings, start=1):
+        if len(ring) < 3:
+            place = ring[0] if ring else None
+            raise DrawingError("an outline that is not closed", part, number, place)
+        polygon = Polygon(ring)
+        if not polygon.is_valid:
+            polygon = _unfolded(polygon, part, number)
+        if polygon.area < tolerance**2:
+            raise DrawingError("an outline without an area", part, number, ring[0])
+        found.append(polygon)
+    return found
+
+
+def _unfolded(polygon: Polygon, part: str, number: int) -> Polygon:
+    """Return the polygon with holes of an outline that runs along itself."""
+    unfolded = shapely.make_valid(polygon)
+    x, y = np.array(polygon.exterior.coords).T
+    enclosed = abs(float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum())) / 2
+    if unfolded.geom_type == "GeometryCollection":
+        areas = [one for one in unfolded.geoms if one.area > 0]
+        unfolded = areas[0] if len(areas) == 1 else MultiPolygon()
+    if unfolded.geom_type == "Polygon" and math.isclose(unfolded.area, enclosed, rel_tol=1e-6):
+        return unfolded
+    reason = shapely.is_valid_reason(polygon)
+    place = tuple(map(float, reason.partition("[")[2].rstrip("]").split()[:2]))
+    where = (place[0], place[1]) if len(place) == 2 else None
+    raise DrawingError("an outline that crosses or touches itself", part, number, where)
+
+
+def together(found: list[Polygon]) -> BaseGeometry:
+    """Return the union of polygons; one that lies inside another is a hole in it."""
+    unique = list({one.normalize().wkb: one for one in found}.values())
+    inner, outer = STRtree(unique).query(unique, predicate="within")
+    depth = np.bincount(inner[inner != outer], minlength=len(unique))
+    whole: BaseGeometry = Polygon()
+    for level in range(depth.max() + 1):
+        here = shapely.union_all(
+            [unique[one] for one in np.flatnonzero(depth == level)], grid_size=GRID
+        )
+        whole = whole.difference(here) if level % 2 else whole.union(here)
+    return whole
+
+
+def without_nested(rings: tuple[Ring, ...]) -> tuple[Ring, ...]:
+    """Return the outlines of a GDSII layer without those inside others, where they add nothing."""
+    shapes = [Polygon(ring) if len(ring) > 2 else Polygon() for ring in rings]
+    sound = [one if one.is_valid else Polygon() for one in shapes]
+    inner, outer = STRtree(sound).query(sound, predicate="within")
+    # of equal ones the first stays
+    nested = {
+        int(a)
+        for a, b in zip(inner, outer, strict=True)
+        if a != b and (sound[a].area < sound[b].area or b < a)
+    }
+    return tuple(ring for number, ring in enumerate(rings) if number not in nested)
+
+
+def healed(part: str, found: list[Polygon], tolerance: float) -> BaseGeometry:
+    """Return the union of polygons, slits of less than the tolerance closed."""
+    whole = together(found)
+    half = tolerance / 2
+    style = {"join_style": "mitre"}
+    closed = whole.buffer(half * 1.01, **style).buffer(-half * 1.01, **style)
+    # where there is no slit, closing changes the outline by rounding errors
+    added = [
+        one
+        for one in parts_of(closed.difference(whole))
+        if one.area > GRID * (one.length + tolerance)
+    ]
+    if added:
+        whole = shapely.union_all(
+            [whole, *(one.buffer(GRID, **style) for one in added)], grid_size=GRID
+        )
+    whole = whole.simplify(_STANDS_OUT * tolerance)
+    corners = shapely.count_coordinates(whole)
+    if corners > _MOST_CORNERS:
+        raise DrawingError(
+            f"{corners} corners, expected at most {_MOST_CORNERS}; a larger tolerance_um than "
+            f"{tolerance:g} makes curves of fewer",
+            part,
+        )
+    return whole
+
+
+def parts_of(shape: BaseGeometry) -> list[Polygon]:
+    """Return the polygons of a shape; lines and points are left out."""
+    return [one for one in shapely.get_parts(shape) if one.geom_type == "Polygon"] + [
+        inner
+        for one in shapely.get_parts(shape)
+        if one.geom_type in ("MultiPolygon", "GeometryCollection")
+        for inner in parts_of(one)
+    ]
+
+
+def one_piece(part: str, shape: BaseGeometry, found: list[Polygon]) -> Polygon:
+    """Return a shape that must be one polygon.
+
+    Raises
+    ------
+    DrawingError
+        If it is in several pieces, with the place where the two nearest nearly touch.
+    """
+    pieces = sorted(parts_of(shape), key=lambda one: -one.area)
+    if len(pieces) == 1:
+        return pieces[0]
+    if not pieces:
+        raise DrawingError("no area", part)
+    others = pieces[1:]
+    apart = [pieces[0].distance(other) for other in others]
+    nearest = others[int(np.argmin(apart))]
+    place = shapely.shortest_line(nearest, pieces[0]).coords[0]
+    raise DrawingError(
+        f"{len(pieces)} pieces, {min(apart):.3g} µm apart, expected one piece",
+        part,
+        nearest_polygon(found, place),
+        (place[0], place[1]),
+    )
+
+
+def nearest_polygon(found: list[Polygon], place: Point | tuple[float, ...]) -> int:
+    """Return the number, from 1, of the drawn polygon whose outline is nearest to a place."""
+    point = shapely.Point(place[0], place[1])
+    return 1 + int(np.argmin([one.boundary.distance(point) for one in found]))
+
+
+def snapped(shape: BaseGeometry, outline: BaseGeometry, distance: float) -> BaseGeometry:
+    """Return a shape whose corners and edges lie on an outline where they are near it."""
+    near = shapely.snap(shape, outline, distance)
+    lines = outline if "Polygon" not in outline.geom_type else outline.boundary
+
+    def onto(coordinates: Array) -> Array:
+        points = shapely.points(coordinates)
+        along = shapely.line_locate_point(lines_of(lines), points[:, None])
+        feet = shapely.line_interpolate_point(lines_of(lines), along)
+        away = shapely.distance(feet, points[:, None])
+        best = away.argmin(axis=1)
+        rows = np.arange(len(points))
+        moved = shapely.get_coordinates(feet[rows, best])
+        return np.where((away[rows, best] < distance)[:, None], moved, coordinates)
+
+    moved = shapely.transform(near, onto)
+    return moved if moved.is_valid else shapely.make_valid(moved)
+
+
+def lines_of(shape: BaseGeometry) -> Array:
+    """Return the single lines of a line or several, shape (n,)."""
+    return np.asarray(shapely.get_parts(shape))
+
+
+def check_widths(part: str, shape: Polygon, found: list[Polygon], narrowest: float) -> None:
+    """Refuse a polygon that is narrow somewhere, or nearly touches itself.
+
+    Raises
+    ------
+    DrawingError
+        With the place where it does.
+    """
+    for ring, other in _ring_pairs(shape):
+        starts = np.array(ring.coords)[:-1]
+        ends = np.array(other.coords)
+        edges = shapely.linestrings(np.stack([ends[:-1], ends[1:]], axis=1))
+        corner, edge = STRtree(edges).query(
+            shapely.points(starts), predicate="dwithin", distance=narrowest
+        )
+        if ring is other:
+            # along the outline, neighbours are near by nature
+            length = ring.length
+            at = np.append(0.0, np.cumsum(shapely.length(edges)))
+            gap = np.stack([(at[corner] - at[edge + 1]) % length, (at[edge] - at[corner]) % length])
+            inside = (edge == corner) | (edge == (corner - 1) % len(edges))
+            away = (gap.min(axis=0) > 4 * narrowest) & ~inside
+            corner, edge = corner[away], edge[away]
+        if corner.size:
+            points = shapely.points(starts[corner])
+            distance = shapely.distance(points, edges[edge])
+            worst = int(distance.argmin())
+            place = (float(points[worst].x), float(points[worst].y))
+            raise DrawingError(
+                f"only {distance[worst]:.3g} µm from another edge of its outline, expected "
+                f"{narrowest:g} µm or more",
+                part,
+                nearest_polygon(found, place),
+                place,
+            )
+    _check_angles(part, shape, found)
+
+
+def _ring_pairs(shape: Polygon) -> list[tuple[BaseGeometry, BaseGeometry]]:
+    rings = [shape.exterior, *shape.interiors]
+    return [(one, other) for one in rings for other in rings]
+
+
+#: Angle (rad) of a corner below which nothing is meshed.
+_SHARPEST = math.radians(1.0)
+
+
+def _check_angles(part: str, shape: Polygon, found: list[Polygon]) -> None:
+    for ring in (shape.exterior, *shape.interiors):
+        corners = np.array(ring.coords)[:-1]
+        before, after = (
+            np.roll(corners, 1, axis=0) - corners,
+            np.roll(corners, -1, axis=0) - corners,
+        )
+        cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+        angle = np.abs(np.arctan2(cross, (before * after).sum(axis=1)))
+        if angle.min() < _SHARPEST:
+            place = corners[int(angle.argmin())]
+            at = (float(place[0]), float(place[1]))
+            raise DrawingError(
+                f"a corner of {math.degrees(angle.min()):.2g}°, expected 1° or more",
+                part,
+                nearest_polygon(found, at),
+                at,
+            )

@@ -1,0 +1,319 @@
+"""What the layers of a drawing file may be, judged by what touches what."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+from shapely import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from hotlever.drawing.contacts import outline_edges, terminal_edges, terminal_part
+from hotlever.drawing.cutting import Cut, cut
+from hotlever.drawing.fault import DrawingError, Point, Ring
+from hotlever.drawing.healing import healed, parts_of, polygons, snapped
+from hotlever.drawing.making import HEATER, SILICON
+from hotlever.drawing.shape import rings_of
+from hotlever.drawing.sheet import Layer, Sheet
+
+SUPPLY, GROUND, READER = "supply", "ground", "reader"
+#: Share of the silicon that a low-doped layer does not exceed.
+_LARGEST_SHARE = 0.6
+
+#: A layer by its name, or outlines.
+Drawn = str | tuple[Ring, ...]
+
+
+@dataclass
+class Proposal:
+    """What is what in a drawing.
+
+    Attributes
+    ----------
+    layers, terminals : dict of str to layer's name or rings
+    tip : tuple of float or None
+    reasons : dict of str to str
+        By the names that parts have in errors, and for the ``tip``.
+    doubts : list of str
+        What could not be told.
+    unused : list of str
+        Layers that are nothing of the lever.
+    """
+
+    layers: dict[str, Drawn] = field(default_factory=dict)
+    terminals: dict[str, Drawn] = field(default_factory=dict)
+    tip: Point | None = None
+    reasons: dict[str, str] = field(default_factory=dict)
+    doubts: list[str] = field(default_factory=list)
+    unused: list[str] = field(default_factory=list)
+
+
+def proposed(sheet: Sheet, tolerance: float) -> Proposal:
+    """Say which layer of a drawing is what, and why."""
+    found = Proposal()
+    shapes = _shapes(sheet, tolerance, found.doubts)
+    judged = [_Silicon(name, sheet, shapes, tolerance) for name in shapes]
+    best = max(judged, key=lambda one: one.merit, default=None)
+    if best is None:
+        found.doubts.append("no layer holds a closed outline")
+        return found
+    found.layers[SILICON] = best.name
+    touched = len(best.cutters) + len(best.touching)
+    found.reasons[SILICON] = (
+        f"{best.shape.area:.4g} µm²; {touched} other layer{'s' * (touched != 1)} lie"
+        f"{'s' * (touched == 1)} across it or touch its outline"
+    )
+    if len(best.pieces) > 1:
+        found.doubts.append(
+            f"layer {best.name} has {len(best.pieces)} pieces that do not touch; a lever is one"
+        )
+    _low_doped(best, found)
+    _terminals(best, sheet, found)
+    _tip(best, sheet, shapes, found)
+    used = {one for one in (*found.layers.values(), *found.terminals.values()) if type(one) is str}
+    split = best.split and {best.split}
+    found.unused = [name for name in sheet.layers if name not in used | (split or set())]
+    return found
+
+
+def _shapes(sheet: Sheet, tolerance: float, doubts: list[str]) -> dict[str, BaseGeometry]:
+    """Return the healed area of each layer that has one."""
+    shapes = {}
+    for name, layer in sheet.layers.items():
+        if not layer.rings:
+            continue
+        try:
+            areas = polygons(name, rings_of(sheet, layer), tolerance)
+            shapes[name] = healed(name, areas, tolerance)
+        except DrawingError as error:
+            doubts.append(f"layer {error}")
+    return {name: shape for name, shape in shapes.items() if not shape.is_empty}
+
+
+class _Silicon:
+    """A layer, seen as the silicon of the lever.
+
+    Attributes
+    ----------
+    cutters : list of str
+        Layers that lie across it so that it falls apart without them, or inside it.
+    touching : list of str
+        Layers that touch its outline along an edge.
+    merit : tuple
+        The larger, the likelier it is the silicon.
+    """
+
+    def __init__(
+        self, name: str, sheet: Sheet, shapes: dict[str, BaseGeometry], tolerance: float
+    ) -> None:
+        self.name, self.tolerance, self.split = name, tolerance, ""
+        self.pieces = sorted(parts_of(shapes[name]), key=lambda one: -one.area)
+        self.shape: Polygon = self.pieces[0]
+        self.areas = shapes
+        self.cutters: list[str] = []
+        self.touching: list[str] = []
+        for other, layer in sheet.layers.items():
+            if other == name:
+                continue
+            if other in shapes and self._is_cut_by(shapes[other]):
+                self.cutters.append(other)
+            elif self.ends_of(other, sheet, layer):
+                self.touching.append(other)
+        self.merit = (bool(self.cutters), min(len(self.touching), 2), self.shape.area)
+
+    def _is_cut_by(self, other: BaseGeometry) -> bool:
+        """Whether the silicon falls apart, or has one more hole, without another layer."""
+        inside = self._sizable(self.shape.intersection(other))
+        area = sum(one.area for one in inside)
+        if not 0 < area < _LARGEST_SHARE * self.shape.area:
+            return False
+        rest = self._sizable(self.shape.difference(other.buffer(self.tolerance)))
+        holes = sum(len(one.interiors) for one in rest)
+        return len(rest) > 1 or holes > len(self.shape.interiors)
+
+    def _sizable(self, shape: BaseGeometry) -> list[Polygon]:
+        return [one for one in parts_of(shape) if one.area > 10 * self.tolerance * one.length]
+
+    def ends_of(self, name: str, sheet: Sheet, layer: Layer) -> bool:
+        """Whether a layer touches the outline along an edge."""
+        try:
+            return bool(terminal_edges(self.shape, {name: _terminal(sheet, layer)}, self.tolerance))
+        except DrawingError:
+            return False
+
+
+def _terminal(sheet: Sheet, layer: Layer) -> tuple[Ring, ...]:
+    return rings_of(sheet, layer, lines=True)
+
+
+# --- low-doped parts ---------------------------------------------------------------------------
+
+
+def _low_doped(best: _Silicon, found: Proposal) -> None:
+    """Tell the heater among the layers that cut the silicon, and name the others."""
+    if not best.cutters:
+        found.doubts.append(
+            "no layer lies across the silicon so that current has to pass it: the heater is missing"
+        )
+        return
+    heater = _hinted(best.cutters, ("heat", "htr")) or _farthest(best)
+    reason = "the silicon falls apart without it"
+    if len(best.cutters) > 1:
+        reason += "; of such layers the farthest from the terminals"
+    found.layers[HEATER], found.reasons[HEATER] = heater, reason
+    rest = [name for name in best.cutters if name != heater]
+    for number, name in enumerate(rest, start=1):
+        part = READER if len(rest) == 1 else f"low-doped-{number}"
+        found.layers[part] = name
+        found.reasons[part] = "the silicon falls apart without it too, nearer to the terminals"
+
+
+def _hinted(names: Iterable[str], words: tuple[str, ...]) -> str | None:
+    """Return the one layer whose name says what it is, None if not one does."""
+    hits = [name for name in names if any(word in name.lower() for word in words)]
+    return hits[0] if len(hits) == 1 else None
+
+
+def _farthest(best: _Silicon) -> str:
+    """Return the layer across the silicon that is farthest from where the terminals are."""
+    ends = [best.areas[name] for name in best.touching if name in best.areas]
+    if not ends:
+        base = _base(best.shape, best.areas[best.cutters[0]])
+        ends = [LineString(edge) for edge in base] or [best.shape.centroid]
+    near = shapely.union_all(ends).centroid
+    return max(
+        best.cutters, key=lambda name: near.distance(best.areas[name].intersection(best.shape))
+    )
+
+
+# --- terminals ---------------------------------------------------------------------------------
+
+
+def _terminals(best: _Silicon, sheet: Sheet, found: Proposal) -> None:
+    """Tell supply, ground and reader by what lies between them."""
+    given: dict[str, Drawn] = {name: name for name in best.touching}
+    if len(given) == 1:
+        (only,) = given
+        rings = _terminal(sheet, sheet.layers[only])
+        if len(rings) > 1:
+            # several contacts on one layer
+            best.split = only
+            given = {f"polygon {n} of {only}": (ring,) for n, ring in enumerate(rings, start=1)}
+    why = "it touches the outline along an edge"
+    if len(given) < 2:
+        heater = found.layers.get(HEATER)
+        middle = best.areas[heater] if isinstance(heater, str) else best.shape.centroid
+        base = _base(best.shape, middle)
+        given = {f"edge {number}": (edge,) for number, edge in enumerate(base, start=1)}
+        why = "one of the edges in a line far from the heater; no layer marks a terminal"
+    if len(given) < 2:
+        found.doubts.append("no edges that could be terminals: supply and ground are missing")
+        return
+    rings_by = {
+        name: _terminal(sheet, sheet.layers[one]) if isinstance(one, str) else one
+        for name, one in given.items()
+    }
+    try:
+        named = _named(best, found, rings_by)
+    except DrawingError as error:
+        found.doubts.append(f"terminals cannot be told apart ({error.what})")
+        named = {
+            role: (name, "") for role, name in zip((SUPPLY, GROUND, READER), given, strict=False)
+        }
+    for role, (name, reason) in named.items():
+        found.terminals[role] = given[name]
+        found.reasons[terminal_part(role)] = "; ".join(filter(None, (why, reason)))
+
+
+def _named(
+    best: _Silicon, found: Proposal, rings: dict[str, tuple[Ring, ...]]
+) -> dict[str, tuple[str, str]]:
+    """Return the terminal for each role, and why."""
+    low = {
+        part: snapped(best.areas[name], best.shape, 1.5 * best.tolerance)
+        for part, name in found.layers.items()
+        if part != SILICON and isinstance(name, str)
+    }
+    whole = cut(best.shape, low)
+    at: dict[str, set[int]] = {}
+    for end in terminal_edges(best.shape, rings, best.tolerance):
+        middle = shapely.Point(np.mean([end.start, end.end], axis=0))
+        away = [piece.shape.distance(middle) for piece in whole.pieces]
+        at.setdefault(end.name, set()).add(int(np.argmin(away)))
+    heaters = {number for number, piece in enumerate(whole.pieces) if piece.kind == HEATER}
+    sides = _grouped(whole, at, heaters)
+    alone = next((side for side in sides if len(side) == 1), sides[0])
+    others = [name for side in sides if side is not alone for name in side] or alone[1:]
+    supply = _hinted(at, ("supply", "bias", "v+", "vdd")) or alone[0]
+    rest = [name for name in (*others, *alone) if name != supply]
+    named = {SUPPLY: (supply, "alone on its side of the heater" if len(at) > 2 else "")}
+    if not rest:
+        return named
+    behind = [name for name in rest if _behind_low_doped(whole, at[name], heaters)]
+    ground = _hinted(rest, ("ground", "gnd")) or next(
+        (name for name in rest if name not in behind), rest[0]
+    )
+    reason = "on the other side of the heater"
+    if len(rest) > 1 and not behind:
+        reason += "; which of the terminals there is ground, the drawing does not say"
+    named[GROUND] = (ground, reason)
+    rest = [name for name in rest if name != ground]
+    for number, name in enumerate(rest):
+        role = READER if number == 0 else f"end-{number}"
+        reason = "behind another low-doped part" if name in behind else "carries no current"
+        named[role] = (name, reason)
+    return named
+
+
+def _grouped(whole: Cut, at: dict[str, set[int]], heaters: set[int]) -> list[list[str]]:
+    """Return the terminals in groups that are connected other than through a heater."""
+    groups: list[list[str]] = []
+    for name in at:
+        reached = whole.reached(at[name], heaters)
+        group = next((one for one in groups if at[one[0]] & reached), None)
+        if group is None:
+            groups.append([name])
+        else:
+            group.append(name)
+    return groups
+
+
+def _behind_low_doped(whole: Cut, numbers: set[int], heaters: set[int]) -> bool:
+    """Whether a terminal reaches the heater through another low-doped part only."""
+    low = {number for number, piece in enumerate(whole.pieces) if piece.kind is not None}
+    reached = whole.reached(numbers, low)
+    return not any(whole.neighbours(one) & heaters for one in reached)
+
+
+def _base(silicon: Polygon, heater: BaseGeometry) -> list[tuple[Point, Point]]:
+    """Return the edges that lie in one line on the hull, the line farthest from the heater."""
+    edges = outline_edges(silicon)
+    hull = np.array(silicon.convex_hull.exterior.coords)
+    best: tuple[float, list[tuple[Point, Point]]] = (0.0, [])
+    for start, end in itertools.pairwise(hull):
+        side = LineString([start, end]).buffer(1e-3)
+        here = [edge for edge in edges if side.covers(LineString(edge))]
+        away = heater.distance(LineString([start, end]))
+        if len(here) > 1 and away > best[0]:
+            best = (away, here)
+    return sorted(best[1])
+
+
+# --- tip ---------------------------------------------------------------------------------------
+
+
+def _tip(best: _Silicon, sheet: Sheet, shapes: dict[str, BaseGeometry], found: Proposal) -> None:
+    """Find the place of the tip."""
+    for _, text, place in sheet.labels:
+        if "tip" in text.lower() and best.shape.contains(shapely.Point(place)):
+            found.tip, found.reasons["tip"] = place, f"the text '{text.strip()[:20]}' stands there"
+            return
+    heater = found.layers.get(HEATER)
+    if isinstance(heater, str):
+        inside = max(parts_of(shapes[heater].intersection(best.shape)), key=lambda one: one.area)
+        middle = inside.centroid if inside.contains(inside.centroid) else inside.point_on_surface()
+        found.tip = (round(middle.x, 6), round(middle.y, 6))
+        found.reasons["tip"] = "the middle of the heater; no text in the drawing says 'tip'"

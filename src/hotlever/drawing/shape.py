@@ -1,0 +1,218 @@
+"""The shape of a probe file that is drawn in a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from hotlever.drawing.contacts import REQUIRED, terminal_part
+from hotlever.drawing.fault import DrawingError, Point, Ring
+from hotlever.drawing.healing import without_nested
+from hotlever.drawing.making import HEATER, SILICON, layout_of
+from hotlever.drawing.sheet import Layer, Sheet, read_sheet
+from hotlever.errors import InputError, quoted
+from hotlever.probe.layout import Layout
+from hotlever.probe.shapes import Shape, thickness
+
+#: What is nearer is the same (µm), unless a probe file says otherwise.
+TOLERANCE_UM = 0.002
+_SECTIONS = ("probe", "layers", "terminals")
+
+Rings = tuple[Ring, ...]
+
+
+class Drawing(Shape):
+    """A lever of any outline; lengths in µm.
+
+    Layers that a probe file takes from a drawing file are read once, when the drawing is made
+    with `read`; here, and wherever a drawn probe is kept, they are lists of points. An outline
+    inside another is a hole in it; a terminal of two points is a line.
+    """
+
+    outline_moves: ClassVar[bool] = False
+
+    shape: Literal["drawing"] = "drawing"
+    file: str | None = Field(default=None, description="GDSII, OASIS or DXF, relative to this file")
+    cell: str | None = Field(
+        default=None, description="of GDSII and OASIS; the top cell if left out"
+    )
+    unit_um: float | None = Field(
+        default=None,
+        gt=0,
+        le=1e6,
+        description="of a DXF file's numbers; left out: what it says, 1 if it says nothing",
+    )
+    tolerance_um: float = Field(
+        default=TOLERANCE_UM,
+        ge=1e-4,
+        le=0.1,
+        description="curves become lines within it, what is nearer is the same",
+    )
+    thickness_um: float = thickness()
+    tip_um: Point = Field(description="place of the tip")
+    layers: dict[str, Rings]
+    terminals: dict[str, Rings]
+
+    @model_validator(mode="after")
+    def _can_be_meshed(self) -> Self:
+        self.layout()
+        return self
+
+    def __hash__(self) -> int:
+        parts = (*self.layers.items(), *self.terminals.items())
+        return hash((parts, self.tip_um, self.tolerance_um, self.thickness_um))
+
+    def dimensions(self) -> dict[str, float]:
+        """Return the thickness: the outline is as it is drawn."""
+        return {"thickness_um": self.thickness_um}
+
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """Return the sections of a probe file that describe it."""
+        values = self.model_dump()
+        return {
+            "probe": {name: one for name, one in values.items() if name not in _SECTIONS},
+            "layers": values["layers"],
+            "terminals": values["terminals"],
+        }
+
+    def layout(self) -> Layout:
+        """Return the regions, terminals and tip of this shape."""
+        made = layout_of(
+            tuple(self.layers.items()),
+            tuple(self.terminals.items()),
+            self.tip_um,
+            self.tolerance_um,
+        )
+        return replace(made, thickness_um=self.thickness_um)
+
+    @classmethod
+    def read(cls, sections: Mapping[str, Any], where: str, folder: Path | None = None) -> Drawing:
+        """Make a drawing of the sections of a probe file.
+
+        Parameters
+        ----------
+        sections : mapping
+            ``probe``, ``layers`` and ``terminals``.
+        where : str
+            Names them in an error.
+        folder : path, optional
+            What the name of the file is relative to.
+
+        Raises
+        ------
+        InputError
+            If a key is missing or wrong, or the file cannot be read.
+        DrawingError
+            If what is drawn is at fault.
+        """
+        values = dict(sections["probe"])
+        tolerance = values.get("tolerance_um", TOLERANCE_UM)
+        tip = values.get("tip_um")
+        if tip is not None:
+            if not _is_points([tip, tip]):
+                raise InputError(f"{where}: [probe]: tip_um = {quoted(tip)}: expected [x, y] (µm)")
+            values["tip_um"] = (float(tip[0]), float(tip[1]))
+        given = {name: _section(sections, name, where) for name in ("layers", "terminals")}
+        named = {part: layer for part, layer in _by_part(given).items() if isinstance(layer, str)}
+        sheet = None
+        if named:
+            sheet = _sheet(values, where, folder, tolerance)
+        outlines = {
+            section: {
+                name: _rings(sheet, one, name, f"{where}: [{section}] {name}", section)
+                for name, one in drawn.items()
+            }
+            for section, drawn in given.items()
+        }
+        try:
+            return cls.of(values | outlines, f"{where}: [probe]")
+        except DrawingError as error:
+            file = where if sheet is None else sheet.file
+            raise error.of_file(file, named, _by_part(outlines)) from None
+
+
+def _by_part(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what is drawn by the name that it has in an error."""
+    ends = {terminal_part(name): drawn for name, drawn in sections["terminals"].items()}
+    return {**sections["layers"], **ends}
+
+
+def _section(sections: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
+    if name not in sections:
+        raise InputError(f"{where}: section [{name}] is missing")
+    for key in (SILICON, HEATER) if name == "layers" else REQUIRED:
+        if key not in sections[name]:
+            raise InputError(f"{where}: [{name}]: {key} is missing")
+    return dict(sections[name])
+
+
+def _sheet(values: dict[str, Any], where: str, folder: Path | None, tolerance: Any) -> Sheet:
+    """Read the file whose layers are named."""
+    file = values.get("file")
+    if not isinstance(file, str) or not file:
+        raise InputError(f"{where}: [probe]: file is missing (GDSII, OASIS or DXF)")
+    for key, kinds, default in (("cell", str, None), ("unit_um", (int, float), None)):
+        if not isinstance(values.get(key, default), (kinds, type(None))):
+            raise InputError(f"{where}: [probe]: {key} = {quoted(values[key])}: not understood")
+    if not (type(tolerance) in (int, float) and 1e-4 <= tolerance <= 0.1):
+        raise InputError(
+            f"{where}: [probe]: tolerance_um = {quoted(tolerance)}: expected 0.0001 to 0.1"
+        )
+    path = Path(file) if folder is None else folder / file
+    unit, cell = values.get("unit_um"), values.get("cell")
+    return read_sheet(os.fspath(path), cell, unit_um=unit, tolerance_um=float(tolerance))
+
+
+def rings_of(sheet: Sheet, layer: Layer, *, lines: bool = False) -> Rings:
+    """Return the outlines of a layer; with `lines` the steps of open ones too."""
+    closed = layer.rings if sheet.kind == "DXF" else without_nested(layer.rings)
+    steps = (step for line in layer.lines for step in pairwise(line))
+    return (*closed, *steps) if lines else closed
+
+
+def _rings(sheet: Sheet | None, given: Any, name: str, where: str, section: str) -> Rings:
+    """Return the outlines of a layer, of a list of points or of a list of such lists."""
+    if sheet is not None and isinstance(given, str):
+        layer = sheet.layer(given, where)
+        if section == "terminals":
+            return rings_of(sheet, layer, lines=True)
+        if layer.lines:
+            x, y = layer.lines[0][0]
+            raise InputError(
+                f"{sheet.file}: {name} (layer {given}), at ({x:.3f}, {y:.3f}) µm: an outline that "
+                "is not closed"
+            )
+        return rings_of(sheet, layer)
+    if isinstance(given, Mapping):
+        raise InputError(
+            f"{where}: found a section, expected a layer or points; layers of other materials than "
+            "silicon cannot be simulated yet"
+        )
+    if _is_points(given):
+        given = [given]
+    elif not (isinstance(given, list | tuple) and given and all(map(_is_points, given))):
+        raise InputError(
+            f'{where} = {quoted(given)}: expected a layer such as "1/0", or points such as '
+            "[[0.0, -1.5], [0.0, 1.5]] (µm)"
+        )
+    return tuple(tuple((float(x), float(y)) for x, y in ring) for ring in given)
+
+
+def _is_points(given: Any) -> bool:
+    """Whether something is a list of two points or more."""
+    return (
+        isinstance(given, list | tuple)
+        and len(given) > 1
+        and all(
+            isinstance(point, list | tuple)
+            and len(point) == 2
+            and all(type(one) in (int, float) and abs(one) < 1e6 for one in point)
+            for point in given
+        )
+    )

@@ -1,0 +1,208 @@
+"""What a drawing file holds: cells, and outlines by layer, in µm."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from scipy import spatial
+from shapely import LineString
+
+from hotlever.drawing.fault import Point, Ring
+from hotlever.errors import InputError, quoted, unknown_name
+from hotlever.files import read_bytes
+
+#: Bytes that a file may have, and of memory and seconds that reading it may take.
+_LARGEST, _MEMORY, _PATIENCE_S = 64 * 2**20, 4 * 2**30, 60.0
+#: Coordinates (µm) beyond which nothing is drawn on a wafer.
+_FARTHEST = 1e6
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One layer of a sheet.
+
+    Attributes
+    ----------
+    rings : tuple of rings
+        Closed outlines.
+    lines : tuple of rings
+        Open ones, which a DXF file may have.
+    """
+
+    rings: tuple[Ring, ...] = ()
+    lines: tuple[Ring, ...] = ()
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """The content of a drawing file, or of one of its cells.
+
+    Attributes
+    ----------
+    file : str
+    kind : str
+        GDSII, OASIS or DXF.
+    cells, top : tuple of str
+        All cells, and those that no other refers to.
+    cell : str or None
+        The one whose layers these are; None in a DXF file.
+    layers : dict of str to Layer
+    labels : tuple of (str, str, Point)
+        Layer, text and place of each text.
+    unit_um : float
+        Of the file's numbers.
+    unit_stated : bool
+        Whether somebody said so; a DXF file need not.
+    left_out : dict of str to int
+        How many entities of a DXF file draw nothing.
+    """
+
+    file: str
+    kind: str
+    cells: tuple[str, ...]
+    top: tuple[str, ...]
+    cell: str | None
+    layers: dict[str, Layer]
+    labels: tuple[tuple[str, str, Point], ...] = ()
+    unit_um: float = 1.0
+    unit_stated: bool = True
+    left_out: dict[str, int] = field(default_factory=dict)
+
+    def layer(self, name: str, where: str) -> Layer:
+        """Return a layer by its name.
+
+        Raises
+        ------
+        InputError
+            If there is none; the text gives the nearest one.
+        """
+        if name not in self.layers:
+            raise unknown_name("layer", name, sorted(self.layers), where)
+        return self.layers[name]
+
+
+def read_sheet(
+    path: str | os.PathLike[str],
+    cell: str | None = None,
+    *,
+    unit_um: float | None = None,
+    tolerance_um: float,
+) -> Sheet:
+    """Read a GDSII, OASIS or DXF file.
+
+    Parameters
+    ----------
+    path : path
+    cell : str, optional
+        Of a GDSII or OASIS file; its top cell if left out.
+    unit_um : float, optional
+        What one unit of a DXF file is; what it says if left out, and µm if it says nothing.
+    tolerance_um : float
+        How far the straight lines that stand for a curve may be from it.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has no such cell or several top cells.
+    """
+    content = read_bytes(path, _LARGEST)
+    found = _read_apart(content, str(path), cell, unit_um, tolerance_um)
+    layers = {}
+    for name, one in sorted(found["layers"].items()):
+        joined, lines = _joined(_points(one["lines"], str(path)), tolerance_um)
+        layers[name] = Layer((*_points(one["rings"], str(path)), *joined), lines)
+    labels = tuple((layer, text, (x, y)) for layer, text, x, y in found["labels"])
+    rest = {name: found[name] for name in ("unit_um", "unit_stated", "left_out") if name in found}
+    cells, top = tuple(found["cells"]), tuple(found["top"])
+    sheet = Sheet(str(path), found["kind"], cells, top, found["cell"], layers, labels, **rest)
+    if sheet.kind == "DXF":
+        if cell is not None:
+            raise InputError(f"{path}: cell = {quoted(cell)}: a DXF file has no cells")
+    elif sheet.cell is None:
+        shown = ", ".join(top[:10]) + (", …" if len(top) > 10 else "")
+        raise InputError(
+            f"{path}: {len(top)} top cells, expected one or its name as `cell` ({shown})"
+            if top
+            else f"{path}: holds no cell"
+        )
+    elif sheet.cell not in cells:
+        raise unknown_name("cell", sheet.cell, cells, str(path))
+    if not layers:
+        raise InputError(f"{path}: holds no outline")
+    return sheet
+
+
+def _read_apart(
+    content: bytes, path: str, cell: str | None, unit_um: float | None, tolerance_um: float
+) -> dict[str, Any]:
+    """Read a file in a process of its own, see `hotlever.drawing.reader`."""
+    options = {
+        "cell": cell,
+        "unit_um": unit_um,
+        "tolerance_um": tolerance_um,
+        "memory": _MEMORY,
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder, "drawing")
+        copy.write_bytes(content)
+        # what a library keeps for its next time (a list of fonts) goes with the folder
+        environment = os.environ | {
+            "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+            "XDG_CACHE_HOME": folder,
+        }
+        script = str(Path(__file__).with_name("reader.py"))
+        try:
+            done = subprocess.run(
+                [sys.executable, "-P", script, str(copy), json.dumps(options)],
+                capture_output=True,
+                stdin=subprocess.DEVNULL,
+                timeout=_PATIENCE_S,
+                env=environment,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise InputError(f"{path}: not read within {_PATIENCE_S:g} s") from None
+    try:
+        found: dict[str, Any] = json.loads(done.stdout)
+    except ValueError:
+        raise InputError(f"{path}: a damaged file, which cannot be read") from None
+    if "error" in found:
+        raise InputError(f"{path}: {' '.join(found['error'].split())}")
+    return found
+
+
+def _points(rings: list[list[list[float]]], path: str) -> tuple[Ring, ...]:
+    for ring in rings:
+        for x, y in ring:
+            if not (abs(x) < _FARTHEST and abs(y) < _FARTHEST):
+                raise InputError(
+                    f"{path}: a corner at ({x:g}, {y:g}) µm, expected less than {_FARTHEST:g} µm"
+                )
+    return tuple(tuple((x, y) for x, y in ring) for ring in rings)
+
+
+def _joined(lines: tuple[Ring, ...], tolerance: float) -> tuple[tuple[Ring, ...], tuple[Ring, ...]]:
+    """Return the closed outlines that lines make whose ends meet, and the lines that are left."""
+    if not lines:
+        return (), ()
+    places = np.array([place for line in lines for place in (line[0], line[-1])])
+    # each end goes to the first of those near it
+    near = spatial.cKDTree(places).query_ball_point(places, tolerance)
+    ends = iter([tuple(places[min(some)].tolist()) for some in near])
+    met = [(next(ends), *line[1:-1], next(ends)) for line in lines]
+    some = [LineString(line) for line in met if len(set(line)) > 1]
+    closed, cuts, dangles, _ = shapely.polygonize_full(some)
+    rings = tuple(
+        tuple((x, y) for x, y in one.exterior.coords[:-1]) for one in shapely.get_parts(closed)
+    )
+    rest = [line for group in (cuts, dangles) for line in shapely.get_parts(group)]
+    return rings, tuple(tuple((x, y) for x, y in line.coords) for line in rest)
