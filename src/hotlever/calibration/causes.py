@@ -23,6 +23,7 @@ from hotlever.lever.lever import COARSE, HOTTEST, Lever
 from hotlever.lever.sensitivities import Linearised
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
+from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import Prior, known_beforehand
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
@@ -70,8 +71,12 @@ class _Curve:
     @one_blas_thread
     def of(cls, probe: Probe, priors: Mapping[str, Prior]) -> _Curve:
         """Solve a probe as far as curves are followed."""
-        # the resistor is a suspect of its own
-        names = tuple(name for name in priors if name != "series_resistance_ohm")
+        # the resistor is a suspect of its own; what is 0 has no logarithm
+        names = tuple(
+            name
+            for name in parameters_of(probe)
+            if name in priors and name != "series_resistance_ohm" and priors[name].value > 0
+        )
         known = [priors[name] for name in names]
         spreads = [one.spread if one.relative else one.spread / abs(one.value) for one in known]
         equations = SimilarLevers(Lever(probe, COARSE)).equations(probe, names)

@@ -10,11 +10,13 @@ from hotlever.types import Array
 #: Data are not described where they scatter about the model by more than this share of the largest,
 #: and neighbours together: of white noise they differ by twice its variance.
 SCATTER, _TOGETHER = 0.004, 0.6
+#: The same of fits without priors, which hold dimensions and whatever else is fixed as they are.
+HELD_SCATTER = 0.02
 #: Fewer rows tell nothing of their neighbours.
 _ROWS = 7
 
 
-def undescribed(residuals: Residuals, values: Array) -> str:
+def undescribed(residuals: Residuals, values: Array, scatter: float = SCATTER) -> str:
     """Return where data are not described by predicted values (3, n); empty if they are.
 
     Tip temperatures are left out: a thermometer's scale may be off by more than its readings
@@ -30,7 +32,7 @@ def undescribed(residuals: Residuals, values: Array) -> str:
         # a drift shows in the order of the rows, another lever in that of the bias
         rows = (whole[known], whole[by_bias][known[by_bias]])
         together = min(float(np.mean(np.diff(row) ** 2)) for row in rows)
-        if square > SCATTER**2 and together < _TOGETHER * 2.0 * square:
+        if square > scatter**2 and together < _TOGETHER * 2.0 * square:
             worst = int(np.nanargmax(np.abs(whole)))
             return (
                 f"{name} differs by {np.sqrt(square):.1%} of its largest value (rms), and not at "
