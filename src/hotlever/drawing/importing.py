@@ -146,7 +146,7 @@ def _probe_file(sheet: Sheet, proposal: Proposal, listing: list[str], name: str)
     if sheet.kind == "DXF" and not sheet.unit_stated:
         lines.append("unit_um = 1.0                   # the file does not say")
     lines.append(
-        f"thickness_um = {reference.shape.thickness_um:<17g}# that of the reference probe: a "
+        f"thickness_um = {reference.layout().thickness_um:<17g}# that of the reference probe: a "
         "drawing does not say"
     )
     lines.append(_entry("tip_um", proposal.tip, proposal.reasons.get("tip"), (0.0, 0.0)))

@@ -42,7 +42,6 @@ class Shape(Record):
     outline_moves: ClassVar[bool] = True
 
     shape: str
-    thickness_um: float
 
     @abstractmethod
     def dimensions(self) -> dict[str, float]:
