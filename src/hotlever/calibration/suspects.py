@@ -156,8 +156,9 @@ def _of_the_rows(rows: Rows) -> list[Suspect]:
             f"are there two sweeps, a new one from row {cut + 1:.0f} ({bias[int(cut)]:.3g} V) on?"
         )
 
-    # where the bias goes back, or else in the middle
-    cuts = [*(np.flatnonzero(np.diff(bias) < 0)[:1] + 1).tolist(), place.size // 2]
+    # where the bias goes back, or else at some quarter
+    back = (np.flatnonzero(np.diff(bias) < 0)[:1] + 1).tolist()
+    cuts = [*back, *(quarter * place.size // 4 for quarter in (1, 2, 3))]
     both = (Suspect(asks, partial(part, first), starts=cuts) for first in (True, False))
     return [*found, *both]
 

@@ -10,6 +10,9 @@ from hotlever.types import Array
 #: Data are not described where they scatter about the model by more than this share of the largest,
 #: and neighbours together: of white noise they differ by twice its variance.
 SCATTER, _TOGETHER = 0.004, 0.6
+#: Outliers stand alone: so many neighbours that are off by more than so many standard deviations,
+#: to the same side, are none.
+_NEIGHBOURS, _FAR = 4, 8.0
 #: Fewer rows tell nothing of their neighbours.
 _ROWS = 7
 
@@ -36,4 +39,20 @@ def undescribed(residuals: Residuals, values: Array) -> str:
                 f"{name} differs by {np.sqrt(square):.1%} of its largest value (rms), and not at "
                 f"random; most at {residuals.bias[worst]:.3g} V"
             )
+    return ""
+
+
+def off_together(residuals: Residuals, values: Array) -> str:
+    """Return where neighbouring data are off together, as no outliers are; empty if none are."""
+    by_bias = np.argsort(residuals.bias, kind="stable")
+    bias = residuals.bias[by_bias]
+    for name, row in zip(residuals.observables, residuals.deviations(values), strict=True):
+        for side in (row[by_bias] > _FAR, row[by_bias] < -_FAR):
+            windows = np.lib.stride_tricks.sliding_window_view(
+                side, min(_NEIGHBOURS, side.size)
+            ).all(axis=1)
+            if name != "tip" and side.size >= _ROWS and windows.any():
+                first = int(np.argmax(windows))
+                last = bias[first + _NEIGHBOURS - 1]
+                return f"{name} is off in neighbouring rows, from {bias[first]:.3g} to {last:.3g} V"
     return ""
