@@ -17,6 +17,7 @@ from hotlever.calibration.plausibility import misfit
 from hotlever.errors import ComputationError
 from hotlever.fitting import Fit, FitOptions, Measurement
 from hotlever.fitting.estimation import Estimate, estimate
+from hotlever.fitting.least_squares import LeastSquares
 from hotlever.lever import Branch
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import PARAMETERS, Material
@@ -225,9 +226,12 @@ def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Pr
         tip_K=predicted.values[2],
         parts={source: np.sqrt(variance) for source, variance in parts.items()},
         priors=use,
-        reason=misfit(residuals, found.optimum.prediction.values, use)
-        or ("the search for one does not settle" if found.problem.left > _UNSETTLED else ""),
-        notes=[*found.notes, *residuals.suspicious(found.optimum.prediction.values, robust=True)],
+        reason=misfit(residuals, found.optimum.prediction.values, use),
+        notes=[
+            *found.notes,
+            *_search(found.problem),
+            *residuals.suspicious(found.optimum.prediction.values, robust=True),
+        ],
         _estimate=found,
     )
 
@@ -237,6 +241,16 @@ def _error_of_model(medium: str, bias: Array, rise: Array) -> Array:
     # a rise that grows as the square of the bias is that of a lever of constant properties
     steepness = 0.5 * np.gradient(np.log(rise), np.log(bias))
     return _MODEL[medium] * rise * np.maximum(steepness, 1.0)
+
+
+def _search(problem: LeastSquares) -> list[str]:
+    """Say that a search was ended far from where it led to."""
+    if problem.left < _UNSETTLED:
+        return []
+    return [
+        f"the search was ended after {problem.evaluations} levers; the next would still have "
+        f"lowered the sum of squares by {problem.left:.1f}, so errors may be larger than stated"
+    ]
 
 
 def _source(name: str) -> str:

@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 from hotlever.calibration.causes import Causes
 from hotlever.errors import InputError
 from hotlever.fitting.measurement import Measurement
-from hotlever.fitting.misfit import undescribed
+from hotlever.fitting.misfit import off_together, undescribed
 from hotlever.fitting.residuals import Residuals
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.probe import Probe
@@ -109,7 +109,7 @@ def remarks(measured: Measurement, tip_K: np.ndarray) -> list[str]:
 
 def misfit(residuals: Residuals, values: np.ndarray, priors: Mapping[str, PriorUse]) -> str:
     """Return why data are not described by what was fitted to them; empty if they are."""
-    reason = undescribed(residuals, values)
+    reason = undescribed(residuals, values) or off_together(residuals, values)
     if reason:
         return reason
     for name, use in priors.items():

@@ -107,19 +107,19 @@ def _of_the_meter(rows: Rows) -> list[Suspect]:
         return replace(rows, current_mA=rows.current_mA - share * largest * pattern)
 
     def asks(question: str) -> Callable[[float], str]:
-        return lambda share: f"{question} by {share:+.1%}?" if abs(share) < _OF_THE_ZERO else ""
+        return lambda share: (
+            f"{question} by {share:+.1%} of its largest value?" if abs(share) < _OF_THE_ZERO else ""
+        )
 
     def times(more: float) -> str:
         known = 1.0 / _FACTOR < 1.0 + more < _FACTOR  # or else it is another unit
         return f"is the current {1.0 + more:.3g} times what it should be?" if known else ""
 
-    zero = "of its largest value"
+    zero, drift = "is the zero of the current off", "does the zero of the current drift"
     return [
         Suspect(times, scaled, free=True),
-        Suspect(asks(f"is the zero of the current off, {zero},"), partial(raised, 1.0), free=True),
-        Suspect(
-            asks(f"does the zero of the current drift, {zero},"), partial(raised, along), free=True
-        ),
+        Suspect(asks(zero), partial(raised, 1.0), free=True),
+        Suspect(asks(drift), partial(raised, along), free=True),
     ]
 
 
@@ -156,8 +156,9 @@ def _of_the_rows(rows: Rows) -> list[Suspect]:
             f"are there two sweeps, a new one from row {cut + 1:.0f} ({bias[int(cut)]:.3g} V) on?"
         )
 
-    # where the bias goes back, or else in the middle
-    cuts = [*(np.flatnonzero(np.diff(bias) < 0)[:1] + 1).tolist(), place.size // 2]
+    # where the bias goes back, or else at some quarter
+    back = (np.flatnonzero(np.diff(bias) < 0)[:1] + 1).tolist()
+    cuts = [*back, *(quarter * place.size // 4 for quarter in (1, 2, 3))]
     both = (Suspect(asks, partial(part, first), starts=cuts) for first in (True, False))
     return [*found, *both]
 

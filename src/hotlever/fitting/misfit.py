@@ -12,6 +12,9 @@ from hotlever.types import Array
 SCATTER, _TOGETHER = 0.004, 0.6
 #: The same of fits without priors, which hold dimensions and whatever else is fixed as they are.
 HELD_SCATTER = 0.02
+#: Outliers stand alone: so many neighbours that are off by more than so many standard deviations,
+#: to the same side, are none.
+_NEIGHBOURS, _FAR = 4, 8.0
 #: Fewer rows tell nothing of their neighbours.
 _ROWS = 7
 
@@ -38,4 +41,20 @@ def undescribed(residuals: Residuals, values: Array, scatter: float = SCATTER) -
                 f"{name} differs by {np.sqrt(square):.1%} of its largest value (rms), and not at "
                 f"random; most at {residuals.bias[worst]:.3g} V"
             )
+    return ""
+
+
+def off_together(residuals: Residuals, values: Array) -> str:
+    """Return where neighbouring data are off together, as no outliers are; empty if none are."""
+    by_bias = np.argsort(residuals.bias, kind="stable")
+    bias = residuals.bias[by_bias]
+    for name, row in zip(residuals.observables, residuals.deviations(values), strict=True):
+        for side in (row[by_bias] > _FAR, row[by_bias] < -_FAR):
+            windows = np.lib.stride_tricks.sliding_window_view(
+                side, min(_NEIGHBOURS, side.size)
+            ).all(axis=1)
+            if name != "tip" and side.size >= _ROWS and windows.any():
+                first = int(np.argmax(windows))
+                last = bias[first + _NEIGHBOURS - 1]
+                return f"{name} is off in neighbouring rows, from {bias[first]:.3g} to {last:.3g} V"
     return ""
