@@ -47,11 +47,8 @@ _FOUND = 0.01
 #: its value ends the fit, since the confirmed model is exact to first order.
 _SETTLED, _SETTLED_RELATIVE = 0.5, 0.03
 _MOST_CONFIRMATIONS = 5
-#: Full weight up to, and none beyond, so many standard deviations: data without outliers keep
-#: nearly all of theirs, and their scatter.
-_FULL, _NONE = 3.5, 6.0
-_HUBER, _HUBER_TURNS = 1.345, 6
-_MOST_REWEIGHTINGS = 20
+#: Reweightings, the first of them gentle.
+_MOST_REWEIGHTINGS, _GENTLE_TURNS = 20, 6
 #: A datum that alone decides a parameter says nothing of its own noise.
 _LEAST_FREE = 0.05
 #: Rounds in which an observable without measurement errors finds its scatter.
@@ -159,14 +156,8 @@ class LeastSquares:
     def _reweighted(self, found: Optimum) -> Optimum:
         """Lessen the weight of outliers until nothing changes."""
         for turn in range(_MOST_REWEIGHTINGS):
-            size = np.abs(self.residuals.deviations(found.prediction.values))
-            # first Huber's weights, which have one optimum, then some that forget outliers
-            at_first = turn < _HUBER_TURNS
-            self.residuals.down = (
-                np.sqrt(_HUBER / np.maximum(size, _HUBER))
-                if at_first
-                else np.clip((_NONE - size) / (_NONE - _FULL), 0.0, 1.0)
-            )
+            at_first = turn < _GENTLE_TURNS
+            self.residuals.lessen(found.prediction.values, gently=at_first)
             # outliers can drive the first fit onto a bound, where it would stay without priors
             origin = self._start if at_first and not self._informed else found.probe
             previous, found = found, self.solve(origin)

@@ -14,6 +14,9 @@ from hotlever.fitting.options import Weights
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.types import Array
 
+#: Huber's weights lessen from here on; the others are full up to, and nothing beyond, so many
+#: standard deviations: data without outliers keep nearly all of theirs, and their scatter.
+_HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
 #: A point is named as suspicious beyond this many standard deviations.
 _SUSPICIOUS = 8.0
 
@@ -192,6 +195,16 @@ class Residuals:
         if self.errors_known:
             least = np.where(self.without_errors[:, None], least, self._scale)
         return np.nan_to_num(difference / np.maximum(scatter, least))
+
+    def lessen(self, values: Array, gently: bool) -> None:
+        """Lessen the weight of data far from a prediction.
+
+        Gently, by Huber's weights, with which a fit has one optimum; or by some that forget
+        outliers.
+        """
+        size = np.abs(self.deviations(values))
+        forgetful = np.clip((_NONE - size) / (_NONE - _FULL), 0.0, 1.0)
+        self.down = np.sqrt(_HUBER / np.maximum(size, _HUBER)) if gently else forgetful
 
     def take_scatter(self, values: Array, used_up: Array | float = 0.0, usual: float = 0.0) -> None:
         """Give observables without measurement errors their scatter about a prediction.
