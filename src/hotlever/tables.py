@@ -191,6 +191,7 @@ class _Reader:
         self, path: str, lines: list[tuple[int, str]], named: bool, header: bool, loose: bool
     ) -> None:
         self._path, self._loose = path, loose
+        self._first = "header" if header else "first row"
         self.rows: list[list[str]] = []
         self.places: list[int] = []
         self.remarks: list[tuple[int, str]] = []
@@ -250,7 +251,7 @@ class _Reader:
             hint = "; with decimal commas, tabs or semicolons must separate the cells" * halves
             raise InputError(
                 f"{self._path}: line {place}: {len(cells)} cells, expected {width} as in the "
-                f"header{hint}"
+                f"{self._first}{hint}"
             )
         self.places.append(place)
         self.rows.append(cells)

@@ -128,12 +128,11 @@ def test_another_lever_is_within_a_few_stated_errors(shape):
     """Dimensions off by 5 %, another material, doping known to 15 %; I-V only."""
     nominal = Probe.reference() if shape == "three-leg" else Probe.u_shape()
     rng = np.random.default_rng(21)
-    spreads = {name: prior.spread for name, prior in default_priors(nominal).items()}
     true = nominal.with_(
         **{
-            name: float(nominal.at([name])[0] * np.exp(spread * rng.standard_normal()))
-            for name, spread in spreads.items()
-            if name != "series_resistance_ohm"
+            name: prior.at(float(rng.standard_normal()))
+            for name, prior in default_priors(nominal).items()
+            if name not in ("series_resistance_ohm", "impurity_exponent")
         }
     )
     lever = Lever(true)

@@ -250,7 +250,7 @@ def test_a_thousand_notes_are_cut_short(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("I_h (mA)\n1,-0.1\n2,-0.2\n", "largest I_h: found -0.1 mA, .*the unit or the sign wrong"),
+        ("I_h (mA)\n1,-0.1\n2,-0.2\n", "largest I_h: found -0.1 mA, .*is the sign wrong"),
         ("I_h (mA)\n1,0\n2,0\n", "the largest I_h: found 0 mA"),
         ("I_h (A)\n1,2\n", "the largest I_h: found 2000 mA, expected 1e-09 to 1000 mA"),
         ("I_h (pA)\n1,0.1\n", "the largest I_h: found 1e-10 mA"),

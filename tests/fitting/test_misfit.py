@@ -61,7 +61,7 @@ def test_outliers_stand_alone(rows, alarm):
     off = np.zeros(COUNT)
     off[list(rows)] = 0.02
     text = off_together(compared(off), MODEL)
-    assert text == ("current is off in neighbouring rows, from 5.79 to 6.61 V" if alarm else "")
+    assert text == ("current is off in neighbouring rows, from 5.79 to 6.34 V" if alarm else "")
 
 
 def test_a_fit_says_first_that_its_data_are_not_described(run, tmp_path):

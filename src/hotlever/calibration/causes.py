@@ -36,7 +36,7 @@ _SOFT = 3.0
 _LEFT_OUT, _UNKNOWN = 1.2, 2.0
 #: A suspect has to lower the sum of squares to this share of what it is without, and to no more
 #: than so much for each row and altogether.
-_BETTER, _EACH, _ALTOGETHER = 0.5, 1.5, 10.0
+_BETTER, _EACH, _ALTOGETHER = 0.5, 2.0, 10.0
 #: Suspects within a factor or a difference of the best are as likely; so many are named.
 _AS_LIKELY, _AS_LIKELY_BY, _NAMED = 1.3, 4.0, 2
 #: The most promising are solved anew where they lead.
@@ -151,12 +151,13 @@ class Causes:
                 found.append(self._search(suspect))
         found.sort(key=lambda one: one.squares)
         found = sorted(map(self._again, found[:_AGAIN]), key=lambda one: one.squares)
-        best = found[0]
+        found = [one for one in found if one.suspect.asks(one.unknown)]
+        best = found[0] if found else self._without
         if best.squares > _BETTER * self._without.squares or not self._explains(best):
             return ""
         limit = max(_AS_LIKELY * best.squares, best.squares + _AS_LIKELY_BY)
         asked = [one.suspect.asks(one.unknown) for one in found if one.squares <= limit]
-        return " or: ".join(list(dict.fromkeys(filter(None, asked)))[:_NAMED])
+        return " or: ".join(list(dict.fromkeys(asked))[:_NAMED])
 
     @cached_property
     def _without(self) -> _Found:

@@ -12,9 +12,9 @@ from hotlever.types import Array
 SCATTER, _TOGETHER = 0.004, 0.6
 #: The same of fits without priors, which hold dimensions and whatever else is fixed as they are.
 HELD_SCATTER = 0.02
-#: Outliers stand alone: so many neighbours that are off by more than so many standard deviations,
-#: to the same side, are none.
-_NEIGHBOURS, _FAR = 4, 8.0
+#: Outliers stand alone: so many neighbours that are off by more than so many standard deviations
+#: are none.
+_NEIGHBOURS, _FAR = 3, 8.0
 #: Fewer rows tell nothing of their neighbours.
 _ROWS = 7
 
@@ -49,12 +49,12 @@ def off_together(residuals: Residuals, values: Array) -> str:
     by_bias = np.argsort(residuals.bias, kind="stable")
     bias = residuals.bias[by_bias]
     for name, row in zip(residuals.observables, residuals.deviations(values), strict=True):
-        for side in (row[by_bias] > _FAR, row[by_bias] < -_FAR):
-            windows = np.lib.stride_tricks.sliding_window_view(
-                side, min(_NEIGHBOURS, side.size)
-            ).all(axis=1)
-            if name != "tip" and side.size >= _ROWS and windows.any():
-                first = int(np.argmax(windows))
-                last = bias[first + _NEIGHBOURS - 1]
-                return f"{name} is off in neighbouring rows, from {bias[first]:.3g} to {last:.3g} V"
+        far = np.abs(row[by_bias]) > _FAR
+        if name == "tip" or far.size < _ROWS:
+            continue
+        together = np.lib.stride_tricks.sliding_window_view(far, _NEIGHBOURS).all(axis=1)
+        if together.any():
+            first = int(np.argmax(together))
+            last = bias[first + _NEIGHBOURS - 1]
+            return f"{name} is off in neighbouring rows, from {bias[first]:.3g} to {last:.3g} V"
     return ""

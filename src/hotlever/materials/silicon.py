@@ -211,7 +211,7 @@ def minimos_mobility(
     Examples
     --------
     >>> minimos_mobility([300.0, 800.0], 4e17, p=2.0)[0].round().tolist()
-    [466.0, 167.0]
+    [466.0, 172.0]
     """
     T, n = np.asarray(T, dtype=float), np.asarray(n, dtype=float)
     lattice_300, steeper, lowest_300, half_300 = _MINIMOS[carrier]
