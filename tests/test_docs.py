@@ -31,7 +31,7 @@ LAWS = (
     "probe/tip.py",
     "calibration",
     "lever/certificate.py",
-    "fitting/least_squares.py",
+    "fitting/least_squares.py", "fitting/residuals.py",
 )
 
 with_examples = [
