@@ -31,7 +31,8 @@ LAWS = (
     "probe/tip.py",
     "calibration",
     "lever/certificate.py",
-    "fitting/least_squares.py", "fitting/residuals.py",
+    "fitting/least_squares.py",
+    "fitting/residuals.py",
 )
 
 with_examples = [
