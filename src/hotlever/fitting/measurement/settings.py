@@ -64,7 +64,7 @@ _PLAIN = {
     "ambient",
     "e",
 }
-#: κ of nitrogen over that of air, within 1 % from 300 to 1200 K: the dilute gases of Lemmon and
+#: κ of nitrogen over that of air, within 1.3 % from 300 to 1200 K: the dilute gases of Lemmon and
 #: Jacobsen, Int. J. Thermophys. 25, 21 (2004).
 NITROGEN = 0.975
 #: mbar; a gas below it, of free molecules, takes less than 0.2 % of a lever's power.
