@@ -65,11 +65,11 @@ def test_outliers_stand_alone(rows, alarm):
 
 
 def test_a_fit_says_first_that_its_data_are_not_described(run, tmp_path):
-    """The current waves by 5 %, as no lever's does."""
+    """The current waves by 10 %, as no lever's does."""
     lines = (Path(__file__).parents[2] / "examples" / "lever-a.csv").read_text().splitlines()
     head = next(k for k, line in enumerate(lines) if line.startswith("V_b"))
     cells = [line.split(",") for line in lines[head + 1 :]]
-    waves = [float(row[1]) * (1.0 + 0.05 * np.sin(2.0 * float(row[0]))) for row in cells if row[1]]
+    waves = [float(row[1]) * (1.0 + 0.1 * np.sin(2.0 * float(row[0]))) for row in cells if row[1]]
     rows = [f"{row[0]},{wave:.6g}" for row, wave in zip(cells, waves, strict=True)]
     (tmp_path / "waves.csv").write_text("\n".join([*lines[:head], "V_b (V),I_h (mA)", *rows]))
     status, out, err = run("fit", "waves.csv", "--fix", "a1", "--fix", "p", "-o", "fit.json")
