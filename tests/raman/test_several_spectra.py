@@ -155,6 +155,7 @@ def test_only_the_best_form_of_an_intensity_is_a_spectrum(series, tmp_path):
     for heading in (
         "shift;Raw;Baseline;Corrected",
         "shift;Pixel;Dark;Intensity",
+        "Raman_Shift;Raw_Data;Background_Data;Processed_Data",
         "shift;x (µm);fit;y",
     ):
         others = [y + 90.0, np.random.default_rng(0).normal(90.0, 1.0, x.size)]

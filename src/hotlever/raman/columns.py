@@ -25,7 +25,9 @@ _ABSOLUTE = re.compile(r"wave\s*numbers?", re.I)
 _WAVELENGTH = re.compile(r"wave\s*length|lambda|\bnm\b|\(nm\)|\[nm\]", re.I)
 #: What intensities are called: the first of these kinds that a table has are the spectra.
 _WANTED = (
-    re.compile(r"(dark|baseline|background)\s*subtracted|corrected|raw\s*[-−–]\s*dark", re.I),
+    re.compile(
+        r"(dark|baseline|background)\s*subtracted|corrected|processed|raw\s*[-−–]\s*dark", re.I
+    ),
     re.compile(r"intensity|counts|cts|signal|ccd|raman\s*int", re.I),
     # raw ones, where the file has no others, or any that a user has named
     re.compile(r"raw|spectrum|sample|data|\by\b", re.I),
@@ -34,8 +36,8 @@ _OTHER, _PLAIN, _UNNAMED = -1, 2, 3  # kinds of columns beside the places in _WA
 _LASER = re.compile(r"laser|excitation", re.I)
 _NO_WAVELENGTH = re.compile(r"pol|power|level", re.I)
 _UNWANTED = re.compile(
-    r"pixel|index|^dark\b(?!\s*sub)|^reference$|%|absorb|irrad|transm|reflect|wave|^#?[xz]\b|time|background"
-    r"|baseline|std|\berr|error|sigma|uncert|±|\bfit|model|resid|weight|smooth|mask|flag",
+    r"pixel|index|^dark\b(?!\s*sub)|^reference$|%|absorb|irrad|transm|reflect|wave|^#?[xz]\b|time"
+    r"|background|baseline|std|\berr|error|sigma|uncert|±|\bfit|model|resid|weight|smooth|mask|flag",
     re.I,
 )
 _MOST_COMPARED = 8  # columns; a series of many is one
