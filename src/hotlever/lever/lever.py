@@ -90,7 +90,7 @@ class Lever:
         return space.in_air(air).in_gas(surroundings.gas_conductivity)
 
     def air_by_inverse_gap(self) -> Array:
-        """Return how the operator of the air changes with the gap; see `change_with_gap`."""
+        """Return how the operator of the air changes with the inverse of the gap, in µm²."""
         layout, surroundings = self.probe.layout(), self.probe.surroundings
         base, operator = self.circuit.base_temperature_K, self.space.air.operator
         return change_with_gap(operator, layout, surroundings, base, self.panels)
