@@ -105,11 +105,24 @@ def test_the_slope_is_that_of_the_deviation(share, spread, relative):
 def test_a_joint_prior_is_as_wide_as_its_covariance():
     values = np.array([2.0, 5.0])
     covariance = np.array([[0.04, 0.03], [0.03, 0.09]])
-    joint = JointPrior(["a", "b"], values, covariance)
+    joint = JointPrior(["a", "b"], values, covariance, np.array([True, True]))
     slopes = joint.slopes(values)
     np.testing.assert_allclose(np.linalg.inv(slopes.T @ slopes), covariance, rtol=1e-12)
     moved = values * 1.001
     np.testing.assert_allclose(joint.deviations(moved), slopes @ (moved - values), rtol=1e-3)
+
+
+def test_what_may_be_zero_is_no_logarithm_in_a_joint_prior():
+    """An exponent may come out with either sign, whatever the data before said."""
+    values, covariance = np.array([2.0, 0.1]), np.array([[0.04, 0.01], [0.01, 0.09]])
+    joint = JointPrior(["a", "s"], values, covariance, np.array([True, False]))
+    here = np.array([2.0, -0.3])
+    away = np.array([0.0, -0.4])
+    squares = away @ np.linalg.solve(covariance, away)
+    assert np.sum(joint.deviations(here) ** 2) == pytest.approx(squares)
+    step = 1e-6 * np.eye(2)
+    slopes = [(joint.deviations(here + one) - joint.deviations(here - one)) / 2e-6 for one in step]
+    np.testing.assert_allclose(joint.slopes(here), np.transpose(slopes), rtol=1e-6)
 
 
 def test_everything_that_a_prior_may_have_is_a_parameter():

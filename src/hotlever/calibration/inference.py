@@ -164,7 +164,8 @@ def estimated(
     own = [name for name in found.options.varied if name not in _CIRCUIT]
     places = [found.options.varied.index(name) for name in own]
     values = found.optimum.probe.at(own)
-    joint = JointPrior(own, values, found.covariance[np.ix_(places, places)])
+    relative = np.array([name not in held or held[name].relative for name in own])
+    joint = JointPrior(own, values, found.covariance[np.ix_(places, places)], relative)
     probe = probe.moved(dict(zip(own, values.tolist(), strict=True)))
     theirs = {name: prior for name, prior in known.items() if name in {*_CIRCUIT, *SCALES}}
     again = FitOptions(

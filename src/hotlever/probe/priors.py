@@ -16,6 +16,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ConfigDict
 
 from hotlever.errors import InputError, unknown_name
@@ -130,7 +131,7 @@ class PriorUse:
 
 @dataclass(frozen=True)
 class JointPrior:
-    """A normal distribution of the logarithms of several parameters, as an estimate leaves it.
+    """A normal distribution of several parameters or their logarithms, as an estimate leaves it.
 
     Attributes
     ----------
@@ -138,24 +139,33 @@ class JointPrior:
     values : ndarray, shape (p,)
     covariance : ndarray, shape (p, p)
         In the parameters' own units.
+    relative : ndarray of bool, shape (p,)
+        Whose logarithm it is; the others may be of either sign.
     """
 
     names: list[str]
     values: Array
     covariance: Array
+    relative: NDArray[np.bool_]
 
     @cached_property
     def _whitening(self) -> Array:
-        relative = self.covariance / np.outer(self.values, self.values)
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(relative)))
+        unit = self._unit(self.values)
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.covariance / np.outer(unit, unit))))
+
+    def _unit(self, values: Array) -> Array:
+        return np.where(self.relative, values, 1.0)
 
     def deviations(self, values: Array) -> Array:
         """Return how far values are from the prior's, in uncorrelated standard deviations."""
-        return np.asarray(self._whitening @ np.log(values / self.values))
+        logarithms = np.log(self._unit(values) / self._unit(self.values))
+        return np.asarray(
+            self._whitening @ np.where(self.relative, logarithms, values - self.values)
+        )
 
     def slopes(self, values: Array) -> Array:
         """Return the derivatives of `deviations` by the values, (p, p)."""
-        return np.asarray(self._whitening / values)
+        return np.asarray(self._whitening / self._unit(values))
 
 
 def nuisances(probe: Probe) -> list[str]:
