@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 from shapely import LineString, Polygon
 
-from hotlever.drawing.fault import DrawingError, Point, Ring
+from hotlever.drawing.fault import DrawingError, Ring
 from hotlever.drawing.healing import polygons
-from hotlever.probe.layout import Terminal
+from hotlever.probe.layout import Point, Terminal
 
 #: Terminals that a lever must have.
 REQUIRED = ("supply", "ground")

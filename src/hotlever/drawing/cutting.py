@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -13,6 +12,7 @@ from shapely import LineString, MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
+from hotlever.drawing.contacts import outline_edges
 from hotlever.drawing.fault import DrawingError
 from hotlever.drawing.healing import GRID, parts_of
 from hotlever.probe.layout import BorderTaper, Point, Taper
@@ -96,22 +96,13 @@ def cut(silicon: Polygon, low_doped: Mapping[str, BaseGeometry]) -> Cut:
     for number, piece in enumerate(pieces):
         for face in kinds[piece.kind]:
             if piece.shape.covers(face.representative_point()):
-                for edge in edges_of(face):
+                for edge in map(frozenset, outline_edges(face)):
                     owners[edge].append(number)
     shared: dict[tuple[int, int], list[Edge]] = defaultdict(list)
     for edge, touching in owners.items():
         if len(touching) == 2 and touching[0] != touching[1]:
             shared[min(touching), max(touching)].append(edge)
     return Cut(pieces, dict(shared))
-
-
-def edges_of(shape: Polygon) -> list[Edge]:
-    """Return the edges of outline and holes, without their directions."""
-    found = []
-    for ring in (shape.exterior, *shape.interiors):
-        corners = [(x, y) for x, y in ring.coords]
-        found += [frozenset(pair) for pair in pairwise(corners)]
-    return found
 
 
 def taper_of(whole: Cut, number: int, tolerance: float) -> Taper | BorderTaper:

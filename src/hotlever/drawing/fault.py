@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hotlever.errors import InputError
+from hotlever.probe.layout import Point
 
-Point = tuple[float, float]
 # A polygon, or a line of two points.
 Ring = tuple[Point, ...]
 

@@ -15,7 +15,8 @@ import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.drawing.fault import DrawingError, Point, Ring
+from hotlever.drawing.fault import DrawingError, Ring
+from hotlever.probe.layout import Point, ring_area
 from hotlever.types import Array
 
 #: Coordinates are rounded to this (µm) where outlines cross: far less than matters.
@@ -55,8 +56,7 @@ def polygons(part: str, rings: Iterable[Ring], tolerance: float) -> list[Polygon
 def _unfolded(polygon: Polygon, part: str, number: int) -> Polygon:
     """Return the polygon with holes of an outline that runs along itself."""
     unfolded = shapely.make_valid(polygon)
-    x, y = np.array(polygon.exterior.coords).T
-    enclosed = abs(float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum())) / 2
+    enclosed = ring_area(np.array(polygon.exterior.coords))
     if unfolded.geom_type == "GeometryCollection":
         areas = [one for one in unfolded.geoms if one.area > 0]
         unfolded = areas[0] if len(areas) == 1 else MultiPolygon()

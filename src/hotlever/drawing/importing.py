@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from hotlever.drawing.contacts import REQUIRED, terminal_part
-from hotlever.drawing.fault import Point, Ring
+from hotlever.drawing.fault import Ring
 from hotlever.drawing.making import HEATER, SILICON
 from hotlever.drawing.proposal import Drawn, Proposal, proposed
 from hotlever.drawing.shape import TOLERANCE_UM
 from hotlever.drawing.sheet import Sheet, read_sheet
 from hotlever.errors import InputError
+from hotlever.probe.layout import Point, ring_area
 from hotlever.probe.probe import Probe
 from hotlever.text import aligned, as_toml
 
@@ -119,7 +120,7 @@ def _listing(sheet: Sheet, proposal: Proposal) -> list[str]:
         (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
         number = f"{len(layer.rings)}" + (f" + {len(layer.lines)} open" if layer.lines else "")
         extent = [f"{x0:.6g} to {x1:.6g}", f"{y0:.6g} to {y1:.6g}"]
-        area = f"{sum(map(_area, layer.rings)):.4g}"
+        area = f"{sum(ring_area(np.array(ring)) for ring in layer.rings):.4g}"
         rows.append([name, number, area, *extent, of_layer.get(name, "–")])
     lines += aligned(rows)
     if len(sheet.layers) > _MOST_LISTED:
@@ -129,11 +130,6 @@ def _listing(sheet: Sheet, proposal: Proposal) -> list[str]:
         kinds = ", ".join(f"{count} {kind}" for kind, count in sheet.left_out.items())
         lines.append(f"left out, since they draw no outline: {kinds}")
     return lines + [f"to be checked: {doubt}" for doubt in proposal.doubts]
-
-
-def _area(ring: Ring) -> float:
-    (x, y), (x1, y1) = np.array(ring).T, np.roll(ring, -1, axis=0).T
-    return abs(float((x * y1 - x1 * y).sum())) / 2
 
 
 def _probe_file(sheet: Sheet, proposal: Proposal, listing: list[str], name: str) -> str:

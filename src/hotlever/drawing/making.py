@@ -10,7 +10,7 @@ from shapely import Polygon
 
 from hotlever.drawing.contacts import REQUIRED, terminal_edges, terminal_part
 from hotlever.drawing.cutting import Cut, cut, taper_of
-from hotlever.drawing.fault import DrawingError, Point, Ring
+from hotlever.drawing.fault import DrawingError, Ring
 from hotlever.drawing.healing import (
     NARROWEST,
     check_widths,
@@ -21,7 +21,7 @@ from hotlever.drawing.healing import (
     polygons,
     snapped,
 )
-from hotlever.probe.layout import Layout, Part, Region, Terminal
+from hotlever.probe.layout import Layout, Part, Point, Region, Terminal
 
 #: Extent of a lever (µm).
 _SMALLEST, _LARGEST = 2.0, 2000.0

@@ -13,11 +13,12 @@ from shapely.geometry.base import BaseGeometry
 
 from hotlever.drawing.contacts import outline_edges, terminal_edges, terminal_part
 from hotlever.drawing.cutting import Cut, cut
-from hotlever.drawing.fault import DrawingError, Point, Ring
+from hotlever.drawing.fault import DrawingError, Ring
 from hotlever.drawing.healing import healed, parts_of, polygons, snapped
 from hotlever.drawing.making import HEATER, SILICON
 from hotlever.drawing.shape import rings_of
 from hotlever.drawing.sheet import Layer, Sheet
+from hotlever.probe.layout import Point
 
 SUPPLY, GROUND, READER = "supply", "ground", "reader"
 #: Share of the silicon that a low-doped layer does not exceed.

@@ -12,17 +12,18 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from hotlever.drawing.contacts import REQUIRED, terminal_part
-from hotlever.drawing.fault import DrawingError, Point, Ring
+from hotlever.drawing.fault import DrawingError, Ring
 from hotlever.drawing.healing import without_nested
 from hotlever.drawing.making import HEATER, SILICON, layout_of
 from hotlever.drawing.sheet import Layer, Sheet, read_sheet
 from hotlever.errors import InputError, quoted
-from hotlever.probe.layout import Layout
-from hotlever.probe.shapes import Shape, thickness
+from hotlever.probe.layout import Layout, Point
+from hotlever.probe.shapes import SHAPE_SECTIONS, Shape, thickness
 
 #: What is nearer is the same (µm), unless a probe file says otherwise.
 TOLERANCE_UM = 0.002
-_SECTIONS = ("probe", "layers", "terminals")
+#: What it may be.
+_FINEST_UM, _COARSEST_UM = 1e-4, 0.1
 
 Rings = tuple[Ring, ...]
 
@@ -50,8 +51,8 @@ class Drawing(Shape):
     )
     tolerance_um: float = Field(
         default=TOLERANCE_UM,
-        ge=1e-4,
-        le=0.1,
+        ge=_FINEST_UM,
+        le=_COARSEST_UM,
         description="curves become lines within it, what is nearer is the same",
     )
     thickness_um: float = thickness()
@@ -76,7 +77,7 @@ class Drawing(Shape):
         """Return the sections of a probe file that describe it."""
         values = self.model_dump()
         return {
-            "probe": {name: one for name, one in values.items() if name not in _SECTIONS},
+            "probe": {name: one for name, one in values.items() if name not in SHAPE_SECTIONS},
             "layers": values["layers"],
             "terminals": values["terminals"],
         }
@@ -160,9 +161,10 @@ def _sheet(values: dict[str, Any], where: str, folder: Path | None, tolerance: A
     for key, kinds, default in (("cell", str, None), ("unit_um", (int, float), None)):
         if not isinstance(values.get(key, default), (kinds, type(None))):
             raise InputError(f"{where}: [probe]: {key} = {quoted(values[key])}: not understood")
-    if not (type(tolerance) in (int, float) and 1e-4 <= tolerance <= 0.1):
+    if not (type(tolerance) in (int, float) and _FINEST_UM <= tolerance <= _COARSEST_UM):
         raise InputError(
-            f"{where}: [probe]: tolerance_um = {quoted(tolerance)}: expected 0.0001 to 0.1"
+            f"{where}: [probe]: tolerance_um = {quoted(tolerance)}: expected {_FINEST_UM:g} to "
+            f"{_COARSEST_UM:g}"
         )
     path = Path(file) if folder is None else folder / file
     unit, cell = values.get("unit_um"), values.get("cell")

@@ -16,9 +16,10 @@ import shapely
 from scipy import spatial
 from shapely import LineString
 
-from hotlever.drawing.fault import Point, Ring
+from hotlever.drawing.fault import Ring
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_bytes
+from hotlever.probe.layout import Point
 
 #: Bytes that a file may have, and of memory and seconds that reading it may take.
 _LARGEST, _MEMORY, _PATIENCE_S = 64 * 2**20, 4 * 2**30, 60.0

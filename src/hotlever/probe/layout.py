@@ -87,7 +87,7 @@ class Region:
     @property
     def area(self) -> float:
         """µm²."""
-        outline, *holes = (_area(np.array(ring)) for ring in self.rings)
+        outline, *holes = (ring_area(np.array(ring)) for ring in self.rings)
         return outline - sum(holes)
 
     @property
@@ -202,7 +202,7 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> tuple[Point, ...]:
     return ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
 
 
-def _area(ring: Array) -> float:
+def ring_area(ring: Array) -> float:
     """Return the area that a ring of points (n, 2) encloses."""
     (x, y), (x1, y1) = ring.T, np.roll(ring, -1, axis=0).T
     return abs(float((x * y1 - x1 * y).sum())) / 2
