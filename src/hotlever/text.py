@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 
 from hotlever.materials import PARAMETERS
-from hotlever.materials.material import Parameter
+from hotlever.materials.parameter import Parameter
 
 INVERSION = "inversion_temperature"
 #: Numbers between these are written without a power of ten.

@@ -15,7 +15,6 @@ from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import read_text, whole_file, write_text
 from hotlever.lever.balances import BALANCES
-from hotlever.lever.equations import LAWS
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.probe import SECTIONS
@@ -53,7 +52,9 @@ def sweep_dataset(
     for part in ("heater", "leg1", "leg2"):
         columns[f"{part}_ohm"] = _resistance(columns[f"{part}_mW"], shown["current_mA"])
     columns["legs_ohm"] = columns["leg1_ohm"] + columns["leg2_ohm"]
-    columns["lever_ohm"] = columns["legs_ohm"] + columns["heater_ohm"]
+    # where all of the conductor is the heater there are no legs
+    whole = np.where(np.isnan(columns["legs_ohm"]), 0.0, columns["legs_ohm"])
+    columns["lever_ohm"] = whole + columns["heater_ohm"]
     variables: dict[str, Any] = {name: columns[name] for name in (*SWEEP_COLUMNS, *_MORE)}
     coordinates: dict[str, Any] = {"bias": columns["bias_V"]}
     if sensitivities is not None:
@@ -64,7 +65,7 @@ def sweep_dataset(
         coordinates=coordinates,
         **{name: json.dumps(section) for name, section in probe.values().items()},
         medium=probe.surroundings.medium,
-        notes="\n".join([*notes, *_range_notes(columns["bias_V"], columns["max_K"])]),
+        notes="\n".join([*notes, *_range_notes(probe, columns["bias_V"], columns["max_K"])]),
     )
 
 
@@ -84,9 +85,10 @@ def _resistance(heat_mW: Array, current_mA: Array) -> Array:
     return np.divide(1000.0 * heat_mW, current_mA**2, out=nothing, where=current_mA > 0)
 
 
-def _range_notes(bias_V: Array, max_K: Array) -> list[str]:
+def _range_notes(probe: Probe, bias_V: Array, max_K: Array) -> list[str]:
     """Say where the laws are used beyond the temperatures they are meant for."""
-    limit = min(law.temperature_range[1] for law in LAWS)
+    laws = [law for kind in probe.made_of.values() for law in kind.laws]
+    limit = min(law.temperature_range[1] for law in laws)
     beyond = bias_V[max_K > limit]
     if not beyond.size:
         return []

@@ -14,9 +14,10 @@ from skfem import MeshTri
 from hotlever.datasets import labelled
 from hotlever.files import whole_file
 from hotlever.lever.elements import FiniteElements
-from hotlever.lever.equations import PER_CM_TO_MILLI_PER_UM, LeverEquations
+from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever
+from hotlever.lever.stack import PER_CM_TO_MILLI_PER_UM
 from hotlever.lever.state import State
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.silicon import conductivity_low_doped, inversion_temperature
@@ -70,7 +71,7 @@ class FieldMapper:
         middle = centres, np.full(centres.shape[1], 0.5 / cuts**2)
         space = FullSpace(mesh, FiniteElements(mesh.elements, element, middle))
         base = lever.circuit.base_temperature_K
-        self._centres = LeverEquations(space, lever.probe.material, base)
+        self._centres = LeverEquations(space, lever.probe.kinds, base)
 
     def map(self, state: State) -> FieldMap:
         """Return the fields of a state of the lever."""

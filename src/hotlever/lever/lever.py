@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -76,7 +77,7 @@ class Lever:
 
     def _prepare(self) -> None:
         self.equations = LeverEquations(
-            self.space, self.probe.material, self.probe.circuit.base_temperature_K
+            self.space, self.probe.kinds, self.probe.circuit.base_temperature_K
         )
         self._branch: Branch | None = None
 
@@ -84,16 +85,20 @@ class Lever:
         """Return a space in the probe's surroundings."""
         if self.medium == "vacuum":
             return space.in_air(None)
-        layout, surroundings = self.probe.layout(), self.probe.surroundings
         base = self.circuit.base_temperature_K
-        air = air_operator(layout, surroundings, base, self.panels, progress)
-        return space.in_air(air).in_gas(surroundings.gas_conductivity)
+        air = air_operator(self._plate, self.probe.surroundings, base, self.panels, progress)
+        return space.in_air(air).in_gas(self.probe.surroundings.gas_conductivity)
 
     def air_by_inverse_gap(self) -> Array:
         """Return how the operator of the air changes with the inverse of the gap, in µm²."""
-        layout, surroundings = self.probe.layout(), self.probe.surroundings
         base, operator = self.circuit.base_temperature_K, self.space.air.operator
-        return change_with_gap(operator, layout, surroundings, base, self.panels)
+        return change_with_gap(operator, self._plate, self.probe.surroundings, base, self.panels)
+
+    @property
+    def _plate(self) -> Layout:
+        """The lever as the air sees it: as thick everywhere as where most lies on one another."""
+        layout = self.probe.layout()
+        return replace(layout, thickness_um=layout.thickest_um)
 
     @property
     def panels(self) -> PanelOptions:
@@ -326,8 +331,8 @@ class Lever:
         knee = branch.knee
         if knee is None:
             raise ComputationError(
-                f"V_l rises until silicon melts, with the tip at {branch.hottest_K:.0f} K: there "
-                "is no knee"
+                f"V_l rises until {self.equations.limit[1]}, with the tip at "
+                f"{branch.hottest_K:.0f} K: there is no knee"
             )
         return self._dataset(branch, branch.u_at([knee.tip_K]), [])
 

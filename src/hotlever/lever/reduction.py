@@ -177,7 +177,7 @@ def _atlas(space: ReducedSpace, training: list[Linearised]) -> Atlas:
         slopes.append(together[:, here][..., columns].swapaxes(0, 1))
     return Atlas.fitted(
         common,
-        [one.branch.equations.material for one in training],
+        [one.probe.material for one in training],
         np.nan_to_num(np.stack(values)),  # a lever without reader shows no V_r
         np.nan_to_num(np.stack(slopes)),
         np.append(~space.is_temperature, [True] * len(SHOWN)),

@@ -51,7 +51,7 @@ class SimilarLevers:
         dimensions = [name for name in names if name in dimensions_of(probe)]
         motions = {name: motion_of(space, self._moving.movement(name)) for name in dimensions}
         base = probe.circuit.base_temperature_K
-        return LeverEquations(space, probe.material, base, motions)
+        return LeverEquations(space, probe.kinds, base, motions)
 
     def _air(self, probe: Probe, names: tuple[str, ...]) -> AirLoss | None:
         """Return the air around a similar probe."""

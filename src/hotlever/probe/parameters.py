@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from hotlever.errors import unknown_name
 from hotlever.materials import PARAMETERS
-from hotlever.materials.material import Parameter
+from hotlever.materials.parameter import Parameter
 from hotlever.text import parameter_named
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from pydantic import ConfigDict
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
-from hotlever.materials.material import Parameter
+from hotlever.materials.parameter import Parameter
 from hotlever.probe.parameters import OF_THE_TIP, parameters_of
 from hotlever.records import Record
 from hotlever.spieser2017 import published
