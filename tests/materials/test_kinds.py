@@ -139,7 +139,7 @@ def test_boron_doped_silicon_has_an_inversion_temperature():
     T = np.linspace(500.0, 1200.0, 70001)
     found = inversion_temperature_p(5e17, 2.5)
     assert found == pytest.approx(T[conductivity_p(T, 5e17, 2.5)[0].argmin()], abs=0.02)
-    assert MADE["p-silicon"].inversion_temperature_K == pytest.approx(
+    assert MADE["p-silicon"].inversion_temperature() == pytest.approx(
         inversion_temperature_p(OPTION_III.n_d, 2.23, 0.4)
     )
 

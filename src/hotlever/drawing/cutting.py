@@ -153,8 +153,11 @@ def taper_of(
         borders = sorted(shapely.get_parts(merged).tolist(), key=lambda one: one.coords[0])
     if not borders:
         return None
-    shape = parts_of(shapely.union_all([whole.pieces[one].shape for one in sorted(group)]))
-    strip = _strip(shape[0], borders, tolerance) if len(shape) == 1 else None
+    shape = whole.pieces[number].shape
+    if len(group) > 1:
+        # where a film ends on it is no corner of the part
+        shape = shapely.union_all([whole.pieces[one].shape for one in sorted(group)]).simplify(GRID)
+    strip = _strip(shape, borders, tolerance)
     if strip is not None:
         return strip
     return BorderTaper(tuple(tuple((x, y) for x, y in border.coords) for border in borders))

@@ -26,5 +26,6 @@ from hotlever.figures.lever import (
     sweep_overview,
     temperature_power,
 )
+from hotlever.figures.materials import material_curves
 from hotlever.figures.raman import one_spectrum, raman_check, thermometry
 from hotlever.figures.style import FIGURE_TYPES, save_figure

@@ -150,9 +150,11 @@ class LowDopedSilicon(Silicon):
     p: float = bounded(OF_SILICON["p"])
     impurity_exponent: float = impurity_exponent()
 
-    @property
-    def inversion_temperature_K(self) -> float:
-        """Temperature (K) at which its resistivity is highest; NaN without one."""
+    def inversion_temperature(self, n: Array | None = None) -> Array:
+        """Return the temperature (K) at which the resistivity of a doping (cm⁻³) is highest.
+
+        Of its own doping by default; NaN where there is none below 1700 K.
+        """
         raise NotImplementedError
 
 
@@ -170,10 +172,10 @@ class NSilicon(LowDopedSilicon):
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
         return conductivity_low_doped(T, n, self.p, self.impurity_exponent)
 
-    @property
-    def inversion_temperature_K(self) -> float:
-        """Temperature (K) at which its resistivity is highest; NaN without one."""
-        return float(inversion_temperature(self.n_d, self.p, self.impurity_exponent))
+    def inversion_temperature(self, n: Array | None = None) -> Array:
+        """Return it (K), see `LowDopedSilicon.inversion_temperature`."""
+        doping = self.n_d if n is None else n
+        return inversion_temperature(doping, self.p, self.impurity_exponent)
 
 
 class PSilicon(LowDopedSilicon):
@@ -190,10 +192,10 @@ class PSilicon(LowDopedSilicon):
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
         return conductivity_p(T, n, self.p, self.impurity_exponent)
 
-    @property
-    def inversion_temperature_K(self) -> float:
-        """Temperature (K) at which its resistivity is highest; NaN without one."""
-        return float(inversion_temperature_p(self.n_d, self.p, self.impurity_exponent))
+    def inversion_temperature(self, n: Array | None = None) -> Array:
+        """Return it (K), see `LowDopedSilicon.inversion_temperature`."""
+        doping = self.n_d if n is None else n
+        return inversion_temperature_p(doping, self.p, self.impurity_exponent)
 
 
 class HighDopedSilicon(Silicon):

@@ -17,7 +17,10 @@ STATED_AT_K = 293.0
 SOMMERFELD = 2.443e-8
 
 
-@law(meant_for=(200.0, 1300.0), source="IEC 60751, linear term")
+@law(
+    meant_for=(250.0, 800.0),
+    source="Bloch and Grüneisen at high temperature; Matula, JPCRD 8, 1147 (1979)",
+)
 def metal_conductivity(T: ArrayLike, resistivity: float, tcr: float) -> Evaluated:
     """Electrical conductivity of a metal film, in S cm⁻¹: ρ = ρ₂₉₃ (1 + α (T − 293 K)).
 
@@ -45,7 +48,7 @@ def metal_conductivity(T: ArrayLike, resistivity: float, tcr: float) -> Evaluate
     }
 
 
-@law(meant_for=(200.0, 1300.0), source="Wiedemann and Franz, Ann. Phys. 165, 497 (1853)")
+@law(meant_for=(250.0, 800.0), source="Wiedemann and Franz, Ann. Phys. 165, 497 (1853)")
 def wiedemann_franz(
     T: ArrayLike, resistivity: float, tcr: float, lorenz_ratio: float = 1.0
 ) -> Evaluated:

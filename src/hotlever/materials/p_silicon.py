@@ -89,7 +89,11 @@ def hole_mobility(
     )
 
 
-@law(meant_for=(290.0, 1300.0), source="Eq. 5, with holes as the majority")
+@law(
+    meant_for=(290.0, 1300.0),
+    source="Eq. 5; holes: Thurber et al., J. Electrochem. Soc. 127, 2291 (1980); gap: Klaassen et "
+    "al., Solid-State Electron. 35, 125 (1992)",
+)
 def conductivity_p(
     T: ArrayLike, n: ArrayLike, p: float, impurity_exponent: float = 0.0
 ) -> Evaluated:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.materials.kinds import KINDS, Kind
+from hotlever.materials.material import HIGH_DOPED, LOW_DOPED
 from hotlever.materials.metal import SOMMERFELD
 from hotlever.spieser2017 import published
 
@@ -60,6 +62,8 @@ PRESETS: dict[str, Preset] = {
 
 #: Lattice mobility exponent of holes; Arora et al., IEEE Trans. Electron Devices 29, 292 (1982).
 _HOLES = 2.23
+#: Names of materials.
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
 def _reference() -> dict[str, Any]:
@@ -103,6 +107,39 @@ def material_of(values: Mapping[str, Any], where: str) -> Kind:
         raise unknown_name("kind", str(kind), KINDS, where)
     given = {**usual_values(kind), **_preset(values.get("preset"), kind, where), **values}
     return KINDS[kind].of(given, where)
+
+
+def materials_of(
+    sections: Mapping[str, Any], where: str, reserved: Collection[str]
+) -> dict[str, Kind]:
+    """Make all materials of the section ``[materials]`` of a probe file.
+
+    Parameters
+    ----------
+    sections : mapping
+        Of `material_of`, by name.
+    where : str
+        Names the file in an error.
+    reserved : collection of str
+        Names that no material may have.
+
+    Raises
+    ------
+    InputError
+        See `material_of`.
+    """
+    found = {}
+    for name, section in sections.items():
+        if not _NAME.fullmatch(name) or name in (*reserved, LOW_DOPED, HIGH_DOPED):
+            raise InputError(
+                f"{where}: [materials]: {quoted(name)} cannot be the name of a material, expected "
+                "a letter, then letters, digits, - or _; and no section's name"
+            )
+        here = f"{where}: [materials.{name}]"
+        if not isinstance(section, dict):
+            raise InputError(f"{here} must be a section, found {quoted(section)}")
+        found[name] = material_of(section, here)
+    return found
 
 
 def _preset(name: Any, kind: str, where: str) -> Mapping[str, float]:

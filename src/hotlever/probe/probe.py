@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,13 +12,14 @@ import numpy as np
 from pydantic import Field, SerializeAsAny, model_validator
 
 from hotlever.errors import InputError, quoted, unknown_name
-from hotlever.files import read_text, write_text
-from hotlever.materials import HIGH_DOPED, LOW_DOPED, Kind, Material
-from hotlever.materials.presets import material_of
+from hotlever.files import write_text
+from hotlever.materials import HIGH_DOPED, LOW_DOPED, Kind, Material, full_name
+from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
+from hotlever.materials.presets import materials_of
 from hotlever.probe.circuit import Circuit
 from hotlever.probe.layout import Layout
 from hotlever.probe.priors import PriorTexts, priors_of
-from hotlever.probe.sections import section_lines, with_values
+from hotlever.probe.sections import read_sections, section_lines, with_values
 from hotlever.probe.shapes import (
     PARAMETRIC,
     SHAPE_SECTIONS,
@@ -35,10 +34,6 @@ from hotlever.records import Record
 from hotlever.spieser2017 import DOI, published
 from hotlever.types import Array
 
-#: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
-#: gigabytes to read.
-_LARGEST, _LONGEST_LINE = 1_000_000, 1000
-
 #: What the sections of a probe file hold, beside the shape in ``[probe]``.
 _PARTS: dict[str, type[Record]] = {
     "circuit": Circuit,
@@ -49,8 +44,6 @@ _PARTS: dict[str, type[Record]] = {
 }
 _MATERIALS = "materials"
 SECTIONS = (*SHAPE_SECTIONS, _MATERIALS, *_PARTS)
-#: Names of materials.
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
 class Probe(Record):
@@ -84,6 +77,23 @@ class Probe(Record):
                 raise ValueError(
                     f"the tip's base has a radius of {self.tip.base_radius_um:.4g} µm, expected "
                     f"less than {room:.4g} µm, half the heater's narrow side"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _low_doped_parts_are_the_lower(self) -> Probe:
+        for region in self.layout().regions:
+            low, high = region.stack[0].material, region.dopant_from
+            of_low, of_high = self.kinds[low], self.kinds[high]
+            if (
+                region.taper is not None
+                and isinstance(of_low, LowDopedSilicon)
+                and isinstance(of_high, HighDopedSilicon)
+                and of_low.n_d >= of_high.n_hd
+            ):
+                raise ValueError(
+                    f"{full_name(low, 'n_d')} = {of_low.n_d:g} must be below "
+                    f"{full_name(high, 'n_hd')} = {of_high.n_hd:g}"
                 )
         return self
 
@@ -167,7 +177,7 @@ class Probe(Record):
                 raise InputError(f"{where}: [{name}] must be a section, found {quoted(section)}")
         if "probe" not in values:
             raise InputError(f"{where}: section [probe] is missing")
-        materials = _materials(values.get(_MATERIALS, {}), where)
+        materials = materials_of(values.get(_MATERIALS, {}), where, SECTIONS)
         drawn = {name: values[name] for name in SHAPE_SECTIONS if name in values}
         shape = shape_of(drawn, where, folder, materials)
         for name in materials:
@@ -199,21 +209,7 @@ class Probe(Record):
         InputError
             If the file cannot be read or its content is at fault.
         """
-        text = read_text(path, largest=_LARGEST)
-        for number, line in enumerate(text.splitlines(), start=1):
-            if len(line) > _LONGEST_LINE:
-                raise InputError(
-                    f"{path}: line {number}: {len(line)} characters, expected at most "
-                    f"{_LONGEST_LINE}"
-                )
-        try:
-            values = tomllib.loads(text)
-        except RecursionError:
-            raise InputError(f"{path}: not valid TOML: nested too deeply") from None
-        except ValueError as error:
-            # a number of thousands of digits is a ValueError too
-            reason = str(error).partition(";")[0]
-            raise InputError(f"{path}: not valid TOML: {reason}") from None
+        values = read_sections(path)
         return cls.from_values(values, str(path), Path(path).parent)
 
     @property
@@ -263,7 +259,8 @@ class Probe(Record):
             if key in known[part] or (dot and records[part] is PriorTexts):
                 return part, key, records[part]
         # a prior has the name of what it is of
-        choices = known[section] if dot else [key for part in known for key in _full(part, known)]
+        full = [f"{part}.{key}" if part in named else key for part in known for key in known[part]]
+        choices = known[section] if dot else full
         raise unknown_name("name", key, dict.fromkeys(choices))
 
     def with_(self, **changes: Any) -> Probe:
@@ -354,6 +351,12 @@ class Probe(Record):
         kinds = self.kinds
         return {name: kinds[name] for name in self.layout().materials}
 
+    @property
+    def heater_silicon(self) -> LowDopedSilicon | None:
+        """The low-doped silicon of the heater; None if it is of another material."""
+        kind = self.kinds[self.layout().heater.stack[0].material]
+        return kind if isinstance(kind, LowDopedSilicon) else None
+
     def layout(self) -> Layout:
         """Return the regions, terminals and tip."""
         return replace(self.shape.layout(), cone=self.tip)
@@ -388,30 +391,8 @@ class Probe(Record):
         write_text(path, self.to_toml())
 
 
-def _materials(sections: dict[str, Any], where: str) -> dict[str, Kind]:
-    """Return the materials of a probe file by name."""
-    found = {}
-    for name, section in sections.items():
-        here = f"{where}: [{_MATERIALS}.{name}]"
-        if not _NAME.fullmatch(name) or name in (*SECTIONS, LOW_DOPED, HIGH_DOPED):
-            raise InputError(
-                f"{where}: [{_MATERIALS}]: {quoted(name)} cannot be the name of a material, "
-                "expected a letter, then letters, digits, - or _; and no section's name"
-            )
-        if not isinstance(section, dict):
-            raise InputError(f"{here} must be a section, found {quoted(section)}")
-        found[name] = material_of(section, here)
-    return found
-
-
 def _fields(part: Record) -> Any:
     return type(part).model_fields
-
-
-def _full(part: str, known: Mapping[str, list[str]]) -> list[str]:
-    """Return the keys of a part by their names in a probe; those of a material have its own."""
-    own = part in ("probe", *_PARTS)
-    return [key if own else f"{part}.{key}" for key in known[part]]
 
 
 def _keys(record: type[Record], section: str) -> list[str]:

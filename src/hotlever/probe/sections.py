@@ -1,14 +1,46 @@
-"""Sections of a probe file as text."""
+"""Sections of a probe file, read and written."""
 
 from __future__ import annotations
 
+import os
+import tomllib
 from collections.abc import Mapping
 from typing import Any
 
+from hotlever.errors import InputError
+from hotlever.files import read_text
 from hotlever.text import as_toml
 
+#: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
+#: gigabytes to read.
+_LARGEST, _LONGEST_LINE = 1_000_000, 1000
 #: Column in which comments begin.
 _COMMENTS = 32
+
+
+def read_sections(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read a probe file (TOML).
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not TOML.
+    """
+    text = read_text(path, largest=_LARGEST)
+    for number, line in enumerate(text.splitlines(), start=1):
+        if len(line) > _LONGEST_LINE:
+            raise InputError(
+                f"{path}: line {number}: {len(line)} characters, expected at most {_LONGEST_LINE}"
+            )
+    try:
+        values = tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{path}: not valid TOML: nested too deeply") from None
+    except ValueError as error:
+        # a number of thousands of digits is a ValueError too
+        reason = str(error).partition(";")[0]
+        raise InputError(f"{path}: not valid TOML: {reason}") from None
+    return values
 
 
 def with_values(section: Mapping[str, Any]) -> dict[str, Any]:
