@@ -96,7 +96,7 @@ class Kind(Record):
         return MELTING_POINT
 
     def end(self, name: str) -> str:
-        """Say what happens to a material of this name above `highest_K`."""
+        """Say what happens to a material of this name above its highest temperature."""
         return f"the laws of '{name}' end"
 
     def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
@@ -124,7 +124,7 @@ class Silicon(Kind):
     )
 
     def end(self, name: str) -> str:
-        """Say what happens to a material of this name above `highest_K`."""
+        """Say what happens to a material of this name above its highest temperature."""
         return "silicon melts"
 
     @property
@@ -260,7 +260,7 @@ class MetalFilm(Kind):
         return min(self.melting_point_K, FORMULA_TO)
 
     def end(self, name: str) -> str:
-        """Say what happens to a material of this name above `highest_K`."""
+        """Say what happens to a material of this name above its highest temperature."""
         return f"'{name}' melts" if self.melting_point_K < FORMULA_TO else super().end(name)
 
     def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:

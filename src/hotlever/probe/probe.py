@@ -306,17 +306,12 @@ class Probe(Record):
             part = getattr(self, field)
             own = {name: values[name] for name in values if part and name in _fields(part)}
             parts[field] = part.model_copy(update=own) if own else part
-        parts[_MATERIALS] = {
-            name: kind.model_copy(
-                update={
-                    own: values[full]
-                    for own in kind.declared
-                    if (full := f"{name}.{own}") in values
-                }
-            )
-            for name, kind in self.materials.items()
-        }
-        return self.model_copy(update=parts)
+        kinds = dict(self.materials)
+        for full in values:
+            name, dot, own = full.partition(".")
+            if dot:
+                kinds[name] = kinds[name].model_copy(update={own: values[full]})
+        return self.model_copy(update={**parts, _MATERIALS: kinds})
 
     def __repr__(self) -> str:
         # the probe file without its comments
