@@ -13,6 +13,7 @@ import xarray as xr
 from hotlever import __version__
 from hotlever.errors import ComputationError
 from hotlever.probe import Probe
+from of_materials import p_type_probe
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "lever-a.csv"
 

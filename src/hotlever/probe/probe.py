@@ -307,10 +307,10 @@ class Probe(Record):
             own = {name: values[name] for name in values if part and name in _fields(part)}
             parts[field] = part.model_copy(update=own) if own else part
         kinds = dict(self.materials)
-        for full in values:
-            name, dot, own = full.partition(".")
+        for full, value in values.items():
+            name, dot, key = full.partition(".")
             if dot:
-                kinds[name] = kinds[name].model_copy(update={own: values[full]})
+                kinds[name] = kinds[name].model_copy(update={key: value})
         return self.model_copy(update={**parts, _MATERIALS: kinds})
 
     def __repr__(self) -> str:
