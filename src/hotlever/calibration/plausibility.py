@@ -10,6 +10,7 @@ from scipy.special import chdtrc
 from hotlever.calibration.causes import Causes
 from hotlever.errors import InputError
 from hotlever.fitting.measurement import Measurement
+from hotlever.fitting.measurement.checks import colder_than_base
 from hotlever.fitting.misfit import off_together, undescribed
 from hotlever.fitting.residuals import Residuals
 from hotlever.lever.lever import COARSE, Lever
@@ -20,8 +21,6 @@ from hotlever.probe.priors import PriorUse
 _WITHIN = 2.5
 #: Rows that a calibration needs, and those that are not few.
 _FEWEST, _FEW = 3, 6
-#: K, and standard errors, by which a tip may seem colder than its base.
-_COLDER_K, _COLDER_ERRORS = 20.0, 4.0
 #: Currents are coarse in steps of this share of the largest, each a multiple within so much.
 _COARSE, _EVEN = 0.01, 0.02
 #: A lever is cold that was never hotter (K).
@@ -72,8 +71,8 @@ def check_plausible(measured: Measurement, probe: Probe, causes: Causes) -> None
 
 def _check_temperatures(measured: Measurement, probe: Probe, where: str) -> None:
     """Refuse tips that are colder than the base of the lever."""
-    base, error = probe.circuit.base_temperature_K, np.nan_to_num(measured.tip_error_K)
-    colder = measured.tip_K < base - np.maximum(_COLDER_K, _COLDER_ERRORS * error)
+    base = probe.circuit.base_temperature_K
+    colder = colder_than_base(measured.tip_K, measured.tip_error_K, base)
     if colder.any():
         row = int(np.argmax(colder))
         raise InputError(
@@ -109,7 +108,7 @@ def remarks(measured: Measurement, tip_K: np.ndarray) -> list[str]:
 
 def misfit(residuals: Residuals, values: np.ndarray, priors: Mapping[str, PriorUse]) -> str:
     """Return why data are not described by what was fitted to them; empty if they are."""
-    reason = undescribed(residuals, values) or off_together(residuals, values)
+    reason = undescribed(residuals, values, with_priors=True) or off_together(residuals, values)
     if reason:
         return reason
     for name, use in priors.items():

@@ -21,7 +21,7 @@ from hotlever.figures.style import (
     VERMILION,
     figure,
 )
-from hotlever.fitting.misfit import SCATTER
+from hotlever.fitting.misfit import usual_scatter
 from hotlever.studies.design import label_of
 from hotlever.studies.twins import ESTIMATE, LEVELS, WAYS
 
@@ -143,8 +143,9 @@ def _difference(axes: Axes, calibration: Calibration, measured: xr.Dataset) -> N
     largest = float(np.abs(known.current_mA).max())
     shown = np.interp(known.bias_V, table.bias_V, table.current_mA)
     share = (known.current_mA - shown) / largest
-    off = np.abs(share) > SCATTER
-    axes.axhspan(-100 * SCATTER, 100 * SCATTER, color="0.9", lw=0, label="as usual")
+    usual = usual_scatter(with_priors=True)
+    off = np.abs(share) > usual
+    axes.axhspan(-100 * usual, 100 * usual, color="0.9", lw=0, label="as usual")
     axes.plot(known.bias_V, 100 * share, "o", color=BLACK, ms=3.0, label="measured")
     axes.plot(known.bias_V[off], 100 * share[off], "o", color=VERMILION, ms=5.0, label="off")
     axes.set(xlabel="bias V$_b$ (V)", ylabel="I$_h$: data − lever (% of the largest)")

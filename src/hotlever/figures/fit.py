@@ -25,7 +25,7 @@ from hotlever.figures.style import (
     figure,
     panel_letters,
 )
-from hotlever.fitting.misfit import SCATTER
+from hotlever.fitting.misfit import usual_scatter
 from hotlever.text import parameter_named
 from hotlever.types import Array
 
@@ -41,7 +41,9 @@ _QUANTILES = (0.025, 0.16, 0.5, 0.84, 0.975)
 _MOST_NAMES = 24
 
 
-def data_and_model(measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str]) -> Figure:
+def data_and_model(
+    measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str], *, with_priors: bool = False
+) -> Figure:
     """Draw measured and modelled observables, and their difference (paper's Figs. 3 and 4).
 
     Parameters
@@ -52,7 +54,10 @@ def data_and_model(measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str
         The sweep of the fitted lever at the measured biases, in the same order.
     fitted : sequence of str
         The observables that entered the fit.
+    with_priors : bool
+        Whether it had priors: its data scatter less, or are marked.
     """
+    usual = usual_scatter(with_priors)
     panels = (
         ("current", "heater current I$_h$ (mA)", "current_mA", "µA", 1000.0),
         ("reader", "reader voltage V$_r$ (V)", "reader_V", "mV", 1000.0),
@@ -69,9 +74,9 @@ def data_and_model(measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str
                 error = measured.tip_error_K
                 lower.fill_between(bias, -error, error, color="0.9", label="± dT")
             lower.plot(bias, (data - values) * factor, "o-", color=VERMILION, lw=0.8, ms=3.5)
-            off = np.abs(data - values) > SCATTER * np.nanmax(np.abs(data), initial=0.0)
+            off = np.abs(data - values) > usual * np.nanmax(np.abs(data), initial=0.0)
             if name != "tip" and off.any():
-                style: Any = {"color": BLACK, "label": f"off by more than {SCATTER:.1%}"}
+                style: Any = {"color": BLACK, "label": f"off by more than {usual:.1%}"}
                 lower.plot(
                     bias[off], (data - values)[off] * factor, "o", ms=5.5, mfc="none", **style
                 )

@@ -15,7 +15,7 @@ from hotlever.errors import BranchEndError, ComputationError, InputError, unknow
 from hotlever.fitting.common_errors import errors_of_scales
 from hotlever.fitting.least_squares import LeastSquares, Optimum
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement, with_measured_circuit
-from hotlever.fitting.misfit import HELD_SCATTER, SCATTER, undescribed
+from hotlever.fitting.misfit import undescribed
 from hotlever.fitting.models import ForwardModel, Prediction, forward_model
 from hotlever.fitting.options import FitOptions
 from hotlever.fitting.residuals import Residuals
@@ -287,7 +287,7 @@ def _found(estimate: Estimate) -> Fit:
         ),
         evaluations=problem.evaluations,
         steps=problem.steps,
-        reason=undescribed(residuals, values, SCATTER if options.priors else HELD_SCATTER),
+        reason=undescribed(residuals, values, with_priors=bool(options.priors)),
         seconds=estimate.seconds,
         priors=estimate.priors(priors) if (priors := estimate.known) else {},
         notes=notes,

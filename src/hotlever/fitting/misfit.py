@@ -9,9 +9,9 @@ from hotlever.types import Array
 
 #: Data are not described where they scatter about the model by more than this share of the largest,
 #: and neighbours together: of white noise they differ by twice its variance.
-SCATTER, _TOGETHER = 0.004, 0.6
+_SCATTER, _TOGETHER = 0.004, 0.6
 #: The same of fits without priors, which hold dimensions and whatever else is fixed as they are.
-HELD_SCATTER = 0.02
+_HELD_SCATTER = 0.02
 #: Outliers stand alone: so many neighbours that are off by more than so many standard deviations
 #: are none.
 _NEIGHBOURS, _FAR = 3, 8.0
@@ -19,12 +19,18 @@ _NEIGHBOURS, _FAR = 3, 8.0
 _ROWS = 7
 
 
-def undescribed(residuals: Residuals, values: Array, scatter: float = SCATTER) -> str:
+def usual_scatter(with_priors: bool) -> float:
+    """Return the share of the largest value by which data may scatter about a model (rms)."""
+    return _SCATTER if with_priors else _HELD_SCATTER
+
+
+def undescribed(residuals: Residuals, values: Array, *, with_priors: bool) -> str:
     """Return where data are not described by predicted values (3, n); empty if they are.
 
     Tip temperatures are left out: a thermometer's scale may be off by more than its readings
     scatter.
     """
+    scatter = usual_scatter(with_priors)
     difference = residuals.difference(values) / residuals.largest
     by_bias = np.argsort(residuals.bias, kind="stable")
     for name, whole in zip(residuals.observables, difference, strict=True):

@@ -116,8 +116,12 @@ class Nearby:
         """
         branch = self.branch_at(values)
         by_parameter = branch.values[:, :3, None] * self._powers / self._unit
-        moved = dict(zip(self._names, values.tolist(), strict=True))
-        circuit = self._probe.moved(moved).circuit
+        own = [
+            (name, value)
+            for name, value in zip(self._names, values.tolist(), strict=True)
+            if name in Circuit.model_fields
+        ]
+        circuit = self._probe.circuit.model_copy(update=dict(own))
         return _with_slopes(branch, by_parameter, circuit, self._bias, self._names)
 
 

@@ -44,7 +44,8 @@ class FitPosterior:
 
     def __init__(self, fit: Fit, model: RoughModel, noise: Noise) -> None:
         self._model, self._probe, self._names = model, fit.probe, fit.names
-        known = [parameters_of(fit.probe)[name] for name in fit.names]
+        every = parameters_of(fit.probe)
+        known = [every[name] for name in fit.names]
         self.scale = np.array([one.scale for one in known])
         self.optimum = fit.probe.at(fit.names) / self.scale
         priors = fit.known_before

@@ -152,11 +152,14 @@ class Fit:
             for name, value in zip(names, self.probe.at(list(names)).tolist(), strict=True)
         }
 
+    @cached_property
+    def _stated(self) -> dict[str, Prior]:
+        return priors_of(self.options.priors, self.probe, "priors")
+
     @property
     def known_before(self) -> dict[str, Prior]:
         """The priors of the parameters that were varied, by name."""
-        known = priors_of(self.options.priors, self.probe, "priors")
-        return {name: prior for name, prior in known.items() if name in self.names}
+        return {name: prior for name, prior in self._stated.items() if name in self.names}
 
     @property
     def correlation(self) -> Array:
@@ -193,7 +196,7 @@ class Fit:
 
     def residuals(self) -> Residuals:
         """Return the data with the fit's own weights, to be compared with predictions."""
-        known = priors_of(self.options.priors, self.probe, "priors")
+        known = self._stated
         common = errors_of_scales(self.measurement, self.observables, known) if known else []
         return Residuals(
             self.measurement,

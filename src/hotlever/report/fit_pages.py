@@ -46,7 +46,9 @@ def add_fit(page: Page, fit: Fit) -> None:
     page.text(f"{'; '.join(outcome(fit))}.")
     page.figure(
         "fit_data_and_model",
-        figures.data_and_model(measured, model, fit.observables),
+        figures.data_and_model(
+            measured, model, fit.observables, with_priors=bool(fit.options.priors)
+        ),
         "Measured and modelled observables against bias, and their difference. "
         "Grey: the stated error of the measured temperature.",
     )

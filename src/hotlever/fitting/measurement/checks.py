@@ -27,6 +27,12 @@ _COLDER_K, _COLDER_ERRORS = 20.0, 4.0
 _COLDEST_BASE_K = 250.0
 
 
+def colder_than_base(tip_K: Array, error_K: Array, base_K: float) -> NDArray[np.bool_]:
+    """Return where a tip seems colder than its base by more than an offset or noise explain."""
+    margin = np.maximum(_COLDER_K, _COLDER_ERRORS * np.nan_to_num(error_K))
+    return np.asarray(tip_K < base_K - margin)
+
+
 def note_rows(notes: list[str], table: Table, odd: NDArray[np.bool_], text: str) -> None:
     """Note what is odd about some rows, if there are any."""
     if odd.any():
@@ -61,9 +67,9 @@ def check(
             note_rows(notes, table, data < -NOISE * size, f"{symbol} is negative")
 
     base = settings.get("base_temperature_K", _COLDEST_BASE_K)
-    margin = np.fmax(_COLDER_K, _COLDER_ERRORS * values["dT_tip"])
+    colder = colder_than_base(values["T_tip"], values["dT_tip"], base)
     text = f"T_tip is below the base temperature ({base:g} K), perhaps in another unit"
-    note_rows(notes, table, values["T_tip"] < base - margin, text)
+    note_rows(notes, table, colder, text)
 
     bias, current = values["V_b"], values["I_h"]
     ohm = settings.get("series_resistance_ohm", 0.0)
