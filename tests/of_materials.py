@@ -41,6 +41,20 @@ def metal_film_probe(**changes: Any) -> Probe:
     return Probe.from_values(metal_film_sections() | changes, "test")
 
 
+def strip_probe(**changes: Any) -> Probe:
+    """A small strip of palladium on silicon nitride, all of it track."""
+    sections = metal_film_sections()
+    outline = [box(0, 0, 20, 2)]
+    for layer in sections["layers"].values():
+        layer["drawn"] = outline
+    sections["probe"]["tip_um"] = [10.0, 1.0]
+    sections["terminals"] = {
+        "supply": [[20.0, 0.0], [20.0, 2.0]],
+        "ground": [[0.0, 0.0], [0.0, 2.0]],
+    }
+    return Probe.from_values(sections | changes, "test")
+
+
 def of_named_silicon(kind: str, legs: dict[str, Any], heater: dict[str, Any]) -> Probe:
     """The reference probe as lists of points, of silicon that has names."""
     sections = reference_points()

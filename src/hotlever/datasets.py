@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from hotlever import __version__
 from hotlever.materials import PARAMETERS
+from hotlever.text import parameter_named
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -136,4 +137,7 @@ def labelled(
         if name in QUANTITIES:
             unit, meaning = QUANTITIES[str(name)]
             data[name].attrs = {"units": unit, "long_name": meaning}
+        elif "." in str(name):  # a parameter of a named material
+            known = parameter_named(str(name))
+            data[name].attrs = {"units": known.unit, "long_name": known.meaning}
     return data

@@ -15,8 +15,8 @@ from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import read_text, whole_file, write_text
 from hotlever.lever.balances import BALANCES
-from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
+from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.probe import SECTIONS
 from hotlever.types import Array
 
@@ -44,7 +44,8 @@ def sweep_dataset(
     """Return what is observed of n states of a lever.
 
     Shown are ``lever_V``, ``current_mA``, ``reader_V``, ``tip_K`` and ``max_K``; the balances,
-    (n, 6), are `BALANCES`; sensitivities, (3, n, 6), are of `OBSERVABLES` by `PARAMETERS`.
+    (n, 6), are `BALANCES`; sensitivities, (3, n, p), are of `OBSERVABLES` by what a fit
+    usually varies.
     """
     columns = {**shown, **dict(zip(BALANCES, balances.T, strict=True))}
     columns["bias_V"] = probe.circuit.bias(shown["lever_V"], shown["current_mA"])
@@ -59,7 +60,7 @@ def sweep_dataset(
     coordinates: dict[str, Any] = {"bias": columns["bias_V"]}
     if sensitivities is not None:
         variables["sensitivity"] = (("observable", "bias", "parameter"), sensitivities)
-        coordinates |= {"observable": list(OBSERVABLES), "parameter": list(PARAMETERS)}
+        coordinates |= {"observable": list(OBSERVABLES), "parameter": list(usual_parameters(probe))}
     return labelled(
         variables,
         coordinates=coordinates,

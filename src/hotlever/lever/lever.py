@@ -26,6 +26,7 @@ from hotlever.lever.sensitivities import sensitivities_of
 from hotlever.lever.state import State
 from hotlever.materials import Material
 from hotlever.probe import Circuit, Layout, MeshOptions, Probe, mesh_layout
+from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
@@ -258,7 +259,8 @@ class Lever:
         bias : array_like, shape (n,)
             Biases (V) in any order, not negative; a slow ramp from zero meets them rising.
         sensitivities : bool
-            Add the derivatives of I_h, V_r and T_tip by the six fit parameters, at fixed bias.
+            Add the derivatives of I_h, V_r and T_tip, at fixed bias, by the parameters that a fit
+            usually varies.
         progress : callable, optional
             Called with the states done and how many there usually are.
 
@@ -313,7 +315,8 @@ class Lever:
         base = self.circuit.base_temperature_K
         shown = branch.shown(u)
         shown |= {"tip_K": base + u**2, "max_K": base + branch.curve(u)[..., 3]}
-        found = sensitivities_of(branch, u, self.circuit) if sensitivities else None
+        names = usual_parameters(self.probe) if sensitivities else ()
+        found = sensitivities_of(branch, u, self.circuit, names) if sensitivities else None
         return sweep_dataset(self.probe, shown, branch.through(balances, slopes)(u), notes, found)
 
     def knee(self) -> xr.Dataset:

@@ -14,10 +14,9 @@ from hotlever.lever.motion import motion_of
 from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.pinned import AtTip
 from hotlever.lever.sensitivities import Linearised
-from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.moving import MovingMesh
-from hotlever.probe.parameters import dimensions_of
+from hotlever.probe.parameters import dimensions_of, usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -75,7 +74,7 @@ class SimilarLevers:
         probe: Probe,
         reach: Reach,
         near: Linearised | None = None,
-        names: tuple[str, ...] = tuple(PARAMETERS),
+        names: tuple[str, ...] | None = None,
     ) -> Linearised:
         """Solve the branch of a probe, with its derivatives.
 
@@ -86,13 +85,15 @@ class SimilarLevers:
         near : Linearised, optional
             Of a similar probe on this mesh, to start from.
         names : tuple of str
-            Parameters of the derivatives, see `hotlever.probe.parameters`.
+            Parameters of the derivatives, see `hotlever.probe.parameters`; by default what a fit
+            usually varies.
 
         Raises
         ------
         ComputationError
             If a state was not found.
         """
+        names = usual_parameters(probe) if names is None else names
         equations = self.equations(probe, names)
         if near is None:
             branch = Follower(equations).until(reach)
