@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 
 from hotlever.materials import KINDS, PARAMETERS
-from hotlever.materials.parameter import Parameter
+from hotlever.materials.parameters import Parameter
 
 INVERSION = "inversion_temperature"
 #: Numbers between these are written without a power of ten.

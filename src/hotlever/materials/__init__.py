@@ -9,7 +9,7 @@ from hotlever.materials.material import (
     full_name,
     parameter,
 )
-from hotlever.materials.parameter import Parameter
+from hotlever.materials.parameters import Parameter
 
 __all__ = [
     "HIGH_DOPED",

@@ -15,7 +15,7 @@ from hotlever.materials.dielectric import dielectric_conductivity
 from hotlever.materials.laws import FORMULA_TO, Evaluated, Law
 from hotlever.materials.metal import constant_conductivity, metal_conductivity, wiedemann_franz
 from hotlever.materials.p_silicon import conductivity_p, inversion_temperature_p
-from hotlever.materials.parameter import (
+from hotlever.materials.parameters import (
     OF_SILICON,
     Parameter,
     bounded,
@@ -52,7 +52,7 @@ _METAL = {
             *("lorenz_ratio", "L/L₀", "1", 1.0, _LEAST_LORENZ, _MOST_LORENZ),
             "heat carried over what Wiedemann and Franz give",
         ),
-        Parameter("kappa", "κ", "W cm⁻¹ K⁻¹", 0.1, 0.01, 5.0, "thermal conductivity"),
+        Parameter("kappa", "κ", "W cm⁻¹ K⁻¹", 0.01, 0.01, 5.0, "thermal conductivity"),
     )
 }
 _DIELECTRIC = {

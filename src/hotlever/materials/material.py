@@ -6,7 +6,7 @@ from pydantic import model_validator
 
 from hotlever.errors import unknown_name
 from hotlever.materials.kinds import HighDopedSilicon, Kind, NSilicon
-from hotlever.materials.parameter import (
+from hotlever.materials.parameters import (
     OF_SILICON,
     Parameter,
     bounded,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from hotlever.errors import unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, full_name
-from hotlever.materials.parameter import Parameter
+from hotlever.materials.parameters import Parameter
 from hotlever.text import parameter_named
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from pydantic import ConfigDict
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
-from hotlever.materials.parameter import Parameter
+from hotlever.materials.parameters import Parameter
 from hotlever.probe.parameters import (
     OF_THE_TIP,
     of_materials,
