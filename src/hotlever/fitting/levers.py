@@ -12,7 +12,7 @@ from scipy.special import chdtri
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.materials import PARAMETERS
-from hotlever.text import INVERSION
+from hotlever.text import INVERSION, parameter_named
 
 #: Levers are said to differ if equal ones would scatter as much less often than this.
 _RARE = 0.01
@@ -75,11 +75,11 @@ def _units(fits: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     name, first = next(iter(fits.items()))
     try:
         # dimensions and the like are varied within priors: their scatter is not the levers'
-        known = {key: str(one["unit"]) for key, one in first["parameters"].items()}
-        units = {key: unit for key, unit in known.items() if key in PARAMETERS or "." in key}
+        names = [key for key in first["parameters"] if key in PARAMETERS or "." in key]
         has_inversion = first["inversion_temperature_K"] is not None
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{name}: not a fit file, {error} is missing") from error
+    units = {key: parameter_named(key).unit for key in names}
     return {**units, **({INVERSION: "K"} if has_inversion else {})}
 
 
