@@ -92,12 +92,11 @@ class Estimate:
     @cached_property
     def covariance(self) -> Array:
         """Covariance of the varied parameters in their own units."""
-        return self.problem.covariance(self.optimum)
+        return self.problem.objective.covariance(self.optimum.prediction)
 
     def slopes(self, prediction: Prediction) -> Array:
         """Return the derivatives of a prediction by the varied parameters, (3, n, p)."""
-        known = self.problem.model.names
-        return prediction.slopes[:, :, [known.index(name) for name in self.options.varied]]
+        return prediction.slopes[:, :, self.problem.objective.columns]
 
     @property
     def known(self) -> dict[str, Prior]:
