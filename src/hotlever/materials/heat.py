@@ -7,6 +7,8 @@ may stray to: below 200 K the heat capacity stays what it is there.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -17,6 +19,7 @@ from hotlever.types import Array
 _SHOMATE = (22.81719, 3.899510, -0.082885, 0.042111, -0.354063)
 #: Molar mass (g/mol) and density (g/cm³) of silicon.
 MOLAR_MASS, DENSITY = 28.0855, 2.329
+_PER_VOLUME = DENSITY / MOLAR_MASS
 #: Temperature (K) whose enthalpy is zero.
 STANDARD_TEMPERATURE = 298.15
 
@@ -34,13 +37,9 @@ def heat_capacity(T: ArrayLike) -> Evaluated:
     """
     T = np.asarray(T, dtype=float)
     t = np.maximum(T, FORMULA_FROM) / 1000.0
-    a, b, c, d, e = _SHOMATE
-    per_mole = a + b * t + c * t**2 + d * t**3 + e / t**2
-    slope = b + 2.0 * c * t + 3.0 * d * t**2 - 2.0 * e / t**3
-    per_volume = DENSITY / MOLAR_MASS
-    return per_volume * per_mole, {
-        "T": np.where(T < FORMULA_FROM, 0.0, per_volume * slope / 1000.0)
-    }
+    _, b, c, d, e = _SHOMATE
+    slope = (b + (2.0 * c + 3.0 * d * t) * t - 2.0 * e / t**3) / 1000.0
+    return _capacity(t), {"T": np.where(T < FORMULA_FROM, 0.0, _PER_VOLUME * slope)}
 
 
 @law(meant_for=(290.0, 1685.0), source=_SOURCE)
@@ -53,15 +52,19 @@ def enthalpy(T: ArrayLike) -> Evaluated:
     [0.0, 1404.8]
     """
     T = np.asarray(T, dtype=float)
-    capacity = heat_capacity.formula(T)[0]
-    above = _kilojoules_per_mole(np.maximum(T, FORMULA_FROM)) - _kilojoules_per_mole(
-        np.asarray(STANDARD_TEMPERATURE)
-    )
+    t = np.maximum(T, FORMULA_FROM) / 1000.0
+    capacity = _capacity(t)
     below = capacity * np.minimum(T - FORMULA_FROM, 0.0)
-    return 1000.0 * DENSITY / MOLAR_MASS * above + below, {"T": capacity}
+    return _integral(t) - _integral(STANDARD_TEMPERATURE / 1000.0) + below, {"T": capacity}
 
 
-def _kilojoules_per_mole(T: Array) -> Array:
-    t = T / 1000.0
+def _capacity(t: Array) -> Array:
+    """Shomate's equation by T / 1000 K."""
     a, b, c, d, e = _SHOMATE
-    return np.asarray(a * t + b * t**2 / 2.0 + c * t**3 / 3.0 + d * t**4 / 4.0 - e / t)
+    return np.asarray(_PER_VOLUME * (a + (b + (c + d * t) * t) * t + e / t**2))
+
+
+def _integral(t: Any) -> Any:
+    """Return its integral over the temperature."""
+    a, b, c, d, e = _SHOMATE
+    return 1000.0 * _PER_VOLUME * ((a + (b / 2.0 + (c / 3.0 + d / 4.0 * t) * t) * t) * t - e / t)
