@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from copy import copy
 from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -27,6 +28,10 @@ from hotlever.materials import Material
 from hotlever.probe import Circuit, Layout, MeshOptions, Probe, mesh_layout
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+
+if TYPE_CHECKING:
+    from hotlever.transient.history import Seen
+    from hotlever.transient.waveform import Waveform
 
 #: Tip temperature (K) up to which branches are followed: where the material laws end.
 HOTTEST = 1300.0
@@ -310,6 +315,23 @@ class Lever:
         shown |= {"tip_K": base + u**2, "max_K": base + branch.curve(u)[..., 3]}
         found = sensitivities_of(branch, u, self.circuit) if sensitivities else None
         return sweep_dataset(self.probe, shown, branch.through(balances, slopes)(u), notes, found)
+
+    @one_blas_thread
+    def pulse(
+        self,
+        waveform: Waveform,
+        until: float | None = None,
+        at: ArrayLike | None = None,
+        *,
+        tolerance_K: float = 0.1,
+        progress: Progress | None = None,
+        seen: Seen | None = None,
+    ) -> xr.Dataset:
+        """Follow the lever in time under a bias that changes; see `hotlever.transient.history`."""
+        from hotlever.transient.history import history
+
+        options: Any = {"tolerance_K": tolerance_K, "progress": progress, "seen": seen}
+        return history(self, waveform, until, at, **options)
 
     def knee(self) -> xr.Dataset:
         """Return the knee of the I-V curve, dV_l/dI_h = 0, as a sweep of one state.
