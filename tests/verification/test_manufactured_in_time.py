@@ -6,10 +6,10 @@ import numpy as np
 from made_up_fields import BASE, BIAS, LENGTH, WIDTH, Exact, nodal_state, silicon_strip, source
 from skfem.element import ElementTriP3
 
+from hotlever.lever.transient.driven import DrivenLever
+from hotlever.lever.transient.runge_kutta import Stepper
 from hotlever.materials.heat import heat_capacity
 from hotlever.probe import Circuit
-from hotlever.transient.driven import DrivenLever
-from hotlever.transient.runge_kutta import Stepper
 
 #: Period (µs), of the order of what heat takes along the strip; and amplitude (K).
 PERIOD, AMPLITUDE = 0.4, 250.0

@@ -8,10 +8,10 @@ from bare import bare_equations
 from skfem import MeshTri
 
 from hotlever.lever import equations as lever_equations
+from hotlever.lever.transient.driven import DrivenLever
+from hotlever.lever.transient.runge_kutta import Stepper
 from hotlever.probe import Circuit, Terminal
 from hotlever.spieser2017 import published
-from hotlever.transient.driven import DrivenLever
-from hotlever.transient.runge_kutta import Stepper
 
 MATERIAL = published("option III").material
 LENGTH, WIDTH, BIAS = 10.0, 1.0, 1.0

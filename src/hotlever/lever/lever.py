@@ -30,8 +30,7 @@ from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
-    from hotlever.transient.history import Seen
-    from hotlever.transient.waveform import Waveform
+    from hotlever.lever.transient.waveform import Waveform
 
 #: Tip temperature (K) up to which branches are followed: where the material laws end.
 HOTTEST = 1300.0
@@ -322,16 +321,20 @@ class Lever:
         waveform: Waveform,
         until: float | None = None,
         at: ArrayLike | None = None,
-        *,
-        tolerance_K: float = 0.1,
-        progress: Progress | None = None,
-        seen: Seen | None = None,
+        **options: Any,
     ) -> xr.Dataset:
-        """Follow the lever in time under a bias that changes; see `hotlever.transient.history`."""
-        from hotlever.transient.history import history
+        """Follow the lever in time (µs); see `hotlever.lever.transient.history.followed`.
 
-        options: Any = {"tolerance_K": tolerance_K, "progress": progress, "seen": seen}
-        return history(self, waveform, until, at, **options)
+        Examples
+        --------
+        >>> from hotlever.lever.transient import pulse
+        >>> history = Lever(Probe.reference()).pulse(pulse(10.0, 5.0), at=[5.0, 100.0])
+        >>> history.tip_K.values.round().tolist()
+        [410.0, 293.0]
+        """
+        from hotlever.lever.transient.history import followed
+
+        return followed(self, waveform, until, at, **options)
 
     def knee(self) -> xr.Dataset:
         """Return the knee of the I-V curve, dV_l/dI_h = 0, as a sweep of one state.

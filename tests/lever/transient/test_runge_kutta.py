@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError
-from hotlever.transient.runge_kutta import EMBEDDED, STAGES, TIMES, WEIGHTS, Stepper
+from hotlever.lever.transient.runge_kutta import EMBEDDED, STAGES, TIMES, WEIGHTS, Stepper
 
 
 def test_the_coefficients_fulfil_the_conditions_of_their_orders():

@@ -10,9 +10,9 @@ from hotlever import Lever, Probe
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.lever import probe_of
 from hotlever.lever.lever import COARSE
+from hotlever.lever.transient import history_csv, pulse, ramp, sine, step, write_history
+from hotlever.lever.transient.history import TIME_COLUMNS
 from hotlever.probe import UShape
-from hotlever.transient import history_csv, pulse, ramp, sine, step, write_history
-from hotlever.transient.history import TIME_COLUMNS
 
 
 def imbalance(data: xr.Dataset) -> float:

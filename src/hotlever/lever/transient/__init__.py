@@ -1,11 +1,11 @@
 """Levers in time: wave forms, what a lever shows under them, and its time constants."""
 
-from hotlever.transient.history import history, history_csv, write_history
-from hotlever.transient.waveform import Waveform, pulse, ramp, read_waveform, sine, step
+from hotlever.lever.transient.history import followed, history_csv, write_history
+from hotlever.lever.transient.waveform import Waveform, pulse, ramp, read_waveform, sine, step
 
 __all__ = [
     "Waveform",
-    "history",
+    "followed",
     "history_csv",
     "pulse",
     "ramp",

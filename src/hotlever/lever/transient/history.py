@@ -1,10 +1,10 @@
-"""What a lever shows in time, as a dataset."""
+"""What a lever shows in time, as a dataset: a history."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,10 +16,10 @@ from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import ComputationError, HistoryEndError, InputError
 from hotlever.lever.equations import LAWS
 from hotlever.lever.state import State
+from hotlever.lever.transient.driven import DrivenLever
+from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
+from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.materials.silicon import MELTING_POINT
-from hotlever.transient.driven import DrivenLever
-from hotlever.transient.runge_kutta import Step, Stepper, hermite
-from hotlever.transient.waveform import Piece, Waveform
 from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
@@ -129,13 +129,14 @@ def _at_rest(lever: Lever, bias: float) -> Array:
     return np.where(lever.space.is_temperature[:, None], state.x, np.sign(bias) * state.x)
 
 
-def history(
+def followed(
     lever: Lever,
     waveform: Waveform,
     until: float | None = None,
     at: ArrayLike | None = None,
     *,
     tolerance_K: float = 0.1,
+    per_step: int = 1,
     seen: Seen | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -146,7 +147,7 @@ def history(
     lever : Lever
         At rest before the wave form begins.
     waveform : Waveform
-        Such as `pulse` or `read_waveform` return; see `hotlever.transient.waveform`.
+        Such as `pulse` or `read_waveform` return; see `hotlever.lever.transient.waveform`.
     until : float, optional
         Time (µs) to stop at; by default the last one asked for, or what the wave form usually
         takes.
@@ -156,6 +157,9 @@ def history(
     tolerance_K : float
         Largest error of a step (K) that is accepted, less where the lever hardly heats; that of
         the whole is of this order.
+    per_step : int
+        Times to report for each step of the solver, where none are asked for; more than one make
+        a smooth curve.
     seen : callable, optional
         Called with each time reported (µs) and the `State` there, whose fields it may keep.
     progress : callable, optional
@@ -184,7 +188,7 @@ def history(
         )
     if not 1e-4 <= tolerance_K <= 10.0:
         raise InputError(f"found a tolerance of {tolerance_K:g} K, expected 1e-4 to 10 K")
-    rows, reached, failure = _Rows(lever, asked, seen), 0.0, ""
+    rows, reached, failure = _Rows(lever, asked, per_step, seen), 0.0, ""
     try:
         for piece, step in follow(lever, waveform, until, tolerance_K):
             end = rows.add(piece, step)
@@ -203,10 +207,10 @@ def history(
 
 
 class _Rows:
-    """Rows of a history: at the times asked for, or at the ends of all steps."""
+    """Rows of a history: at the times asked for, or where the solver stepped."""
 
-    def __init__(self, lever: Lever, asked: Array | None, seen: Seen | None) -> None:
-        self._lever, self._asked, self._seen = lever, asked, seen
+    def __init__(self, lever: Lever, asked: Array | None, per_step: int, seen: Seen | None) -> None:
+        self._lever, self._asked, self._per_step, self._seen = lever, asked, per_step, seen
         self._observer = _Observer(lever)
         self.time: list[float] = []
         self.bias: list[float] = []
@@ -219,10 +223,11 @@ class _Rows:
             self._add(piece, step, values, slopes, 0.0)
         melts = _melts(step, values, slopes)
         end = step.end if melts is None else melts
-        inside: Sequence[float] = [end]
-        if self._asked is not None:
-            inside = self._asked[(self._asked > step.start) & (self._asked <= end)].tolist()
-        for t in inside:
+        if self._asked is None:
+            inside = np.linspace(step.start, end, self._per_step + 1)[1:]
+        else:
+            inside = self._asked[(self._asked > step.start) & (self._asked <= end)]
+        for t in inside.tolist():
             self._add(piece, step, values, slopes, t)
         return melts
 

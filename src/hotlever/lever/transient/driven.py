@@ -58,7 +58,7 @@ class InCircuit:
 
 
 class DrivenLever:
-    """See the module's text and `hotlever.transient.runge_kutta.Problem`.
+    """See the module's text and `hotlever.lever.transient.runge_kutta.Problem`.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.transient import pulse, ramp, read_waveform, sine, step
+from hotlever.lever.transient import pulse, ramp, read_waveform, sine, step
 from hotlever.units import setting
 
 

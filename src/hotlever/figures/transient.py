@@ -1,0 +1,50 @@
+"""Figures of levers in time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.figure import Figure
+
+from hotlever.figures.style import BLUE, GREEN, ORANGE, PURPLE, VERMILION, figure
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: Rows that are marked; more would hide the lines.
+_MARKED = 40
+
+
+def history_overview(history: xr.Dataset) -> Figure:
+    """Draw what a lever shows in time: voltages, current, tip temperature, heat.
+
+    Where the bias stays what it is, time is logarithmic.
+    """
+    settles = float(history.bias_V.max()) == float(history.bias_V.min())
+    data = history.isel(time=history.time > 0) if settles else history
+    style: Any = {"marker": "o" if data.sizes["time"] <= _MARKED else "", "ms": 3}
+    with figure(7.4, 5.2, 2, 2, letters=True, sharex=True) as (made, grid):
+        voltage, current, tip, heat = grid.ravel()
+        voltage.plot(data.time, data.bias_V, color=PURPLE, label="bias V$_b$", **style)
+        voltage.plot(data.time, data.lever_V, color=BLUE, label="lever V$_l$", **style)
+        if data.reader_V.notnull().any():
+            voltage.plot(data.time, data.reader_V, color=GREEN, label="reader V$_r$", **style)
+        voltage.set(ylabel="voltage (V)")
+        current.plot(data.time, data.current_mA, color=BLUE, **style)
+        current.set(ylabel="heater current I$_h$ (mA)")
+        tip.plot(data.time, data.tip_K, color=VERMILION, **style)
+        tip.set(ylabel="tip temperature (K)")
+        for name, label, colour in (
+            ("supplied_nJ", "supplied", PURPLE),
+            ("stored_nJ", "stored", VERMILION),
+            ("lost_nJ", "lost", ORANGE),
+        ):
+            heat.plot(data.time, data[name], color=colour, label=label, **style)
+        heat.set(ylabel="energy (nJ)")
+        for axes in (voltage, heat):
+            axes.legend()
+        for axes in (tip, heat):
+            axes.set(xlabel="time (µs)")
+        if settles:
+            tip.set_xscale("log")
+    return made
