@@ -26,7 +26,7 @@ _AFTERWARDS, _PERIODS = 100.0, 10
 #: After a step it takes so long (µs) until next to nothing changes.
 _SETTLING = 1000.0
 #: Steps per period of a sine, so that none is overlooked.
-_PER_PERIOD = 12
+_PER_PERIOD = 20
 _TIME, _BIAS = re.compile("t|time", re.I), re.compile("V|V_?b|bias|voltage", re.I)
 
 
