@@ -46,6 +46,9 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "supplied_nJ": ("nJ", "electrical energy taken up since the start"),
     "stored_nJ": ("nJ", "heat in the lever above that at the base temperature"),
     "lost_nJ": ("nJ", "heat lost through the leg ends and into the air since the start"),
+    "time_constant_us": ("µs", "time constant, negative for what grows"),
+    "heating_us": ("µs", "time from 10 to 90 % of the tip's rise"),
+    "cooling_us": ("µs", "time from 90 to 10 % of the tip's rise"),
     # along the heater
     "position": ("µm", "position along the heater"),
     "temperature": ("K", "temperature"),

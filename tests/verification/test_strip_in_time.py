@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from bare import bare_equations
 from skfem import MeshTri
 
 from hotlever.lever import equations as lever_equations
+from hotlever.lever.state import State
 from hotlever.lever.transient.driven import DrivenLever
+from hotlever.lever.transient.modes import modes
 from hotlever.lever.transient.runge_kutta import Stepper
 from hotlever.probe import Circuit, Terminal
 from hotlever.spieser2017 import published
@@ -66,3 +70,11 @@ def test_a_strip_heats_as_the_sum_of_its_modes(strip):
             assert found == pytest.approx(rise_in_the_middle(step.end), abs=1e-6 * END)
             compared += 1
     assert compared > 10
+
+
+def test_its_time_constants_are_those_of_its_modes(strip):
+    lever = SimpleNamespace(equations=strip, circuit=Circuit(series_resistance_ohm=0.0))
+    state = State(lever, np.zeros((strip.space.size + 1, 1)))
+    found, _ = modes(state, count=3)
+    expected = (LENGTH / np.pi / np.array([1, 2, 3])) ** 2 / DIFFUSIVITY
+    np.testing.assert_allclose(found, expected, rtol=1e-6)

@@ -1,7 +1,16 @@
 """Levers in time: wave forms, what a lever shows under them, and its time constants."""
 
 from hotlever.lever.transient.history import followed, history_csv, write_history
-from hotlever.lever.transient.waveform import Waveform, pulse, ramp, read_waveform, sine, step
+from hotlever.lever.transient.modes import rise_times, time_constants
+from hotlever.lever.transient.waveform import (
+    Waveform,
+    pulse,
+    ramp,
+    read_waveform,
+    sine,
+    step,
+    switched_off,
+)
 
 __all__ = [
     "Waveform",
@@ -10,7 +19,10 @@ __all__ = [
     "pulse",
     "ramp",
     "read_waveform",
+    "rise_times",
     "sine",
     "step",
+    "switched_off",
+    "time_constants",
     "write_history",
 ]

@@ -91,7 +91,7 @@ class Polyline(Waveform):
     @property
     def highest_V(self) -> float:  # type: ignore[override]
         """Largest bias (V) of either sign."""
-        return max(map(abs, self.volts))
+        return max(map(abs, (self.before_V, *self.volts)))
 
     def pieces(self, until: float) -> Iterator[Piece]:
         """Give the smooth parts up to a time (µs); after the last corner the bias stays."""
@@ -150,6 +150,12 @@ def step(volts: float) -> Waveform:
     """Return a bias that is switched on at t = 0 and stays."""
     _check(volts)
     return Polyline(f"step to {volts:g} V", (0.0,), (volts,), _SETTLING)
+
+
+def switched_off(volts: float) -> Waveform:
+    """Return a bias at which the lever has come to rest, and that is switched off at t = 0."""
+    _check(volts)
+    return Polyline(f"{volts:g} V switched off", (0.0,), (0.0,), _SETTLING, volts)
 
 
 def pulse(volts: float, length: float, period: float | None = None, count: int = 1) -> Waveform:
