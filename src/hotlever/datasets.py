@@ -49,6 +49,15 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "time_constant_us": ("µs", "time constant, negative for what grows"),
     "heating_us": ("µs", "time from 10 to 90 % of the tip's rise"),
     "cooling_us": ("µs", "time from 90 to 10 % of the tip's rise"),
+    # small signals
+    "frequency": ("Hz", "frequency"),
+    "frequency_Hz": ("Hz", "frequency"),
+    "impedance_real_ohm": ("ohm", "real part of the impedance"),
+    "impedance_imag_ohm": ("ohm", "imaginary part of the impedance"),
+    "tip_per_power_K_per_mW": ("K/mW", "change of the tip temperature by that of the power"),
+    "tip_per_power_deg": ("deg", "phase of the tip temperature against the power"),
+    "tip_per_bias_K_per_V": ("K/V", "change of the tip temperature by that of the bias"),
+    "tip_per_bias_deg": ("deg", "phase of the tip temperature against the bias"),
     # along the heater
     "position": ("µm", "position along the heater"),
     "temperature": ("K", "temperature"),

@@ -12,7 +12,7 @@ from skfem import MeshTri
 from hotlever.lever import equations as lever_equations
 from hotlever.lever.state import State
 from hotlever.lever.transient.driven import DrivenLever
-from hotlever.lever.transient.modes import modes
+from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.runge_kutta import Stepper
 from hotlever.probe import Circuit, Terminal
 from hotlever.spieser2017 import published
@@ -75,6 +75,6 @@ def test_a_strip_heats_as_the_sum_of_its_modes(strip):
 def test_its_time_constants_are_those_of_its_modes(strip):
     lever = SimpleNamespace(equations=strip, circuit=Circuit(series_resistance_ohm=0.0))
     state = State(lever, np.zeros((strip.space.size + 1, 1)))
-    found, _ = modes(state, count=3)
+    found, _ = slowest_modes(state, count=3)
     expected = (LENGTH / np.pi / np.array([1, 2, 3])) ** 2 / DIFFUSIVITY
     np.testing.assert_allclose(found, expected, rtol=1e-6)

@@ -1,6 +1,17 @@
 """All commands: importing a command's module registers it on the application."""
 
-from hotlever.cli import cache, calibrate, design, fit, probe, pulse, raman, reproduce, sweep
+from hotlever.cli import (
+    cache,
+    calibrate,
+    design,
+    fit,
+    probe,
+    pulse,
+    raman,
+    reproduce,
+    spectrum,
+    sweep,
+)
 from hotlever.cli.application import app
 
 __all__ = [
@@ -13,5 +24,6 @@ __all__ = [
     "pulse",
     "raman",
     "reproduce",
+    "spectrum",
     "sweep",
 ]

@@ -1,4 +1,4 @@
-"""Figures of levers in time."""
+"""Figures of levers in time and frequency."""
 
 from __future__ import annotations
 
@@ -47,4 +47,31 @@ def history_overview(history: xr.Dataset) -> Figure:
             axes.set(xlabel="time (µs)")
         if settles:
             tip.set_xscale("log")
+    return made
+
+
+def small_signals(spectrum: xr.Dataset) -> Figure:
+    """Draw the impedance (Nyquist, Bode) and how the tip follows power and bias."""
+    with figure(7.4, 5.4, 2, 2, letters=True) as (made, grid):
+        nyquist, bode, size, phase = grid.ravel()
+        real, imaginary = spectrum.impedance_real_ohm / 1000, spectrum.impedance_imag_ohm / 1000
+        nyquist.plot(real, -imaginary, "o-", ms=3, color=BLUE)
+        nyquist.set(xlabel="Re Z (kΩ)", ylabel="−Im Z (kΩ)")
+        nyquist.axhline(0, color="0.4", lw=0.8)
+        bode.plot(spectrum.frequency, real, color=BLUE, label="Re Z")
+        bode.plot(spectrum.frequency, imaginary, "--", color=BLUE, label="Im Z")
+        bode.set(xlabel="frequency (Hz)", ylabel="impedance (kΩ)")
+        for name, label, colour in (
+            ("tip_per_power", "by power (K/mW)", VERMILION),
+            ("tip_per_bias", "by bias (K/V)", PURPLE),
+        ):
+            unit = "K_per_mW" if name == "tip_per_power" else "K_per_V"
+            size.plot(spectrum.frequency, spectrum[f"{name}_{unit}"], color=colour, label=label)
+            angle = spectrum[f"{name}_deg"]
+            phase.plot(spectrum.frequency, angle, color=colour, label=label.partition(" (")[0])
+        size.set(xlabel="frequency (Hz)", ylabel="change of T$_{tip}$ (K/mW, K/V)", yscale="log")
+        phase.set(xlabel="frequency (Hz)", ylabel="phase (°)")
+        for axes in (bode, size, phase):
+            axes.set_xscale("log")
+            axes.legend()
     return made

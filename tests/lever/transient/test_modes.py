@@ -8,7 +8,7 @@ import pytest
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.transient import rise_times, time_constants
 from hotlever.lever.transient.driven import DrivenLever
-from hotlever.lever.transient.modes import modes
+from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.runge_kutta import Stepper
 from hotlever.probe import Circuit
 
@@ -29,7 +29,7 @@ def slowest(lever, bias, source="bias"):
 def test_a_small_change_decays_or_grows_as_its_mode_says(coarse, bias, source, runs_away):
     """Beyond the fold, a state that the resistor holds is no longer held without it."""
     (state,) = coarse.solve([bias])
-    constants, changes = modes(state, source)
+    constants, changes = slowest_modes(state, source)
     assert (constants[0] < 0) == runs_away
     assert (constants[1:] > 0).all()
     moved = changes[:, [0]] / coarse.space.tip_rise(changes[:, 0])

@@ -2,6 +2,7 @@
 
 from hotlever.lever.transient.history import followed, history_csv, write_history
 from hotlever.lever.transient.modes import rise_times, time_constants
+from hotlever.lever.transient.small_signals import spectrum
 from hotlever.lever.transient.waveform import (
     Waveform,
     pulse,
@@ -21,6 +22,7 @@ __all__ = [
     "read_waveform",
     "rise_times",
     "sine",
+    "spectrum",
     "step",
     "switched_off",
     "time_constants",

@@ -45,7 +45,7 @@ def stored_change(equations: LeverEquations, x: Array, change: Array) -> Array:
 
 
 @one_blas_thread
-def modes(state: State, source: Source = "bias", count: int = 4) -> tuple[Array, Array]:
+def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tuple[Array, Array]:
     """Return the slowest modes of a state.
 
     Parameters
@@ -112,7 +112,7 @@ def time_constants(
     Raises
     ------
     InputError, ComputationError
-        See `modes` and `Lever.solve`.
+        See `slowest_modes` and `Lever.solve`.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def time_constants(
     [21.0, 72.0]
     """
     states = lever.solve(bias)
-    found = np.array([modes(state, source, count)[0] for state in states])
+    found = np.array([slowest_modes(state, source, count)[0] for state in states])
     return labelled(
         {
             "time_constant_us": (("bias", "mode"), found),
@@ -159,7 +159,7 @@ def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
     states = lever.solve(bias)
     base, columns = lever.circuit.base_temperature_K, np.empty((3, len(states)))
     for place, state in enumerate(states):
-        until = 20.0 * float(modes(state)[0][0])
+        until = 20.0 * float(slowest_modes(state)[0][0])
         rise = state.tip_K - base
 
         def crossed(waveform: Waveform, until: float = until, rise: float = rise) -> float:
