@@ -12,7 +12,6 @@ from hotlever.lever import probe_of
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import history_csv, pulse, ramp, sine, step, write_history
 from hotlever.lever.transient.history import TIME_COLUMNS
-from hotlever.probe import UShape
 
 
 def imbalance(data: xr.Dataset) -> float:
@@ -88,16 +87,7 @@ def other(request, in_air):
     probe = Probe.reference()
     if request.param == "tip":
         return Lever(probe.with_(**{"tip.height_um": 0.5}), COARSE)
-    shape = UShape(
-        length_um=40.0,
-        leg_width_um=8.0,
-        gap_um=5.0,
-        bridge_width_um=4.0,
-        heater_length_um=4.0,
-        heater_width_um=2.0,
-        thickness_um=0.4,
-    )
-    return Lever(probe.model_copy(update={"shape": shape}), COARSE)
+    return Lever(Probe.u_shape(), COARSE)
 
 
 def test_every_lever_can_be_followed(other):
