@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from hotlever.datasets import labelled
+from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import InputError
-from hotlever.files import read_text, whole_file, write_text
+from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES
 from hotlever.lever.equations import LAWS
 from hotlever.materials import PARAMETERS
@@ -104,24 +104,12 @@ def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
     InputError
         If the suffix is neither, or the file cannot be written.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix == ".csv":
-        write_text(path, sweep_csv(data))
-    elif suffix == ".nc":
-        with whole_file(path) as temporary:
-            data.to_netcdf(temporary, engine="netcdf4")
-    else:
-        raise InputError(f"{path}: unknown file type '{suffix}', expected .csv or .nc")
+    write_dataset(data, path, SWEEP_COLUMNS)
 
 
 def sweep_csv(data: xr.Dataset) -> str:
     """Return a sweep as CSV text, one row per bias; empty where a value does not exist."""
-    columns = [data[name].values for name in SWEEP_COLUMNS]
-    rows = (
-        ",".join("" if np.isnan(value) else f"{value:.10g}" for value in row)
-        for row in zip(*columns, strict=True)
-    )
-    return "\n".join([",".join(SWEEP_COLUMNS), *rows]) + "\n"
+    return csv_text(data, SWEEP_COLUMNS)
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:

@@ -25,6 +25,7 @@ from hotlever.lever.space import LEVER, TIP, Factors, Fields, Fluxes, Pin, Space
 from hotlever.materials import Material
 from hotlever.materials.air import kirchhoff_variable, thermal_conductivity_of_air
 from hotlever.materials.doping import tapered_doping
+from hotlever.materials.heat import enthalpy
 from hotlever.materials.laws import Law
 from hotlever.materials.silicon import (
     conductivity_high_doped,
@@ -36,6 +37,8 @@ from hotlever.types import Array
 
 #: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
 PER_CM_TO_MILLI_PER_UM = 0.1
+#: J/cm³ to nJ/µm³; with times in µs, nJ are mW µs.
+PER_CM3_TO_NANO_PER_UM3 = 1e-3
 
 #: The laws that the equations use.
 LAWS = (thermal_conductivity, conductivity_low_doped, conductivity_high_doped)
@@ -178,11 +181,36 @@ class LeverEquations:
         unit = PER_CM_TO_MILLI_PER_UM * self.space.air.gas_conductivity
         return unit * theta, unit * by["T"]
 
-    def factorised(self, x: Array, pin: Pin = TIP) -> Factors:
-        """Return the factorised Jacobians of states, with the row of a pin last."""
+    def heat_density(self, T: Array) -> tuple[Array, Array]:
+        """Return the heat above that at the base temperature (nJ/µm²), and its slope by T.
+
+        Thickness included, at temperatures (K), (points, n).
+        """
+        held, by = enthalpy(T)
+        sheet = PER_CM3_TO_NANO_PER_UM3 * self.space.thickness_um
+        cold = enthalpy(self.base_temperature_K)[0]
+        return np.asarray(sheet * (held - cold)), np.asarray(sheet * by["T"])
+
+    def stored(self, x: Array) -> Array:
+        """Return the heat stored in states (nJ), tested as `balance` tests, (size + 1, n).
+
+        In time `balance` is what it loses per µs.
+        """
+        fields, _ = self.at(x)
+        nothing = np.zeros_like(fields.grad_T)
+        return self.space.weak_form(Fluxes(self.heat_density(fields.T)[0], nothing, nothing))
+
+    def factorised(self, x: Array, pin: Pin = TIP, per_us: float = 0.0) -> Factors:
+        """Return the factorised Jacobians of states, with the row of a pin last.
+
+        They are those of `balance` and so many times (1/µs) that of `stored`.
+        """
         fields, laws = self.at(x)
+        heat_source_T = -laws.sigma_by["T"] * square(fields.grad_V)
+        if per_us:
+            heat_source_T = heat_source_T + per_us * self.heat_density(fields.T)[1]
         tangent = Tangent(
-            heat_source_T=-laws.sigma_by["T"] * square(fields.grad_V),
+            heat_source_T=heat_source_T,
             heat_flux_T=laws.kappa_by["T"] * fields.grad_T,
             kappa=laws.kappa,
             heat_source_V=-2.0 * laws.sigma * fields.grad_V,

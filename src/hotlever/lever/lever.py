@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from copy import copy
 from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -27,6 +28,9 @@ from hotlever.materials import Material
 from hotlever.probe import Circuit, Layout, MeshOptions, Probe, mesh_layout
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+
+if TYPE_CHECKING:
+    from hotlever.lever.transient.waveform import Waveform
 
 #: Tip temperature (K) up to which branches are followed: where the material laws end.
 HOTTEST = 1300.0
@@ -310,6 +314,27 @@ class Lever:
         shown |= {"tip_K": base + u**2, "max_K": base + branch.curve(u)[..., 3]}
         found = sensitivities_of(branch, u, self.circuit) if sensitivities else None
         return sweep_dataset(self.probe, shown, branch.through(balances, slopes)(u), notes, found)
+
+    @one_blas_thread
+    def pulse(
+        self,
+        waveform: Waveform,
+        until: float | None = None,
+        at: ArrayLike | None = None,
+        **options: Any,
+    ) -> xr.Dataset:
+        """Follow the lever in time (µs); see `hotlever.lever.transient.history.followed`.
+
+        Examples
+        --------
+        >>> from hotlever.lever.transient import pulse
+        >>> history = Lever(Probe.reference()).pulse(pulse(10.0, 5.0), at=[5.0, 100.0])
+        >>> history.tip_K.values.round().tolist()
+        [410.0, 293.0]
+        """
+        from hotlever.lever.transient.history import followed
+
+        return followed(self, waveform, until, at, **options)
 
     def knee(self) -> xr.Dataset:
         """Return the knee of the I-V curve, dV_l/dI_h = 0, as a sweep of one state.
