@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hotlever import memory
 from hotlever.errors import BranchEndError, ComputationError, InputError, unknown_name
 from hotlever.fitting.common_errors import errors_of_scales
 from hotlever.fitting.least_squares import LeastSquares, Optimum
@@ -145,6 +146,8 @@ def estimate(
     data of an observable may be wrong together, by the scale of their meter or thermometer.
     """
     began = time.perf_counter()
+    # what an earlier one used
+    memory.give_back()
     measurement = Measurement.given(measurement)
     given = Probe.reference() if probe is None else Probe.given(probe)
     probe, notes = with_measured_circuit(given, measurement, options.medium)
