@@ -11,6 +11,7 @@ parallel borders both are the same, which shows how good the diffusion is solved
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,8 @@ from skfem.models.poisson import laplace, mass
 
 from hotlever.lever import Lever
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.space import Tapered
+from hotlever.lever.space import PlacedFilm
+from hotlever.materials import LOW_DOPED
 from hotlever.probe import MeshOptions, Probe, mesh_layout
 from problems import BIAS, peer_problem, processor_seconds, solve_with_peer, table
 
@@ -122,13 +124,15 @@ def doping() -> None:
     for name, probe in levers().items():
         lever = Lever(probe)
         space, material = lever.space, probe.material
-        share = diffused_share(probe, space.elements.positions[:, space.tapered.points])
-        own = share_by_distance(space.tapered, material.delta)
+        (low,) = (film for film in space.films if film.material == LOW_DOPED)
+        share = diffused_share(probe, space.elements.positions[:, low.points])
+        own = share_by_distance(low, material.delta)
         other = FullSpace(space.mesh)
         distance = material.delta * erfcinv(2 * np.clip(share, 1e-12, 1 - 1e-12))
-        other.tapered = Tapered(space.tapered.points, distance[None, :, None])
+        diffused = replace(low, distances=distance[None, :, None])
+        other.films = tuple(diffused if film is low else film for film in space.films)
         sweep, exact = (Lever(probe, space=one).sweep([2.0, 5.0, 8.0]) for one in (space, other))
-        weights = space.weights[space.tapered.points, 0]
+        weights = space.weights[low.points, 0]
         rms = np.sqrt(np.average((own - share) ** 2, weights=weights))
         rows.append(
             [
@@ -144,11 +148,11 @@ def doping() -> None:
     table(["heater", "largest", "rms", "I_h", "R_h", "T_tip (K)"], rows)
 
 
-def share_by_distance(tapered: Tapered, delta: float) -> np.ndarray:
+def share_by_distance(low: PlacedFilm, delta: float) -> np.ndarray:
     """The share of the high-doped silicon's dopant by `tapered_doping`."""
     from hotlever.materials.doping import tapered_doping
 
-    share, _ = tapered_doping(tapered.distances[..., 0], 0.0, delta, n_hd=1.0)
+    share, _ = tapered_doping(low.distances[..., 0], 0.0, delta, n_hd=1.0)
     return share
 
 

@@ -13,6 +13,7 @@ import xarray as xr
 from hotlever import __version__
 from hotlever.errors import ComputationError
 from hotlever.probe import Probe
+from of_materials import p_type_probe
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "lever-a.csv"
 
@@ -41,6 +42,33 @@ def test_probe_show_describes_and_draws(run, tmp_path):
     assert "three-leg, 0.4 µm thick" in out
     assert "831.3 K" in out
     assert (tmp_path / "probe.svg").stat().st_size > 1000
+
+
+def test_materials_are_listed_and_drawn(run, tmp_path):
+    status, out, _ = run("materials", "--plot", str(tmp_path / "materials.svg"))
+    assert status == 0
+    for word in ("p-silicon", "lorenz_ratio", "Ω cm", "Thurber", "290 to 1300 K", "SiO2", "Matula"):
+        assert word in out
+    assert "W m" in (tmp_path / "materials.svg").read_text(encoding="utf-8")
+    status, _, err = run("material")
+    assert status == 2
+    assert "did you mean 'materials'" in err
+
+
+def test_values_of_materials_are_set_by_name(run, tmp_path):
+    p_type_probe().to_file(tmp_path / "p.toml")
+    sweep = ("sweep", str(tmp_path / "p.toml"), "--bias", "3:3:1")
+    found = []
+    for setting in ("hot.n_d=2e18", "hot.n_d=1e18", "legs.c_kappa=thickness"):
+        status, out, err = run(*sweep, "--set", setting)
+        assert status == 0, err
+        found.append(float(out.splitlines()[1].split(",")[4]))
+    assert len(set(found)) == 3
+    for setting, hint in (("hot.nd=1e18", "'n_d'"), ("hott.n_d=1e18", "'hot'")):
+        status, _, err = run(*sweep, "--set", setting)
+        assert status == 2
+        assert f"did you mean {hint}" in err
+        assert err.count("\n") == 1
 
 
 def test_sweep_prints_csv(run):

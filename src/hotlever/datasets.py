@@ -12,6 +12,7 @@ from hotlever import __version__
 from hotlever.errors import InputError
 from hotlever.files import whole_file, write_text
 from hotlever.materials import PARAMETERS
+from hotlever.text import parameter_named
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -159,6 +160,9 @@ def labelled(
         if name in QUANTITIES:
             unit, meaning = QUANTITIES[str(name)]
             data[name].attrs = {"units": unit, "long_name": meaning}
+        elif "." in str(name):  # a parameter of a named material
+            known = parameter_named(str(name))
+            data[name].attrs = {"units": known.unit, "long_name": known.meaning}
     return data
 
 

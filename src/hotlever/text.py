@@ -7,8 +7,8 @@ import math
 import re
 from collections.abc import Sequence
 
-from hotlever.materials import PARAMETERS
-from hotlever.materials.material import Parameter
+from hotlever.materials import KINDS, PARAMETERS
+from hotlever.materials.parameters import Parameter
 
 INVERSION = "inversion_temperature"
 #: Numbers between these are written without a power of ten.
@@ -52,15 +52,24 @@ def value_with_error(value: float, stderr: float | None, scale: float = 1.0) -> 
 
 
 def parameter_named(name: str) -> Parameter:
-    """Return how a parameter of the material, or any other value of a probe file, is printed.
+    """Return how a parameter of a material, or any other value of a probe file, is printed.
 
     Examples
     --------
     >>> parameter_named("heater_width_um").symbol, parameter_named("heater_width_um").unit
     ('heater width', 'µm')
+    >>> parameter_named("film.tcr").symbol, parameter_named("film.tcr").unit
+    ('α (film)', 'K⁻¹')
     """
     if name in PARAMETERS:
         return PARAMETERS[name]
+    material, dot, own = name.partition(".")
+    declared = [kind.declared[own] for kind in KINDS.values() if own in kind.declared]
+    if dot and declared:
+        known = declared[0]
+        return known._replace(
+            name=name, symbol=f"{known.symbol} ({material})", meaning=f"{known.meaning}, {material}"
+        )
     stem, _, ending = name.rpartition("_")
     if ending not in _UNITS:
         return Parameter(name, name.replace("_", " "), "1", 1.0, -math.inf, math.inf, name)
@@ -108,8 +117,9 @@ def sentence(text: str) -> str:
     >>> sentence("the levers differ"), sentence("n_d is not determined")
     ('The levers differ.', 'n_d is not determined.')
     """
-    begins_with_name = re.split(r"\W", text, maxsplit=1)[0] in PARAMETERS
-    return f"{text if begins_with_name else text[0].upper() + text[1:]}."
+    first = re.split(r"[^\w.]", text, maxsplit=1)[0]
+    is_name = first in PARAMETERS or "." in first
+    return f"{text if is_name else text[0].upper() + text[1:]}."
 
 
 def aligned(rows: Sequence[Sequence[str]], right: bool = False) -> list[str]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import ezdxf
 import gdstk
 import pytest
-from drawn import box, drawn, library_of, reference_points, written
 from reference_drawing import reference_library
 
+from drawn import box, drawn, library_of, reference_points, written
 from hotlever.drawing.fault import DrawingError
 from hotlever.errors import InputError
 from hotlever.lever import Lever
@@ -125,8 +125,8 @@ def test_what_is_drawn_wrongly_is_named_with_its_place(name):
             {"layers": {"silicon": box(0, 0, 9, 9), "heater": [[1]]}},
             'expected a layer such as "1/0"',
         ),
-        ({"layers": {"silicon": {"drawn": "5/0"}, "heater": HEATER}}, "cannot be simulated yet"),
-        ({"materials": {"pd": {"kind": "metal-film"}}}, "cannot be simulated yet"),
+        ({"layers": {"silicon": {"drawn": "5/0"}, "heater": HEATER}}, "material is missing"),
+        ({"materials": {"pd": {"kind": "metal-film"}}}, "pd.: resistivity is missing"),
         ({"probe": {"tip_um": "here"}}, r"tip_um = 'here': expected \[x, y\]"),
         ({"probe": {"tip_um": [48.58, 5.0]}}, r"tip_um, at \(48.580, 5.000\) µm: .*outside"),
         ({"probe": {"thickness_um": 100}}, "thickness_um = 100"),

@@ -32,19 +32,19 @@ def test_between_parallel_borders_it_is_the_papers_equation(x):
     "distances", [(4.5, -0.5), (0.7, 3.3), (2.0, 2.0), (1.0, 1.5, 0.4), (1.2,)]
 )
 def test_partial_derivatives_are_exact(distances):
-    at = {"n_d": 5.75e17, "delta": 0.647}
-    _, partials = tapered_doping(distances, **at, n_hd=N_HD)
+    at = {"n_d": 5.75e17, "delta": 0.647, "n_hd": N_HD}
+    _, partials = tapered_doping(distances, **at)
     assert set(partials) == {*at, "distances"}
     for name, number in at.items():
         slope = numerical_derivative(
-            lambda value, name=name: tapered_doping(distances, **{**at, name: value}, n_hd=N_HD)[0],
+            lambda value, name=name: tapered_doping(distances, **{**at, name: value})[0],
             number,
             1e-3 * number,
         )
         assert partials[name] == pytest.approx(slope, rel=1e-5, abs=1e8)
     for border, unit in enumerate(np.eye(len(distances))):
         slope = numerical_derivative(
-            lambda step, unit=unit: tapered_doping(distances + step * unit, **at, n_hd=N_HD)[0],
+            lambda step, unit=unit: tapered_doping(distances + step * unit, **at)[0],
             0.0,
             1e-3,
         )

@@ -9,10 +9,20 @@ import xarray as xr
 import made_up
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
-from hotlever.materials.silicon import minimos_mobility, mobility
+from hotlever.materials import LOW_DOPED
+from hotlever.materials.kinds import NSilicon
 from hotlever.probe import Probe
 from hotlever.studies import twins
-from hotlever.studies.twins import ALL, ESTIMATE, WAYS, MinimosLever, drawn, judge, measured
+from hotlever.studies.twins import (
+    ALL,
+    ESTIMATE,
+    WAYS,
+    MinimosLever,
+    MinimosSilicon,
+    drawn,
+    judge,
+    measured,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -82,10 +92,10 @@ def test_another_mobility_changes_the_lever_and_nobody_else_s():
     probe = Probe.reference()
     before = Lever(probe, COARSE).sweep([5.0, 9.0])
     other = MinimosLever(probe, COARSE)
-    assert other.equations.mobility_law is minimos_mobility
+    assert isinstance(other.equations.made_of[LOW_DOPED], MinimosSilicon)
     assert abs(other.sweep([5.0, 9.0]).current_mA / before.current_mA - 1).max() > 5e-3
     again = Lever(probe, COARSE)
-    assert again.equations.mobility_law is mobility
+    assert type(again.equations.made_of[LOW_DOPED]) is NSilicon
     xr.testing.assert_allclose(again.sweep([5.0, 9.0]).current_mA, before.current_mA)
     assert isinstance(other.with_probe(probe.with_(n_d=4e17)), MinimosLever)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from skfem import MeshTri
 from skfem.element import Element
@@ -12,8 +14,9 @@ from hotlever.lever.equations import LeverEquations
 from hotlever.lever.following import Follower
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.pinned import state_at_bias
-from hotlever.materials import Material
+from hotlever.materials import Kind, Material
 from hotlever.probe import Circuit, Layout, ProbeMesh, Region, Taper, Terminal
+from hotlever.probe.layout import Film
 
 
 def bare_equations(
@@ -24,12 +27,22 @@ def bare_equations(
     material: Material,
     *,
     taper: Taper | None = None,
+    stack: dict[str, tuple[Kind, float]] | None = None,
     element: Element | None = None,
     quadrature: int = 6,
 ) -> LeverEquations:
-    """Equations of one piece of silicon between two terminals."""
+    """Equations of one piece of silicon, or of a stack, between two terminals.
+
+    A stack gives materials and thicknesses (µm) by name, the body first.
+    """
     region = Region("all", "heater", ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), taper)
-    layout = Layout((region,), (supply, ground), tip, 0.4)
+    kinds, thickness = material.kinds, 0.4
+    if stack is not None:
+        (body, (_, thickness)), *films = stack.items()
+        on_it = tuple(Film(name, film) for name, (_, film) in films)
+        region = replace(region, material=body, films=on_it)
+        kinds = {name: kind for name, (kind, _) in stack.items()}
+    layout = Layout((region,), (supply, ground), tip, thickness)
     boundary = mesh.boundary_facets()
 
     def edges(terminal: Terminal):
@@ -46,7 +59,7 @@ def bare_equations(
         {"supply": edges(supply), "ground": edges(ground)},
     )
     space = FullSpace(probe_mesh, FiniteElements(mesh, element, quadrature))
-    return LeverEquations(space, material, 293.0)
+    return LeverEquations(space, kinds, 293.0)
 
 
 def state_at(equations: LeverEquations, voltage: float) -> np.ndarray:

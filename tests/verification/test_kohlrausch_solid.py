@@ -27,7 +27,7 @@ def highest(voltage, refinement):
     )
     mesh = mesh_solid(layout, sizes)
     space = FullSpace(mesh, FiniteElements(mesh.elements, ElementTetP2(), 4))
-    equations = LeverEquations(space, published("option III").material, 293.0)
+    equations = LeverEquations(space, published("option III").material.kinds, 293.0)
     return 293.0 + space.rises(state_at(equations, voltage)).max()
 
 

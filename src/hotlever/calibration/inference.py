@@ -21,8 +21,9 @@ from hotlever.fitting.estimation import Estimate, estimate
 from hotlever.fitting.least_squares import LeastSquares
 from hotlever.lever import Branch
 from hotlever.lever.dataset import OBSERVABLES
-from hotlever.materials import PARAMETERS, Material
+from hotlever.materials import Material
 from hotlever.probe import Probe
+from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.priors import (
     SCALES,
     JointPrior,
@@ -177,7 +178,7 @@ def estimated(
         fixed=options.fixed,
         priors=theirs,
         robust=_robust(measured),
-        free=tuple(name for name in own if name not in PARAMETERS),
+        free=tuple(name for name in own if name not in usual_parameters(probe)),
     )
     try:
         found = estimate(measured, probe, again, joint=joint, progress=progress)
@@ -287,4 +288,5 @@ def _search(problem: LeastSquares) -> list[str]:
 
 
 def _source(name: str) -> str:
-    return _CIRCUIT.get(name, "material" if name in Material.model_fields else "geometry")
+    of_material = "." in name or name in Material.model_fields
+    return _CIRCUIT.get(name, "material" if of_material else "geometry")

@@ -62,7 +62,7 @@ def calibration_text(calibration: Calibration) -> str:
 def _knee_lines(calibration: Calibration) -> list[str]:
     knee, law = calibration.knee, calibration.power_law
     if np.isnan(knee.power_mW):
-        return ["no knee below the melting point of silicon"]
+        return ["no knee as far as the lever can be heated"]
     factor = (
         f"k = {value_with_error(calibration.k, calibration.k_stderr)} times the power of the knee "
         f"in vacuum, {law.threshold_mW:.3f} mW"

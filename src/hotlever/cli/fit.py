@@ -43,6 +43,12 @@ def fit_command(
         None, help="Some of current,reader,tip; all that the file has if left out."
     ),
     fix: list[str] | None = Option(None, metavar="NAME[=VALUE]", help="Hold a parameter."),
+    free: str | None = Option(
+        None,
+        metavar="NAME[,...]",
+        help="Vary more than is usual: any parameter of a material, as film.lorenz_ratio, or of "
+        "the probe.",
+    ),
     robust: bool = Option(
         False, "--robust", help="Lessen the weight of points far off the others."
     ),
@@ -95,6 +101,7 @@ def fit_command(
         observables=None if observables is None else observables.split(","),
         fixed=parse_values("--fix", fix, bare=True),
         priors=stated if given is None else {**stated, **given} if given else {},
+        free=() if free is None else tuple(name.strip() for name in free.split(",")),
         **chosen,
     )
     columns = parse_columns(column or [])

@@ -222,6 +222,8 @@ def parse_settings(settings: list[str] | None, probe: Probe) -> dict[str, Any]:
             values[name] = text == "true"
         elif type(None) in kinds and text == "none":
             values[name] = None
+        elif any(text in get_args(kind) for kind in kinds):
+            values[name] = text
         elif float in kinds or (field is None and section == "probe"):
             values[name] = parse_number(text, where)
         else:

@@ -118,10 +118,9 @@ def _fault_drawn(outputs: Outputs, plot: Path | None) -> Iterator[None]:
 
 
 def _described(probe: Probe, layout: Layout, name: str) -> list[str]:
-    from hotlever.materials.silicon import inversion_temperature
     from hotlever.probe import mesh_layout
 
-    circuit, material = probe.circuit, probe.material
+    circuit, silicon = probe.circuit, probe.heater_silicon
     x, y = layout.tip
     given = {key: getattr(probe.shape, key) for key in probe.shape.description()}
     dimensions = [
@@ -138,24 +137,48 @@ def _described(probe: Probe, layout: Layout, name: str) -> list[str]:
         f"  tip at ({x:g}, {y:g}) µm; terminals {', '.join(terminals)}",
         f"circuit: series resistance {circuit.series_resistance_ohm:g} ohm, "
         f"base temperature {circuit.base_temperature_K:g} K",
-        "material: " + ", ".join(f"{key} {value:g}" for key, value in material),
-        "inversion temperature of the heater: "
-        f"{inversion_temperature(material.n_d, material.p):.1f} K",
+        *_materials(probe),
+        *(
+            []
+            if silicon is None
+            else [f"inversion temperature of the heater: {silicon.inversion_temperature():.1f} K"]
+        ),
         f"mesh: {mesh_layout(layout).elements.nelements} triangles",
     ]
+
+
+def _materials(probe: Probe) -> list[str]:
+    """Return the values of what a probe is made of, a line for each material."""
+    plain = {"material": probe.material} if probe.has_plain_silicon else {}
+    lines = []
+    for name, one in {**plain, **probe.materials}.items():
+        values = [
+            f"{key} {value:g}" if isinstance(value, float) else str(value)
+            for key, value in one
+            if value is not None and key != "preset"
+        ]
+        lines.append(f"{name}: {', '.join(values)}")
+    return lines
 
 
 def _regions(layout: Layout) -> list[str]:
     """Return what the regions of a drawing are."""
     from hotlever.probe.layout import Taper
 
+    plain = {"high-doped", "low-doped"}
     lines = []
     for region in layout.regions:
-        kind = "high-doped"
+        stack = [
+            film.material + (f" {film.thickness_um:g} µm" if film.thickness_um else "")
+            for film in region.stack
+        ]
+        kind = "high-doped" if plain.issuperset(stack) else " under ".join(stack)
+        own = "low-doped" if plain.issuperset(stack) else f"{kind}, low-doped"
         if isinstance(region.taper, Taper):
-            kind = f"low-doped strip, {region.taper.length_um:.4g} µm from border to border"
+            kind = f"{own} strip, {region.taper.length_um:.4g} µm from border to border"
         elif region.taper is not None:
             borders = len(region.taper.borders)
-            kind = f"low-doped, doping by the distance to {borders} border{'s' * (borders > 1)}"
-        lines.append(f"{region.name}: {region.part}, {region.area:.4g} µm², {kind}")
+            kind = f"{own}, doping by the distance to {borders} border{'s' * (borders > 1)}"
+        part = "insulates" if region.insulates else region.part
+        lines.append(f"{region.name}: {part}, {region.area:.4g} µm², {kind}")
     return lines

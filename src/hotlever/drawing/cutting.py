@@ -1,4 +1,4 @@
-"""The silicon of a drawing cut into regions, with the borders between them."""
+"""The body of a drawn lever cut into regions, with the borders between them."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ Edge = frozenset[Point]
 
 @dataclass(frozen=True)
 class Piece:
-    """One connected part of the silicon, of one kind.
+    """One connected part of the lever, of the same layers.
 
     Attributes
     ----------
-    kind : str or None
-        The name of the low-doped part; None of high-doped silicon.
+    layers : tuple of str
+        The part of the body, or the body itself, and the films on it.
     shape : Polygon
         Its corners are bit by bit those of its neighbours.
     """
 
-    kind: str | None
+    layers: tuple[str, ...]
     shape: Polygon
 
 
 @dataclass(frozen=True)
 class Cut:
-    """Silicon in pieces.
+    """A lever in pieces.
 
     Attributes
     ----------
@@ -63,38 +63,58 @@ class Cut:
             found |= new
         return found
 
+    def part_of(self, number: int) -> set[int]:
+        """Return the pieces that make one part of the body with one, whatever lies on them."""
+        own = self.pieces[number].layers[0]
+        others = {one for one, piece in enumerate(self.pieces) if piece.layers[0] != own}
+        return self.reached({number}, others)
 
-def cut(silicon: Polygon, low_doped: Mapping[str, BaseGeometry]) -> Cut:
-    """Cut silicon along the outlines of its low-doped parts.
+    def beside(self, number: int) -> set[str]:
+        """Return the parts, or the body, that border on the part of a piece."""
+        around = set[int]().union(*(self.neighbours(one) for one in self.part_of(number)))
+        return {self.pieces[one].layers[0] for one in around} - {self.pieces[number].layers[0]}
+
+
+def cut(
+    body: tuple[str, Polygon],
+    parts: Mapping[str, BaseGeometry],
+    films: Mapping[str, BaseGeometry] | None = None,
+) -> Cut:
+    """Cut a body, with its name, along the outlines of its parts and of the films on it.
 
     Raises
     ------
     DrawingError
-        If two low-doped parts overlap.
+        If two parts overlap.
     """
-    names = list(low_doped)
+    (whole, outline), films = body, films or {}
+    names = list(parts)
     for place, name in enumerate(names):
         for other in names[:place]:
-            both = low_doped[name].intersection(low_doped[other])
+            both = parts[name].intersection(parts[other])
             if any(one.buffer(-10 * GRID).area > 0 for one in parts_of(both)):
                 at = both.representative_point()
                 raise DrawingError(f"it overlaps with '{other}'", name, None, (at.x, at.y))
-    outlines = [silicon.boundary, *(shape.boundary for shape in low_doped.values())]
-    noded = shapely.union_all(outlines, grid_size=GRID)
-    kinds: dict[str | None, list[Polygon]] = defaultdict(list)
+    drawn = [*parts.values(), *films.values()]
+    noded = shapely.union_all(
+        [outline.boundary, *(shape.boundary for shape in drawn)], grid_size=GRID
+    )
+    kinds: dict[tuple[str, ...], list[Polygon]] = defaultdict(list)
     for face in shapely.get_parts(shapely.polygonize(list(shapely.get_parts(noded)))):
         at = face.representative_point()
-        if silicon.covers(at):
-            kind = next((name for name in names if low_doped[name].covers(at)), None)
-            kinds[kind].append(face)
+        if outline.covers(at):
+            part = next((name for name in names if parts[name].covers(at)), whole)
+            on_it = [name for name, shape in films.items() if shape.covers(at)]
+            kinds[part, *on_it].append(face)
+    order = [*names, whole]
     pieces = [
         Piece(kind, orient(one))
-        for kind in (*names, None)
+        for kind in sorted(kinds, key=lambda kind: order.index(kind[0]))
         for one in sorted(parts_of(shapely.union_all(kinds[kind])), key=lambda one: -one.area)
     ]
     owners: dict[Edge, list[int]] = defaultdict(list)
     for number, piece in enumerate(pieces):
-        for face in kinds[piece.kind]:
+        for face in kinds[piece.layers]:
             if piece.shape.covers(face.representative_point()):
                 for edge in map(frozenset, outline_edges(face)):
                     owners[edge].append(number)
@@ -105,31 +125,39 @@ def cut(silicon: Polygon, low_doped: Mapping[str, BaseGeometry]) -> Cut:
     return Cut(pieces, dict(shared))
 
 
-def taper_of(whole: Cut, number: int, tolerance: float) -> Taper | BorderTaper:
-    """Return how the doping of a low-doped piece is tapered from its high-doped neighbours.
+def taper_of(
+    whole: Cut, number: int, sources: set[str], tolerance: float
+) -> Taper | BorderTaper | None:
+    """Return how the doping of a low-doped piece is tapered from its neighbours, if it is.
 
-    Raises
-    ------
-    DrawingError
-        If it has none.
+    Parameters
+    ----------
+    whole : Cut
+    number : int
+        Of the piece.
+    sources : set of str
+        Parts, or the body, from which dopant diffuses.
+    tolerance : float
     """
-    piece = whole.pieces[number]
+    group = whole.part_of(number)
     borders: list[LineString] = []
     edges = [
         tuple(edge)
         for pair, edges in whole.shared.items()
-        if number in pair and whole.pieces[sum(pair) - number].kind is None
+        for inside, outside in (pair, pair[::-1])
+        if inside in group and whole.pieces[outside].layers[0] in sources
         for edge in edges
     ]
     if edges:
         merged = shapely.line_merge(MultiLineString(edges))
         borders = sorted(shapely.get_parts(merged).tolist(), key=lambda one: one.coords[0])
     if not borders:
-        at = piece.shape.representative_point()
-        raise DrawingError(
-            "it borders on no high-doped silicon", piece.kind or "", None, (at.x, at.y)
-        )
-    strip = _strip(piece.shape, borders, tolerance)
+        return None
+    shape = whole.pieces[number].shape
+    if len(group) > 1:
+        # where a film ends on it is no corner of the part
+        shape = shapely.union_all([whole.pieces[one].shape for one in sorted(group)]).simplify(GRID)
+    strip = _strip(shape, borders, tolerance)
     if strip is not None:
         return strip
     return BorderTaper(tuple(tuple((x, y) for x, y in border.coords) for border in borders))

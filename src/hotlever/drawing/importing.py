@@ -11,7 +11,7 @@ import numpy as np
 
 from hotlever.drawing.contacts import REQUIRED, terminal_part
 from hotlever.drawing.fault import Ring
-from hotlever.drawing.making import HEATER, SILICON
+from hotlever.drawing.layers import HEATER, SILICON
 from hotlever.drawing.proposal import Drawn, Proposal, proposed
 from hotlever.drawing.shape import TOLERANCE_UM
 from hotlever.drawing.sheet import Sheet, read_sheet

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import shapely
-from shapely import Polygon
+from shapely import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from hotlever.drawing.contacts import REQUIRED, terminal_edges, terminal_part
 from hotlever.drawing.cutting import Cut, cut, taper_of
@@ -21,28 +23,39 @@ from hotlever.drawing.healing import (
     polygons,
     snapped,
 )
-from hotlever.probe.layout import Layout, Part, Point, Region, Terminal
+from hotlever.drawing.layers import HEATER, DrawnLayer
+from hotlever.probe.layout import (
+    BorderTaper,
+    Film,
+    Layout,
+    Part,
+    Point,
+    Region,
+    Taper,
+    Terminal,
+)
+from hotlever.probe.mesh import MOST_SQUARES
 
 #: Extent of a lever (µm).
 _SMALLEST, _LARGEST = 2.0, 2000.0
-#: As many squares of its width as a heater may have: it is meshed in steps of its width.
-_SQUARES = 100.0
-#: Outlines nearer than so many tolerances to that of the silicon are the same.
+#: Outlines nearer than so many tolerances to that of the body are the same.
 _SNAP = 1.5
-SILICON, HEATER = "silicon", "heater"
 
 Outlines = tuple[tuple[str, tuple[Ring, ...]], ...]
 
 
 @lru_cache(maxsize=32)
-def layout_of(layers: Outlines, terminals: Outlines, tip: Point, tolerance_um: float) -> Layout:
-    """Return the layout of a drawing, 1 µm thick.
+def layout_of(
+    layers: tuple[DrawnLayer, ...], terminals: Outlines, tip: Point, tolerance_um: float
+) -> Layout:
+    """Return the layout of a drawing, its body 1 µm thick.
 
     Parameters
     ----------
-    layers, terminals : tuple of (str, tuple of rings)
-        Outlines by name, µm: ``silicon``, ``heater`` and other low-doped parts; and terminals,
-        where a ring of two points is a line.
+    layers : tuple of DrawnLayer
+        Among them the body.
+    terminals : tuple of (str, tuple of rings)
+        Outlines by name, µm; a ring of two points is a line.
     tip : tuple of float
     tolerance_um : float
         What is nearer is the same.
@@ -53,58 +66,68 @@ def layout_of(layers: Outlines, terminals: Outlines, tip: Point, tolerance_um: f
         If the drawing is at fault; see `hotlever.drawing.healing`, `hotlever.drawing.cutting` and
         `hotlever.drawing.contacts`.
     """
-    drawn = dict(layers)
+    known = {layer.name: layer for layer in layers}
     narrowest = NARROWEST * tolerance_um
-    found = {name: polygons(name, rings, tolerance_um) for name, rings in drawn.items()}
-    silicon = one_piece(SILICON, healed(SILICON, found[SILICON], tolerance_um), found[SILICON])
-    _check_extent(silicon)
-    check_widths(SILICON, silicon, found[SILICON], narrowest)
-    low_doped = {}
+    found = {name: polygons(name, one.rings, tolerance_um) for name, one in known.items()}
+    body = next(layer.name for layer in layers if layer.is_body)
+    outline = one_piece(body, healed(body, found[body], tolerance_um), found[body])
+    _check_extent(body, outline)
+    check_widths(body, outline, found[body], narrowest)
+    near, shapes = [outline], dict[str, BaseGeometry]()
     for name, areas in found.items():
-        if name != SILICON:
+        if name != body:
             shape = healed(name, areas, tolerance_um)
-            _check_on_silicon(name, areas, silicon, tolerance_um)
-            low_doped[name] = snapped(shape, silicon, _SNAP * tolerance_um)
-    ends = terminal_edges(silicon, dict(terminals), tolerance_um)
-    whole = cut(_with_corners(silicon, ends), low_doped)
+            _check_on_body(name, areas, body, outline, tolerance_um)
+            for one in near:
+                shape = snapped(shape, one, _SNAP * tolerance_um)
+            shapes[name] = shape
+            # parts lie apart from each other, films on all that is below
+            if known[name].is_film:
+                near.append(shape)
+    ends = terminal_edges(outline, dict(terminals), tolerance_um)
+    films = {name: shape for name, shape in shapes.items() if known[name].is_film}
+    parts = {name: shape for name, shape in shapes.items() if name not in films}
+    whole = cut((body, _with_corners(outline, ends)), parts, films)
     for piece in whole.pieces:
-        name = piece.kind or SILICON
+        name = piece.layers[-1]
         check_widths(name, piece.shape, found[name], narrowest)
-    regions = _regions(whole, ends, tolerance_um)
+    regions = _regions(whole, known, ends, tolerance_um)
     for region, piece in zip(regions, whole.pieces, strict=True):
         squares = region.area / region.narrow_um**2
-        if region.part == "heater" and squares > _SQUARES:
+        if HEATER in piece.layers and squares > MOST_SQUARES:
             at = piece.shape.representative_point()
             raise DrawingError(
                 f"{region.narrow_um:.3g} µm wide and {squares:.0f} times as long, expected at most "
-                f"{_SQUARES:g}",
+                f"{MOST_SQUARES:g}",
                 HEATER,
                 nearest_polygon(found[HEATER], (at.x, at.y)),
                 (at.x, at.y),
             )
-    if not silicon.contains(shapely.Point(tip)):
-        raise DrawingError("it lies outside the silicon", "tip_um", None, tip)
+    if not outline.contains(shapely.Point(tip)):
+        raise DrawingError(f"it lies outside the {body}", "tip_um", None, tip)
     return Layout(tuple(regions), tuple(ends), tip, 1.0)
 
 
-def _check_extent(silicon: Polygon) -> None:
-    x0, y0, x1, y1 = silicon.bounds
+def _check_extent(body: str, outline: Polygon) -> None:
+    x0, y0, x1, y1 = outline.bounds
     extent = max(x1 - x0, y1 - y0)
     if not _SMALLEST <= extent <= _LARGEST:
         raise DrawingError(
             f"{extent:.4g} µm long, expected {_SMALLEST:g} to {_LARGEST:g} µm; is the unit right?",
-            SILICON,
+            body,
             None,
             (x0, y0),
         )
 
 
-def _check_on_silicon(name: str, areas: list[Polygon], silicon: Polygon, tolerance: float) -> None:
+def _check_on_body(
+    name: str, areas: list[Polygon], body: str, outline: Polygon, tolerance: float
+) -> None:
     for number, area in enumerate(areas, start=1):
-        inside = area.intersection(silicon)
+        inside = area.intersection(outline)
         if not any(one.area > tolerance**2 for one in parts_of(inside)):
             at = area.representative_point()
-            raise DrawingError("it lies outside the silicon", name, number, (at.x, at.y))
+            raise DrawingError(f"it lies outside the {body}", name, number, (at.x, at.y))
 
 
 def _with_corners(silicon: Polygon, ends: list[Terminal]) -> Polygon:
@@ -113,54 +136,115 @@ def _with_corners(silicon: Polygon, ends: list[Terminal]) -> Polygon:
     return shapely.snap(silicon, places, 1e-6)
 
 
-def _regions(whole: Cut, ends: list[Terminal], tolerance: float) -> list[Region]:
-    """Return the pieces as regions, each with its part in the circuit."""
-    at = _terminals_of(whole, ends)
-    parts = _parts(whole, at)
+def _regions(
+    whole: Cut, known: dict[str, DrawnLayer], ends: list[Terminal], tolerance: float
+) -> list[Region]:
+    """Return the pieces as regions, each with what it is made of and its part in the circuit."""
+    at = _terminals_of(whole, ends, tolerance)
+    insulates = {
+        number
+        for number, piece in enumerate(whole.pieces)
+        if not any(known[name].kind.conducts for name in piece.layers)
+    }
+    body = next(layer.name for layer in known.values() if layer.is_body)
+    parts = _parts(whole, body, at, insulates)
     regions, counts = [], dict[str, int]()
     for number, piece in enumerate(whole.pieces):
         here = [name for name, numbers in at.items() if number in numbers]
-        name = piece.kind or " at ".join([SILICON, *([", ".join(here)] if here else [])])
+        (own, *films), name = piece.layers, piece.layers[-1]
+        if known[own].is_body:
+            name = " at ".join([name, *([", ".join(here)] if here else [])])
         counts[name] = counts.get(name, 0) + 1
         outline, *holes = (
             tuple((float(x), float(y)) for x, y in ring.coords[:-1])
             for ring in (piece.shape.exterior, *piece.shape.interiors)
         )
-        regions.append(
-            Region(
-                name if counts[name] == 1 else f"{name} {counts[name]}",
-                parts[number],
-                outline,
-                None if piece.kind is None else taper_of(whole, number, tolerance),
-                tuple(holes),
-            )
+        taper, dopant_from = _taper(whole, known, number, tolerance)
+        made = Region(
+            name if counts[name] == 1 else f"{name} {counts[name]}",
+            parts[number],
+            outline,
+            taper,
+            tuple(holes),
+            material=known[own].material,
+            films=tuple(Film(known[one].material, known[one].thickness_um) for one in films),
+            insulates=number in insulates,
         )
+        regions.append(made if dopant_from is None else replace(made, dopant_from=dopant_from))
     return regions
 
 
-def _terminals_of(whole: Cut, ends: list[Terminal]) -> dict[str, set[int]]:
-    """Return the numbers of the pieces that each terminal touches."""
-    found: dict[str, set[int]] = {}
-    for end in ends:
-        middle = shapely.Point(np.mean([end.start, end.end], axis=0))
-        away = [piece.shape.boundary.distance(middle) for piece in whole.pieces]
-        found.setdefault(end.name, set()).add(int(np.argmin(away)))
-    return found
-
-
-def _parts(whole: Cut, at: dict[str, set[int]]) -> list[Part]:
-    """Return what each piece is to the circuit.
-
-    Without the heaters the silicon falls apart: what is left at the supply is leg 1, at ground
-    leg 2. A low-doped part and what lies behind it, seen from supply and ground, carry no current.
+def _taper(
+    whole: Cut, known: dict[str, DrawnLayer], number: int, tolerance: float
+) -> tuple[Taper | BorderTaper | None, str | None]:
+    """Return how the doping of a piece is tapered, and from which material; None where it is even.
 
     Raises
     ------
     DrawingError
-        If current passes beside the heaters, or not through them.
+        If it should border on high-doped silicon and does not, or borders on two kinds of it.
     """
-    heaters = {number for number, piece in enumerate(whole.pieces) if piece.kind == HEATER}
-    supply, ground = (whole.reached(at[name], heaters) for name in REQUIRED)
+    piece = whole.pieces[number]
+    own = piece.layers[0]
+    if not known[own].is_low_doped:
+        return None, None
+    sources = {name for name in whole.beside(number) if known[name].is_high_doped}
+    materials = {known[name].material for name in sources}
+    at = piece.shape.representative_point()
+    if not materials and any(layer.is_body and layer.is_high_doped for layer in known.values()):
+        raise DrawingError("it borders on no high-doped silicon", own, None, (at.x, at.y))
+    if len(materials) > 1:
+        what = f"it borders on high-doped silicon of {len(materials)} materials, expected one"
+        raise DrawingError(what, own, None, (at.x, at.y))
+    return taper_of(whole, number, sources, tolerance), next(iter(materials), None)
+
+
+def _terminals_of(whole: Cut, ends: list[Terminal], tolerance: float) -> dict[str, set[int]]:
+    """Return the numbers of the pieces that each terminal touches."""
+    found: dict[str, set[int]] = {}
+    for end in ends:
+        edge = LineString([end.start, end.end])
+        along = [piece.shape.boundary.intersection(edge).length for piece in whole.pieces]
+        touched = {number for number, length in enumerate(along) if length > tolerance}
+        middle = edge.interpolate(0.5, normalized=True)
+        away = [piece.shape.boundary.distance(middle) for piece in whole.pieces]
+        found.setdefault(end.name, set()).update(touched or {int(np.argmin(away))})
+    return found
+
+
+def _parts(whole: Cut, body: str, at: dict[str, set[int]], insulates: set[int]) -> list[Part]:
+    """Return what each piece is to the circuit.
+
+    Without the heaters the conductor falls apart: what is left at the supply is leg 1, at ground
+    leg 2. A low-doped part and what lies behind it, seen from supply and ground, carry no current.
+    Where no layer is called heater, all that is between supply and ground is one.
+
+    Raises
+    ------
+    DrawingError
+        If a terminal touches no conductor, or current passes beside the heaters, or not through
+        them.
+    """
+    for name in REQUIRED:
+        if at[name] <= insulates:
+            place = whole.pieces[min(at[name])].shape.representative_point()
+            what = "it touches no conductor"
+            raise DrawingError(what, terminal_part(name), None, (place.x, place.y))
+    drawn = {number for number, piece in enumerate(whole.pieces) if HEATER in piece.layers}
+    heaters = drawn - insulates
+    if drawn and not heaters:
+        place = whole.pieces[min(drawn)].shape.representative_point()
+        raise DrawingError("it conducts no current", HEATER, None, (place.x, place.y))
+    supply, ground = (whole.reached(at[name], heaters | insulates) for name in REQUIRED)
+    if not heaters:
+        if not supply & ground:
+            place = whole.pieces[min(at[REQUIRED[1]])].shape.representative_point()
+            what = "no conductor joins it with the supply"
+            raise DrawingError(what, terminal_part(REQUIRED[1]), None, (place.x, place.y))
+        return [
+            "heater" if number in supply & ground else "reader branch"
+            for number in range(len(whole.pieces))
+        ]
     if not supply or not ground:
         name = REQUIRED[0] if not supply else REQUIRED[1]
         place = whole.pieces[min(at[name])].shape.representative_point()
@@ -179,13 +263,14 @@ def _parts(whole: Cut, at: dict[str, set[int]]) -> list[Part]:
         (heaters, "heater"),
     )
     parts: dict[int, Part] = {one: part for numbers, part in kinds for one in numbers}
-    for number, piece in enumerate(whole.pieces):
-        if piece.kind is not None and number not in heaters:
-            legs = supply if number in supply else ground
-            end = at[REQUIRED[0] if number in supply else REQUIRED[1]]
-            cut_off = legs - whole.reached(end, {*heaters, number}) - {number}
-            # current passes it if more of the leg, with heaters at it, lies behind it
-            feeds = any(whole.neighbours(one) & heaters for one in (*cut_off, number))
-            if not feeds:
-                parts.update(dict.fromkeys((*cut_off, number), "reader branch"))
+    for number in sorted(set(parts) - heaters):
+        if whole.pieces[number].layers == (body,):
+            continue
+        legs = supply if number in supply else ground
+        end = at[REQUIRED[0] if number in supply else REQUIRED[1]]
+        cut_off = legs - whole.reached(end, {*heaters, *insulates, number}) - {number}
+        # current passes it if more of the leg, with heaters at it, lies behind it
+        feeds = any(whole.neighbours(one) & heaters for one in (*cut_off, number))
+        if not feeds:
+            parts.update(dict.fromkeys((*cut_off, number), "reader branch"))
     return [parts.get(number, "reader branch") for number in range(len(whole.pieces))]

@@ -15,7 +15,7 @@ from hotlever.drawing.contacts import outline_edges, terminal_edges, terminal_pa
 from hotlever.drawing.cutting import Cut, cut
 from hotlever.drawing.fault import DrawingError, Ring
 from hotlever.drawing.healing import healed, parts_of, polygons, snapped
-from hotlever.drawing.making import HEATER, SILICON
+from hotlever.drawing.layers import HEATER, SILICON
 from hotlever.drawing.shape import rings_of
 from hotlever.drawing.sheet import Layer, Sheet
 from hotlever.probe.layout import Point
@@ -238,13 +238,13 @@ def _named(
         for part, name in found.layers.items()
         if part != SILICON and isinstance(name, str)
     }
-    whole = cut(best.shape, low)
+    whole = cut((SILICON, best.shape), low)
     at: dict[str, set[int]] = {}
     for end in terminal_edges(best.shape, rings, best.tolerance):
         middle = shapely.Point(np.mean([end.start, end.end], axis=0))
         away = [piece.shape.distance(middle) for piece in whole.pieces]
         at.setdefault(end.name, set()).add(int(np.argmin(away)))
-    heaters = {number for number, piece in enumerate(whole.pieces) if piece.kind == HEATER}
+    heaters = {number for number, piece in enumerate(whole.pieces) if HEATER in piece.layers}
     sides = _grouped(whole, at, heaters)
     alone = next((side for side in sides if len(side) == 1), sides[0])
     others = [name for side in sides if side is not alone for name in side] or alone[1:]
@@ -284,7 +284,7 @@ def _grouped(whole: Cut, at: dict[str, set[int]], heaters: set[int]) -> list[lis
 
 def _behind_low_doped(whole: Cut, numbers: set[int], heaters: set[int]) -> bool:
     """Whether a terminal reaches the heater through another low-doped part only."""
-    low = {number for number, piece in enumerate(whole.pieces) if piece.kind is not None}
+    low = {number for number, piece in enumerate(whole.pieces) if SILICON not in piece.layers}
     reached = whole.reached(numbers, low)
     return not any(whole.neighbours(one) & heaters for one in reached)
 

@@ -14,9 +14,11 @@ from pydantic import Field, model_validator
 from hotlever.drawing.contacts import REQUIRED, terminal_part
 from hotlever.drawing.fault import DrawingError, Ring
 from hotlever.drawing.healing import without_nested
-from hotlever.drawing.making import HEATER, SILICON, layout_of
+from hotlever.drawing.layers import DRAWN, DrawnLayer, Made, made_of
+from hotlever.drawing.making import layout_of
 from hotlever.drawing.sheet import Layer, Sheet, read_sheet
 from hotlever.errors import InputError, quoted
+from hotlever.materials import Kind
 from hotlever.probe.layout import Layout, Point
 from hotlever.probe.shapes import SHAPE_SECTIONS, Shape, thickness
 
@@ -55,10 +57,12 @@ class Drawing(Shape):
         le=_COARSEST_UM,
         description="curves become lines within it, what is nearer is the same",
     )
-    thickness_um: float = thickness()
+    thickness_um: float = thickness("of the lever, without films on it")
     tip_um: Point = Field(description="place of the tip")
     layers: dict[str, Rings]
     terminals: dict[str, Rings]
+    #: Of those layers that say so; part of ``[layers]`` in a probe file.
+    made: dict[str, Made] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _can_be_meshed(self) -> Self:
@@ -66,7 +70,7 @@ class Drawing(Shape):
         return self
 
     def __hash__(self) -> int:
-        parts = (*self.layers.items(), *self.terminals.items())
+        parts = (*self.layers.items(), *self.terminals.items(), *self.made.items())
         return hash((parts, self.tip_um, self.tolerance_um, self.thickness_um))
 
     def dimensions(self) -> dict[str, float]:
@@ -75,17 +79,27 @@ class Drawing(Shape):
 
     def sections(self) -> dict[str, dict[str, Any]]:
         """Return the sections of a probe file that describe it."""
-        values = self.model_dump()
+        values = self.model_dump(exclude={"made"})
+        layers = dict(values["layers"])
+        for name, made in self.made.items():
+            layers[name] = {DRAWN: layers[name], **made.model_dump(exclude={"kind"})}
         return {
             "probe": {name: one for name, one in values.items() if name not in SHAPE_SECTIONS},
-            "layers": values["layers"],
+            "layers": layers,
             "terminals": values["terminals"],
         }
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """The names of the materials that layers are said to be made of."""
+        return tuple(dict.fromkeys(made.material for made in self.made.values()))
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
         made = layout_of(
-            tuple(self.layers.items()),
+            tuple(
+                DrawnLayer(name, rings, self.made.get(name)) for name, rings in self.layers.items()
+            ),
             tuple(self.terminals.items()),
             self.tip_um,
             self.tolerance_um,
@@ -93,7 +107,13 @@ class Drawing(Shape):
         return replace(made, thickness_um=self.thickness_um)
 
     @classmethod
-    def read(cls, sections: Mapping[str, Any], where: str, folder: Path | None = None) -> Drawing:
+    def read(
+        cls,
+        sections: Mapping[str, Any],
+        where: str,
+        folder: Path | None = None,
+        materials: Mapping[str, Kind] | None = None,
+    ) -> Drawing:
         """Make a drawing of the sections of a probe file.
 
         Parameters
@@ -104,6 +124,8 @@ class Drawing(Shape):
             Names them in an error.
         folder : path, optional
             What the name of the file is relative to.
+        materials : mapping of str to Kind, optional
+            Those that layers may be made of.
 
         Raises
         ------
@@ -120,6 +142,7 @@ class Drawing(Shape):
                 raise InputError(f"{where}: [probe]: tip_um = {quoted(tip)}: expected [x, y] (µm)")
             values["tip_um"] = (float(tip[0]), float(tip[1]))
         given = {name: _section(sections, name, where) for name in ("layers", "terminals")}
+        given["layers"], made = made_of(given["layers"], materials or {}, f"{where}: [layers]")
         named = {part: layer for part, layer in _by_part(given).items() if isinstance(layer, str)}
         sheet = None
         if named:
@@ -132,7 +155,7 @@ class Drawing(Shape):
             for section, drawn in given.items()
         }
         try:
-            return cls.of(values | outlines, f"{where}: [probe]")
+            return cls.of({**values, **outlines, "made": made}, f"{where}: [probe]")
         except DrawingError as error:
             file = where if sheet is None else sheet.file
             raise error.of_file(file, named, _by_part(outlines)) from None
@@ -147,7 +170,9 @@ def _by_part(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
 def _section(sections: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
     if name not in sections:
         raise InputError(f"{where}: section [{name}] is missing")
-    for key in (SILICON, HEATER) if name == "layers" else REQUIRED:
+    if not isinstance(sections[name], Mapping):
+        raise InputError(f"{where}: [{name}] must be a section")
+    for key in () if name == "layers" else REQUIRED:
         if key not in sections[name]:
             raise InputError(f"{where}: [{name}]: {key} is missing")
     return dict(sections[name])
@@ -191,11 +216,6 @@ def _rings(sheet: Sheet | None, given: Any, name: str, where: str, section: str)
                 "is not closed"
             )
         return rings_of(sheet, layer)
-    if isinstance(given, Mapping):
-        raise InputError(
-            f"{where}: found a section, expected a layer or points; layers of other materials than "
-            "silicon cannot be simulated yet"
-        )
     if _is_points(given):
         given = [given]
     elif not (isinstance(given, list | tuple) and given and all(map(_is_points, given))):

@@ -26,6 +26,7 @@ from hotlever.figures.lever import (
     sweep_overview,
     temperature_power,
 )
+from hotlever.figures.materials import material_curves
 from hotlever.figures.raman import one_spectrum, raman_check, thermometry
 from hotlever.figures.style import FIGURE_TYPES, save_figure
 from hotlever.figures.transient import history_overview, small_signals

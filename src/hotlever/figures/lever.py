@@ -27,6 +27,7 @@ from hotlever.figures.style import (
     VERMILION,
     figure,
 )
+from hotlever.materials import HIGH_DOPED
 from hotlever.probe import Layout, Region
 from hotlever.spieser2017 import BASE_TEMPERATURE_K, POWER_LAW_SPREAD_K
 
@@ -49,13 +50,10 @@ def _patch(region: Region, **style: Any) -> PathPatch:
 
 def probe_drawing(layout: Layout, title: str = "") -> Figure:
     """Draw a probe from above, with heater, reader, terminals and tip marked."""
-    low_doped = {"heater": (VERMILION, "heater (low-doped)"), "reader": (SKY, "reader (low-doped)")}
     with figure(7.0, 3.4) as (made, axes):
         handles: dict[str, Patch | Line2D] = {}
         for region in layout.regions:
-            colour, label = "0.82", "high-doped silicon"
-            if region.taper is not None:
-                colour, label = low_doped["heater" if region.part == "heater" else "reader"]
+            colour, label = _shown_as(region)
             axes.add_patch(_patch(region, facecolor=colour, edgecolor="0.55", lw=0.6))
             handles.setdefault(label, Patch(facecolor=colour, edgecolor="0.55", label=label))
         middle, labelled = layout.box.mean(axis=0), set[tuple[int, bool]]()
@@ -92,6 +90,22 @@ def probe_drawing(layout: Layout, title: str = "") -> Figure:
         axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)", title=title)
         made.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
     return made
+
+
+def _shown_as(region: Region) -> tuple[str, str]:
+    """Return colour and label of a region in a drawing of its probe."""
+    heats = region.part == "heater"
+    if region.insulates:
+        return "0.93", f"{region.stack[-1].material} (insulates)"
+    if region.films:
+        top = region.films[-1].material
+        return (VERMILION, f"heater ({top})") if heats else (ORANGE, top)
+    if region.taper is not None:
+        name = "heater" if heats else "reader"
+        return VERMILION if heats else SKY, f"{name} (low-doped)"
+    material = region.stack[0].material
+    label = "high-doped silicon" if material == HIGH_DOPED else material
+    return (VERMILION, f"heater ({label})") if heats else ("0.82", label)
 
 
 def outlines(axes: Axes, layout: Layout) -> None:

@@ -26,9 +26,7 @@ from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.reduced import ReducedLever
 from hotlever.lever.similar import SimilarLevers
-from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameter_of
 from hotlever.probe.priors import SCALES, JointPrior, Prior, PriorUse, priors_of
 from hotlever.types import Array, Progress
 
@@ -151,8 +149,7 @@ def estimate(
     measurement = Measurement.given(measurement)
     given = Probe.reference() if probe is None else Probe.given(probe)
     probe, notes = with_measured_circuit(given, measurement, options.medium)
-    for name in options.free:
-        parameter_of(probe, name)
+    options = options.of(probe)
     priors = priors_of(options.priors, probe, "priors")
     options = replace(options, priors=priors)
     observables = _observables(options, measurement, probe, notes)
@@ -166,7 +163,7 @@ def estimate(
             f"{measurement.path or 'measurement'}: {residuals.size} data for "
             f"{len(options.varied)} parameters; fix some or measure more"
         )
-    names = (*PARAMETERS, *(name for name in options.varied if name not in PARAMETERS))
+    names = tuple(dict.fromkeys([*options.usual, *options.varied]))
     make = model or partial(forward_model, names=names)
     # with priors errors are a matter of standard deviations, to which the fast lever's slopes do
     forward = replace(make(probe, residuals.bias), names=names, first_order=not known)

@@ -32,8 +32,9 @@ def compare_levers(fits: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        On (``lever``, ``quantity``), the quantities being the six parameters and
-        ``inversion_temperature``: ``value`` and ``stderr`` (NaN where there is none). On
+        On (``lever``, ``quantity``), the quantities being the parameters of the materials, and
+        ``inversion_temperature`` if there is one: ``value`` and ``stderr`` (NaN where there is
+        none). On
         ``quantity``: ``mean``; ``scatter``, the standard deviation between levers (NaN for one
         lever); ``mean_stderr``; ``chi_square`` of the values about their weighted mean, NaN
         where a standard error is missing.
@@ -41,12 +42,13 @@ def compare_levers(fits: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
     Raises
     ------
     InputError
-        If there is no fit, or one is no fit file.
+        If there is no fit, one is no fit file, or they are of levers of different materials.
     """
     if not fits:
         raise InputError("no fits to compare, expected one or more")
-    quantities = [*PARAMETERS, INVERSION]
-    rows = np.array([_row(name, content) for name, content in fits.items()], dtype=float)
+    units = _units(fits)
+    quantities = list(units)
+    rows = np.array([_row(name, one, quantities) for name, one in fits.items()], dtype=float)
     value, stderr = rows[..., 0], rows[..., 1]
     known = np.isfinite(stderr) & (stderr > 0)
     weights = np.where(known, 1.0 / np.where(known, stderr, 1.0) ** 2, np.nan)
@@ -54,7 +56,6 @@ def compare_levers(fits: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
     scatter = value.std(axis=0, ddof=1) if len(rows) > 1 else np.full(len(quantities), np.nan)
     with np.errstate(invalid="ignore"):  # no error at all is none on average
         mean_stderr = np.where(known, stderr, 0.0).sum(axis=0) / known.sum(axis=0)
-    units = [*(known.unit for known in PARAMETERS.values()), "K"]
     return labelled(
         {
             "value": (("lever", "quantity"), value),
@@ -65,17 +66,37 @@ def compare_levers(fits: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
             "chi_square": (weights * (value - middle) ** 2).sum(axis=0),
         },
         "quantity",
-        {"lever": list(fits), "quantity": quantities, "unit": ("quantity", units)},
+        {"lever": list(fits), "quantity": quantities, "unit": ("quantity", list(units.values()))},
     )
 
 
-def _row(name: str, content: Mapping[str, Any]) -> list[tuple[float | None, float | None]]:
+def _units(fits: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    """Return the quantities that the levers are compared by, with their units."""
+    name, first = next(iter(fits.items()))
+    try:
+        # dimensions and the like are varied within priors: their scatter is not the levers'
+        known = {key: str(one["unit"]) for key, one in first["parameters"].items()}
+        units = {key: unit for key, unit in known.items() if key in PARAMETERS or "." in key}
+        has_inversion = first["inversion_temperature_K"] is not None
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{name}: not a fit file, {error} is missing") from error
+    return {**units, **({INVERSION: "K"} if has_inversion else {})}
+
+
+def _row(
+    name: str, content: Mapping[str, Any], quantities: Sequence[str]
+) -> list[tuple[float | None, float | None]]:
     """Return value and standard error of each quantity in a fit file."""
     try:
-        entries = [content["parameters"][key] for key in PARAMETERS]
-        inversion = content["inversion_temperature_K"], content["inversion_temperature_stderr_K"]
-        return [*((entry["value"], entry["stderr"]) for entry in entries), inversion]
-    except (KeyError, TypeError) as error:
+        known = {
+            **{key: (one["value"], one["stderr"]) for key, one in content["parameters"].items()},
+            INVERSION: (
+                content["inversion_temperature_K"],
+                content["inversion_temperature_stderr_K"],
+            ),
+        }
+        return [known[quantity] for quantity in quantities]
+    except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{name}: not a fit file, {error} is missing") from error
 
 

@@ -21,12 +21,12 @@ from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.pinned import AtTip
 from hotlever.lever.reduced import ReducedLever, ReducedSpace
-from hotlever.lever.reduction import cached_reduction, known_reduction
+from hotlever.lever.reduction import cached_reduction, can_be_reduced, known_reduction
 from hotlever.lever.sensitivities import Linearised, at_fixed_bias, by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.parameters import parameters_of
+from hotlever.probe.parameters import parameters_of, usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -267,7 +267,7 @@ class ForwardModel:
 
 def full_model(lever: Lever, bias: Array) -> ForwardModel:
     """Return a lever as forward model, just as it is."""
-    return ForwardModel(SimilarLevers(lever), None, bias)
+    return ForwardModel(SimilarLevers(lever), None, bias, usual_parameters(lever.probe))
 
 
 def reduced_model(lever: Lever, reduced: ReducedLever, bias: Array) -> ForwardModel:
@@ -279,7 +279,7 @@ def forward_model(
     probe: Probe,
     bias: Array,
     *,
-    names: tuple[str, ...] = tuple(PARAMETERS),
+    names: tuple[str, ...] | None = None,
     reduce: bool = False,
 ) -> ForwardModel:
     """Return the fastest forward model of a probe.
@@ -289,14 +289,15 @@ def forward_model(
     probe : Probe
     bias : ndarray, shape (n,)
     names : tuple of str
-        Parameters of the derivatives. With dimensions among them no reduced lever serves, since its
-        modes are those of one geometry.
+        Parameters of the derivatives; by default what a fit usually varies. A reduced lever does
+        not serve all, see `hotlever.lever.reduction.can_be_reduced`.
     reduce : bool
         Make and keep a reduced lever (some seconds) if the geometry has none yet: it pays where
         more than one fit is to come.
     """
     lever, reduced = Lever(probe), None
-    if set(names) <= set(PARAMETERS):
+    names = usual_parameters(probe) if names is None else names
+    if can_be_reduced(probe, names):
         reduced = cached_reduction(lever) if reduce else known_reduction(lever)
     fast: BranchSolver = SimilarLevers(Lever(probe, COARSE)) if reduced is None else reduced
     return ForwardModel(fast, SimilarLevers(lever), bias, names)

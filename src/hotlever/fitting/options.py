@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal, get_args
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import PARAMETERS, parameter
 from hotlever.probe import Probe
+from hotlever.probe.parameters import of_materials, parameter_of, usual_parameters
 from hotlever.probe.priors import SCALES, Prior
 from hotlever.probe.surroundings import Medium
 
@@ -41,7 +42,10 @@ class FitOptions:
         What is known before, of parameters of the material, dimensions, the circuit or the scales
         of meters, also as text (`hotlever.probe.priors`); all that have a prior are varied.
     free : sequence of str
-        What else is varied beside the material.
+        What else is varied, beside what usually is.
+    usual : sequence of str
+        What usually is: by default the six parameters of the paper's lever. A fit takes what its
+        probe is made of (`hotlever.probe.parameters.usual_parameters`).
 
     Raises
     ------
@@ -57,13 +61,16 @@ class FitOptions:
     medium: Medium | None = None
     priors: Mapping[str, Prior | str] = field(default_factory=dict)
     free: Sequence[str] = ()
+    usual: Sequence[str] = tuple(PARAMETERS)
 
     def __post_init__(self) -> None:
         for name in self.fixed:
-            parameter(name)
-            if name in self.priors:
-                raise InputError(f"{name} is fixed and has a prior, expected one of them")
-        if len(self.fixed) >= len(PARAMETERS):
+            if "." not in name:
+                parameter(name)
+            for others, what in ((self.priors, "has a prior"), (self.free, "is free")):
+                if name in others:
+                    raise InputError(f"{name} is fixed and {what}, expected one of them")
+        if not self.varied:
             raise InputError("all parameters are fixed; nothing is left to fit")
         asked: list[tuple[str, Any, tuple[str, ...]]] = [
             ("weights", self.weights, get_args(Weights))
@@ -83,14 +90,31 @@ class FitOptions:
 
     @property
     def material(self) -> list[str]:
-        """The parameters of the material to find."""
-        return [name for name in PARAMETERS if name not in self.fixed]
+        """The parameters to find of those that are usually varied."""
+        return [name for name in self.usual if name not in self.fixed]
 
     @property
     def varied(self) -> list[str]:
         """All parameters to find."""
         more = dict.fromkeys([*self.priors, *self.free])
-        return [*self.material, *(name for name in more if name not in {*PARAMETERS, *SCALES})]
+        return [*self.material, *(name for name in more if name not in {*self.usual, *SCALES})]
+
+    def of(self, probe: Probe) -> FitOptions:
+        """Return the options for a probe: what usually varies is what it is made of.
+
+        Raises
+        ------
+        InputError
+            If it has no such parameter as is fixed or free, with the nearest that it has; or if
+            all are fixed.
+        """
+        known = of_materials(probe)
+        for name in self.fixed:
+            if name not in known:
+                raise unknown_name("parameter", name, known)
+        for name in self.free:
+            parameter_of(probe, name)
+        return replace(self, usual=usual_parameters(probe))
 
     def held(self, probe: Probe) -> Probe:
         """Return a probe with the fixed values in place.
@@ -105,4 +129,7 @@ class FitOptions:
 
     def values(self) -> dict[str, Any]:
         """Return the options as plain values."""
-        return asdict(self) | {"fixed": dict(self.fixed), "free": list(self.free)}
+        found = asdict(self) | {"fixed": dict(self.fixed), "free": list(self.free)}
+        if tuple(found.pop("usual")) != tuple(PARAMETERS):
+            found["usual"] = list(self.usual)
+        return found

@@ -24,10 +24,9 @@ from hotlever.fitting.diagnostics import effective_sample_size, split_rhat
 from hotlever.fitting.ensembles import Chains, Gaussian, sample
 from hotlever.fitting.result import Fit
 from hotlever.fitting.rough import RoughModel, rough_model
-from hotlever.materials import PARAMETERS
-from hotlever.materials.silicon import inversion_temperature
+from hotlever.materials import full_name
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameters_of
+from hotlever.probe.parameters import parameters_of, usual_parameters
 from hotlever.text import INVERSION
 from hotlever.types import Array, Progress
 
@@ -185,9 +184,11 @@ def _dataset(fit: Fit, chains: Chains, scale: Array) -> xr.Dataset:
     ensembles, walkers, draws, _ = chains.points.shape
     values = chains.points * scale
     columns = {name: values[..., place] for place, name in enumerate(fit.names)}
-    material = fit.probe.material
-    n_d, p = columns.get("n_d", material.n_d), columns.get("p", material.p)
-    columns[INVERSION] = np.broadcast_to(inversion_temperature(n_d, p), values.shape[:3])
+    silicon, material = fit.probe.heater_silicon, fit.probe.layout().heater.stack[0].material
+    if silicon is not None:
+        at = {own: columns.get(full_name(material, own)) for own in ("n_d", "p")}
+        moved = silicon.model_copy(update={own: one for own, one in at.items() if one is not None})
+        columns[INVERSION] = np.broadcast_to(moved.inversion_temperature(), values.shape[:3])
     # R̂ between ensembles, which are independent; the walkers of one are not
     rhat = [
         split_rhat(np.swapaxes(column, 1, 2).reshape(ensembles, -1)) for column in columns.values()
@@ -197,7 +198,8 @@ def _dataset(fit: Fit, chains: Chains, scale: Array) -> xr.Dataset:
         for name, column in (columns | {"log_probability": chains.log_probability}).items()
     }
     size = [effective_sample_size(chained[name]) for name in columns]
-    held = [name for name in PARAMETERS if name not in fit.names]
+    held = [name for name in usual_parameters(fit.probe) if name not in fit.names]
+    at_rest = zip(held, fit.probe.at(held).tolist(), strict=True)
     data = labelled(
         {
             **chained,
@@ -210,7 +212,7 @@ def _dataset(fit: Fit, chains: Chains, scale: Array) -> xr.Dataset:
             "quantity": list(columns),
             "ensemble": ("chain", np.repeat(np.arange(ensembles), walkers)),
         },
-        fixed=", ".join(f"{name} = {getattr(material, name):g}" for name in held),
+        fixed=", ".join(f"{name} = {value:g}" for name, value in at_rest),
         observables=", ".join(fit.observables),
         sampler=f"emcee {emcee.__version__}",
     )

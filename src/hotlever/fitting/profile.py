@@ -13,9 +13,8 @@ from hotlever.fitting.least_squares import LeastSquares
 from hotlever.fitting.models import ForwardModel, Prediction, forward_model
 from hotlever.fitting.residuals import Residuals
 from hotlever.fitting.result import Fit
-from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameter_of
+from hotlever.probe.parameters import parameter_of, usual_parameters
 from hotlever.types import Array
 
 #: Confidence levels whose intervals are read off a profile.
@@ -127,7 +126,7 @@ def profile_likelihood(
 
 def _model(result: Fit, residuals: Residuals) -> ForwardModel:
     """Return a model that is exact to first order at the optimum, and used as it is from there."""
-    names = tuple(dict.fromkeys([*PARAMETERS, *result.names]))
+    names = tuple(dict.fromkeys([*usual_parameters(result.probe), *result.names]))
     model = forward_model(result.probe, residuals.bias, names=names, reduce=True)
     return model.confirmed(model.predict(result.probe))
 

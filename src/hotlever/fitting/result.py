@@ -31,10 +31,14 @@ from hotlever.fitting.options import FitOptions
 from hotlever.fitting.residuals import Residuals
 from hotlever.fitting.words import fit_text
 from hotlever.lever.lever import Lever
-from hotlever.materials import PARAMETERS
-from hotlever.materials.silicon import inversion_temperature
+from hotlever.materials import full_name
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameter_of, parameters_of
+from hotlever.probe.parameters import (
+    of_materials,
+    parameter_of,
+    parameters_of,
+    usual_parameters,
+)
 from hotlever.probe.priors import Prior, PriorUse, priors_of
 from hotlever.types import Array
 
@@ -139,9 +143,10 @@ class Fit:
 
     @cached_property
     def parameters(self) -> dict[str, FittedParameter]:
-        """Value and standard error of the material's parameters and what else was varied."""
+        """Value and standard error of what is usually varied, and of what else was."""
         spread = dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-        known, names = parameters_of(self.probe), dict.fromkeys([*PARAMETERS, *self.names])
+        known = parameters_of(self.probe)
+        names = dict.fromkeys([*usual_parameters(self.probe), *self.names])
         return {
             name: FittedParameter(
                 value=value,
@@ -173,21 +178,25 @@ class Fit:
 
     @property
     def inversion_temperature_K(self) -> float:
-        """Inversion temperature T_i of the heater's doping concentration (K)."""
-        material = self.probe.material
-        return float(inversion_temperature(material.n_d, material.p, material.impurity_exponent))
+        """Inversion temperature T_i of the heater's doping concentration (K); NaN without one."""
+        silicon = self.probe.heater_silicon
+        return float("nan") if silicon is None else float(silicon.inversion_temperature())
 
     @cached_property
     def inversion_temperature_stderr_K(self) -> float:
         """Its standard error (K), by central differences; NaN if unknown."""
-        material, slope = self.probe.material, np.zeros(len(self.names))
-        for name in {"n_d", "p"} & set(self.names):
-            ends = getattr(material, name) * np.array([1 - 1e-4, 1 + 1e-4])
-            at = {"n_d": material.n_d, "p": material.p, name: ends}
-            rise = np.diff(
-                inversion_temperature(at["n_d"], at["p"], material.impurity_exponent)
-            ).item()
-            slope[self.names.index(name)] = rise / np.ptp(ends)
+        silicon, slope = self.probe.heater_silicon, np.zeros(len(self.names))
+        if silicon is None:
+            return float("nan")
+        material = self.probe.layout().heater.stack[0].material
+        for own in ("n_d", "p"):
+            name, value = full_name(material, own), getattr(silicon, own)
+            if name in self.names:
+                low, high = (
+                    silicon.model_copy(update={own: value * way}).inversion_temperature()
+                    for way in (1 - 1e-4, 1 + 1e-4)
+                )
+                slope[self.names.index(name)] = float(high - low) / (2e-4 * value)
         return float(np.sqrt(slope @ self.covariance @ slope))
 
     def model(self, bias: ArrayLike | None = None) -> xr.Dataset:
@@ -344,8 +353,10 @@ def statements(fit: Fit) -> list[str]:
                 f"{name} is poorly determined by these data: its standard error is {share:.0%} of "
                 "its value"
             )
-    for name in set(fit.names) & PARAMETERS.keys():
-        known, value = PARAMETERS[name], fit.parameters[name].value
+    for name, known in of_materials(fit.probe).items():
+        if name not in fit.names:
+            continue
+        value = fit.parameters[name].value
         for bound in (known.lower, known.upper):
             if abs(value - bound) < _AT_THE_BOUND * abs(bound):
                 found.append(

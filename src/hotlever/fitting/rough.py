@@ -12,7 +12,7 @@ from hotlever.lever.certificate import estimated_error
 from hotlever.lever.curve import spline_through
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduced import ReducedLever
-from hotlever.lever.reduction import cached_reduction
+from hotlever.lever.reduction import cached_reduction, can_be_reduced
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.threads import one_blas_thread
@@ -44,14 +44,14 @@ class RoughModel(Protocol):
 
 
 def rough_model(probe: Probe, names: list[str], bias: Array) -> RoughModel:
-    """Return the rough model for a fit's parameters; the material alone has a reduced lever.
+    """Return the rough model for a fit's parameters: a reduced lever where one serves.
 
     Raises
     ------
     ComputationError
         If the lever cannot be solved.
     """
-    if set(names) <= set(PARAMETERS):
+    if can_be_reduced(probe, names):
         lever = Lever(probe)
         return OtherMaterials(lever, cached_reduction(lever), bias)
     return SimilarProbes(probe, tuple(names), bias)

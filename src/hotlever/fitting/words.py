@@ -37,12 +37,13 @@ def parameter_rows(fit: Fit) -> list[tuple[str, str, str, str]]:
 def outcome(fit: Fit) -> list[str]:
     """Say what follows from the parameters of a fit, and how well it describes the data."""
     inversion = value_with_error(fit.inversion_temperature_K, fit.inversion_temperature_stderr_K)
+    has_one = np.isfinite(fit.inversion_temperature_K)
     rms = (
         f"{name.rsplit('_', 1)[0]} {value:.3g} {name.rsplit('_', 1)[1]}"
         for name, value in fit.residual_rms.items()
     )
     return [
-        f"inversion temperature: {inversion} K",
+        *([f"inversion temperature: {inversion} K"] if has_one else []),
         f"rms of data - model: {', '.join(rms)}",
         f"fitted to {', '.join(fit.observables)} in {fit.steps} steps, {fit.seconds:.1f} s",
     ]

@@ -7,10 +7,10 @@ import numpy as np
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.space import Fluxes, Space
-from hotlever.types import Array
+from hotlever.types import Array, Index
 
-#: What `balance_columns` returns: Joule heat of heater and legs (mW), current to ground (mA),
-#: heat through the leg ends and into the air (mW).
+#: What `balance_columns` returns: Joule heat of heater and legs (mW; NaN without legs), current to
+#: ground (mA), heat through the leg ends and into the air (mW).
 BALANCES = (
     "heater_mW",
     "leg1_mW",
@@ -48,6 +48,12 @@ def _balances(space: Space, fluxes: Fluxes, theta: Array | None) -> Array:
     if theta is not None:
         air_heat, at_ends = space.air.heat(theta)
         end_heat = end_heat - at_ends
-    joule = [-heat_source[space.parts[part]].sum(axis=0) for part in ("heater", "leg 1", "leg 2")]
+    joule = [_joule(heat_source, space.parts[part]) for part in ("heater", "leg 1", "leg 2")]
     ground = -np.einsum("dp,dpn->n", space.ground_test, charge)
     return np.stack([*joule, ground, end_heat, air_heat], axis=-1)
+
+
+def _joule(heat_source: Array, points: Index) -> Array:
+    """Return the heat made at some points; NaN if the lever has no such part."""
+    made = -heat_source[points].sum(axis=0)
+    return np.asarray(made if points.size else np.full_like(made, np.nan))

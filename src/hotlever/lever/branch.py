@@ -23,8 +23,7 @@ from scipy.interpolate import PPoly
 
 from hotlever.errors import BranchEndError
 from hotlever.lever.curve import smooth_curve
-from hotlever.lever.equations import LAWS, SHOWN, LeverEquations
-from hotlever.materials.silicon import MELTING_POINT
+from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 
@@ -142,17 +141,17 @@ class Branch:
 
     @cached_property
     def end_u(self) -> float:
-        """Where the branch ends: at its last state, or where the silicon begins to melt."""
+        """Where the branch ends: at its last state, or where something begins to melt."""
         if not self.melts:
             return float(self.u[-1])
         highest = PPoly(self.curve.c[..., 3], self.curve.x)
-        melting = MELTING_POINT - self.base_temperature_K
+        melting = self.equations.limit[0] - self.base_temperature_K
         return float(highest.solve(melting, extrapolate=False).min())
 
     @property
     def melts(self) -> bool:
-        """Whether the branch ends because silicon melts."""
-        return bool(self.base_temperature_K + self.values[-1, 3] >= MELTING_POINT)
+        """Whether the branch ends because something melts: silicon, or another material."""
+        return bool(self.base_temperature_K + self.values[-1, 3] >= self.equations.limit[0])
 
     @property
     def hottest_K(self) -> float:
@@ -271,14 +270,15 @@ class Branch:
     def ended(self, reading: Reading) -> BranchEndError:
         """Return the error that says where a ramp of the bias ends."""
         bias, tip = reading.last_V, reading.last_K
+        limit, end = self.equations.limit
         if self.melts and tip == self.hottest_K:
-            text = f"silicon melts at a bias of {bias:.4f} V, where the tip is at {tip:.1f} K"
+            text = f"{end} at a bias of {bias:.4f} V, where the tip is at {tip:.1f} K"
         else:
             at = self.point(float(np.sqrt(tip - self.base_temperature_K)))
             text = (
                 f"the branch of a slow bias ramp ends at a bias of {bias:.4f} V (lever "
                 f"{at.lever_V:.4f} V, current {at.current_mA:.4f} mA, tip {tip:.1f} K): above it "
-                "there is no steady state below the melting point of silicon"
+                f"there is no steady state below {limit:.0f} K"
             )
         return BranchEndError(text, bias_reached=bias)
 
@@ -306,5 +306,7 @@ def _crossing(curve: PPoly, low: float, high: float, values: Array) -> Array:
 
 def steps_of(equations: LeverEquations) -> Array:
     """Return u where the tip passes a step of a law, at which the curves bend sharply."""
-    rises = np.array([T for law in LAWS for T in law.steps]) - equations.base_temperature_K
+    laws = [law for kind in equations.made_of.values() for law in kind.laws]
+    steps = sorted({T for law in laws for T in law.steps})
+    rises = np.array(steps) - equations.base_temperature_K
     return np.sqrt(rises[rises > 0])

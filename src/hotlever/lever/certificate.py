@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from hotlever.lever.branch import Branch
+from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import Lever
 from hotlever.lever.pinned import AtTip
 from hotlever.lever.reduced import ReducedSpace
@@ -43,7 +44,8 @@ def estimated_error(lever: Lever, branch: Branch, u: Array) -> Array:
     """
     space = branch.equations.space
     assert isinstance(space, ReducedSpace)
-    equations = lever.with_material(branch.equations.material).equations
+    base = branch.base_temperature_K
+    equations = LeverEquations(lever.space, branch.equations.materials, base)
     reduced = branch.states(u)
     x, every = space.expanded(reduced), np.arange(u.size)
     problem = AtTip(equations, u**2)

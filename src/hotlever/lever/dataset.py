@@ -15,9 +15,8 @@ from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import InputError
 from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES
-from hotlever.lever.equations import LAWS
-from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
+from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.probe import SECTIONS
 from hotlever.types import Array
 
@@ -45,7 +44,8 @@ def sweep_dataset(
     """Return what is observed of n states of a lever.
 
     Shown are ``lever_V``, ``current_mA``, ``reader_V``, ``tip_K`` and ``max_K``; the balances,
-    (n, 6), are `BALANCES`; sensitivities, (3, n, 6), are of `OBSERVABLES` by `PARAMETERS`.
+    (n, 6), are `BALANCES`; sensitivities, (3, n, p), are of `OBSERVABLES` by what a fit
+    usually varies.
     """
     columns = {**shown, **dict(zip(BALANCES, balances.T, strict=True))}
     columns["bias_V"] = probe.circuit.bias(shown["lever_V"], shown["current_mA"])
@@ -53,18 +53,20 @@ def sweep_dataset(
     for part in ("heater", "leg1", "leg2"):
         columns[f"{part}_ohm"] = _resistance(columns[f"{part}_mW"], shown["current_mA"])
     columns["legs_ohm"] = columns["leg1_ohm"] + columns["leg2_ohm"]
-    columns["lever_ohm"] = columns["legs_ohm"] + columns["heater_ohm"]
+    # where all of the conductor is the heater there are no legs
+    whole = np.where(np.isnan(columns["legs_ohm"]), 0.0, columns["legs_ohm"])
+    columns["lever_ohm"] = whole + columns["heater_ohm"]
     variables: dict[str, Any] = {name: columns[name] for name in (*SWEEP_COLUMNS, *_MORE)}
     coordinates: dict[str, Any] = {"bias": columns["bias_V"]}
     if sensitivities is not None:
         variables["sensitivity"] = (("observable", "bias", "parameter"), sensitivities)
-        coordinates |= {"observable": list(OBSERVABLES), "parameter": list(PARAMETERS)}
+        coordinates |= {"observable": list(OBSERVABLES), "parameter": list(usual_parameters(probe))}
     return labelled(
         variables,
         coordinates=coordinates,
         **{name: json.dumps(section) for name, section in probe.values().items()},
         medium=probe.surroundings.medium,
-        notes="\n".join([*notes, *_range_notes(columns["bias_V"], columns["max_K"])]),
+        notes="\n".join([*notes, *_range_notes(probe, columns["bias_V"], columns["max_K"])]),
     )
 
 
@@ -84,9 +86,15 @@ def _resistance(heat_mW: Array, current_mA: Array) -> Array:
     return np.divide(1000.0 * heat_mW, current_mA**2, out=nothing, where=current_mA > 0)
 
 
-def _range_notes(bias_V: Array, max_K: Array) -> list[str]:
+def laws_end_K(probe: Probe) -> float:
+    """Return the temperature (K) beyond which a law of a probe's materials is extrapolated."""
+    laws = [law for kind in probe.made_of.values() for law in kind.laws]
+    return min(law.temperature_range[1] for law in laws)
+
+
+def _range_notes(probe: Probe, bias_V: Array, max_K: Array) -> list[str]:
     """Say where the laws are used beyond the temperatures they are meant for."""
-    limit = min(law.temperature_range[1] for law in LAWS)
+    limit = laws_end_K(probe)
     beyond = bias_V[max_K > limit]
     if not beyond.size:
         return []
@@ -137,3 +145,20 @@ def probe_of(data: xr.Dataset) -> Probe:
     """Return the probe that a sweep was made of."""
     sections = {name: json.loads(data.attrs[name]) for name in SECTIONS if name in data.attrs}
     return Probe.from_values(sections, "sweep")
+
+
+def checked_bias(bias: ArrayLike) -> Array:
+    """Return biases as an array.
+
+    Raises
+    ------
+    InputError
+        If one is negative or not finite, or there is none.
+    """
+    values = np.atleast_1d(np.asarray(bias, dtype=float))
+    wrong = values[~(values >= 0) | ~np.isfinite(values)]
+    if wrong.size:
+        raise InputError(f"found a bias of {wrong[0]:g} V, expected finite biases of 0 or more")
+    if not values.size:
+        raise InputError("no bias, expected one or more")
+    return values

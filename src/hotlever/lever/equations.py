@@ -16,73 +16,37 @@ operator fills the plate itself with air too; κ is therefore κ_Si − κ_air w
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from hotlever.lever.motion import Motion
 from hotlever.lever.space import LEVER, TIP, Factors, Fields, Fluxes, Pin, Space, Tangent
-from hotlever.materials import Material
-from hotlever.materials.air import kirchhoff_variable, thermal_conductivity_of_air
-from hotlever.materials.doping import tapered_doping
-from hotlever.materials.heat import enthalpy
-from hotlever.materials.laws import Law
-from hotlever.materials.silicon import (
-    conductivity_high_doped,
-    conductivity_low_doped,
-    mobility,
-    thermal_conductivity,
-)
+from hotlever.lever.stack import GAS, PER_CM_TO_MILLI_PER_UM, Conductivities, Stacks
+from hotlever.materials import Kind
+from hotlever.materials.air import kirchhoff_variable
 from hotlever.types import Array
-
-#: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
-PER_CM_TO_MILLI_PER_UM = 0.1
-#: J/cm³ to nJ/µm³; with times in µs, nJ are mW µs.
-PER_CM3_TO_NANO_PER_UM3 = 1e-3
-
-#: The laws that the equations use.
-LAWS = (thermal_conductivity, conductivity_low_doped, conductivity_high_doped)
 
 #: What an instrument shows of a state, in the order of `LeverEquations.observed`.
 SHOWN = ("lever_V", "current_mA", "reader_V")
 
-#: Parameters that are of no law: one moves all temperatures, the others are of the air.
-BASE, GAS, GAP = "base_temperature_K", "gas_conductivity", "surface_gap_um"
+#: Parameters that are of no law: one moves all temperatures, the other is of the air.
+BASE, GAP = "base_temperature_K", "surface_gap_um"
 
 #: Error (relative) to which derivatives are solved, and the most rounds of refinement.
 _EXACT, _MOST_ROUNDS = 1e-6, 6
 
 
-@dataclass(frozen=True)
-class Conductivities:
-    """Sheet conductivities (thickness included) at the quadrature points, with derivatives.
-
-    Attributes
-    ----------
-    kappa, sigma : ndarray, shape (points, n)
-        mW/K and mA/V.
-    kappa_by, sigma_by : dict of str to ndarray
-        Derivatives by ``T``, or by the material parameters asked for.
-    """
-
-    kappa: Array
-    sigma: Array
-    kappa_by: dict[str, Array]
-    sigma_by: dict[str, Array]
-
-
 class LeverEquations:
-    """Residual, Jacobian and derivatives of one lever with one material.
+    """Residual, Jacobian and derivatives of one lever of some materials.
 
     Parameters
     ----------
     space : Space
-    material : Material
+    materials : mapping of str to Kind
+        What it is made of, by name.
     base_temperature_K : float
     motions : mapping of str to Motion, optional
         Of the dimensions by which derivatives may be asked for.
-    mobility_law : Law
-        Of the carriers in low-doped silicon; Eq. 8 by default.
 
     Attributes
     ----------
@@ -94,59 +58,32 @@ class LeverEquations:
     def __init__(
         self,
         space: Space,
-        material: Material,
+        materials: Mapping[str, Kind],
         base_temperature_K: float,
         motions: Mapping[str, Motion] | None = None,
-        mobility_law: Law = mobility,
     ) -> None:
-        self.space, self.material, self.motions = space, material, motions or {}
-        self.mobility_law = mobility_law
+        self.space, self.materials, self.motions = space, materials, motions or {}
         self.base_temperature_K = base_temperature_K
-        self._sheet = PER_CM_TO_MILLI_PER_UM * space.thickness_um
+        self._stacks = Stacks(space, materials, self.motions)
         self._latest: tuple[Array, tuple[Fields, Conductivities]] | None = None
-        self._doping, by = tapered_doping(
-            space.tapered.distances, material.n_d, material.delta, n_hd=material.n_hd
-        )
-        self._doping_by = {"n_d": by["n_d"], "delta": by["delta"]} | {
-            name: (by["distances"] * motion.distances).sum(axis=0)
-            for name, motion in self.motions.items()
-        }
         self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]
         self.step_limit = np.where(space.is_temperature, 60.0, 5.0)[:, None]
 
     # --- the laws at the quadrature points --------------------------------------------------
 
+    @property
+    def made_of(self) -> dict[str, Kind]:
+        """The materials of which there are films, by name."""
+        return {film.material: self.materials[film.material] for film in self.space.films}
+
+    @property
+    def limit(self) -> tuple[float, str]:
+        """Temperature (K) beyond which no state is meaningful, and what happens there."""
+        return min((kind.highest_K, kind.end(name)) for name, kind in self.made_of.items())
+
     def conductivities(self, T: Array, names: Sequence[str] = ("T",)) -> Conductivities:
         """Evaluate κ and σ at temperatures (K), (points, n), with some of their derivatives."""
-        material, here = self.material, self.space.tapered.points
-        kappa, kappa_by = thermal_conductivity(T, material.c_kappa)
-        if self.space.air is not None:
-            air = self.space.air
-            filling = air.gas_conductivity * air.filling
-            of_air, of_air_by = thermal_conductivity_of_air(T)
-            kappa = kappa - filling * of_air
-            kappa_by = {
-                **kappa_by,
-                "T": kappa_by["T"] - filling * of_air_by["T"],
-                GAS: -air.filling * of_air,
-            }
-        sigma, sigma_by = conductivity_high_doped(T, material.a0, material.a1)
-        carriers = material.p, material.impurity_exponent, self.mobility_law
-        sigma[here], low_by = conductivity_low_doped(T[here], self._doping, *carriers)
-        low_by |= {name: low_by["n"] * by for name, by in self._doping_by.items()}
-
-        def sheet_by(name: str) -> Array:
-            by = np.zeros_like(sigma) + sigma_by.get(name, 0.0)
-            by[here] = low_by.get(name, 0.0)
-            return np.asarray(self._sheet * by)
-
-        nothing = np.zeros_like(kappa)
-        return Conductivities(
-            self._sheet * kappa,
-            self._sheet * sigma,
-            {name: self._sheet * kappa_by.get(name, nothing) for name in names},
-            {name: sheet_by(name) for name in names},
-        )
+        return self._stacks.conductivities(T, names)
 
     def at(self, x: Array) -> tuple[Fields, Conductivities]:
         """Return the fields of states (size + 1, n), and κ and σ, at the quadrature points."""
@@ -186,10 +123,9 @@ class LeverEquations:
 
         Thickness included, at temperatures (K), (points, n).
         """
-        held, by = enthalpy(T)
-        sheet = PER_CM3_TO_NANO_PER_UM3 * self.space.thickness_um
-        cold = enthalpy(self.base_temperature_K)[0]
-        return np.asarray(sheet * (held - cold)), np.asarray(sheet * by["T"])
+        held, by = self._stacks.heat(T)
+        cold, _ = self._stacks.heat(np.full((len(T), 1), self.base_temperature_K))
+        return held - cold, by
 
     def stored(self, x: Array) -> Array:
         """Return the heat stored in states (nJ), tested as `balance` tests, (size + 1, n).

@@ -16,12 +16,13 @@ from skfem import MeshTri
 from hotlever.datasets import labelled
 from hotlever.files import whole_file, write_text
 from hotlever.lever.elements import FiniteElements
-from hotlever.lever.equations import PER_CM_TO_MILLI_PER_UM, LeverEquations
+from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever
+from hotlever.lever.stack import PER_CM_TO_MILLI_PER_UM
 from hotlever.lever.state import State
 from hotlever.materials.doping import tapered_doping
-from hotlever.materials.silicon import conductivity_low_doped, inversion_temperature
+from hotlever.materials.kinds import HighDopedSilicon
 from hotlever.types import Array
 
 
@@ -37,7 +38,7 @@ class FieldMap:
         µm. Neighbouring elements have points of their own.
     triangles : ndarray of int, shape (m, 3)
     temperature, potential : ndarray, shape (n,)
-        K and V.
+        K and V; the potential is NaN where nothing conducts.
     region : ndarray of int, shape (m,)
         Index into the layout's regions.
     current_density : ndarray, shape (m, 2)
@@ -45,7 +46,7 @@ class FieldMap:
     heat_flux : ndarray, shape (m, 2)
         mW/µm².
     resistivity : ndarray, shape (m,)
-        Ω cm.
+        Ω cm, the mean of what lies on one another; infinite where nothing conducts.
     """
 
     bias: float
@@ -72,13 +73,16 @@ class FieldMapper:
         middle = centres, np.full(centres.shape[1], 0.5 / cuts**2)
         space = FullSpace(mesh, FiniteElements(mesh.elements, element, middle))
         base = lever.circuit.base_temperature_K
-        self._centres = LeverEquations(space, lever.probe.material, base)
+        self._centres = LeverEquations(space, lever.probe.kinds, base)
 
     def map(self, state: State) -> FieldMap:
         """Return the fields of a state of the lever."""
         corners, space = self._corners, self._centres.space
         T, V = (corners.sampling[: corners.weights.size] @ values for values in state.nodal)
         elements = len(corners.dofs)
+        # where nothing conducts there is no potential
+        conducting = state.lever.space.conducting
+        V[np.repeat(~conducting, corners.per_element)] = np.nan
         offsets = corners.per_element * np.arange(elements)[:, None, None]
         fields, laws = self._centres.at(state.x)
 
@@ -94,8 +98,15 @@ class FieldMapper:
             region=np.repeat(state.lever.space.mesh.region, len(self._cell)),
             current_density=per_triangle(-laws.sigma * fields.grad_V),
             heat_flux=per_triangle(-laws.kappa * fields.grad_T),
-            resistivity=(PER_CM_TO_MILLI_PER_UM * space.thickness_um / laws.sigma).ravel(),
+            resistivity=_resistivity(space.thickness_um, laws.sigma),
         )
+
+
+def _resistivity(thickness_um: float | Array, sigma: Array) -> Array:
+    """Return the resistivity (Ω cm) of sheets of some conductivity (mA/V), (points, 1)."""
+    sheet = np.broadcast_to(PER_CM_TO_MILLI_PER_UM * thickness_um, sigma.shape)
+    nothing = np.full_like(sigma, np.inf)
+    return np.divide(sheet, sigma, out=nothing, where=sigma > 0).ravel()
 
 
 def _cut_triangle(cuts: int) -> MeshTri:
@@ -165,20 +176,25 @@ def heater_profile(state: State, count: int = 161) -> xr.Dataset:
     Raises
     ------
     InputError
-        If the heater is no strip between two parallel straight borders.
+        If the heater is no strip of low-doped silicon between two parallel straight borders.
     """
     lever = state.lever
-    taper, material = lever.space.mesh.layout.heater_taper, lever.probe.material
+    layout, silicon = lever.space.mesh.layout, lever.probe.heater_silicon
+    taper = layout.heater_taper
+    beside = lever.probe.kinds[layout.heater.dopant_from]
+    # only low-doped silicon beside high-doped silicon has a taper
+    assert silicon is not None
+    assert isinstance(beside, HighDopedSilicon)
     # stay inside: the ends are shared with high-doped silicon
     position = np.linspace(-0.5, 0.5, count) * taper.length_um * (1 - 1e-9)
     points = np.reshape(taper.centre, (2, 1)) + np.outer(taper.axis, position)
     T = lever.space.elements.basis.probes(points) @ state.nodal[0]
-    n, _ = tapered_doping(taper.distances(points), material.n_d, material.delta, n_hd=material.n_hd)
-    sigma, sigma_by = conductivity_low_doped(T, n, material.p, material.impurity_exponent)
+    n, _ = tapered_doping(taper.distances(points), silicon.n_d, silicon.delta, n_hd=beside.n_hd)
+    sigma, sigma_by = silicon.electrical_conductivity(T, n)
     columns = {
         "temperature": T,
         "doping": n,
-        "inversion_temperature": inversion_temperature(n, material.p, material.impurity_exponent),
+        "inversion_temperature": silicon.inversion_temperature(n),
         "resistivity": 1.0 / sigma,
         "resistivity_slope": -sigma_by["T"] / sigma**2,
     }

@@ -2,6 +2,7 @@
 
 The unknowns are the temperature and the potential at the nodes, without those held at the base
 temperature or at ground; the nodes of the supply contact share one unknown, the lever voltage.
+Where nothing conducts there is no potential.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from scipy.sparse.linalg import SuperLU, splu
 from hotlever.air.operator import AirOperator
 from hotlever.lever.air_loss import AirLoss, AirSolver
 from hotlever.lever.elements import FiniteElements, sums_by_index
-from hotlever.lever.space import FAR, LinearMap, Pin, Space, Tangent, Tapered
-from hotlever.probe.layout import Layout, Part
+from hotlever.lever.space import FAR, LinearMap, Pin, PlacedFilm, Space, Tangent, at_some
+from hotlever.probe.layout import Film, Layout, Part
 from hotlever.probe.mesh import ProbeMesh
 from hotlever.probe.solid import SolidMesh
 from hotlever.types import Array, Index
@@ -37,6 +38,8 @@ class FullSpace(Space):
     ----------
     parts : dict of str to ndarray of int
         Quadrature points of the regions of each part.
+    conducting : ndarray of bool, shape (elements,)
+        Where a current may flow.
     end_test : ndarray, shape (1 + dimension, points)
         Values and slopes of the function that is one at the leg ends.
     ground_test : ndarray, shape (dimension, points)
@@ -50,15 +53,20 @@ class FullSpace(Space):
             name: self.elements.facet_nodes(facets) for name, facets in mesh.terminal_facets.items()
         }
         ends = np.unique(np.concatenate(list(terminal_nodes.values())))
-        ground, supply = terminal_nodes["ground"], terminal_nodes["supply"]
-        self._number_unknowns(ends, ground, supply)
+        insulates = np.array([region.insulates for region in mesh.layout.regions])
+        self.conducting = ~insulates[mesh.region]
+        # a contact is where a terminal meets a conductor
+        conducts = np.unique(self.elements.dofs[self.conducting])
+        contacts = {name: np.intersect1d(nodes, conducts) for name, nodes in terminal_nodes.items()}
+        ground, supply = contacts["ground"], contacts["supply"]
+        self._number_unknowns(ends, ground, supply, conducts)
         # in the middle of the silicon's thickness
         tip = np.zeros(len(self.elements.positions))
         tip[:2] = mesh.layout.tip
         (element,), (weights,), _ = self.elements.at_points(tip[None])
         self.tip = (self._T[self.elements.dofs[element]], weights)
         self._lay_out_matrix()
-        reader = terminal_nodes.get("reader")
+        reader = contacts.get("reader")
         self.reader = (
             None if reader is None else (self._V[reader], np.full(reader.size, 1.0 / reader.size))
         )
@@ -69,23 +77,21 @@ class FullSpace(Space):
         self.weights = self.elements.weights[:, None]
         self.end_test = self._sampled_sum(ends).reshape(kinds, points)
         self.ground_test = self._sampled_sum(ground).reshape(kinds, points)[1:]
-        # elements of a solid have their thickness themselves
-        flat = len(self.elements.positions) == 2
-        self.thickness_um = thickness_at(mesh.layout, self.elements.positions) if flat else 1.0
         region = np.repeat(mesh.region, self.elements.per_element)
-        self.tapered = self._tapered_points(region)
+        self._place_films(region)
         parts = np.array([one.part for one in mesh.layout.regions])[region]
         self.parts = {part: np.flatnonzero(parts == part) for part in get_args(Part)}
 
     # --- where things are -------------------------------------------------------------------------
 
-    def _number_unknowns(self, ends: Index, ground: Index, supply: Index) -> None:
+    def _number_unknowns(self, ends: Index, ground: Index, supply: Index, conducts: Index) -> None:
         """Give every nodal value its unknown, in an order with little fill.
 
         Values that are held get -1, the potential of the supply V_l.
         """
         order = _fill_reducing_order(self.elements.dofs, self.elements.size)
-        free = np.ones((2, self.elements.size), dtype=bool)
+        free = np.zeros((2, self.elements.size), dtype=bool)
+        free[0], free[1, conducts] = True, True
         free[0, ends] = free[1, ground] = free[1, supply] = False
         number = np.full((self.elements.size, 2), -1, dtype=np.intp)
         flat = free[:, order].T
@@ -111,20 +117,54 @@ class FullSpace(Space):
         ones[nodes] = 1.0
         return np.asarray(self.elements.sampling @ ones)
 
-    def _tapered_points(self, region: Index) -> Tapered:
-        """Find the points in low-doped regions, by the region of each point."""
-        tapers = [one.taper for one in self.mesh.layout.regions]
-        points = np.flatnonzero(np.array([one is not None for one in tapers])[region])
+    def _place_films(self, region: Index) -> None:
+        """Find what lies at the points, by the region of each point."""
+        layout, positions = self.mesh.layout, self.elements.positions
+        # elements of a solid have their thickness themselves
+        flat = len(positions) == 2
+        body = thickness_at(layout, positions[:2])
+        where: dict[tuple[int, Film, str | None], list[int]] = {}
+        for number, one in enumerate(layout.regions):
+            for place, film in enumerate(one.stack):
+                source = None if place or one.taper is None else one.dopant_from
+                where.setdefault((place, film, source), []).append(number)
+        films = []
+        for (_, film, source), numbers in where.items():
+            points = np.flatnonzero(np.isin(region, numbers))
+            is_body = film.thickness_um is None
+            thickness = at_some(body, points) if film.thickness_um is None else film.thickness_um
+            even = np.empty((0, points.size, 1))
+            films.append(
+                PlacedFilm(
+                    film.material,
+                    points,
+                    thickness,
+                    counted_um=thickness if flat else 1.0,
+                    is_body=is_body,
+                    dopant_from=source,
+                    distances=even if source is None else self._from_borders(region, points),
+                )
+            )
+        self.films = tuple(films)
+        self.thickness_um = self.plate_um = body if flat else 1.0
+        if len(films) > 1 and not all(film.is_body for film in films):
+            self.thickness_um = np.zeros((region.size, 1))
+            for placed in films:
+                self.thickness_um[placed.points] += placed.counted_um
+            self.plate_um = body + (layout.thickest_um - layout.thickness_um)
+
+    def _from_borders(self, region: Index, points: Index) -> Array:
+        """Return how far points in low-doped regions are from the borders of each one's region."""
+        tapers, of_points = [one.taper for one in self.mesh.layout.regions], region[points]
         known = {
-            number: taper.distances(self.elements.positions[:2, points[region[points] == number]])
-            for number, taper in enumerate(tapers)
-            if taper is not None
+            number: taper.distances(self.elements.positions[:2, points[of_points == number]])
+            for number in np.unique(of_points)
+            if (taper := tapers[number]) is not None
         }
-        most = max(map(len, known.values()), default=0)
-        distances = np.full((most, points.size, 1), FAR)
+        distances = np.full((max(map(len, known.values())), points.size, 1), FAR)
         for number, found in known.items():
-            distances[: len(found), region[points] == number, 0] = found
-        return Tapered(points, distances)
+            distances[: len(found), of_points == number, 0] = found
+        return distances
 
     def nodal(self, x: Array, base_temperature_K: float) -> tuple[Array, Array]:
         """Return temperature (K) and potential (V) of a state at all nodes, each (nodes,)."""
@@ -262,7 +302,7 @@ class SparseFactors:
 
 
 def thickness_at(layout: Layout, positions: Array) -> float | Array:
-    """Return the silicon's thickness (µm); where there is a cone, at positions (2, points)."""
+    """Return the body's thickness (µm); where there is a cone, at positions (2, points)."""
     if layout.cone is None:
         return float(layout.thickness_um)
     distance = np.linalg.norm(positions - np.reshape(layout.tip, (2, 1)), axis=0)

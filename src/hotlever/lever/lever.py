@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from hotlever.air.surface import PanelOptions
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.balances import balance_columns, balance_slopes
 from hotlever.lever.branch import Branch, Reach, Reading
-from hotlever.lever.dataset import at_bias, sweep_dataset
+from hotlever.lever.dataset import at_bias, checked_bias, sweep_dataset
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.following import Follower
 from hotlever.lever.full_space import FullSpace
@@ -26,6 +27,7 @@ from hotlever.lever.sensitivities import sensitivities_of
 from hotlever.lever.state import State
 from hotlever.materials import Material
 from hotlever.probe import Circuit, Layout, MeshOptions, Probe, mesh_layout
+from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
@@ -80,7 +82,7 @@ class Lever:
 
     def _prepare(self) -> None:
         self.equations = LeverEquations(
-            self.space, self.probe.material, self.probe.circuit.base_temperature_K
+            self.space, self.probe.kinds, self.probe.circuit.base_temperature_K
         )
         self._branch: Branch | None = None
 
@@ -88,16 +90,20 @@ class Lever:
         """Return a space in the probe's surroundings."""
         if self.medium == "vacuum":
             return space.in_air(None)
-        layout, surroundings = self.probe.layout(), self.probe.surroundings
         base = self.circuit.base_temperature_K
-        air = air_operator(layout, surroundings, base, self.panels, progress)
-        return space.in_air(air).in_gas(surroundings.gas_conductivity)
+        air = air_operator(self._plate, self.probe.surroundings, base, self.panels, progress)
+        return space.in_air(air).in_gas(self.probe.surroundings.gas_conductivity)
 
     def air_by_inverse_gap(self) -> Array:
         """Return how the operator of the air changes with the inverse of the gap, in µm²."""
-        layout, surroundings = self.probe.layout(), self.probe.surroundings
         base, operator = self.circuit.base_temperature_K, self.space.air.operator
-        return change_with_gap(operator, layout, surroundings, base, self.panels)
+        return change_with_gap(operator, self._plate, self.probe.surroundings, base, self.panels)
+
+    @property
+    def _plate(self) -> Layout:
+        """The lever as the air sees it: as thick everywhere as where most lies on one another."""
+        layout = self.probe.layout()
+        return replace(layout, thickness_um=layout.thickest_um)
 
     @property
     def panels(self) -> PanelOptions:
@@ -257,7 +263,8 @@ class Lever:
         bias : array_like, shape (n,)
             Biases (V) in any order, not negative; a slow ramp from zero meets them rising.
         sensitivities : bool
-            Add the derivatives of I_h, V_r and T_tip by the six fit parameters, at fixed bias.
+            Add the derivatives of I_h, V_r and T_tip, at fixed bias, by the parameters that a fit
+            usually varies.
         progress : callable, optional
             Called with the states done and how many there usually are.
 
@@ -312,7 +319,8 @@ class Lever:
         base = self.circuit.base_temperature_K
         shown = branch.shown(u)
         shown |= {"tip_K": base + u**2, "max_K": base + branch.curve(u)[..., 3]}
-        found = sensitivities_of(branch, u, self.circuit) if sensitivities else None
+        names = usual_parameters(self.probe) if sensitivities else ()
+        found = sensitivities_of(branch, u, self.circuit, names) if sensitivities else None
         return sweep_dataset(self.probe, shown, branch.through(balances, slopes)(u), notes, found)
 
     @one_blas_thread
@@ -351,8 +359,8 @@ class Lever:
         knee = branch.knee
         if knee is None:
             raise ComputationError(
-                f"V_l rises until silicon melts, with the tip at {branch.hottest_K:.0f} K: there "
-                "is no knee"
+                f"V_l rises until {self.equations.limit[1]}, with the tip at "
+                f"{branch.hottest_K:.0f} K: there is no knee"
             )
         return self._dataset(branch, branch.u_at([knee.tip_K]), [])
 
@@ -361,23 +369,6 @@ class Lever:
 def _flat_space(layout: Layout, mesh: MeshOptions) -> FullSpace:
     """Return mesh and operators of a layout in vacuum; levers of one shape share them."""
     return FullSpace(mesh_layout(layout, mesh))
-
-
-def checked_bias(bias: ArrayLike) -> Array:
-    """Return biases as an array.
-
-    Raises
-    ------
-    InputError
-        If one is negative or not finite, or there is none.
-    """
-    values = np.atleast_1d(np.asarray(bias, dtype=float))
-    wrong = values[~(values >= 0) | ~np.isfinite(values)]
-    if wrong.size:
-        raise InputError(f"found a bias of {wrong[0]:g} V, expected finite biases of 0 or more")
-    if not values.size:
-        raise InputError("no bias, expected one or more")
-    return values
 
 
 def sweep(

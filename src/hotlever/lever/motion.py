@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hotlever.lever.full_space import FullSpace, thickness_at
-from hotlever.lever.space import Fields, Fluxes
+from hotlever.lever.space import Fields, Fluxes, PlacedFilm
 from hotlever.probe.layout import Taper
 from hotlever.probe.moving import LayoutRate, Movement
 from hotlever.types import Array
@@ -30,16 +30,19 @@ class Motion:
     strain : ndarray, shape (dimension, dimension, points)
         Derivative of the velocity's component i (first axis) along j.
     swelling : ndarray, shape (points, 1)
-        Of the weights and of the thickness, relative.
-    distances : ndarray, shape (borders, k, 1)
-        Of those that `hotlever.lever.space.Tapered` holds.
+        Of the weights, relative.
+    thickening_um : ndarray, shape (points, 1)
+        Of the body (µm).
+    distances : tuple of ndarray, shape (borders, k, 1)
+        Of those of each `hotlever.lever.space.PlacedFilm`.
     tip : ndarray, shape (nodes,)
         Of the weights that give the rise of the tip temperature.
     """
 
     strain: Array
     swelling: Array
-    distances: Array
+    thickening_um: Array
+    distances: tuple[Array, ...]
     tip: Array
 
     def strained(self, gradient: Array) -> Array:
@@ -89,23 +92,26 @@ def motion_of(space: FullSpace, movement: Movement) -> Motion:
         moved = replace(layout, tip=there, thickness_um=thick, cone=rate.cone(way))
         return thickness_at(moved, at + way * velocity)
 
-    thicker = (thickness(_SMALL_UM) - thickness(-_SMALL_UM)) / (2 * _SMALL_UM * thickness(0.0))
+    thicker = (thickness(_SMALL_UM) - thickness(-_SMALL_UM)) / (2 * _SMALL_UM)
     (element,), _, slopes = elements.at_points(np.array([layout.tip]))
     reference = elements.on_reference(np.array(layout.tip), element)
     at_tip = corners[:, 0, element] + sides[:, :, element] @ reference
     return Motion(
         strain,
-        np.asarray(strain[0, 0] + strain[1, 1])[:, None] + thicker,
-        _from_borders(space, rate, velocity),
+        np.asarray(strain[0, 0] + strain[1, 1])[:, None],
+        np.broadcast_to(thicker, space.weights.shape),
+        tuple(_from_borders(space, film, rate, velocity) for film in space.films),
         tip=(rate.tip - at_tip) @ slopes[:, 0],
     )
 
 
-def _from_borders(space: FullSpace, rate: LayoutRate, velocity: Array) -> Array:
-    """Return how the distances of tapered points from the borders of their regions change."""
-    changes = np.zeros_like(space.tapered.distances)
-    region = np.repeat(space.mesh.region, space.elements.per_element)[space.tapered.points]
-    moved = velocity[:, space.tapered.points]
+def _from_borders(space: FullSpace, film: PlacedFilm, rate: LayoutRate, velocity: Array) -> Array:
+    """Return how the distances of a film's points from the borders of their regions change."""
+    changes = np.zeros_like(film.distances)
+    if not film.distances.size:
+        return changes
+    region = np.repeat(space.mesh.region, space.elements.per_element)[film.points]
+    moved = velocity[:, film.points]
     for number, (now, later) in enumerate(zip(rate.now.regions, rate.later.regions, strict=True)):
         before, after, here = now.taper, later.taper, region == number
         # borders of any other shape belong to drawings, whose outlines do not move

@@ -26,7 +26,7 @@ from hotlever.lever.full_space import FullSpace
 from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
 from hotlever.lever.pinned import AtTip
 from hotlever.lever.sensitivities import Linearised
-from hotlever.lever.space import LinearMap, Pin, Space, Tangent
+from hotlever.lever.space import LinearMap, Pin, Space, Tangent, at_some
 from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import Probe
 from hotlever.threads import one_blas_thread
@@ -75,8 +75,8 @@ class ReducedSpace(Space):
             full.potential.kinds,
             slice(self.count, None),
         )
-        self.weights, self.thickness_um = full.weights, full.thickness_um
-        self.tapered = full.tapered
+        self.weights, self.films = full.weights, full.films
+        self.thickness_um, self.plate_um = full.thickness_um, full.plate_um
         unknowns, weights = full.tip
         self.tip = (np.arange(self.count), modes_T[:, unknowns] @ weights)
         self.reader = None
@@ -95,9 +95,9 @@ class ReducedSpace(Space):
         space.temperature = self.temperature.among(points)
         space.potential = self.potential.among(points)
         space.weights = weights[:, None]
-        if not isinstance(self.thickness_um, float):
-            space.thickness_um = self.thickness_um[points]
-        space.tapered = self.tapered.among(points)
+        space.thickness_um = at_some(self.thickness_um, points)
+        space.plate_um = at_some(self.plate_um, points)
+        space.films = tuple(film.among(points) for film in self.films)
         return space
 
     def rises(self, x: Array) -> Array:
@@ -219,7 +219,7 @@ class ReducedLever:
     def equations(self, material: Material, *, few: bool = False) -> LeverEquations:
         """Return the equations of a material at all points, or at the few."""
         space = self.few_points if few else self.all_points
-        return LeverEquations(space, material, self.base_temperature_K)
+        return LeverEquations(space, material.kinds, self.base_temperature_K)
 
     @one_blas_thread
     def solved(self, material: Material, u: Array, guess: Array, factors: Any = None) -> Solved:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from hotlever.lever.lever import Lever
 from hotlever.lever.reduced import ReducedLever, ReducedSpace
 from hotlever.lever.sensitivities import Linearised
 from hotlever.materials import PARAMETERS
+from hotlever.probe import Probe
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index, Progress
 
@@ -52,6 +54,15 @@ class ReductionOptions:
     seed: int = 0
 
 
+def can_be_reduced(probe: Probe, names: Collection[str]) -> bool:
+    """Return whether a reduced lever serves: of one geometry, for the paper's silicon.
+
+    With dimensions among the parameters it does not, since its modes are those of one geometry, nor
+    with other materials, for which there is no box of parameters to train it in.
+    """
+    return set(names) <= set(PARAMETERS) and not probe.materials
+
+
 @one_blas_thread
 def reduce(
     lever: Lever, options: ReductionOptions | None = None, progress: Progress | None = None
@@ -65,7 +76,14 @@ def reduce(
     options : ReductionOptions, optional
     progress : callable, optional
         Called with the parameter sets done and their number.
+
+    Raises
+    ------
+    ValueError
+        If the lever has named materials, see `can_be_reduced`.
     """
+    if not can_be_reduced(lever.probe, ()):
+        raise ValueError("a reduced lever is of the paper's silicon only")
     from scipy.stats import qmc  # takes long, and most commands reduce nothing
 
     options = options or ReductionOptions()
@@ -177,7 +195,7 @@ def _atlas(space: ReducedSpace, training: list[Linearised]) -> Atlas:
         slopes.append(together[:, here][..., columns].swapaxes(0, 1))
     return Atlas.fitted(
         common,
-        [one.branch.equations.material for one in training],
+        [one.probe.material for one in training],
         np.nan_to_num(np.stack(values)),  # a lever without reader shows no V_r
         np.nan_to_num(np.stack(slopes)),
         np.append(~space.is_temperature, [True] * len(SHOWN)),

@@ -107,13 +107,13 @@ def at_fixed_bias(
     )
 
 
-def sensitivities_of(branch: Branch, u: Array, circuit: Circuit) -> Array:
-    """Return the derivatives of `at_fixed_bias` at any u of a branch, exact."""
-    shown = np.zeros((u.size, len(SHOWN), len(PARAMETERS)))
+def sensitivities_of(branch: Branch, u: Array, circuit: Circuit, names: Sequence[str]) -> Array:
+    """Return the derivatives of `at_fixed_bias` by parameters at any u of a branch, exact."""
+    shown = np.zeros((u.size, len(SHOWN), len(names)))
     hot = np.flatnonzero(u > 0)  # without power nothing depends on the material
     for start in range(0, hot.size, _AT_ONCE):
         some = hot[start : start + _AT_ONCE]
-        shown[some] = by_parameter(branch.equations, branch.states(u[some]))
+        shown[some] = by_parameter(branch.equations, branch.states(u[some]), names)
     return at_fixed_bias(branch.curve(u, 1), u, circuit, shown)
 
 

@@ -14,10 +14,9 @@ from hotlever.lever.motion import motion_of
 from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.pinned import AtTip
 from hotlever.lever.sensitivities import Linearised
-from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.moving import MovingMesh
-from hotlever.probe.parameters import dimensions_of
+from hotlever.probe.parameters import dimensions_of, usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -51,7 +50,7 @@ class SimilarLevers:
         dimensions = [name for name in names if name in dimensions_of(probe)]
         motions = {name: motion_of(space, self._moving.movement(name)) for name in dimensions}
         base = probe.circuit.base_temperature_K
-        return LeverEquations(space, probe.material, base, motions)
+        return LeverEquations(space, probe.kinds, base, motions)
 
     def _air(self, probe: Probe, names: tuple[str, ...]) -> AirLoss | None:
         """Return the air around a similar probe."""
@@ -75,7 +74,7 @@ class SimilarLevers:
         probe: Probe,
         reach: Reach,
         near: Linearised | None = None,
-        names: tuple[str, ...] = tuple(PARAMETERS),
+        names: tuple[str, ...] | None = None,
     ) -> Linearised:
         """Solve the branch of a probe, with its derivatives.
 
@@ -86,13 +85,15 @@ class SimilarLevers:
         near : Linearised, optional
             Of a similar probe on this mesh, to start from.
         names : tuple of str
-            Parameters of the derivatives, see `hotlever.probe.parameters`.
+            Parameters of the derivatives, see `hotlever.probe.parameters`; by default what a fit
+            usually varies.
 
         Raises
         ------
         ComputationError
             If a state was not found.
         """
+        names = usual_parameters(probe) if names is None else names
         equations = self.equations(probe, names)
         if near is None:
             branch = Follower(equations).until(reach)

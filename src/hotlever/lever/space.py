@@ -10,7 +10,7 @@ nothing else.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -69,25 +69,47 @@ class LinearMap:
 
 
 @dataclass(frozen=True)
-class Tapered:
-    """Quadrature points in low-doped regions.
+class PlacedFilm:
+    """The quadrature points at which a film lies, or the body of the lever.
 
     Attributes
     ----------
+    material : str
     points : ndarray of int, shape (k,)
+    thickness_um : float or ndarray, shape (k, 1)
+    counted_um : float or ndarray, shape (k, 1)
+        The thickness that makes a sheet conductance: 1 where the elements have it themselves.
+    is_body : bool
+    dopant_from : str or None
+        The material from which dopant diffuses into this one.
     distances : ndarray, shape (borders, k, 1)
-        From the borders of each one's region with high-doped silicon (µm); `FAR` where it has
-        fewer than others.
+        From the borders of each point's region with that material (µm); `FAR` where it has fewer
+        than others. No borders where the doping is even.
     """
 
+    material: str
     points: Index
+    thickness_um: float | Array
+    counted_um: float | Array
+    is_body: bool
+    dopant_from: str | None
     distances: Array
 
-    def among(self, points: Index) -> Tapered:
-        """Return those among some of the quadrature points, by their number there."""
+    def among(self, points: Index) -> PlacedFilm:
+        """Return the film at some of the quadrature points, by their number there."""
         kept = np.isin(self.points, points)
-        place = np.searchsorted(points, self.points[kept])
-        return Tapered(place, self.distances[:, kept])
+        return replace(
+            self,
+            points=np.searchsorted(points, self.points[kept]),
+            thickness_um=at_some(self.thickness_um, kept),
+            counted_um=at_some(self.counted_um, kept),
+            distances=self.distances[:, kept],
+        )
+
+
+def at_some(values: float | Array, points: Any) -> float | Array:
+    """Return values at some points, or the value that all have."""
+    return values if isinstance(values, float) else values[points]
 
 
 @dataclass(frozen=True)
@@ -175,8 +197,11 @@ class Space(ABC):
         The first gives values and slopes, the second slopes only.
     weights : ndarray, shape (points, 1)
     thickness_um : float or ndarray, shape (points, 1)
-        Of the silicon.
-    tapered : Tapered
+        Of all that lies on one another.
+    plate_um : float or ndarray, shape (points, 1)
+        Of the plate as the air sees it: that of the thickest stack.
+    films : tuple of PlacedFilm
+        What lies where.
     is_temperature : ndarray of bool, shape (size + 1,)
     tip : tuple of (ndarray of int, ndarray)
         Unknowns and weights that give the rise of the tip temperature.
@@ -191,7 +216,8 @@ class Space(ABC):
     potential: LinearMap
     weights: Array
     thickness_um: float | Array
-    tapered: Tapered
+    plate_um: float | Array
+    films: tuple[PlacedFilm, ...]
     is_temperature: NDArray[np.bool_]
     tip: tuple[Index, Array]
     reader: tuple[Index, Array] | None

@@ -85,10 +85,13 @@ class SolidLever(Lever):
                     "[surroundings]: the full 3-D simulation knows free space only; expected no "
                     "surface below, no chip and no temperature jump"
                 )
-        radius = self._sphere_radius_um
-        solid = mesh_solid(
-            self.probe.layout(), self._options, sphere_radius_um=radius if in_air else None
-        )
+        radius, layout = self._sphere_radius_um, self.probe.layout()
+        if any(region.films for region in layout.regions):
+            raise InputError(
+                "[layers]: the full 3-D simulation knows one material across the thickness, "
+                "expected a lever without films"
+            )
+        solid = mesh_solid(layout, self._options, sphere_radius_um=radius if in_air else None)
         space = FullSpace(solid, FiniteElements(solid.elements, ElementTetP2(), 4))
         if not in_air:
             return space

@@ -1,5 +1,24 @@
 """Material laws, the doping profile, and the published parameter sets."""
 
-from hotlever.materials.material import PARAMETERS, Material, Parameter, parameter
+from hotlever.materials.kinds import KINDS, Kind
+from hotlever.materials.material import (
+    HIGH_DOPED,
+    LOW_DOPED,
+    PARAMETERS,
+    Material,
+    full_name,
+    parameter,
+)
+from hotlever.materials.parameters import Parameter
 
-__all__ = ["PARAMETERS", "Material", "Parameter", "parameter"]
+__all__ = [
+    "HIGH_DOPED",
+    "KINDS",
+    "LOW_DOPED",
+    "PARAMETERS",
+    "Kind",
+    "Material",
+    "Parameter",
+    "full_name",
+    "parameter",
+]

@@ -23,7 +23,7 @@ def tapered_doping(distances: ArrayLike, n_d: float, delta: float, *, n_hd: floa
     Every border with high-doped silicon adds its share ½ erfc(d/Δ) at the distance d. Between two
     parallel borders, at d = l_h/2 − x and l_h/2 + x, this is the paper's unnumbered equation
     between Eqs. 4 and 5: a step profile smoothed by 1-D diffusion over the length Δ. The partial
-    derivatives are by ``n_d``, ``delta`` and, for each border, ``distances``.
+    derivatives are by ``n_d``, ``delta``, ``n_hd`` and, for each border, ``distances``.
 
     Parameters
     ----------
@@ -55,6 +55,7 @@ def tapered_doping(distances: ArrayLike, n_d: float, delta: float, *, n_hd: floa
     return n_d + (n_hd - n_d) * share, {
         "n_d": 1.0 - share,
         "delta": (bell * ratio).sum(axis=0),
+        "n_hd": share,
         "distances": -bell,
     }
 

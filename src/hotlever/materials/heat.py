@@ -58,6 +58,19 @@ def enthalpy(T: ArrayLike) -> Evaluated:
     return _integral(t) - _integral(STANDARD_TEMPERATURE / 1000.0) + below, {"T": capacity}
 
 
+@law(meant_for=(290.0, 600.0), source="values at 298 K; CRC Handbook of Chemistry and Physics")
+def enthalpy_by_capacity(T: ArrayLike, heat_capacity: float) -> Evaluated:
+    """Enthalpy above that at 298.15 K, in J cm⁻³, of a constant `heat_capacity` (J cm⁻³ K⁻¹).
+
+    Examples
+    --------
+    >>> enthalpy_by_capacity(398.15, heat_capacity=2.85)[0].item()
+    285.0
+    """
+    above = np.asarray(T, dtype=float) - STANDARD_TEMPERATURE
+    return heat_capacity * above, {"T": heat_capacity + 0.0 * above, "heat_capacity": above}
+
+
 def _capacity(t: Array) -> Array:
     """Shomate's equation by T / 1000 K."""
     a, b, c, d, e = _SHOMATE

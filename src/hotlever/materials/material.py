@@ -1,43 +1,27 @@
-"""The material parameters of a lever: the six that a fit finds, and two that it is told."""
+"""The silicon of a lever as in the paper: the six parameters that a fit finds, and two more."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from hotlever.errors import unknown_name
+from hotlever.materials.kinds import HighDopedSilicon, Kind, NSilicon
+from hotlever.materials.parameters import (
+    OF_SILICON,
+    Parameter,
+    bounded,
+    high_doping,
+    impurity_exponent,
+)
 from hotlever.records import Record
-
-
-class Parameter(NamedTuple):
-    """One fit parameter as users meet it: its name in files, its symbol in the paper, its unit.
-
-    A fit divides by the `scale`, to work with numbers of order one, and stays between `lower` and
-    `upper`, within which silicon levers make sense.
-    """
-
-    name: str
-    symbol: str
-    unit: str
-    scale: float
-    lower: float
-    upper: float
-    meaning: str
-
 
 #: The six fit parameters in the paper's order.
 PARAMETERS: dict[str, Parameter] = {
-    parameter.name: parameter
-    for parameter in (
-        Parameter("c_kappa", "c_κ", "1", 1.0, 0.1, 1.5, "scale of the thermal conductivity"),
-        Parameter("delta", "Δ", "µm", 1.0, 0.05, 2.0, "diffusion length of the doping profile"),
-        Parameter("n_d", "n_d", "cm⁻³", 1e17, 1e16, 1e19, "doping concentration of the heater"),
-        Parameter("p", "p", "1", 1.0, 1.0, 4.0, "phonon scattering exponent"),
-        Parameter("a0", "a₀", "Ω cm", 1e-4, 1e-4, 1e-2, "high-doped resistivity at 300 K"),
-        Parameter("a1", "a₁", "Ω cm K⁻¹", 1e-6, 0.0, 1e-5, "its temperature coefficient"),
-    )
+    name: OF_SILICON[name] for name in ("c_kappa", "delta", "n_d", "p", "a0", "a1")
 }
+
+#: What the two kinds of silicon are called that `Material` describes.
+LOW_DOPED, HIGH_DOPED = "low-doped", "high-doped"
 
 
 def parameter(name: str) -> Parameter:
@@ -58,37 +42,48 @@ def parameter(name: str) -> Parameter:
     return PARAMETERS[name]
 
 
-def _of_silicon(name: str) -> Any:
-    """Return the bounds of a parameter, twice as wide as a fit's, and what it is."""
-    known = PARAMETERS[name]
-    meaning = f"{known.meaning}, {known.symbol} ({known.unit})"
-    return Field(ge=known.lower / 2, le=2 * known.upper, description=meaning)
+def full_name(material: str, own: str) -> str:
+    """Return the name of a material's parameter in probe files, fits and on the command line.
+
+    Examples
+    --------
+    >>> full_name("film", "tcr"), full_name("low-doped", "n_d")
+    ('film.tcr', 'n_d')
+    """
+    return own if material in (LOW_DOPED, HIGH_DOPED) else f"{material}.{own}"
 
 
 class Material(Record):
-    """Parameters of the laws in Eqs. 4 to 11 (section ``[material]`` of a probe file)."""
+    """Parameters of the laws in Eqs. 4 to 11 (section ``[material]`` of a probe file).
 
-    c_kappa: float = _of_silicon("c_kappa")
-    delta: float = _of_silicon("delta")
-    n_d: float = _of_silicon("n_d")
-    p: float = _of_silicon("p")
-    a0: float = _of_silicon("a0")
-    a1: float = _of_silicon("a1")
-    n_hd: float = Field(
-        default=2.2e20,
-        ge=1e18,
-        le=1e22,
-        description="doping concentration of the high-doped silicon (cm⁻³)",
-    )
-    impurity_exponent: float = Field(
-        default=0.0,
-        ge=-2.0,
-        le=4.0,
-        description="mobility limited by impurities rises as (T / 300 K) to this power; 0: Eq. 9",
-    )
+    They make two kinds of silicon that share c_κ: the n-doped one of heater and reader, and the
+    high-doped one around it.
+    """
+
+    c_kappa: float = bounded(OF_SILICON["c_kappa"])
+    delta: float = bounded(OF_SILICON["delta"])
+    n_d: float = bounded(OF_SILICON["n_d"])
+    p: float = bounded(OF_SILICON["p"])
+    a0: float = bounded(OF_SILICON["a0"])
+    a1: float = bounded(OF_SILICON["a1"])
+    n_hd: float = high_doping()
+    impurity_exponent: float = impurity_exponent()
 
     @model_validator(mode="after")
     def _heater_is_the_low_doped_part(self) -> Material:
         if self.n_d >= self.n_hd:
             raise ValueError(f"n_d = {self.n_d:g} must be below n_hd = {self.n_hd:g}")
         return self
+
+    @property
+    def kinds(self) -> dict[str, Kind]:
+        """The two kinds of silicon, by `LOW_DOPED` and `HIGH_DOPED`."""
+        values = dict(self)
+        made: dict[str, type[Kind]] = {LOW_DOPED: NSilicon, HIGH_DOPED: HighDopedSilicon}
+        # unchecked, since the values are checked already: fits make many
+        return {
+            name: kind.model_construct(
+                **{own: values[own] for own in kind.model_fields if own in values}
+            )
+            for name, kind in made.items()
+        }

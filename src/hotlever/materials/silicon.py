@@ -10,7 +10,8 @@ The laws take arrays of the temperature `T` (K), the local doping concentration 
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Callable, Iterable
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,8 @@ from hotlever.materials.laws import FORMULA_TO, Evaluated, Law, Partials, law
 from hotlever.types import Array
 
 Carrier = Literal["electron", "hole"]
+#: Majority first.
+_CARRIERS: tuple[Carrier, Carrier] = ("electron", "hole")
 
 #: Melting point (K): no state of a lever beyond it is meaningful.
 MELTING_POINT = 1687.0
@@ -94,8 +97,12 @@ def intrinsic_density(T: ArrayLike, n: ArrayLike) -> Evaluated:
     >>> f"{n_i:.2e}"
     '9.68e+09'
     """
-    T = np.asarray(T, dtype=float)
-    gap, d_gap = band_gap.formula(T, n)
+    return _intrinsic(T, band_gap.formula(T, n))
+
+
+def _intrinsic(T: ArrayLike, band_gap: Evaluated) -> Evaluated:
+    """Eq. 7, first line, for a band gap."""
+    T, (gap, d_gap) = np.asarray(T, dtype=float), band_gap
     two_kT = 2.0 * BOLTZMANN * T
     n_i = 2.70e19 * (T / 300.0) ** 1.5 * np.exp(-gap / two_kT)
     return n_i, {
@@ -107,23 +114,21 @@ def intrinsic_density(T: ArrayLike, n: ArrayLike) -> Evaluated:
 @law(meant_for=(200.0, 1300.0), source="Eq. 6")
 def carrier_density(T: ArrayLike, n: ArrayLike, carrier: Carrier = "electron") -> Evaluated:
     """Density of electrons, or of holes n_i²/n_e, in n-doped silicon, in cm⁻³ (Eq. 6)."""
-    return _carriers(T, n)[carrier]
+    majority, minority = carriers(T, n, band_gap)
+    return majority if carrier == "electron" else minority
 
 
-def _carriers(T: ArrayLike, n: ArrayLike) -> dict[Carrier, Evaluated]:
-    """Electrons and holes together, as they share n_i."""
+def carriers(T: ArrayLike, n: ArrayLike, gap_law: Law) -> tuple[Evaluated, Evaluated]:
+    """Return majority and minority carriers (cm⁻³) together, as they share n_i (Eq. 6)."""
     n = np.asarray(n, dtype=float)
-    n_i, d_i = intrinsic_density.formula(T, n)
+    n_i, d_i = _intrinsic(T, gap_law.formula(T, n))
     root = np.sqrt(n**2 + 4.0 * n_i**2)
-    electrons = 0.5 * (n + root)
-    holes = n_i**2 / electrons
+    majority = 0.5 * (n + root)
+    minority = n_i**2 / majority
     # n_e - n_h = n and n_e n_h = n_i² give (n_e + n_h) dn_e = n_e dn + 2 n_i dn_i
     d_T = 2.0 * n_i * d_i["T"] / root
-    d_n = (electrons + 2.0 * n_i * d_i["n"]) / root
-    return {
-        "electron": (electrons, {"T": d_T, "n": d_n}),
-        "hole": (holes, {"T": d_T, "n": d_n - 1.0}),
-    }
+    d_n = (majority + 2.0 * n_i * d_i["n"]) / root
+    return (majority, {"T": d_T, "n": d_n}), (minority, {"T": d_T, "n": d_n - 1.0})
 
 
 @law(meant_for=(290.0, 1300.0), source="Eq. 9")
@@ -175,8 +180,15 @@ def mobility(
     carrier: Carrier = "electron",
 ) -> Evaluated:
     """Carrier mobility by Matthiessen's rule, in cm² V⁻¹ s⁻¹ (Eq. 8)."""
-    impurity, d_impurity = impurity_mobility.formula(T, n, impurity_exponent, carrier)
-    phonon, d_phonon = phonon_mobility.formula(T, p, carrier)
+    return matthiessen(
+        impurity_mobility.formula(T, n, impurity_exponent, carrier),
+        phonon_mobility.formula(T, p, carrier),
+    )
+
+
+def matthiessen(by_impurities: Evaluated, by_phonons: Evaluated) -> Evaluated:
+    """Return the mobility of two that limit it together."""
+    (impurity, d_impurity), (phonon, d_phonon) = by_impurities, by_phonons
     share = 1.0 / (impurity + phonon)
     by_phonon, by_impurity = (impurity * share) ** 2, (phonon * share) ** 2
     return impurity * phonon * share, {
@@ -240,10 +252,17 @@ def conductivity_low_doped(
     mobility_law: Law = mobility,
 ) -> Evaluated:
     """Electrical conductivity of the low-doped heater and reader, in S cm⁻¹ (Eq. 5)."""
-    sigma: Array = np.zeros(np.broadcast(T, n).shape)
+    return conducted(
+        (density, mobility_law.formula(T, n, p, impurity_exponent, carrier))
+        for density, carrier in zip(carriers(T, n, band_gap), _CARRIERS, strict=True)
+    )
+
+
+def conducted(carried: Iterable[tuple[Evaluated, Evaluated]]) -> Evaluated:
+    """Return the conductivity (S cm⁻¹) of carriers of some densities and mobilities (Eq. 5)."""
+    sigma: Array = np.zeros(())
     total: Partials = dict.fromkeys(("T", "n", "p", "impurity_exponent"), sigma)
-    for carrier, (density, d_density) in _carriers(T, n).items():
-        speed, d_speed = mobility_law.formula(T, n, p, impurity_exponent, carrier)
+    for (density, d_density), (speed, d_speed) in carried:
         sigma = sigma + ELEMENTARY_CHARGE * density * speed
         total = {
             name: total[name]
@@ -297,14 +316,17 @@ def inversion_temperature(n: ArrayLike, p: ArrayLike, impurity_exponent: ArrayLi
     >>> inversion_temperature([4.10e17], p=2.64).round(0).tolist()
     [805.0]
     """
-    n, p, exponent = np.broadcast_arrays(
-        *(np.asarray(one, dtype=float) for one in (n, p, impurity_exponent))
-    )
-    cold, hot = np.full(n.shape, 300.0), np.full(n.shape, FORMULA_TO)
+    return highest_resistivity(conductivity_low_doped, n, p, impurity_exponent)
 
-    def slope(T: Array, n: Array, p: Any, exponent: Any) -> Array:
-        sigma, partials = conductivity_low_doped(T, n, p, exponent)
+
+def highest_resistivity(conductivity: Callable[..., Evaluated], *parameters: ArrayLike) -> Array:
+    """Return the temperature (K) at which a conductivity of some parameters is lowest; or NaN."""
+    arguments = np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in parameters))
+    cold, hot = (np.full(arguments[0].shape, T) for T in (300.0, FORMULA_TO))
+
+    def slope(T: Array, *arguments: Array) -> Array:
+        sigma, partials = conductivity(T, *arguments)
         return partials["T"] / sigma
 
-    root = elementwise.find_root(slope, (cold, hot), args=(n, p, exponent))
+    root = elementwise.find_root(slope, (cold, hot), args=tuple(arguments))
     return np.where(root.success, root.x, np.nan)

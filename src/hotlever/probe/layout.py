@@ -14,13 +14,14 @@ from typing import Literal
 import numpy as np
 
 from hotlever.errors import InputError
+from hotlever.materials import HIGH_DOPED, LOW_DOPED
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
 
 Point = tuple[float, float]
 
-# What a region is to the measuring circuit: R_h, R_l1, R_l2 of the paper's Fig. 1(c), or
-# the reader branch, which carries no current.
+# What a region is to the measuring circuit: R_h, R_l1, R_l2 of the paper's Fig. 1(c), or what
+# carries no current: the reader branch, and all that insulates.
 Part = Literal["heater", "leg 1", "leg 2", "reader branch"]
 
 #: Beyond a straight line by less (rad), a corner is as good as none: there slopes of the fields
@@ -61,10 +62,40 @@ class BorderTaper:
 
 
 @dataclass(frozen=True)
-class Region:
-    """A polygon, with holes or without, of one kind of silicon: low-doped if it has a taper.
+class Film:
+    """A film that lies on the body of a lever, or the body itself.
 
-    The outline runs counter-clockwise, holes clockwise.
+    Attributes
+    ----------
+    material : str
+        By its name in the probe.
+    thickness_um : float or None
+        None of the body, whose thickness is that of the layout, and of the tip's cone.
+    """
+
+    material: str
+    thickness_um: float | None = None
+
+
+@dataclass(frozen=True)
+class Region:
+    """A polygon, with holes or without, of one stack of materials.
+
+    The outline runs counter-clockwise, holes clockwise. Attributes that are left out are those of
+    the silicon of ``[material]`` alone.
+
+    Attributes
+    ----------
+    taper : Taper or BorderTaper, optional
+        Where the doping is low and tapered.
+    material : str, optional
+        Of the body; left out: low-doped silicon where there is a taper, high-doped elsewhere.
+    dopant_from : str
+        The material beside it from which dopant diffuses into it, where there is a taper.
+    films : tuple of Film
+        What lies on the body.
+    insulates : bool
+        Whether nothing in the stack carries a current.
     """
 
     name: str
@@ -72,6 +103,16 @@ class Region:
     outline: tuple[Point, ...]
     taper: Taper | BorderTaper | None = None
     holes: tuple[tuple[Point, ...], ...] = ()
+    material: str | None = None
+    dopant_from: str = HIGH_DOPED
+    films: tuple[Film, ...] = ()
+    insulates: bool = False
+
+    @property
+    def stack(self) -> tuple[Film, ...]:
+        """What it is made of, the body first."""
+        body = LOW_DOPED if self.taper is not None else HIGH_DOPED
+        return (Film(self.material or body), *self.films)
 
     @property
     def rings(self) -> tuple[tuple[Point, ...], ...]:
@@ -145,7 +186,7 @@ class Layout:
     tip : tuple of float
         Position of the tip (µm).
     thickness_um : float
-        Thickness of the silicon (µm).
+        Thickness of the lever's body (µm), without films on it.
     cone : Tip, optional
         The tip's body; left out where it is not modelled.
     """
@@ -155,6 +196,19 @@ class Layout:
     tip: Point
     thickness_um: float
     cone: Tip | None = None
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """The names of all materials, each once."""
+        used = (film.material for region in self.regions for film in region.stack)
+        return tuple(dict.fromkeys(used))
+
+    @property
+    def thickest_um(self) -> float:
+        """Thickness where most lies on one another (µm), without the tip's cone."""
+        return self.thickness_um + max(
+            sum(film.thickness_um or 0.0 for film in region.films) for region in self.regions
+        )
 
     @property
     def heater(self) -> Region:
@@ -185,15 +239,22 @@ class Layout:
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     def reentrant_corners(self) -> list[Point]:
-        """Corners where the silicon spans more than 180°, at which fields are singular.
+        """Corners where lever or conductor spans more than 180°, at which fields are singular.
 
         Corners that are hardly any, as where an arc is made of short edges, are left out.
         """
-        rings = [ring for region in self.regions for ring in region.rings]
-        corners = np.unique(np.concatenate([np.array(ring) for ring in rings]).round(6), axis=0)
-        angle = sum(_angles_at(corners, np.array(ring)) for ring in rings)
-        found = (angle > math.pi + _HARDLY) & (angle < 2 * math.pi - 1e-6)
-        return [(float(x), float(y)) for x, y in corners[found]]
+        conducting = tuple(region for region in self.regions if not region.insulates)
+        found = [_reentrant(some) for some in dict.fromkeys((self.regions, conducting))]
+        return list(dict.fromkeys(corner for corners in found for corner in corners))
+
+
+def _reentrant(regions: tuple[Region, ...]) -> list[Point]:
+    """Return the corners at which some regions together span more than 180°."""
+    rings = [ring for region in regions for ring in region.rings]
+    corners = np.unique(np.concatenate([np.array(ring) for ring in rings]).round(6), axis=0)
+    angle = sum(_angles_at(corners, np.array(ring)) for ring in rings)
+    found = (angle > math.pi + _HARDLY) & (angle < 2 * math.pi - 1e-6)
+    return [(float(x), float(y)) for x, y in corners[found]]
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> tuple[Point, ...]:

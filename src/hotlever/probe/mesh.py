@@ -17,6 +17,8 @@ from hotlever.types import Array, Index
 
 #: How far off (µm) a point is still on a line.
 ON_LINE = 1e-6
+#: As many squares of its width as a drawn heater may have: it is meshed in steps of its width.
+MOST_SQUARES = 100.0
 _NOT_MESHED = "Netgen could not mesh this layout; are its parts of too different a size?"
 
 
@@ -119,7 +121,9 @@ def _netgen(layout: Layout, options: MeshOptions) -> tuple[MeshTri, Index]:
         face = face_of(region, WorkPlane())
         face.name = f"{index}"
         if region.part == "heater":
-            face.maxh = options.heater * region.narrow_um / options.refinement
+            # of a film that heats all along, some hundred steps are enough
+            step = max(region.narrow_um, math.sqrt(region.area / MOST_SQUARES))
+            face.maxh = options.heater * step / options.refinement
         faces.append(face)
     shape = Glue(faces)
     corners = layout.reentrant_corners()

@@ -1,12 +1,12 @@
-"""What a fit may vary of a probe: its material, its dimensions, circuit and gas."""
+"""What a fit may vary of a probe: its materials, its dimensions, circuit and gas."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from hotlever.errors import unknown_name
-from hotlever.materials import PARAMETERS
-from hotlever.materials.material import Parameter
+from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, full_name
+from hotlever.materials.parameters import Parameter
 from hotlever.text import parameter_named
 
 if TYPE_CHECKING:
@@ -15,11 +15,6 @@ if TYPE_CHECKING:
 #: Shares of a dimension or a resistance, of a base temperature, and of what a gas conducts, within
 #: which a fit stays.
 _OF_THE_VALUE, _OF_THE_BASE, _OF_THE_GAS = (0.5, 1.5), (0.8, 1.2), (0.2, 5.0)
-#: What the paper takes as 0: it is varied if it has a prior.
-_IMPURITIES = Parameter(
-    *("impurity_exponent", "s", "1", 10.0, -2.0, 4.0),
-    "power of the temperature in mobility limited by impurities",
-)
 #: Dimensions of a tip that matter to its lever.
 OF_THE_TIP = ("height_um", "half_angle_deg")
 
@@ -29,8 +24,56 @@ def dimensions_of(probe: Probe) -> list[str]:
     return [*probe.shape.dimensions(), *(OF_THE_TIP if probe.tip is not None else ())]
 
 
+def of_materials(probe: Probe) -> dict[str, Parameter]:
+    """Return all parameters of what a probe is made of, by name: first those a fit usually varies.
+
+    Those of ``[material]`` keep the paper's order; two kinds of silicon share c_κ there.
+
+    Examples
+    --------
+    >>> from hotlever import Probe
+    >>> list(of_materials(Probe.reference()))
+    ['c_kappa', 'delta', 'n_d', 'p', 'a0', 'a1', 'impurity_exponent', 'n_hd']
+    """
+    usual = dict.fromkeys(usual_parameters(probe))
+    found = {
+        full_name(material, own): known._replace(name=full_name(material, own))
+        for material, kind in _kinds(probe)
+        for own, known in kind.parameters.items()
+    }
+    return {name: found[name] for name in [*usual, *(name for name in found if name not in usual)]}
+
+
+def usual_parameters(probe: Probe) -> tuple[str, ...]:
+    """Return what a fit varies of a probe unless it is told otherwise: the paper's six, if it can.
+
+    Of other materials what each kind says, as far as it matters here: without a border with
+    high-doped silicon there is no diffusion length.
+
+    Examples
+    --------
+    >>> from hotlever import Probe
+    >>> usual_parameters(Probe.reference())
+    ('c_kappa', 'delta', 'n_d', 'p', 'a0', 'a1')
+    """
+    tapered = {one.stack[0].material for one in probe.layout().regions if one.taper is not None}
+    found = [
+        full_name(material, own)
+        for material, kind in _kinds(probe)
+        for own in kind.usual
+        if own in kind.parameters and (own != "delta" or material in tapered)
+    ]
+    plain = [name for name in PARAMETERS if name in found]
+    return tuple(dict.fromkeys([*plain, *found]))
+
+
+def _kinds(probe: Probe) -> list[tuple[str, Kind]]:
+    """Return the materials of a probe, low-doped silicon first."""
+    return sorted(probe.made_of.items(), key=lambda item: item[0] != LOW_DOPED)
+
+
 def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Parameter]:
-    """Return all that a fit may vary, by name: first the material's parameters.
+    """Return all that a fit may vary, by name: first the materials' parameters.
 
     With `anywhere`, what counts in other surroundings only as well.
 
@@ -50,7 +93,7 @@ def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Paramete
             shares["surface_gap_um"] = _OF_THE_VALUE
     parts = (probe.shape, probe.tip, probe.circuit, probe.surroundings)
     meaning = {name: text for part in parts if part for name, text in part.description().items()}
-    found = {**PARAMETERS, _IMPURITIES.name: _IMPURITIES}
+    found = of_materials(probe)
     for (name, (least, most)), value in zip(shares.items(), probe.at(list(shares)), strict=True):
         found[name] = parameter_named(name)._replace(
             scale=float(value),

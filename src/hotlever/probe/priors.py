@@ -21,8 +21,13 @@ from pydantic import ConfigDict
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
-from hotlever.materials.material import Parameter
-from hotlever.probe.parameters import OF_THE_TIP, parameters_of
+from hotlever.materials.parameters import Parameter
+from hotlever.probe.parameters import (
+    OF_THE_TIP,
+    of_materials,
+    parameters_of,
+    usual_parameters,
+)
 from hotlever.records import Record
 from hotlever.spieser2017 import published
 from hotlever.types import Array
@@ -48,6 +53,8 @@ _GAS = 0.1
 _GAP = 0.1
 #: Nominal doping is that good, where the probe file says no better (the makers' own tolerance).
 _DOPING = 0.15
+#: What is known of films of other materials: they differ from the bulk, and from each other.
+_FILM = 0.2
 #: Dimensions that do not matter to the tip.
 _HARMLESS = ("reader_length_um", "reader_centre_um")
 ALL_DIMENSIONS = "dimensions"
@@ -191,15 +198,16 @@ def published_material() -> dict[str, Prior]:
 def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) -> dict[str, Prior]:
     """Return what is known of a lever of which nothing but the probe file is known.
 
-    The material scatters about the probe's as that of the published levers does, half as much
-    again; mobility limited by impurities goes with a power of the temperature, 0 as in the paper
-    within 0.75; the doping is nominal within 15 %, dimensions are within 5 %, those of a tip within
-    20 %, the series resistance within 0.1 %, the base temperature within 1 K; what air takes up and
-    the gap to a surface below are known to 10 %. What is known of the material instead may be
-    given; what the probe file states wins.
+    Silicon scatters about the probe's as that of the published levers does, half as much again, and
+    films of other materials within 20 %; mobility limited by impurities goes with a power of the
+    temperature, 0 as in the paper within 0.75; the doping is nominal within 15 %, dimensions are
+    within 5 %, those of a tip within 20 %, the series resistance within 0.1 %, the base temperature
+    within 1 K; what air takes up and the gap to a surface below are known to 10 %. What is known of
+    the material instead may be given; what the probe file states wins.
     """
-    spreads = {name: prior.spread for name, prior in published_material().items()}
-    spreads["n_d"] = _DOPING
+    known = {name: prior.spread for name, prior in published_material().items()}
+    known["n_d"] = _DOPING
+    spreads = {name: known.get(_own(name), _FILM) for name in usual_parameters(probe)}
     if probe.tip is not None:
         spreads |= dict.fromkeys(OF_THE_TIP, _TIP)
     spreads |= dict.fromkeys(nuisances(probe), _DIMENSIONS)
@@ -215,9 +223,19 @@ def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) ->
         for (name, spread), value in zip(spreads.items(), values, strict=True)
         if value > 0
     }
-    for name, spread in (("base_temperature_K", _BASE_K), ("impurity_exponent", _IMPURITIES)):
+    absolute = {"base_temperature_K": _BASE_K}
+    absolute |= {
+        name: _IMPURITIES for name in of_materials(probe) if _own(name) == "impurity_exponent"
+    }
+    for name, spread in absolute.items():
         found[name] = Prior(float(probe.at([name])[0]), spread, relative=False)
-    return found | {**(material or {})} | priors_of(probe.stated_priors, probe, "[prior]")
+    own = {name: prior for name, prior in (material or {}).items() if name in found}
+    return found | own | priors_of(probe.stated_priors, probe, "[prior]")
+
+
+def _own(name: str) -> str:
+    """Return the name of a parameter without that of its material."""
+    return name.rpartition(".")[2]
 
 
 def known_beforehand(probe: Probe, stated: Mapping[str, Prior | str] | None) -> dict[str, Prior]:

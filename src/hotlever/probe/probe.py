@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, SerializeAsAny, model_validator
 
 from hotlever.errors import InputError, quoted, unknown_name
-from hotlever.files import read_text, write_text
-from hotlever.materials import Material
+from hotlever.files import write_text
+from hotlever.materials import HIGH_DOPED, LOW_DOPED, Kind, Material, full_name
+from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
+from hotlever.materials.presets import materials_of
 from hotlever.probe.circuit import Circuit
 from hotlever.probe.layout import Layout
 from hotlever.probe.priors import PriorTexts, priors_of
+from hotlever.probe.sections import read_sections, section_lines, with_values
 from hotlever.probe.shapes import (
     PARAMETRIC,
     SHAPE_SECTIONS,
@@ -30,12 +32,7 @@ from hotlever.probe.surroundings import Surroundings
 from hotlever.probe.tip import Tip
 from hotlever.records import Record
 from hotlever.spieser2017 import DOI, published
-from hotlever.text import as_toml
 from hotlever.types import Array
-
-#: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
-#: gigabytes to read.
-_LARGEST, _LONGEST_LINE = 1_000_000, 1000
 
 #: What the sections of a probe file hold, beside the shape in ``[probe]``.
 _PARTS: dict[str, type[Record]] = {
@@ -45,7 +42,8 @@ _PARTS: dict[str, type[Record]] = {
     "tip": Tip,
     "prior": PriorTexts,
 }
-SECTIONS = (*SHAPE_SECTIONS, *_PARTS)
+_MATERIALS = "materials"
+SECTIONS = (*SHAPE_SECTIONS, _MATERIALS, *_PARTS)
 
 
 class Probe(Record):
@@ -66,6 +64,7 @@ class Probe(Record):
     shape: Shape
     circuit: Circuit = Circuit()
     material: Material = published("option III").material
+    materials: dict[str, SerializeAsAny[Kind]] = Field(default_factory=dict)
     surroundings: Surroundings = Surroundings()
     tip: Tip | None = None
     prior: PriorTexts | None = None
@@ -80,6 +79,27 @@ class Probe(Record):
                     f"less than {room:.4g} µm, half the heater's narrow side"
                 )
         return self
+
+    @model_validator(mode="after")
+    def _low_doped_parts_are_the_lower(self) -> Probe:
+        for region in self.layout().regions:
+            low, high = region.stack[0].material, region.dopant_from
+            of_low, of_high = self.kinds[low], self.kinds[high]
+            if (
+                region.taper is not None
+                and isinstance(of_low, LowDopedSilicon)
+                and isinstance(of_high, HighDopedSilicon)
+                and of_low.n_d >= of_high.n_hd
+            ):
+                raise ValueError(
+                    f"{full_name(low, 'n_d')} = {of_low.n_d:g} must be below "
+                    f"{full_name(high, 'n_hd')} = {of_high.n_hd:g}"
+                )
+        return self
+
+    def __hash__(self) -> int:
+        parts = tuple(getattr(self, name) for name in _PARTS)
+        return hash((self.shape, tuple(self.materials.items()), *parts))
 
     @classmethod
     def reference(cls) -> Probe:
@@ -151,25 +171,30 @@ class Probe(Record):
             Naming the section and key, what was found and what is expected.
         """
         for name, section in values.items():
-            if name == "materials":
-                raise InputError(
-                    f"{where}: [materials]: other materials than the paper's silicon cannot be "
-                    "simulated yet; expected [material]"
-                )
             if name not in SECTIONS:
                 raise unknown_name("section", name, SECTIONS, where)
             if not isinstance(section, dict):
                 raise InputError(f"{where}: [{name}] must be a section, found {quoted(section)}")
         if "probe" not in values:
             raise InputError(f"{where}: section [probe] is missing")
+        materials = materials_of(values.get(_MATERIALS, {}), where, SECTIONS)
         drawn = {name: values[name] for name in SHAPE_SECTIONS if name in values}
-        parts: dict[str, Any] = {"shape": shape_of(drawn, where, folder)}
+        shape = shape_of(drawn, where, folder, materials)
+        for name in materials:
+            if name not in shape.materials:
+                raise InputError(
+                    f"{where}: [{_MATERIALS}.{name}]: no layer is made of it, expected [layers.…] "
+                    f'with material = "{name}"'
+                )
+        parts: dict[str, Any] = {"shape": shape, _MATERIALS: materials}
         usual = {"material": published("option III").material.model_dump()}
         for name, part in _PARTS.items():
             if name in values:
                 section = {**usual.get(name, {}), **values[name]}
                 parts[name] = part.of(section, f"{where}: [{name}]")
         probe = cls.of(parts, where)
+        if "material" in values and not probe.has_plain_silicon:
+            raise InputError(f"{where}: [material]: no layer is made of it, expected none")
         priors_of(probe.stated_priors, probe, f"{where}: [prior]")
         return probe
 
@@ -184,39 +209,35 @@ class Probe(Record):
         InputError
             If the file cannot be read or its content is at fault.
         """
-        text = read_text(path, largest=_LARGEST)
-        for number, line in enumerate(text.splitlines(), start=1):
-            if len(line) > _LONGEST_LINE:
-                raise InputError(
-                    f"{path}: line {number}: {len(line)} characters, expected at most "
-                    f"{_LONGEST_LINE}"
-                )
-        try:
-            values = tomllib.loads(text)
-        except RecursionError:
-            raise InputError(f"{path}: not valid TOML: nested too deeply") from None
-        except ValueError as error:
-            # a number of thousands of digits is a ValueError too
-            reason = str(error).partition(";")[0]
-            raise InputError(f"{path}: not valid TOML: {reason}") from None
+        values = read_sections(path)
         return cls.from_values(values, str(path), Path(path).parent)
 
     @property
     def _records(self) -> dict[str, Record]:
-        """What it is made of, beside the shape, by the section of its file."""
-        return {name: getattr(self, name) for name in _PARTS if getattr(self, name)}
+        """What it consists of, beside the shape, by the section of its file."""
+        named = {f"{_MATERIALS}.{name}": kind for name, kind in self.materials.items()}
+        return named | self._parts
 
-    def _sections(self) -> dict[str, dict[str, Any]]:
-        """Return the sections of its file, with the keys that have no value."""
-        rest = {name: part.model_dump() for name, part in self._records.items()}
-        return self.shape.sections() | rest
+    @property
+    def _parts(self) -> dict[str, Record]:
+        """Those of its parts that matter."""
+        parts = {name: getattr(self, name) for name in _PARTS if getattr(self, name)}
+        if not self.has_plain_silicon:
+            del parts["material"]
+        return parts
+
+    @property
+    def has_plain_silicon(self) -> bool:
+        """Whether any of it is made of the silicon of ``[material]``."""
+        return not {LOW_DOPED, HIGH_DOPED}.isdisjoint(self.layout().materials)
 
     def values(self) -> dict[str, dict[str, Any]]:
         """Return the sections as plain values: what `from_values` takes."""
-        return {
-            name: {key: value for key, value in section.items() if value is not None}
-            for name, section in self._sections().items()
-        }
+        found: dict[str, dict[str, Any]] = self.shape.sections()
+        if self.materials:
+            found[_MATERIALS] = {name: kind.model_dump() for name, kind in self.materials.items()}
+        found |= {name: part.model_dump() for name, part in self._parts.items()}
+        return {name: with_values(section) for name, section in found.items()}
 
     def field(self, name: str) -> tuple[str, str, type[Record]]:
         """Return section, key and record of a name such as ``n_d`` or ``tip.height_um``.
@@ -227,15 +248,19 @@ class Probe(Record):
             If it is no key of a probe file; the nearest one is given.
         """
         section, dot, key = name.rpartition(".")
-        records = {"probe": type(self.shape), **_PARTS}
+        named = {one: type(kind) for one, kind in self.materials.items()}
+        records: dict[str, type[Record]] = {"probe": type(self.shape), **named, **_PARTS}
         if dot and section not in records:
-            raise unknown_name("section", section, SECTIONS)
+            raise unknown_name("section", section, [*SECTIONS, *named])
         known = {part: _keys(record, part) for part, record in records.items()}
-        for part in [section] if dot else ["probe", *self._records, *records]:
+        own = [part for part in _PARTS if getattr(self, part)]
+        # those of a named material have its name before them
+        for part in [section] if dot else ["probe", *own, *_PARTS]:
             if key in known[part] or (dot and records[part] is PriorTexts):
                 return part, key, records[part]
         # a prior has the name of what it is of
-        choices = known[section] if dot else [key for keys in known.values() for key in keys]
+        full = [f"{part}.{key}" if part in named else key for part in known for key in known[part]]
+        choices = known[section] if dot else full
         raise unknown_name("name", key, dict.fromkeys(choices))
 
     def with_(self, **changes: Any) -> Probe:
@@ -249,10 +274,12 @@ class Probe(Record):
         InputError
             If a name exists in no section (the nearest one is given) or a value is impossible.
         """
-        sections = self._sections()
+        sections = self.values()
         for name, value in changes.items():
             section, key, _ = self.field(name)
-            sections.setdefault(section, {})[key] = value
+            inside = sections[_MATERIALS] if section in self.materials else sections
+            inside.setdefault(section, {})[key] = value
+        sections = {name: with_values(section) for name, section in sections.items()}
         shape = PARAMETRIC.get(str(sections["probe"]["shape"]))
         if shape is not None and not isinstance(self.shape, shape):
             own = {
@@ -263,22 +290,28 @@ class Probe(Record):
 
     def at(self, names: Sequence[str]) -> Array:
         """Return some of its values by their names in a probe file, shape (len(names),)."""
-        return np.array([getattr(self._part_with(name), name) for name in names], dtype=float)
+        return np.array([self._value(name) for name in names], dtype=float)
+
+    def _value(self, name: str) -> Any:
+        material, dot, own = name.partition(".")
+        if dot:
+            return getattr(self.materials[material], own)
+        parts = (self.shape, *(getattr(self, part) for part in _PARTS))
+        return next(getattr(part, name) for part in parts if part and name in _fields(part))
 
     def moved(self, values: Mapping[str, float]) -> Probe:
         """Return a copy with some values changed, as `with_` does but unchecked and fast."""
-        parts = {}
-        for field in type(self).model_fields:
+        parts: dict[str, Any] = {}
+        for field in ("shape", *_PARTS):
             part = getattr(self, field)
-            own = {
-                name: values[name] for name in values if part and name in type(part).model_fields
-            }
+            own = {name: values[name] for name in values if part and name in _fields(part)}
             parts[field] = part.model_copy(update=own) if own else part
-        return self.model_copy(update=parts)
-
-    def _part_with(self, name: str) -> Record:
-        parts = (self.shape, *self._records.values())
-        return next(part for part in parts if name in type(part).model_fields)
+        kinds = dict(self.materials)
+        for full, value in values.items():
+            name, dot, key = full.partition(".")
+            if dot:
+                kinds[name] = kinds[name].model_copy(update={key: value})
+        return self.model_copy(update={**parts, _MATERIALS: kinds})
 
     def __repr__(self) -> str:
         # the probe file without its comments
@@ -302,6 +335,23 @@ class Probe(Record):
         """What its file says of its priors, by name."""
         return {} if self.prior is None else self.prior.by_name
 
+    @property
+    def kinds(self) -> dict[str, Kind]:
+        """All its materials by name, the two of ``[material]`` among them."""
+        return {**self.material.kinds, **self.materials}
+
+    @property
+    def made_of(self) -> dict[str, Kind]:
+        """The materials that its layout has, by name."""
+        kinds = self.kinds
+        return {name: kinds[name] for name in self.layout().materials}
+
+    @property
+    def heater_silicon(self) -> LowDopedSilicon | None:
+        """The low-doped silicon of the heater; None if it is of another material."""
+        kind = self.kinds[self.layout().heater.stack[0].material]
+        return kind if isinstance(kind, LowDopedSilicon) else None
+
     def layout(self) -> Layout:
         """Return the regions, terminals and tip."""
         return replace(self.shape.layout(), cone=self.tip)
@@ -316,19 +366,19 @@ class Probe(Record):
             )
         meaning = self.shape.description()
         for name, section in self.shape.sections().items():
-            given = {key: value for key, value in section.items() if value is not None}
-            lines += ["", f"[{name}]", *_entries(given, meaning)]
+            lines += section_lines(name, section, meaning)
         return "\n".join(lines) + "\n" + self.other_sections()
 
     def other_sections(self) -> str:
         """Return the sections of its file beside those of its shape."""
         lines = []
         for name, part in self._records.items():
-            lines += ["", f"[{name}]", *_entries(part.model_dump(), part.description())]
+            lines += section_lines(name, part.model_dump(), part.description(), optional=True)
         if self.tip is None:
             example = Tip(height_um=0.7, half_angle_deg=20, apex_radius_um=0.02)
             lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]
-            lines += ["# [tip]", *_entries(example.model_dump(), example.description(), "# ")]
+            values, meaning = example.model_dump(), example.description()
+            lines += section_lines("tip", values, meaning, start="# ")[1:]
         return "\n".join(lines) + "\n"
 
     def to_file(self, path: str | os.PathLike[str]) -> None:
@@ -336,17 +386,11 @@ class Probe(Record):
         write_text(path, self.to_toml())
 
 
+def _fields(part: Record) -> Any:
+    return type(part).model_fields
+
+
 def _keys(record: type[Record], section: str) -> list[str]:
     """Return the keys of a section; in ``[probe]`` those of all shapes, its own first."""
     shapes = PARAMETRIC.values() if section == "probe" else ()
     return [key for one in (record, *shapes) for key in one.model_fields]
-
-
-def _entries(section: dict[str, Any], meaning: dict[str, str], start: str = "") -> list[str]:
-    """Return the lines of a section, each with what its value is."""
-    lines = []
-    for key, value in section.items():
-        written = f"{value:.12g}" if isinstance(value, float) else as_toml(value)
-        entry = f"# {key} =" if value is None else f"{start}{key} = {written}"
-        lines.append(f"{entry:<32}# {meaning[key]}" if key in meaning else entry)
-    return lines

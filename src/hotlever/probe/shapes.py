@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from hotlever.errors import InputError, unknown_name
+from hotlever.materials import Kind
 from hotlever.probe.layout import Layout, Part, Region, Taper, Terminal, rectangle
 from hotlever.records import Record
 
@@ -30,9 +31,9 @@ def _length(meaning: str, least: float = 0.05, most: float = 1000.0, **default: 
     return Field(ge=least, le=most, description=meaning, **default)
 
 
-def thickness() -> Any:
-    """Return the bounds of a lever's thickness (µm)."""
-    return _length("of the silicon", 0.01, 20)
+def thickness(meaning: str = "of the silicon") -> Any:
+    """Return the bounds of a lever's thickness (µm), and what it is."""
+    return _length(meaning, 0.01, 20)
 
 
 class Shape(Record):
@@ -42,6 +43,11 @@ class Shape(Record):
     outline_moves: ClassVar[bool] = True
 
     shape: str
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """The names of the materials, beside ``[material]``, that it says it is made of."""
+        return ()
 
     @abstractmethod
     def dimensions(self) -> dict[str, float]:
@@ -257,7 +263,12 @@ SHAPES = (*PARAMETRIC, DRAWING)
 SHAPE_SECTIONS = ("probe", "layers", "terminals")
 
 
-def shape_of(sections: Mapping[str, Any], where: str, folder: Path | None = None) -> Shape:
+def shape_of(
+    sections: Mapping[str, Any],
+    where: str,
+    folder: Path | None = None,
+    materials: Mapping[str, Kind] | None = None,
+) -> Shape:
     """Make the shape that some sections of a probe file describe.
 
     Parameters
@@ -268,6 +279,8 @@ def shape_of(sections: Mapping[str, Any], where: str, folder: Path | None = None
         Names the file in an error.
     folder : path, optional
         What the name of a drawing's file is relative to.
+    materials : mapping of str to Kind, optional
+        Those that the layers of a drawing may be made of.
 
     Raises
     ------
@@ -284,7 +297,7 @@ def shape_of(sections: Mapping[str, Any], where: str, folder: Path | None = None
     if name == DRAWING:
         from hotlever.drawing.shape import Drawing  # most probes are drawn by their dimensions
 
-        return Drawing.read(sections, where, folder)
+        return Drawing.read(sections, where, folder, materials)
     for section in SHAPE_SECTIONS[1:]:
         if section in sections:
             raise InputError(f'{where}: section [{section}] means nothing with shape = "{name}"')

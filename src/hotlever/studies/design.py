@@ -15,7 +15,6 @@ from hotlever.errors import ComputationError, unknown_name
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
 from hotlever.materials.doping import diffusion_length
-from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import MeshOptions, Probe
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.steps import each
@@ -110,10 +109,11 @@ def quantities(probe: Probe, power_mW: float, air: bool = True) -> dict[str, flo
     vacuum = lever.branch_past_knee()
     if vacuum.highest_power_mW < power_mW:
         vacuum = lever.branch()
-    material, knee = probe.material, vacuum.knee
+    silicon, knee = probe.heater_silicon, vacuum.knee
     cold = vacuum.point(_COLD_U)
     found = dict.fromkeys(QUANTITIES, float("nan"))
-    found["inversion_K"] = float(inversion_temperature(material.n_d, material.p))
+    if silicon is not None:
+        found["inversion_K"] = float(silicon.inversion_temperature())
     found["tip_K"] = float(vacuum.tip_temperature(power_mW))
     found["cold_ohm"] = 1000.0 * cold.lever_V / cold.current_mA
     if knee is None:

@@ -26,7 +26,14 @@ from hotlever.errors import BranchEndError, HotleverError
 from hotlever.fitting import Measurement
 from hotlever.lever import Branch, Lever
 from hotlever.lever.equations import LeverEquations
-from hotlever.materials.silicon import inversion_temperature, minimos_mobility
+from hotlever.materials import LOW_DOPED
+from hotlever.materials.kinds import NSilicon
+from hotlever.materials.laws import Evaluated
+from hotlever.materials.silicon import (
+    conductivity_low_doped,
+    inversion_temperature,
+    minimos_mobility,
+)
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.priors import default_priors
 from hotlever.probe.tip import Tip
@@ -62,13 +69,22 @@ PERCENTILES = (50, 90, 100)
 _DECILES, _ROWS = 10, 101  # of the bias, and of a calibration's table
 
 
+class MinimosSilicon(NSilicon):
+    """Silicon doped with phosphorus whose carriers move as in MINIMOS."""
+
+    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
+        """Return σ (S cm⁻¹), see `hotlever.materials.kinds.Kind`."""
+        return conductivity_low_doped(T, n, self.p, self.impurity_exponent, minimos_mobility)
+
+
 class MinimosLever(Lever):
     """A lever whose carriers move as in MINIMOS where it is low-doped."""
 
     def _prepare(self) -> None:
         super()._prepare()
-        base, material = self.circuit.base_temperature_K, self.probe.material
-        self.equations = LeverEquations(self.space, material, base, mobility_law=minimos_mobility)
+        kinds = self.probe.kinds
+        kinds[LOW_DOPED] = MinimosSilicon.model_construct(**dict(kinds[LOW_DOPED]))
+        self.equations = LeverEquations(self.space, kinds, self.circuit.base_temperature_K)
 
 
 def drawn(

@@ -14,12 +14,11 @@ from scipy.optimize import brentq
 
 from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import ComputationError, HistoryEndError, InputError
-from hotlever.lever.equations import LAWS
+from hotlever.lever.dataset import laws_end_K
 from hotlever.lever.state import State
 from hotlever.lever.transient.driven import DrivenLever
 from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
 from hotlever.lever.transient.waveform import Piece, Waveform
-from hotlever.materials.silicon import MELTING_POINT
 from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
@@ -194,7 +193,7 @@ def followed(
             end = rows.add(piece, step)
             reached = step.end if end is None else end
             if end is not None:
-                failure = f"silicon melts after {end:.6g} µs"
+                failure = f"{lever.equations.limit[1]} after {end:.6g} µs"
                 break
             if progress is not None:
                 progress(int(_PARTS * reached / until), _PARTS)
@@ -221,7 +220,7 @@ class _Rows:
         values, slopes = self._observer.read(step)
         if not self.time and (self._asked is None or self._asked[0] == 0.0):
             self._add(piece, step, values, slopes, 0.0)
-        melts = _melts(step, values, slopes)
+        melts = _melts(step, values, slopes, self._lever.equations.limit[0])
         end = step.end if melts is None else melts
         if self._asked is None:
             inside = np.linspace(step.start, end, self._per_step + 1)[1:]
@@ -239,15 +238,15 @@ class _Rows:
             self._seen(t, State(self._lever, step.between(t)))
 
 
-def _melts(step: Step, values: Array, slopes: Array) -> float | None:
-    """Return when the hottest place melts within a step."""
+def _melts(step: Step, values: Array, slopes: Array, limit_K: float) -> float | None:
+    """Return when the hottest place reaches a limit within a step."""
     row = [_FOLLOWED.index("max_K")]
-    if values[row[0], 1] < MELTING_POINT:
+    if values[row[0], 1] < limit_K:
         return None
 
     def above(t: float) -> float:
         found = hermite(step.start, step.end, values[row], slopes[row], t)
-        return float(found[0]) - MELTING_POINT
+        return float(found[0]) - limit_K
 
     return float(brentq(above, step.start, step.end)) if above(step.start) < 0 else step.start
 
@@ -271,7 +270,7 @@ def _dataset(lever: Lever, waveform: Waveform, rows: _Rows) -> xr.Dataset:
     more = ("max_K", "supplied_nJ", "stored_nJ", "lost_nJ")
     variables |= {name: columns[name] for name in (*TIME_COLUMNS[2:], *more)}
     notes = [] if lever.space.air is None else [_AIR_NOTE]
-    limit = min(law.temperature_range[1] for law in LAWS)
+    limit = laws_end_K(lever.probe)
     beyond = time[columns["max_K"] > limit]
     if beyond.size:
         notes.append(

@@ -1,0 +1,354 @@
+"""What a lever is made of: kinds of material, each with its parameters and its laws.
+
+A material of a kind gives thermal and electrical conductivity with exact derivatives by the
+temperature, by its own parameters and, where it is doped, by the local doping. The laws are those
+of the modules beside this one; here is said which kind follows which, and with which parameters.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from hotlever.errors import InputError
+from hotlever.materials.dielectric import dielectric_conductivity
+from hotlever.materials.heat import enthalpy, enthalpy_by_capacity
+from hotlever.materials.laws import FORMULA_TO, Evaluated, Law
+from hotlever.materials.metal import constant_conductivity, metal_conductivity, wiedemann_franz
+from hotlever.materials.p_silicon import conductivity_p, inversion_temperature_p
+from hotlever.materials.parameters import (
+    OF_SILICON,
+    Parameter,
+    bounded,
+    high_doping,
+    impurity_exponent,
+)
+from hotlever.materials.silicon import (
+    MELTING_POINT,
+    conductivity_high_doped,
+    conductivity_low_doped,
+    inversion_temperature,
+    thermal_conductivity,
+)
+from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
+from hotlever.records import Record
+from hotlever.types import Array
+
+#: In place of c_κ: κ follows from the thickness.
+BY_THICKNESS = "thickness"
+#: Temperature coefficients (K⁻¹) of metal films; with any of them the resistivity stays positive.
+_LEAST_TCR, _MOST_TCR = -5e-4, 5e-3
+#: Heat a metal carries over what its electrons do.
+_LEAST_LORENZ, _MOST_LORENZ = 0.2, 5.0
+
+_METAL = {
+    known.name: known
+    for known in (
+        Parameter("resistivity", "ρ₂₉₃", "Ω cm", 1e-5, 1e-6, 1e-3, "resistivity at 293 K"),
+        Parameter(
+            *("tcr", "α", "K⁻¹", 1e-3, _LEAST_TCR, _MOST_TCR),
+            "temperature coefficient of the resistivity",
+        ),
+        Parameter(
+            *("lorenz_ratio", "L/L₀", "1", 1.0, _LEAST_LORENZ, _MOST_LORENZ),
+            "heat carried over what Wiedemann and Franz give",
+        ),
+        Parameter("kappa", "κ", "W cm⁻¹ K⁻¹", 0.01, 0.01, 5.0, "thermal conductivity"),
+    )
+}
+_DIELECTRIC = {
+    known.name: known
+    for known in (
+        Parameter("kappa", "κ₃₀₀", "W cm⁻¹ K⁻¹", 0.01, 1e-3, 1.0, "thermal conductivity at 300 K"),
+        Parameter("kappa_exponent", "m", "1", 1.0, -1.5, 1.5, "power of the temperature in it"),
+    )
+}
+
+
+class Kind(Record):
+    """A material of one kind (section ``[materials.NAME]`` of a probe file)."""
+
+    #: All parameters that one of this kind may have, by name.
+    declared: ClassVar[dict[str, Parameter]]
+    #: Those that a fit varies unless it is told otherwise.
+    usual: ClassVar[tuple[str, ...]]
+    #: Whether it carries a current.
+    conducts: ClassVar[bool] = True
+
+    kind: str
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Those of the declared parameters that are numbers here."""
+        return {
+            name: known
+            for name, known in self.declared.items()
+            if isinstance(getattr(self, name), float)
+        }
+
+    @property
+    def laws(self) -> tuple[Law, ...]:
+        """Of thermal and, if it conducts, electrical conductivity."""
+        raise NotImplementedError
+
+    @property
+    def highest_K(self) -> float:
+        """Temperature (K) at which it melts or its laws end."""
+        return MELTING_POINT
+
+    def end(self, name: str) -> str:
+        """Say what happens to a material of this name above its highest temperature."""
+        return f"the laws of '{name}' end"
+
+    def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
+        """Return κ (W cm⁻¹ K⁻¹) of a film, with its derivatives.
+
+        They are by ``T``, by parameters, and by ``thickness_um`` where κ depends on it.
+        """
+        raise NotImplementedError
+
+    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
+        """Return σ (S cm⁻¹), with its derivatives by ``T``, by parameters and by ``n``.
+
+        The doping `n` (cm⁻³) matters to a `LowDopedSilicon` only.
+        """
+        raise NotImplementedError
+
+    def enthalpy(self, T: Array) -> Evaluated:
+        """Return the heat held above that at 298.15 K (J cm⁻³), with its derivative by ``T``."""
+        raise NotImplementedError
+
+
+class Silicon(Kind):
+    """What all kinds of silicon have in common."""
+
+    c_kappa: float | Literal["thickness"] = Field(
+        union_mode="left_to_right",
+        description=f'scale of the thermal conductivity; or "{BY_THICKNESS}": it follows from the '
+        "thickness",
+    )
+
+    def end(self, name: str) -> str:
+        """Say what happens to a material of this name above its highest temperature."""
+        return "silicon melts"
+
+    @property
+    def _heat(self) -> Law:
+        by_thickness = self.c_kappa == BY_THICKNESS
+        return thermal_conductivity_of_layer if by_thickness else thermal_conductivity
+
+    def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
+        """Return κ (W cm⁻¹ K⁻¹), see `Kind.thermal_conductivity`."""
+        return self._heat(T, thickness_um if self.c_kappa == BY_THICKNESS else self.c_kappa)
+
+    def enthalpy(self, T: Array) -> Evaluated:
+        """Return the heat held (J cm⁻³), see `Kind.enthalpy`."""
+        return enthalpy(T)
+
+
+class Stored(Kind):
+    """What materials have in common whose heat capacity is a number."""
+
+    heat_capacity: float | None = Field(
+        default=None,
+        ge=0.5,
+        le=10.0,
+        description="heat capacity (J cm⁻³ K⁻¹), which counts in time",
+    )
+
+    def enthalpy(self, T: Array) -> Evaluated:
+        """Return the heat held (J cm⁻³), see `Kind.enthalpy`.
+
+        Raises
+        ------
+        InputError
+            If no heat capacity was given.
+        """
+        if self.heat_capacity is None:
+            raise InputError(
+                f"a {self.kind} without heat_capacity (J cm⁻³ K⁻¹) cannot be followed in time"
+            )
+        return enthalpy_by_capacity(T, self.heat_capacity)
+
+
+class LowDopedSilicon(Silicon):
+    """Silicon whose carriers are those of its dopant and, when hot, its own."""
+
+    declared: ClassVar = {
+        name: OF_SILICON[name] for name in ("c_kappa", "delta", "n_d", "p", "impurity_exponent")
+    }
+    usual: ClassVar = ("c_kappa", "delta", "n_d", "p")
+
+    delta: float = bounded(OF_SILICON["delta"])
+    n_d: float = bounded(OF_SILICON["n_d"])
+    p: float = bounded(OF_SILICON["p"])
+    impurity_exponent: float = impurity_exponent()
+
+    def inversion_temperature(self, n: Array | None = None) -> Array:
+        """Return the temperature (K) at which the resistivity of a doping (cm⁻³) is highest.
+
+        Of its own doping by default; NaN where there is none below 1700 K.
+        """
+        raise NotImplementedError
+
+
+class NSilicon(LowDopedSilicon):
+    """Silicon doped with phosphorus, as in the paper."""
+
+    kind: Literal["n-silicon"] = "n-silicon"
+
+    @property
+    def laws(self) -> tuple[Law, ...]:
+        """Of thermal and electrical conductivity."""
+        return self._heat, conductivity_low_doped
+
+    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
+        """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
+        return conductivity_low_doped(T, n, self.p, self.impurity_exponent)
+
+    def inversion_temperature(self, n: Array | None = None) -> Array:
+        """Return it (K), see `LowDopedSilicon.inversion_temperature`."""
+        doping = self.n_d if n is None else n
+        return inversion_temperature(doping, self.p, self.impurity_exponent)
+
+
+class PSilicon(LowDopedSilicon):
+    """Silicon doped with boron."""
+
+    kind: Literal["p-silicon"] = "p-silicon"
+
+    @property
+    def laws(self) -> tuple[Law, ...]:
+        """Of thermal and electrical conductivity."""
+        return self._heat, conductivity_p
+
+    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
+        """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
+        return conductivity_p(T, n, self.p, self.impurity_exponent)
+
+    def inversion_temperature(self, n: Array | None = None) -> Array:
+        """Return it (K), see `LowDopedSilicon.inversion_temperature`."""
+        doping = self.n_d if n is None else n
+        return inversion_temperature_p(doping, self.p, self.impurity_exponent)
+
+
+class HighDopedSilicon(Silicon):
+    """Quasi-metallic silicon; its dopant diffuses into low-doped silicon beside it."""
+
+    declared: ClassVar = {name: OF_SILICON[name] for name in ("c_kappa", "a0", "a1", "n_hd")}
+    usual: ClassVar = ("c_kappa", "a0", "a1")
+
+    kind: Literal["high-doped-silicon"] = "high-doped-silicon"
+    a0: float = bounded(OF_SILICON["a0"])
+    a1: float = bounded(OF_SILICON["a1"])
+    n_hd: float = high_doping()
+
+    @property
+    def laws(self) -> tuple[Law, ...]:
+        """Of thermal and electrical conductivity."""
+        return self._heat, conductivity_high_doped
+
+    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
+        """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
+        return conductivity_high_doped(T, self.a0, self.a1)
+
+
+class MetalFilm(Stored):
+    """A metal film; the values of a bulk metal are where a fit may start."""
+
+    declared: ClassVar = _METAL
+    usual: ClassVar = ("resistivity", "tcr")
+
+    kind: Literal["metal-film"] = "metal-film"
+    preset: str | None = Field(default=None, description="metal whose values those left out are")
+    resistivity: float = bounded(_METAL["resistivity"])
+    tcr: float = Field(
+        ge=_LEAST_TCR,
+        le=_MOST_TCR,
+        description="temperature coefficient of the resistivity, α (K⁻¹)",
+    )
+    lorenz_ratio: float = bounded(_METAL["lorenz_ratio"], default=1.0)
+    kappa: float | None = Field(
+        default=None,
+        ge=_METAL["kappa"].lower / 2,
+        le=2 * _METAL["kappa"].upper,
+        description="thermal conductivity (W cm⁻¹ K⁻¹); left out: by Wiedemann and Franz",
+    )
+    melting_point_K: float = Field(default=MELTING_POINT, ge=400, le=4000, description="K")
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Those of the declared parameters that count here."""
+        other = "kappa" if self.kappa is None else "lorenz_ratio"
+        return {name: known for name, known in self.declared.items() if name != other}
+
+    @property
+    def laws(self) -> tuple[Law, ...]:
+        """Of thermal and electrical conductivity."""
+        heat = wiedemann_franz if self.kappa is None else constant_conductivity
+        return heat, metal_conductivity
+
+    @property
+    def highest_K(self) -> float:
+        """Temperature (K) at which it melts or its laws end."""
+        return min(self.melting_point_K, FORMULA_TO)
+
+    def end(self, name: str) -> str:
+        """Say what happens to a material of this name above its highest temperature."""
+        return f"'{name}' melts" if self.melting_point_K < FORMULA_TO else super().end(name)
+
+    def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
+        """Return κ (W cm⁻¹ K⁻¹), see `Kind.thermal_conductivity`."""
+        if self.kappa is not None:
+            return constant_conductivity(T, self.kappa)
+        return wiedemann_franz(T, self.resistivity, self.tcr, self.lorenz_ratio)
+
+    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
+        """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
+        return metal_conductivity(T, self.resistivity, self.tcr)
+
+
+class Dielectric(Stored):
+    """An insulator, which carries heat alone."""
+
+    declared: ClassVar = _DIELECTRIC
+    usual: ClassVar = ("kappa",)
+    conducts: ClassVar = False
+
+    kind: Literal["dielectric"] = "dielectric"
+    preset: str | None = Field(
+        default=None, description="dielectric whose values those left out are"
+    )
+    kappa: float = bounded(_DIELECTRIC["kappa"])
+    kappa_exponent: float = Field(
+        default=0.0,
+        ge=_DIELECTRIC["kappa_exponent"].lower,
+        le=_DIELECTRIC["kappa_exponent"].upper,
+        description="power of the temperature in it, m",
+    )
+
+    @property
+    def laws(self) -> tuple[Law, ...]:
+        """Of the thermal conductivity."""
+        return (dielectric_conductivity,)
+
+    @property
+    def highest_K(self) -> float:
+        """Temperature (K) at which its laws end."""
+        return FORMULA_TO
+
+    def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
+        """Return κ (W cm⁻¹ K⁻¹), see `Kind.thermal_conductivity`."""
+        return dielectric_conductivity(T, self.kappa, self.kappa_exponent)
+
+    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
+        """Return σ (S cm⁻¹), zero."""
+        nothing = 0.0 * T
+        return nothing, {"T": nothing}
+
+
+KINDS: dict[str, type[Kind]] = {
+    kind.model_fields["kind"].default: kind
+    for kind in (NSilicon, PSilicon, HighDopedSilicon, MetalFilm, Dielectric)
+}

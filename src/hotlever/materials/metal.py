@@ -1,0 +1,85 @@
+"""Metal films: resistivity by the temperature, and the heat that the electrons carry.
+
+`T` is in K; units are cm, V, A, W and K. A film's resistivity is above that of the bulk metal and
+its temperature coefficient below: both are for a fit to find.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hotlever.materials.laws import Evaluated, law
+
+#: Temperature (K) at which a metal's resistivity is stated.
+STATED_AT_K = 293.0
+#: Sommerfeld's value of the Lorenz number (V² K⁻²), (π k_B/e)²/3.
+SOMMERFELD = 2.443e-8
+
+
+@law(
+    meant_for=(250.0, 800.0),
+    source="Bloch and Grüneisen at high temperature; Matula, JPCRD 8, 1147 (1979)",
+)
+def metal_conductivity(T: ArrayLike, resistivity: float, tcr: float) -> Evaluated:
+    """Electrical conductivity of a metal film, in S cm⁻¹: ρ = ρ₂₉₃ (1 + α (T − 293 K)).
+
+    Parameters
+    ----------
+    T : array_like
+    resistivity : float
+        ρ₂₉₃, at 293 K (Ω cm).
+    tcr : float
+        α, its temperature coefficient (K⁻¹).
+
+    Examples
+    --------
+    >>> sigma, _ = metal_conductivity([293.0, 393.0], resistivity=2e-5, tcr=2e-3)
+    >>> (1.0 / sigma).round(9).tolist()
+    [2e-05, 2.4e-05]
+    """
+    above = np.asarray(T, dtype=float) - STATED_AT_K
+    rise = 1.0 + tcr * above
+    sigma = 1.0 / (resistivity * rise)
+    return sigma, {
+        "T": -sigma * tcr / rise,
+        "resistivity": -sigma / resistivity,
+        "tcr": -sigma * above / rise,
+    }
+
+
+@law(meant_for=(250.0, 800.0), source="Wiedemann and Franz, Ann. Phys. 165, 497 (1853)")
+def wiedemann_franz(
+    T: ArrayLike, resistivity: float, tcr: float, lorenz_ratio: float = 1.0
+) -> Evaluated:
+    """Thermal conductivity of a metal by its electrical one, κ = L σ T, in W cm⁻¹ K⁻¹.
+
+    Parameters
+    ----------
+    T, resistivity, tcr
+        See `metal_conductivity`.
+    lorenz_ratio : float
+        L over Sommerfeld's value; above 1 where the lattice carries heat too.
+
+    Examples
+    --------
+    >>> kappa, _ = wiedemann_franz(293.0, resistivity=1.05e-5, tcr=3.6e-3)
+    >>> (100 * kappa).round(1).item()  # W/(m K)
+    68.2
+    """
+    T = np.asarray(T, dtype=float)
+    sigma, by = metal_conductivity.formula(T, resistivity, tcr)
+    lorenz = SOMMERFELD * lorenz_ratio
+    kappa = lorenz * sigma * T
+    return kappa, {
+        **{name: lorenz * T * partial for name, partial in by.items()},
+        "T": lorenz * (sigma + T * by["T"]),
+        "lorenz_ratio": kappa / lorenz_ratio,
+    }
+
+
+@law(meant_for=(200.0, 1300.0), source="a constant, as stated in the probe file")
+def constant_conductivity(T: ArrayLike, kappa: float) -> Evaluated:
+    """Thermal conductivity that does not depend on the temperature, in W cm⁻¹ K⁻¹."""
+    nothing = np.zeros_like(np.asarray(T, dtype=float))
+    return nothing + kappa, {"T": nothing, "kappa": nothing + 1.0}
