@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import InputError

@@ -12,6 +12,7 @@ from hotlever.lever import probe_of
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import history_csv, pulse, ramp, sine, step, write_history
 from hotlever.lever.transient.history import TIME_COLUMNS
+from of_materials import metal_film_probe, metal_film_sections
 
 
 def imbalance(data: xr.Dataset) -> float:
@@ -189,3 +190,24 @@ def test_a_history_is_written_and_read_again(golden, tmp_path):
         assert all("units" in found[name].attrs for name in (*TIME_COLUMNS, "lost_nJ", "time"))
     with pytest.raises(InputError, match=r"\.csv or \.nc"):
         write_history(golden, tmp_path / "a.txt")
+
+
+def test_a_lever_of_a_metal_film_on_a_dielectric_has_the_heat_of_both():
+    lever = Lever(metal_film_probe(), COARSE)
+    found = lever.pulse(step(0.5), at=[1.0, 1e5], tolerance_K=1e-3)
+    # over some thousand time constants
+    assert imbalance(found) < 1e-5
+    (rest,) = lever.solve([0.5])
+    assert found.tip_K.values[-1] - 293.0 == pytest.approx(rest.tip_K - 293.0, rel=1e-5)
+    # 0.4 µm of nitride and, on it, 0.05 µm of palladium
+    density, by_T = lever.equations.heat_density(np.full((len(lever.space.weights), 1), 294.0))
+    assert {0.4 * 2.1e-3, 0.4 * 2.1e-3 + 0.05 * 2.93e-3} == set(by_T.ravel().round(9))
+    np.testing.assert_allclose(density, by_T)
+
+
+def test_a_material_without_a_heat_capacity_cannot_be_followed():
+    film = {"kind": "metal-film", "resistivity": 2e-5, "tcr": 2e-3}
+    materials = {**metal_film_sections()["materials"], "film": film}
+    lever = Lever(metal_film_probe(materials=materials), COARSE)
+    with pytest.raises(InputError, match="a metal-film without heat_capacity"):
+        lever.pulse(step(1.0), at=[1.0])
