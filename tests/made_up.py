@@ -61,7 +61,7 @@ def twins(other_law: bool = False) -> xr.Dataset:
         columns = {
             "off_K": (("way", "row"), off),
             "tip_K": ("row", 300.0 + 5.0 * rows),
-            "tip_stderr_K": ("row", np.full(rows.size, 10.0)),
+            "stated_K": ("row", np.full(rows.size, 10.0)),
             "seconds": 1.0,
             "refused": "" if np.isfinite(sigma) else "no lever like this",
             "doubted": "",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,6 +18,11 @@ from hotlever.probe import Probe
 from of_materials import p_type_probe
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "lever-a.csv"
+
+
+def test_the_module_is_the_command():
+    done = subprocess.run([sys.executable, "-m", "hotlever", "--version"], capture_output=True)
+    assert (done.returncode, done.stdout.decode()) == (0, f"{__version__}\n")
 
 
 def test_help_and_version(run):

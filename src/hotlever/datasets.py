@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hotlever import __version__
+from hotlever.errors import InputError
+from hotlever.files import whole_file, write_text
 from hotlever.materials import PARAMETERS
 from hotlever.text import parameter_named
 
@@ -36,6 +41,24 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "end_heat_mW": ("mW", "heat leaving by the leg ends"),
     "air_heat_mW": ("mW", "heat leaving into the air"),
     "sensitivity": ("of the observable by the parameter", "derivative at fixed bias"),
+    # in time
+    "time": ("µs", "time"),
+    "time_us": ("µs", "time"),
+    "supplied_nJ": ("nJ", "electrical energy taken up since the start"),
+    "stored_nJ": ("nJ", "heat in the lever above that at the base temperature"),
+    "lost_nJ": ("nJ", "heat lost through the leg ends and into the air since the start"),
+    "time_constant_us": ("µs", "time constant, negative for what grows"),
+    "heating_us": ("µs", "time from 10 to 90 % of the tip's rise"),
+    "cooling_us": ("µs", "time from 90 to 10 % of the tip's rise"),
+    # small signals
+    "frequency": ("Hz", "frequency"),
+    "frequency_Hz": ("Hz", "frequency"),
+    "impedance_real_ohm": ("ohm", "real part of the impedance"),
+    "impedance_imag_ohm": ("ohm", "imaginary part of the impedance"),
+    "tip_per_power_K_per_mW": ("K/mW", "change of the tip temperature by that of the power"),
+    "tip_per_power_deg": ("deg", "phase of the tip temperature against the power"),
+    "tip_per_bias_K_per_V": ("K/V", "change of the tip temperature by that of the bias"),
+    "tip_per_bias_deg": ("deg", "phase of the tip temperature against the bias"),
     # along the heater
     "position": ("µm", "position along the heater"),
     "temperature": ("K", "temperature"),
@@ -141,3 +164,30 @@ def labelled(
             known = parameter_named(str(name))
             data[name].attrs = {"units": known.unit, "long_name": known.meaning}
     return data
+
+
+def csv_text(data: xr.Dataset, columns: Sequence[str]) -> str:
+    """Return columns of a dataset as CSV text; empty where a value does not exist."""
+    rows = (
+        ",".join("" if math.isnan(value) else f"{value:.10g}" for value in row)
+        for row in zip(*(data[name].values for name in columns), strict=True)
+    )
+    return "\n".join([",".join(columns), *rows]) + "\n"
+
+
+def write_dataset(data: xr.Dataset, path: str | os.PathLike[str], columns: Sequence[str]) -> None:
+    """Write a dataset as ``.csv`` (some columns) or ``.nc`` (everything).
+
+    Raises
+    ------
+    InputError
+        If the suffix is neither, or the file cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == ".csv":
+        write_text(path, csv_text(data, columns))
+    elif suffix == ".nc":
+        with whole_file(path) as temporary:
+            data.to_netcdf(temporary, engine="netcdf4")
+    else:
+        raise InputError(f"{path}: unknown file type '{suffix}', expected .csv or .nc")

@@ -48,6 +48,17 @@ class BranchEndError(ComputationError):
         self.bias_reached = bias_reached
 
 
+class HistoryEndError(ComputationError):
+    """A lever could not be followed in time to the end asked for.
+
+    It was followed to ``time_reached`` (µs); ``partial`` holds what was seen up to there.
+    """
+
+    def __init__(self, message: str, time_reached: float, partial: Any = None) -> None:
+        super().__init__(message, partial)
+        self.time_reached = time_reached
+
+
 def quoted(found: object) -> str:
     """Return what was found as an error quotes it: the beginning of what is long.
 

@@ -57,6 +57,12 @@ _WORDS = {
     "atm": ("bar", 1.01325),
     "mmhg": ("bar", 1.01325 / 760.0),
 }
+#: Of settings alone: in a heading `V_s` is no voltage in seconds.
+_SETTINGS = {
+    prefix + symbol: (symbol, power)
+    for prefix, power in _PREFIXES.items()
+    for symbol in ("s", "Hz", "V")
+}
 #: By name: quantity, power of ten, and what else one of the unit is.
 _UNITS = {
     prefix + symbol: (quantity, power, factor)
@@ -199,3 +205,31 @@ def quantity(text: str) -> tuple[float | None, str]:
         return None, text
     value = float(found[0].replace(",", ".").lower().replace("d", "e"))
     return value if abs(value) <= LARGEST_NUMBER else None, text[found.end() :]
+
+
+def setting(text: str, inside: str, where: str, *, bare: bool = False) -> float:
+    """Return a voltage, a time or a frequency such as ``5us`` in another unit.
+
+    Without a unit it is understood only if it may be `bare`.
+
+    Raises
+    ------
+    InputError
+        If it is anything else; the text begins with `where`.
+
+    Examples
+    --------
+    >>> setting("5us", "us", "--until"), setting("20 kHz", "Hz", "--sine")
+    (5.0, 20000.0)
+    """
+    value, unit = quantity(text.strip())
+    unit = unicodedata.normalize("NFKC", unit).replace(" ", "")
+    symbol, theirs = _SETTINGS.get(unit or inside * bare, ("", 0))
+    wanted, ours = _SETTINGS[inside]
+    if value is None or symbol != wanted:
+        raise InputError(
+            f"{where}: found '{shown(text)}', expected a number with a unit like {inside}"
+        )
+    # whole powers are exact: 250 ns are 0.25 µs to the last digit
+    power = theirs - ours
+    return value * 10.0**power if power >= 0 else value / 10.0**-power

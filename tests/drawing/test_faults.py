@@ -5,9 +5,9 @@ from __future__ import annotations
 import ezdxf
 import gdstk
 import pytest
-from drawn import box, drawn, library_of, reference_points, written
 from reference_drawing import reference_library
 
+from drawn import box, drawn, library_of, reference_points, written
 from hotlever.drawing.fault import DrawingError
 from hotlever.errors import InputError
 from hotlever.lever import Lever

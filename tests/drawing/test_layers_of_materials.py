@@ -6,7 +6,17 @@ import tomllib
 
 import numpy as np
 import pytest
+
 from drawn import box, reference_points
+from hotlever.errors import BranchEndError, InputError
+from hotlever.lever import Lever
+from hotlever.lever.lever import COARSE
+from hotlever.lever.sensitivities import by_parameter
+from hotlever.lever.similar import SimilarLevers
+from hotlever.lever3d import SolidLever
+from hotlever.materials import HIGH_DOPED
+from hotlever.probe import Probe
+from hotlever.spieser2017 import published
 from of_materials import (
     FILM,
     NITRIDE,
@@ -18,16 +28,6 @@ from of_materials import (
     p_type_probe,
     silicon_with_a_film,
 )
-
-from hotlever.errors import BranchEndError, InputError
-from hotlever.lever import Lever
-from hotlever.lever.lever import COARSE
-from hotlever.lever.sensitivities import by_parameter
-from hotlever.lever.similar import SimilarLevers
-from hotlever.lever3d import SolidLever
-from hotlever.materials import HIGH_DOPED
-from hotlever.probe import Probe
-from hotlever.spieser2017 import published
 
 OPTION_III = published("option III").material
 BIAS = [2.0, 7.22, 9.0]

@@ -83,7 +83,7 @@ def test_a_narrow_prior_is_a_fixed_parameter(data):
 def test_the_shares_add_up_to_the_covariance(data):
     options = FitOptions(priors=default_priors(NOMINAL))
     one = estimate(data[0], NOMINAL, options)
-    shares = one.problem.shares(one.optimum)
+    shares = one.problem.objective.shares(one.optimum.prediction)
     assert set(shares) == {"measurement", *options.priors}
     total = np.sum(list(shares.values()), axis=0)
     scale = np.sqrt(np.diag(one.covariance))

@@ -30,12 +30,12 @@ def compared(off: np.ndarray, bias: np.ndarray = BIAS, tip: bool = False) -> Res
 
 def test_noise_is_described():
     residuals = compared(0.01 * np.random.default_rng(1).standard_normal(COUNT))
-    assert undescribed(residuals, MODEL) == ""
+    assert undescribed(residuals, MODEL, with_priors=True) == ""
     assert off_together(residuals, MODEL) == ""
 
 
 def test_what_is_off_smoothly_is_not_and_the_worst_place_is_named():
-    text = undescribed(compared(0.05 * ALONG**3), MODEL)
+    text = undescribed(compared(0.05 * ALONG**3), MODEL, with_priors=True)
     assert text.startswith("current differs by 1.8%")
     assert text.endswith("most at 11 V")
 
@@ -43,17 +43,17 @@ def test_what_is_off_smoothly_is_not_and_the_worst_place_is_named():
 def test_a_drift_over_rows_up_and_down_is_not_described():
     bias = np.concatenate([BIAS[::2], BIAS[::-2]])
     values = np.stack([0.1 * bias, np.full(COUNT, np.nan), np.full(COUNT, 300.0)])
-    assert "not at random" in undescribed(compared(0.03 * ALONG, bias), values)
+    assert "not at random" in undescribed(compared(0.03 * ALONG, bias), values, with_priors=True)
 
 
 def test_another_lever_shows_also_in_shuffled_rows():
     order = np.random.default_rng(2).permutation(COUNT)
     residuals = compared(0.05 * ALONG[order], BIAS[order])
-    assert "not at random" in undescribed(residuals, MODEL[:, order])
+    assert "not at random" in undescribed(residuals, MODEL[:, order], with_priors=True)
 
 
 def test_the_scale_of_a_thermometer_is_no_misfit():
-    assert undescribed(compared(0.05 * ALONG, tip=True), MODEL) == ""
+    assert undescribed(compared(0.05 * ALONG, tip=True), MODEL, with_priors=True) == ""
 
 
 @pytest.mark.parametrize(("rows", "alarm"), [((5, 15, 25, 35), False), ((20, 21, 22, 23), True)])

@@ -4,61 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bare import bare_equations
-from skfem import MeshTri
+from made_up_fields import BASE, BIAS, Exact, nodal_state, silicon_strip, source
 from skfem.element import ElementTriP1, ElementTriP2, ElementTriP3
 
 from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.space import LEVER
-from hotlever.materials.doping import tapered_doping
-from hotlever.materials.silicon import conductivity_low_doped, thermal_conductivity
-from hotlever.probe import Taper, Terminal
-from hotlever.spieser2017 import published
-
-LENGTH, WIDTH, BIAS, BASE = 2.0, 1.0, 1.5, 293.0
-TAPER = Taper((1.0, 0.5), (1.0, 0.0), 2.0)
-MATERIAL = published("option III").material
-
-
-class Exact:
-    """Temperature and potential that satisfy all boundary conditions, with derivatives."""
-
-    def __init__(self, amplitude: float) -> None:
-        self.amplitude = amplitude
-
-    def temperature(self, x, y):
-        a, kx, ky = self.amplitude, np.pi / LENGTH, np.pi / WIDTH
-        s, c, b, d = np.sin(kx * x), np.cos(kx * x), 1 + 0.3 * np.cos(ky * y), np.sin(ky * y)
-        value = BASE + a * s * b
-        gradient = np.stack([a * kx * c * b, -0.3 * a * ky * s * d])
-        laplacian = -a * kx**2 * s * b - 0.3 * a * ky**2 * s * np.cos(ky * y)
-        return value, gradient, laplacian
-
-    def potential(self, x, y):
-        kx, ky = np.pi / LENGTH, np.pi / WIDTH
-        wave, along = np.cos(ky * y), np.sin(kx * x)
-        value = BIAS * x / LENGTH + 0.2 * along * wave
-        gradient = np.stack(
-            [BIAS / LENGTH + 0.2 * kx * np.cos(kx * x) * wave, -0.2 * ky * along * np.sin(ky * y)]
-        )
-        return value, gradient, -0.2 * (kx**2 + ky**2) * along * wave
-
-    def loads(self, x, y):
-        """Heat and charge sources (W/cm³-like, per cm of the laws) in strong form."""
-        T, grad_T, lap_T = self.temperature(x, y)
-        _, grad_V, lap_V = self.potential(x, y)
-        kappa, kappa_by = thermal_conductivity(T, MATERIAL.c_kappa)
-        n, n_by = tapered_doping([2.0 - x, x], MATERIAL.n_d, MATERIAL.delta, n_hd=MATERIAL.n_hd)
-        sigma, sigma_by = conductivity_low_doped(T, n, MATERIAL.p)
-        grad_sigma = sigma_by["T"] * grad_T
-        grad_sigma[0] += sigma_by["n"] * (n_by["distances"][1] - n_by["distances"][0])
-        heat = (
-            -kappa_by["T"] * (grad_T**2).sum(axis=0)
-            - kappa * lap_T
-            - sigma * (grad_V**2).sum(axis=0)
-        )
-        charge = -(grad_sigma * grad_V).sum(axis=0) - sigma * lap_V
-        return heat, charge
 
 
 class Loaded:
@@ -67,12 +17,7 @@ class Loaded:
     def __init__(self, equations, exact) -> None:
         self.equations, space = equations, equations.space
         self.scale, self.step_limit = equations.scale, equations.step_limit
-        points = space.weights.size
-        sheet = 0.1 * space.thickness_um * space.weights[:, 0]
-        values = space.elements.sampling[:points]
-        heat, charge = (
-            values.T @ (sheet * load) for load in exact.loads(*space.elements.positions)
-        )
+        heat, charge = (source(space, load) for load in exact.loads(*space.elements.positions))
         self.loads = space.from_nodal(heat, charge, 0.0)[:, None]
 
     def residual(self, x, which):
@@ -86,25 +31,11 @@ class Loaded:
 
 def errors(element, refinements, amplitude):
     """L2 errors of temperature and potential on a mesh of squares cut in two."""
-    count = 2**refinements
-    mesh = MeshTri.init_tensor(
-        np.linspace(0, LENGTH, 2 * count + 1), np.linspace(0, WIDTH, count + 1)
-    )
-    equations = bare_equations(
-        mesh,
-        Terminal("supply", (LENGTH, 0.0), (LENGTH, WIDTH)),
-        Terminal("ground", (0.0, 0.0), (0.0, WIDTH)),
-        (1.0, 0.5),
-        MATERIAL,
-        taper=TAPER,
-        element=element,
-        quadrature=10,
-    )
+    equations = silicon_strip(element, 2**refinements)
     exact = Exact(amplitude)
     space = equations.space
-    x, y = space.elements.nodes
-    start = space.from_nodal(exact.temperature(x, y)[0] - BASE, exact.potential(x, y)[0], BIAS)
-    solved = find_roots(Loaded(equations, exact), start[:, None], NewtonOptions()).x
+    start = nodal_state(space, exact)
+    solved = find_roots(Loaded(equations, exact), start, NewtonOptions()).x
     points, weights = space.elements.positions, space.elements.weights
     values = space.elements.sampling[: weights.size]
     return [

@@ -39,8 +39,6 @@ TABLE_COLUMNS = (
     *("bias_V", "lever_V", "current_mA", "power_mW"),
     *("tip_K", "tip_stderr_K", "tip_low_K", "tip_high_K"),
 )
-#: Standard errors that 95 % of a normal distribution lie within.
-_BAND = 1.96
 
 
 @dataclass(frozen=True)
@@ -190,8 +188,6 @@ class Calibration:
 
 def table_of(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:
     """Return the table of a calibration: `TABLE_COLUMNS`, and the error by source."""
-    tip, wide = columns["tip_K"], _BAND * columns["tip_stderr_K"]
-    columns = {**columns, "tip_low_K": tip - wide, "tip_high_K": tip + wide}
     errors = (("source", "bias"), np.array(list(budget.values())))
     return labelled(
         {**columns, "budget_K": errors},

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.calibration.knee import Knee
+from hotlever.calibration.limits import BAND, profile_of_tip
 from hotlever.calibration.plausibility import misfit
 from hotlever.errors import ComputationError
 from hotlever.fitting import Fit, FitOptions, Measurement
@@ -66,6 +67,8 @@ class Estimated:
         Even rows over the measured range.
     parts : dict of str to ndarray
         Standard error of the tip temperature (K) at the rows, by source; independent of each other.
+    tip_low_K, tip_high_K : ndarray, shape (n,)
+        What 95 % lie between; they are as far away as the errors say, unless these do not hold.
     priors : dict of str to PriorUse
     reason : str
         Why the data are not described; empty if they are.
@@ -77,6 +80,8 @@ class Estimated:
     current_mA: Array
     tip_K: Array
     parts: dict[str, Array]
+    tip_low_K: Array
+    tip_high_K: Array
     priors: dict[str, PriorUse]
     reason: str
     notes: list[str]
@@ -214,28 +219,55 @@ def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Pr
     predicted = found.predicted(bias)
     slopes = found.slopes(predicted)[list(OBSERVABLES).index("tip")]
     parts: dict[str, Array] = {}
-    for name, share in found.problem.shares(found.optimum).items():
+    for name, share in found.problem.objective.shares(found.optimum.prediction).items():
         source = name if name in ("measurement", "fit") else _source(name)
         variance = np.einsum("bi,ij,bj->b", slopes, share, slopes)
         parts[source] = parts.get(source, 0.0) + variance
-    rise = predicted.values[2] - best.circuit.base_temperature_K
-    parts["model"] = _error_of_model(best.surroundings.medium, bias, rise) ** 2
+    tip = predicted.values[2]
+    of_model = _error_of_model(
+        best.surroundings.medium, bias, tip - best.circuit.base_temperature_K
+    )
+    stderr = np.sqrt(np.sum(list(parts.values()), axis=0))
+    (low, high), lopsided = _limits(found, tip, stderr, of_model)
+    parts["model"] = of_model**2
     use = found.priors(known)
     return Estimated(
         probe=best,
         bias_V=bias,
         current_mA=predicted.values[0],
-        tip_K=predicted.values[2],
+        tip_K=tip,
         parts={source: np.sqrt(variance) for source, variance in parts.items()},
+        tip_low_K=low,
+        tip_high_K=high,
         priors=use,
         reason=misfit(residuals, found.optimum.prediction.values, use),
         notes=[
             *found.notes,
             *_search(found.problem),
+            *lopsided,
             *residuals.suspicious(found.optimum.prediction.values, robust=True),
         ],
         _estimate=found,
     )
+
+
+def _limits(
+    found: Estimate, tip: Array, stderr: Array, of_model: Array
+) -> tuple[tuple[Array, Array], list[str]]:
+    """Return what 95 % of the tip temperatures lie between (K), and words if that is lopsided."""
+    objective, at = found.problem.objective, found.optimum.prediction
+    if not objective.informed:
+        away = BAND * np.hypot(stderr, of_model)
+        return (tip - away, tip + away), []
+    profile = profile_of_tip(objective, at, found.problem.others(at), found.covariance)
+    low, high = profile.limits(tip, stderr, of_model)
+    if profile.linear:
+        return (low, high), []
+    return (low, high), [
+        "the tip temperature is not a linear function of what is unknown, so that its limits come "
+        f"from estimates of hotter and colder levers: at {tip[-1]:.0f} K 95 % lie from "
+        f"{low[-1]:.0f} to {high[-1]:.0f} K"
+    ]
 
 
 def _error_of_model(medium: str, bias: Array, rise: Array) -> Array:

@@ -13,10 +13,11 @@ from hotlever.calibration.calibration import TABLE_COLUMNS, Calibration, table_o
 from hotlever.calibration.causes import Causes
 from hotlever.calibration.inference import Estimated, estimated
 from hotlever.calibration.knee import IVCurve
+from hotlever.calibration.limits import BAND
 from hotlever.calibration.plausibility import check_plausible, remarks
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.power_law_fit import fit_power_law
-from hotlever.calibration.rule import by_rule
+from hotlever.calibration.rule import ByRule, by_rule
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting import Fit, Measurement, read_fit
@@ -131,7 +132,7 @@ def _by_estimate(
     circuit = found.probe.circuit
     shown = circuit.power(measured.bias_V, measured.current_mA)
     return Calibration(
-        table=_table(circuit, found.bias_V, found.current_mA, found.tip_K, found.parts),
+        table=_table(circuit, found, found.parts, (found.tip_low_K, found.tip_high_K)),
         route=route,
         medium=medium,
         power_law=law,
@@ -170,7 +171,7 @@ def _by_rule(
     k = at_knee / used.threshold_mW
     own = reference.at(circuit.power(measured.bias_V, measured.current_mA), at_knee)
     return Calibration(
-        table=_table(circuit, found.bias_V, found.current_mA, found.tip_K, parts),
+        table=_table(circuit, found, parts),
         route=route,
         medium="vacuum",
         power_law=used,
@@ -187,13 +188,18 @@ def _by_rule(
 
 
 def _table(
-    circuit: Circuit, bias: Array, current: Array, tip: Array, parts: dict[str, Array]
+    circuit: Circuit,
+    found: Estimated | ByRule,
+    parts: dict[str, Array],
+    limits: tuple[Array, Array] | None = None,
 ) -> xr.Dataset:
-    """Return the table of a calibration, of what was found at its rows."""
+    """Return the table of a calibration; 95 % lie as far away as its errors say without limits."""
+    bias, current, tip = found.bias_V, found.current_mA, found.tip_K
     total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
+    low, high = limits or (tip - BAND * total, tip + BAND * total)
     lever = circuit.lever_voltage(bias, current)
-    columns = (bias, lever, current, lever * current, tip, total)
-    return table_of(dict(zip(TABLE_COLUMNS, columns, strict=False)), parts)
+    columns = (bias, lever, current, lever * current, tip, total, low, high)
+    return table_of(dict(zip(TABLE_COLUMNS, columns, strict=True)), parts)
 
 
 def _law_of(vacuum: Branch, threshold: float | None) -> tuple[PowerLaw, float]:

@@ -1,6 +1,18 @@
 """All commands: importing a command's module registers it on the application."""
 
-from hotlever.cli import cache, calibrate, design, fit, materials, probe, raman, reproduce, sweep
+from hotlever.cli import (
+    cache,
+    calibrate,
+    design,
+    fit,
+    materials,
+    probe,
+    pulse,
+    raman,
+    reproduce,
+    spectrum,
+    sweep,
+)
 from hotlever.cli.application import app
 
 __all__ = [
@@ -11,7 +23,9 @@ __all__ = [
     "fit",
     "materials",
     "probe",
+    "pulse",
     "raman",
     "reproduce",
+    "spectrum",
     "sweep",
 ]

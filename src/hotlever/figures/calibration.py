@@ -90,7 +90,7 @@ def twins(found: xr.Dataset) -> Figure:
         From `hotlever.studies.twins.together`.
     """
     largest, other = abs(found.off_K).max("row"), found.other_law.values
-    ratio = (found.off_K.sel(way=ESTIMATE) / found.tip_stderr_K).transpose("twin", "row")
+    ratio = (found.off_K.sel(way=ESTIMATE) / found.stated_K).transpose("twin", "row")
     laws = [law for law in (False, True) if law in other]
     with figure(8.0, 3.8, 1, 2, letters=True) as (made, (by_way, by_bias)):
         beside: Any = {"transform": by_way.get_yaxis_transform(), "va": "center", "fontsize": 8}

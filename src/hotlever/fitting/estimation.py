@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hotlever import memory
 from hotlever.errors import BranchEndError, ComputationError, InputError, unknown_name
 from hotlever.fitting.common_errors import errors_of_scales
 from hotlever.fitting.least_squares import LeastSquares, Optimum
@@ -90,12 +91,11 @@ class Estimate:
     @cached_property
     def covariance(self) -> Array:
         """Covariance of the varied parameters in their own units."""
-        return self.problem.covariance(self.optimum)
+        return self.problem.objective.covariance(self.optimum.prediction)
 
     def slopes(self, prediction: Prediction) -> Array:
         """Return the derivatives of a prediction by the varied parameters, (3, n, p)."""
-        known = self.problem.model.names
-        return prediction.slopes[:, :, [known.index(name) for name in self.options.varied]]
+        return prediction.slopes[:, :, self.problem.objective.columns]
 
     @property
     def known(self) -> dict[str, Prior]:
@@ -144,6 +144,8 @@ def estimate(
     data of an observable may be wrong together, by the scale of their meter or thermometer.
     """
     began = time.perf_counter()
+    # what an earlier one used
+    memory.give_back()
     measurement = Measurement.given(measurement)
     given = Probe.reference() if probe is None else Probe.given(probe)
     probe, notes = with_measured_circuit(given, measurement, options.medium)

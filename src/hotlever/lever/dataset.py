@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
-from hotlever.datasets import labelled
+from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import InputError
-from hotlever.files import read_text, whole_file, write_text
+from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES
 from hotlever.probe import Probe
 from hotlever.probe.parameters import usual_parameters
@@ -86,10 +87,15 @@ def _resistance(heat_mW: Array, current_mA: Array) -> Array:
     return np.divide(1000.0 * heat_mW, current_mA**2, out=nothing, where=current_mA > 0)
 
 
+def laws_end_K(probe: Probe) -> float:
+    """Return the temperature (K) beyond which a law of a probe's materials is extrapolated."""
+    laws = [law for kind in probe.made_of.values() for law in kind.laws]
+    return min(law.temperature_range[1] for law in laws)
+
+
 def _range_notes(probe: Probe, bias_V: Array, max_K: Array) -> list[str]:
     """Say where the laws are used beyond the temperatures they are meant for."""
-    laws = [law for kind in probe.made_of.values() for law in kind.laws]
-    limit = min(law.temperature_range[1] for law in laws)
+    limit = laws_end_K(probe)
     beyond = bias_V[max_K > limit]
     if not beyond.size:
         return []
@@ -107,24 +113,12 @@ def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
     InputError
         If the suffix is neither, or the file cannot be written.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix == ".csv":
-        write_text(path, sweep_csv(data))
-    elif suffix == ".nc":
-        with whole_file(path) as temporary:
-            data.to_netcdf(temporary, engine="netcdf4")
-    else:
-        raise InputError(f"{path}: unknown file type '{suffix}', expected .csv or .nc")
+    write_dataset(data, path, SWEEP_COLUMNS)
 
 
 def sweep_csv(data: xr.Dataset) -> str:
     """Return a sweep as CSV text, one row per bias; empty where a value does not exist."""
-    columns = [data[name].values for name in SWEEP_COLUMNS]
-    rows = (
-        ",".join("" if np.isnan(value) else f"{value:.10g}" for value in row)
-        for row in zip(*columns, strict=True)
-    )
-    return "\n".join([",".join(SWEEP_COLUMNS), *rows]) + "\n"
+    return csv_text(data, SWEEP_COLUMNS)
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -152,3 +146,20 @@ def probe_of(data: xr.Dataset) -> Probe:
     """Return the probe that a sweep was made of."""
     sections = {name: json.loads(data.attrs[name]) for name in SECTIONS if name in data.attrs}
     return Probe.from_values(sections, "sweep")
+
+
+def checked_bias(bias: ArrayLike) -> Array:
+    """Return biases as an array.
+
+    Raises
+    ------
+    InputError
+        If one is negative or not finite, or there is none.
+    """
+    values = np.atleast_1d(np.asarray(bias, dtype=float))
+    wrong = values[~(values >= 0) | ~np.isfinite(values)]
+    if wrong.size:
+        raise InputError(f"found a bias of {wrong[0]:g} V, expected finite biases of 0 or more")
+    if not values.size:
+        raise InputError("no bias, expected one or more")
+    return values

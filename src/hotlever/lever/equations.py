@@ -118,11 +118,35 @@ class LeverEquations:
         unit = PER_CM_TO_MILLI_PER_UM * self.space.air.gas_conductivity
         return unit * theta, unit * by["T"]
 
-    def factorised(self, x: Array, pin: Pin = TIP) -> Factors:
-        """Return the factorised Jacobians of states, with the row of a pin last."""
+    def heat_density(self, T: Array) -> tuple[Array, Array]:
+        """Return the heat above that at the base temperature (nJ/µm²), and its slope by T.
+
+        Thickness included, at temperatures (K), (points, n).
+        """
+        held, by = self._stacks.heat(T)
+        cold, _ = self._stacks.heat(np.full((len(T), 1), self.base_temperature_K))
+        return held - cold, by
+
+    def stored(self, x: Array) -> Array:
+        """Return the heat stored in states (nJ), tested as `balance` tests, (size + 1, n).
+
+        In time `balance` is what it loses per µs.
+        """
+        fields, _ = self.at(x)
+        nothing = np.zeros_like(fields.grad_T)
+        return self.space.weak_form(Fluxes(self.heat_density(fields.T)[0], nothing, nothing))
+
+    def factorised(self, x: Array, pin: Pin = TIP, per_us: float = 0.0) -> Factors:
+        """Return the factorised Jacobians of states, with the row of a pin last.
+
+        They are those of `balance` and so many times (1/µs) that of `stored`.
+        """
         fields, laws = self.at(x)
+        heat_source_T = -laws.sigma_by["T"] * square(fields.grad_V)
+        if per_us:
+            heat_source_T = heat_source_T + per_us * self.heat_density(fields.T)[1]
         tangent = Tangent(
-            heat_source_T=-laws.sigma_by["T"] * square(fields.grad_V),
+            heat_source_T=heat_source_T,
             heat_flux_T=laws.kappa_by["T"] * fields.grad_T,
             kappa=laws.kappa,
             heat_source_V=-2.0 * laws.sigma * fields.grad_V,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
+from xml.etree import ElementTree
 
 import meshio
 import numpy as np
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from skfem import MeshTri
 
 from hotlever.datasets import labelled
-from hotlever.files import whole_file
+from hotlever.files import whole_file, write_text
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
@@ -143,6 +145,16 @@ def write_vtu(fields: FieldMap, path: str | os.PathLike[str]) -> None:
     )
     with whole_file(path) as temporary:
         mesh.write(temporary, file_format="vtu")
+
+
+def write_pvd(times: Sequence[float], names: Sequence[str], path: str | os.PathLike[str]) -> None:
+    """Write the index of a series of VTU files in time (µs), which ParaView opens as one."""
+    collection = ElementTree.Element("VTKFile", type="Collection", version="0.1")
+    parts = ElementTree.SubElement(collection, "Collection")
+    for time, name in zip(times, names, strict=True):
+        ElementTree.SubElement(parts, "DataSet", timestep=f"{time:.10g}", file=name)
+    ElementTree.indent(collection)
+    write_text(path, ElementTree.tostring(collection, encoding="unicode") + "\n")
 
 
 def heater_profile(state: State, count: int = 161) -> xr.Dataset:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -17,7 +18,7 @@ from hotlever.air.surface import PanelOptions
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.balances import balance_columns, balance_slopes
 from hotlever.lever.branch import Branch, Reach, Reading
-from hotlever.lever.dataset import at_bias, sweep_dataset
+from hotlever.lever.dataset import at_bias, checked_bias, sweep_dataset
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.following import Follower
 from hotlever.lever.full_space import FullSpace
@@ -29,6 +30,9 @@ from hotlever.probe import Circuit, Layout, MeshOptions, Probe, mesh_layout
 from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+
+if TYPE_CHECKING:
+    from hotlever.lever.transient.waveform import Waveform
 
 #: Tip temperature (K) up to which branches are followed: where the material laws end.
 HOTTEST = 1300.0
@@ -319,6 +323,27 @@ class Lever:
         found = sensitivities_of(branch, u, self.circuit, names) if sensitivities else None
         return sweep_dataset(self.probe, shown, branch.through(balances, slopes)(u), notes, found)
 
+    @one_blas_thread
+    def pulse(
+        self,
+        waveform: Waveform,
+        until: float | None = None,
+        at: ArrayLike | None = None,
+        **options: Any,
+    ) -> xr.Dataset:
+        """Follow the lever in time (µs); see `hotlever.lever.transient.history.followed`.
+
+        Examples
+        --------
+        >>> from hotlever.lever.transient import pulse
+        >>> history = Lever(Probe.reference()).pulse(pulse(10.0, 5.0), at=[5.0, 100.0])
+        >>> history.tip_K.values.round().tolist()
+        [410.0, 293.0]
+        """
+        from hotlever.lever.transient.history import followed
+
+        return followed(self, waveform, until, at, **options)
+
     def knee(self) -> xr.Dataset:
         """Return the knee of the I-V curve, dV_l/dI_h = 0, as a sweep of one state.
 
@@ -344,23 +369,6 @@ class Lever:
 def _flat_space(layout: Layout, mesh: MeshOptions) -> FullSpace:
     """Return mesh and operators of a layout in vacuum; levers of one shape share them."""
     return FullSpace(mesh_layout(layout, mesh))
-
-
-def checked_bias(bias: ArrayLike) -> Array:
-    """Return biases as an array.
-
-    Raises
-    ------
-    InputError
-        If one is negative or not finite, or there is none.
-    """
-    values = np.atleast_1d(np.asarray(bias, dtype=float))
-    wrong = values[~(values >= 0) | ~np.isfinite(values)]
-    if wrong.size:
-        raise InputError(f"found a bias of {wrong[0]:g} V, expected finite biases of 0 or more")
-    if not values.size:
-        raise InputError("no bias, expected one or more")
-    return values
 
 
 def sweep(

@@ -1,4 +1,4 @@
-"""Sheet conductivities of what lies on one another, at the quadrature points of a lever.
+"""Sheet conductivities of what lies on one another, at the quadrature points, and its heat.
 
 Films conduct beside each other: κ and σ of a region are the sums over its films of thickness times
 conductivity. The laws are those of the materials (`hotlever.materials.kinds`). Parameters have the
@@ -22,6 +22,8 @@ from hotlever.types import Array
 
 #: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
 PER_CM_TO_MILLI_PER_UM = 0.1
+#: J/cm³ to nJ/µm³; with times in µs, nJ are mW µs.
+PER_CM3_TO_NANO_PER_UM3 = 1e-3
 #: How many times as well as air the gas conducts, a parameter of no material.
 GAS = "gas_conductivity"
 
@@ -163,6 +165,16 @@ class Stacks:
         if self._air is not None:
             self._take_off_air(total, T, names)
         return total
+
+    def heat(self, T: Array) -> tuple[Array, Array]:
+        """Return the enthalpy (nJ/µm²) at temperatures (K), (points, n), and its slope by T."""
+        held, by_T = np.zeros(T.shape), np.zeros(T.shape)
+        for film in self._films:
+            here, sheet = film.film.points, PER_CM3_TO_NANO_PER_UM3 * film.film.counted_um
+            enthalpy, by = film.kind.enthalpy(T[here])
+            held[here] += sheet * enthalpy
+            by_T[here] += sheet * by["T"]
+        return held, by_T
 
     def _take_off_air(self, total: Conductivities, T: Array, names: Sequence[str]) -> None:
         """Take off what the air would conduct that fills the plate, see `LeverEquations`."""

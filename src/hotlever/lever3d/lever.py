@@ -16,10 +16,10 @@ from skfem.element import ElementTetP2
 
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
-from hotlever.lever.dataset import at_bias
+from hotlever.lever.dataset import at_bias, checked_bias
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.lever import Lever, checked_bias
+from hotlever.lever.lever import Lever
 from hotlever.lever.state import State
 from hotlever.lever3d.still_air import OpenAir, ngsolve
 from hotlever.probe import Probe

@@ -11,7 +11,9 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
+from hotlever.errors import InputError
 from hotlever.materials.dielectric import dielectric_conductivity
+from hotlever.materials.heat import enthalpy, enthalpy_by_capacity
 from hotlever.materials.laws import FORMULA_TO, Evaluated, Law
 from hotlever.materials.metal import constant_conductivity, metal_conductivity, wiedemann_franz
 from hotlever.materials.p_silicon import conductivity_p, inversion_temperature_p
@@ -113,6 +115,10 @@ class Kind(Record):
         """
         raise NotImplementedError
 
+    def enthalpy(self, T: Array) -> Evaluated:
+        """Return the heat held above that at 298.15 K (J cm⁻³), with its derivative by ``T``."""
+        raise NotImplementedError
+
 
 class Silicon(Kind):
     """What all kinds of silicon have in common."""
@@ -135,6 +141,35 @@ class Silicon(Kind):
     def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
         """Return κ (W cm⁻¹ K⁻¹), see `Kind.thermal_conductivity`."""
         return self._heat(T, thickness_um if self.c_kappa == BY_THICKNESS else self.c_kappa)
+
+    def enthalpy(self, T: Array) -> Evaluated:
+        """Return the heat held (J cm⁻³), see `Kind.enthalpy`."""
+        return enthalpy(T)
+
+
+class Stored(Kind):
+    """What materials have in common whose heat capacity is a number."""
+
+    heat_capacity: float | None = Field(
+        default=None,
+        ge=0.5,
+        le=10.0,
+        description="heat capacity (J cm⁻³ K⁻¹), which counts in time",
+    )
+
+    def enthalpy(self, T: Array) -> Evaluated:
+        """Return the heat held (J cm⁻³), see `Kind.enthalpy`.
+
+        Raises
+        ------
+        InputError
+            If no heat capacity was given.
+        """
+        if self.heat_capacity is None:
+            raise InputError(
+                f"a {self.kind} without heat_capacity (J cm⁻³ K⁻¹) cannot be followed in time"
+            )
+        return enthalpy_by_capacity(T, self.heat_capacity)
 
 
 class LowDopedSilicon(Silicon):
@@ -219,7 +254,7 @@ class HighDopedSilicon(Silicon):
         return conductivity_high_doped(T, self.a0, self.a1)
 
 
-class MetalFilm(Kind):
+class MetalFilm(Stored):
     """A metal film; the values of a bulk metal are where a fit may start."""
 
     declared: ClassVar = _METAL
@@ -274,7 +309,7 @@ class MetalFilm(Kind):
         return metal_conductivity(T, self.resistivity, self.tcr)
 
 
-class Dielectric(Kind):
+class Dielectric(Stored):
     """An insulator, which carries heat alone."""
 
     declared: ClassVar = _DIELECTRIC

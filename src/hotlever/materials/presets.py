@@ -13,7 +13,10 @@ from hotlever.materials.material import HIGH_DOPED, LOW_DOPED
 from hotlever.materials.metal import SOMMERFELD
 from hotlever.spieser2017 import published
 
-_CRC = "CRC Handbook of Chemistry and Physics, resistivity at 293 and 400 K, κ at 300 K"
+_CRC = (
+    "CRC Handbook of Chemistry and Physics, resistivity at 293 and 400 K, κ at 300 K, heat "
+    "capacity at 298 K"
+)
 
 
 @dataclass(frozen=True)
@@ -25,8 +28,10 @@ class Preset:
     source: str
 
 
-def _metal(at_293: float, at_400: float, kappa: float, melts_K: float, source: str) -> Preset:
-    """Make a preset of two resistivities (µΩ cm) and κ at 300 K (W m⁻¹ K⁻¹)."""
+def _metal(
+    at_293: float, at_400: float, kappa: float, melts_K: float, heat_capacity: float, source: str
+) -> Preset:
+    """Make a preset of two resistivities (µΩ cm), κ at 300 K (W m⁻¹ K⁻¹) and c (J cm⁻³ K⁻¹)."""
     tcr = (at_400 / at_293 - 1.0) / 107.0
     by_electrons = SOMMERFELD * 300.0 / (1e-6 * at_293 * (1.0 + 7.0 * tcr))
     values = {
@@ -34,28 +39,31 @@ def _metal(at_293: float, at_400: float, kappa: float, melts_K: float, source: s
         "tcr": round(tcr, 6),
         "lorenz_ratio": round(0.01 * kappa / by_electrons, 3),
         "melting_point_K": melts_K,
+        "heat_capacity": heat_capacity,
     }
     return Preset("metal-film", values, source)
 
 
 #: By the name that goes with ``preset = "..."``.
 PRESETS: dict[str, Preset] = {
-    "Pt": _metal(10.5, 14.6, 71.6, 2041.0, _CRC),
-    "Pd": _metal(10.54, 14.48, 71.8, 1828.0, f"{_CRC}; Matula, JPCRD 8, 1147 (1979)"),
-    "Cr": _metal(12.5, 15.8, 93.9, 2180.0, _CRC),
-    "Au": _metal(2.214, 3.107, 318.0, 1337.0, f"{_CRC}; Matula, JPCRD 8, 1147 (1979)"),
+    "Pt": _metal(10.5, 14.6, 71.6, 2041.0, 2.85, _CRC),
+    "Pd": _metal(10.54, 14.48, 71.8, 1828.0, 2.93, f"{_CRC}; Matula, JPCRD 8, 1147 (1979)"),
+    "Cr": _metal(12.5, 15.8, 93.9, 2180.0, 3.21, _CRC),
+    "Au": _metal(2.214, 3.107, 318.0, 1337.0, 2.49, f"{_CRC}; Matula, JPCRD 8, 1147 (1979)"),
     "NiCr": _metal(
-        *(108.0, 109.3, 13.4, 1673.0),
-        "80 % Ni, 20 % Cr: makers' data (108 µΩ cm and 1.1e-4 K⁻¹ at 293 K, κ 13.4 W/(m K))",
+        *(108.0, 109.3, 13.4, 1673.0, 3.78),
+        "80 % Ni, 20 % Cr: makers' data (108 µΩ cm and 1.1e-4 K⁻¹ at 293 K, κ 13.4 W/(m K), "
+        "0.45 J/(g K))",
     ),
     "SiN": Preset(
         "dielectric",
-        {"kappa": 0.032, "kappa_exponent": 0.33},
-        "LPCVD, low stress: Mastrangelo et al., Sens. Actuators A 23, 856 (1990); m of SiO₂",
+        {"kappa": 0.032, "kappa_exponent": 0.33, "heat_capacity": 2.1},
+        "LPCVD, low stress: Mastrangelo et al., Sens. Actuators A 23, 856 (1990), 3.0 g/cm³ and "
+        "0.7 J/(g K); m of SiO₂",
     ),
     "SiO2": Preset(
         "dielectric",
-        {"kappa": 0.0138, "kappa_exponent": 0.33},
+        {"kappa": 0.0138, "kappa_exponent": 0.33, "heat_capacity": 1.63},
         "fused: Touloukian et al., Thermophysical Properties of Matter 2 (1970), 300 to 600 K",
     ),
 }

@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 
 from hotlever.calibration.knee import IVCurve, find_knee
+from hotlever.calibration.limits import BAND
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
@@ -194,9 +195,10 @@ def judge(
     xarray.Dataset
         ``off_K`` on ``way`` and ``row`` (of the calibration's table), the error above 400 K, NaN
         below, and throughout for a way that gave no answer; ``tip_K``, the truth, and
-        ``tip_stderr_K``, as the estimate states it; ``seconds`` of processor; as texts ``refused``,
-        why there is no estimate, and ``doubted``, why it says that the data are not described; as
-        coordinates ``twin``, the number, and ``other_law``, whether the mobility is not Eq. 8's.
+        ``stated_K``, the error that the estimate states on that side; ``seconds`` of processor; as
+        texts ``refused``, why there is no estimate, and ``doubted``, why it says that the data are
+        not described; as coordinates ``twin``, the number, and ``other_law``, whether the mobility
+        is not Eq. 8's.
 
     Raises
     ------
@@ -216,15 +218,17 @@ def judge(
     seconds = time.process_time() - began
     if not refused:
         rows, doubted = found.table, found.reason
-        tip, stated = lever.sweep(rows.bias_V.values).tip_K.values, rows.tip_stderr_K.values
+        tip = lever.sweep(rows.bias_V.values).tip_K.values
         off[0] = rows.tip_K.values - tip
+        limit = np.where(off[0] > 0, rows.tip_low_K.values, rows.tip_high_K.values)
+        stated = np.abs(limit - rows.tip_K.values) / BAND
         with suppress(HotleverError):
             for place, way in enumerate(paper_ways(data, nominal), start=1):
                 off[place] = way(rows.power_mW.values) - tip
     columns = {
         "off_K": (("way", "row"), np.where(tip > HOT, off, np.nan)),
         "tip_K": ("row", tip),
-        "tip_stderr_K": ("row", stated),
+        "stated_K": ("row", stated),
         "seconds": seconds,
         "refused": refused,
         "doubted": doubted,
@@ -250,7 +254,7 @@ def summary(found: xr.Dataset) -> xr.Dataset:
         every bias, and how many were ``answered``.
     """
     answered = found.isel(twin=(found.refused == "").values)
-    ratio = abs(answered.off_K.sel(way=ESTIMATE) / answered.tip_stderr_K).values
+    ratio = abs(answered.off_K.sel(way=ESTIMATE) / answered.stated_K).values
     largest = abs(answered.off_K).max("row").transpose("way", "twin").values
     parts = [np.array_split(one[np.isfinite(one)], _DECILES) for one in ratio]
     held = [

@@ -1,0 +1,159 @@
+"""How far the tip temperature may be off either way, where the linearised error may not hold.
+
+The profile: all parameters are estimated anew with the tip temperature at one bias pulled away, on
+either side. The sum of squares, of which each unit is a standard deviation squared, then rises by
+the square of how many standard errors away it is. A linearised error is that for small changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize
+
+from hotlever.errors import ComputationError
+from hotlever.fitting.models import Prediction
+from hotlever.fitting.objective import UNSOLVED, Objective, Vicinity
+from hotlever.types import Array
+
+#: Standard errors that 95 % of a normal distribution lie within.
+BAND = 1.96
+#: Biases at which the tip temperature is pulled away, and by how many standard errors.
+_PLACES, _AWAY = 5, 2.0
+#: Most times that it is pulled, each with the error found before, unless that changes by less.
+_ROUNDS, _NEARLY = 3, 0.1
+#: Relative change of the sum of squares at which a pulled estimate is found.
+_FOUND = 1e-5
+#: A rise of the sum of squares below which a side is open.
+_LEAST_RISE = 0.25
+#: A linearised error that is right within this factor holds.
+_ALIKE = 1.25
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Standard errors on either side, as multiples of the linearised one.
+
+    Attributes
+    ----------
+    tip_K : ndarray, shape (k,)
+        Rising.
+    below, above : ndarray, shape (k,)
+    """
+
+    tip_K: Array
+    below: Array
+    above: Array
+
+    @property
+    def linear(self) -> bool:
+        """Whether the linearised error holds everywhere."""
+        return bool(np.abs(np.log([self.below, self.above])).max() < np.log(_ALIKE))
+
+    def limits(self, tip_K: Array, stderr_K: Array, other_K: Array) -> tuple[Array, Array]:
+        """Return what 95 % of the tip temperatures lie between (K).
+
+        The profile is that of the linearised error `stderr_K`; an `other_K` is the same either way.
+        """
+        if self.linear:
+            below = above = np.ones_like(tip_K)
+        else:
+            below, above = (np.interp(tip_K, self.tip_K, side) for side in (self.below, self.above))
+        low, high = (BAND * np.hypot(side * stderr_K, other_K) for side in (below, above))
+        return tip_K - low, tip_K + high
+
+
+def profile_of_tip(
+    objective: Objective, at: Prediction, others: list[Prediction], covariance: Array
+) -> Profile:
+    """Pull the tip temperature of an estimate away from its optimum.
+
+    Parameters
+    ----------
+    objective : Objective
+        Residuals with priors.
+    at : Prediction
+        The optimum.
+    others : list of Prediction
+        Levers near it that have been solved too.
+    covariance : ndarray, shape (p, p)
+        Of the varied parameters, linearised.
+    """
+    vicinity = Vicinity(objective, at, others)
+    least = _squares(vicinity.residual(vicinity.origin))
+    order = np.argsort(at.values[2])
+    some = order[np.linspace(order.size / 3, order.size - 1, _PLACES).astype(int)]
+    found = []
+    for place in some:
+        slope = at.slopes[2, place, objective.columns]
+        along = covariance @ slope
+        stderr = float(np.sqrt(slope @ along))
+        step = _AWAY * along / (stderr * objective.scale)
+        for way in (-1.0, 1.0):
+            multiple, optimum = 1.0, vicinity.origin + way * step
+            for _ in range(_ROUNDS):
+                pulled = _Pulled(vicinity, int(place), way * multiple * stderr)
+                optimum = pulled.estimate(optimum)
+                rise = _squares(vicinity.residual(optimum)) - least
+                away = abs(pulled.tip_K(optimum) - at.values[2, place]) / stderr
+                last, multiple = multiple, away / np.sqrt(max(rise, _LEAST_RISE))
+                if abs(multiple / last - 1.0) < _NEARLY:
+                    break
+            found.append(multiple)
+    below, above = np.reshape(found, (-1, 2)).T
+    return Profile(at.values[2, some], below, above)
+
+
+class _Pulled:
+    """An estimate whose tip temperature at one bias is pulled to one side.
+
+    If it had been measured there as well, twice as far away, with the error that it is known by,
+    the estimate would move half the way: to `_AWAY` standard errors if everything is linear. A
+    negative error is one to the cold side.
+    """
+
+    def __init__(self, vicinity: Vicinity, place: int, stderr: float) -> None:
+        self._vicinity, self._place, self._stderr = vicinity, place, stderr
+        self._target = self.tip_K(vicinity.origin) + 2.0 * _AWAY * stderr
+
+    def tip_K(self, scaled: Array) -> float:
+        return float(self._vicinity.predict(scaled)[0][2, self._place])
+
+    def estimate(self, start: Array) -> Array:
+        """Return the scaled parameters of least squares."""
+        objective = self._vicinity.objective
+        low, high = objective.bounds
+        try:
+            self.tip_K(start)
+        except ComputationError:
+            start = self._vicinity.origin
+        inside = np.clip(start, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
+        found = optimize.least_squares(
+            self._residual,
+            inside,
+            self._jacobian,
+            (low, high),
+            x_scale="jac",
+            ftol=_FOUND,
+            gtol=None,
+            max_nfev=100,
+        )
+        return np.asarray(found.x)
+
+    def _residual(self, scaled: Array) -> Array:
+        known = self._vicinity.residual(scaled)
+        try:
+            return np.append(known, (self.tip_K(scaled) - self._target) / self._stderr)
+        except ComputationError:
+            return np.append(known, UNSOLVED)
+
+    def _jacobian(self, scaled: Array) -> Array:
+        objective = self._vicinity.objective
+        slope = self._vicinity.predict(scaled)[1][2, self._place, objective.columns]
+        row = slope * objective.scale / self._stderr
+        return np.vstack([self._vicinity.jacobian(scaled), row])
+
+
+def _squares(residual: Array) -> float:
+    return float(residual @ residual)

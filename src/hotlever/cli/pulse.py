@@ -1,0 +1,182 @@
+"""``hotlever pulse``: a lever in time, under a bias that changes."""
+
+from __future__ import annotations
+
+from itertools import count as count_up
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from typer import Option
+
+from hotlever.cli.application import app
+from hotlever.cli.options import (
+    File,
+    MediumOption,
+    PlotFile,
+    ProbeFile,
+    check_medium,
+    check_plot,
+    load_probe,
+    parse_settings,
+)
+from hotlever.cli.output import give, note, progress
+from hotlever.errors import HistoryEndError, InputError
+from hotlever.files import Outputs, output_folder
+from hotlever.units import setting
+
+if TYPE_CHECKING:
+    from hotlever.lever import Lever, State
+    from hotlever.lever.transient import Waveform
+
+#: Times that may be asked for; and points of a curve for each step of the solver.
+MOST_TIMES, _CURVE = 10_000, 8
+
+
+@app.command("pulse")
+def pulse_command(
+    probe_file: ProbeFile = None,
+    step: str | None = Option(None, metavar="V", help="Switch the bias on, and leave it."),
+    pulse: str | None = Option(None, metavar="V,TIME", help="A pulse, such as 10V,5us."),
+    period: str | None = Option(None, metavar="TIME", help="Of pulses that are repeated."),
+    count: int | None = Option(None, metavar="N", help="Number of pulses."),
+    ramp: str | None = Option(None, metavar="V,TIME", help="Raise the bias, such as 8V,50us."),
+    sine: str | None = Option(None, metavar="V+V@FREQ", help="Such as 3V+0.5V@20kHz."),
+    waveform: File = Option(None, help="A table of times and biases, such as a supply takes."),
+    until: str | None = Option(None, metavar="TIME", help="When to stop."),
+    at: str | None = Option(
+        None, metavar="TIME,...", help="Times to report; where the solver stepped if left out."
+    ),
+    medium: MediumOption = None,
+    settings: list[str] | None = Option(
+        None, "--set", metavar="NAME=VALUE", help="Change a value of the probe file."
+    ),
+    output: File = Option(
+        None, "-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."
+    ),
+    plot: PlotFile = None,
+    fields: File = Option(None, help="Write the fields as a series of VTU to this folder."),
+) -> None:
+    """Follow a lever in time: steps, pulses, ramps, sines, or what a file says."""
+    from hotlever.lever import Lever
+    from hotlever.lever.transient import history_csv, write_history
+
+    repeated = {"--period": period, "--count": count}
+    wave = _waveform(
+        {"--step": step, "--pulse": pulse, "--ramp": ramp, "--sine": sine}, repeated, waveform
+    )
+    end = None if until is None else setting(until, "us", "--until")
+    times = None if at is None else [setting(one, "us", "--at") for one in at.split(",")]
+    if times is not None and len(times) > MOST_TIMES:
+        raise InputError(f"--at: found {len(times)} times, expected at most {MOST_TIMES}")
+    check_medium(medium)
+    outputs = Outputs(probe_file, waveform)
+    outputs.file(output, ".csv", ".nc")
+    check_plot(outputs, plot)
+    outputs.folder(fields)
+    probe = load_probe(probe_file)
+    probe = probe.with_(**parse_settings(settings, probe))
+    failure: HistoryEndError | None = None
+    # a figure has smooth curves, the table the steps alone
+    per_step = _CURVE if plot is not None and times is None else 1
+    states: list[tuple[float, State]] = []
+    told = count_up()
+    with progress("air") as update:
+        lever = Lever(probe if medium is None else probe.in_medium(medium), progress=update)
+    with progress("pulse") as update:
+
+        def seen(t: float, state: State) -> None:
+            if next(told) % per_step == 0 and fields is not None:
+                states.append((t, state))
+
+        try:
+            curve = lever.pulse(wave, end, times, per_step=per_step, progress=update, seen=seen)
+        except HistoryEndError as error:
+            curve, failure = error.partial, error
+    data = curve.isel(time=slice(None, None, per_step))
+    note(*filter(None, data.attrs["notes"].split("\n")))
+    with outputs.together():
+        if output is not None:
+            write_history(data, output)
+        if plot is not None and data.sizes["time"]:
+            from hotlever import figures
+
+            figures.save_figure(figures.history_overview(curve), plot)
+        if fields is not None:
+            _write_fields(lever, states, output_folder(fields))
+    if output is None:
+        give(history_csv(data))
+    if failure is not None:
+        raise failure
+
+
+def _waveform(
+    texts: dict[str, str | None], repeated: dict[str, str | int | None], path: Path | None
+) -> Waveform:
+    """Make the one wave form that is asked for."""
+    from hotlever.lever import transient
+
+    given = {name: text for name, text in texts.items() if text is not None}
+    if len(given) + (path is not None) != 1:
+        found = ", ".join([*given, *["--waveform"] * (path is not None)]) or "none"
+        expected = ", ".join([*texts, "--waveform"])
+        raise InputError(f"found {found}: expected one of {expected}")
+    alone = [name for name, value in repeated.items() if value is not None]
+    if alone and "--pulse" not in given:
+        raise InputError(f"{alone[0]}: goes with --pulse")
+    if path is not None:
+        return transient.read_waveform(path)
+    ((name, text),) = given.items()
+    try:
+        if name == "--step":
+            return transient.step(setting(text, "V", name, bare=True))
+        if name == "--sine":
+            return transient.sine(*_sine(text))
+        volts, length = _volts_and_time(text, name)
+        if name == "--ramp":
+            return transient.ramp(volts, length)
+        period, count = repeated.values()
+        each = None if period is None else setting(str(period), "us", "--period")
+        return transient.pulse(volts, length, each, 1 if count is None else int(count))
+    except InputError as error:
+        raise error if str(error).startswith("--") else InputError(f"{name}: {error}") from None
+
+
+def _volts_and_time(text: str, where: str) -> tuple[float, float]:
+    """Parse ``10V,5us``.
+
+    Examples
+    --------
+    >>> _volts_and_time("10V,5us", "--pulse")
+    (10.0, 5.0)
+    """
+    volts, comma, length = text.partition(",")
+    if not comma:
+        raise InputError(f"{where}: found '{text}', expected V,TIME such as 10V,5us")
+    return setting(volts, "V", where, bare=True), setting(length, "us", where)
+
+
+def _sine(text: str) -> tuple[float, float, float]:
+    """Parse ``3V+0.5V@20kHz``; the offset may be left out.
+
+    Examples
+    --------
+    >>> _sine("3V+0.5V@20kHz"), _sine("2@1MHz")
+    ((3.0, 0.5, 20000.0), (0.0, 2.0, 1000000.0))
+    """
+    volts, at, frequency = text.partition("@")
+    if not at:
+        raise InputError(f"--sine: found '{text}', expected V+V@FREQ such as 3V+0.5V@20kHz")
+    offset, _, amplitude = volts.rpartition("+")
+    biases = [setting(one, "V", "--sine", bare=True) for one in (offset or "0", amplitude)]
+    return biases[0], biases[1], setting(frequency, "Hz", "--sine")
+
+
+def _write_fields(lever: Lever, states: list[tuple[float, State]], folder: Path) -> None:
+    """Write the fields of states in time to a folder, with their index."""
+    from hotlever.lever.fields import FieldMapper, write_pvd, write_vtu
+
+    mapper = FieldMapper(lever)
+    names = [f"fields_{place:04d}.vtu" for place in range(len(states))]
+    for name, (_, state) in zip(names, states, strict=True):
+        write_vtu(mapper.map(state), folder / name)
+    write_pvd([t for t, _ in states], names, folder / "fields.pvd")

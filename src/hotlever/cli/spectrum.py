@@ -1,0 +1,95 @@
+"""``hotlever spectrum``: what a lever answers to small signals at an operating point."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from typer import Option
+
+from hotlever.cli.application import app
+from hotlever.cli.options import (
+    File,
+    MediumOption,
+    PlotFile,
+    ProbeFile,
+    check_medium,
+    check_plot,
+    load_probe,
+    parse_settings,
+)
+from hotlever.cli.output import give, progress
+from hotlever.datasets import csv_text, write_dataset
+from hotlever.errors import InputError
+from hotlever.files import Outputs
+from hotlever.units import setting
+
+if TYPE_CHECKING:
+    from hotlever.types import Array
+
+#: Frequencies that may be asked for.
+MOST_FREQUENCIES = 10_000
+
+
+@app.command("spectrum")
+def spectrum_command(
+    probe_file: ProbeFile = None,
+    bias: str = Option(..., metavar="V", help="Of the operating point."),
+    frequency: str = Option(
+        "1Hz:10MHz:71", metavar="START:STOP:COUNT", help="Spaced evenly in the logarithm."
+    ),
+    medium: MediumOption = None,
+    settings: list[str] | None = Option(
+        None, "--set", metavar="NAME=VALUE", help="Change a value of the probe file."
+    ),
+    output: File = Option(
+        None, "-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."
+    ),
+    plot: PlotFile = None,
+) -> None:
+    """Show impedance and thermal response to small signals at a bias."""
+    from hotlever.lever import Lever
+    from hotlever.lever.transient.small_signals import SPECTRUM_COLUMNS, spectrum
+
+    volts, frequencies = setting(bias, "V", "--bias", bare=True), _frequencies(frequency)
+    check_medium(medium)
+    outputs = Outputs(probe_file)
+    outputs.file(output, ".csv", ".nc")
+    check_plot(outputs, plot)
+    probe = load_probe(probe_file)
+    probe = probe.with_(**parse_settings(settings, probe))
+    with progress("air") as update:
+        lever = Lever(probe if medium is None else probe.in_medium(medium), progress=update)
+    with progress("spectrum") as update:
+        (state,) = lever.solve([volts], update)
+        data = spectrum(state, frequencies)
+    with outputs.together():
+        if output is not None:
+            write_dataset(data, output, SPECTRUM_COLUMNS)
+        if plot is not None:
+            from hotlever import figures
+
+            figures.save_figure(figures.small_signals(data), plot)
+    if output is None:
+        give(csv_text(data, SPECTRUM_COLUMNS))
+
+
+def _frequencies(text: str) -> Array:
+    """Parse ``START:STOP:COUNT`` with units.
+
+    Examples
+    --------
+    >>> _frequencies("1Hz:1kHz:4").round(6).tolist()
+    [1.0, 10.0, 100.0, 1000.0]
+    """
+    import numpy as np
+
+    where, parts = f"--frequency {text}", text.split(":")
+    if len(parts) != 3:
+        raise InputError(f"{where}: expected START:STOP:COUNT such as 1Hz:10MHz:71")
+    start, stop = (setting(part, "Hz", where) for part in parts[:2])
+    count = int(parts[2]) if parts[2].isdecimal() and len(parts[2]) < 9 else 0
+    if not 1 <= count <= MOST_FREQUENCIES:
+        raise InputError(f"{where}: expected a COUNT from 1 to {MOST_FREQUENCIES}")
+    if not 0 < start <= stop or (count == 1) != (start == stop):
+        raise InputError(f"{where}: expected 0 < START < STOP, or START = STOP with COUNT 1")
+    return np.geomspace(start, stop, count)

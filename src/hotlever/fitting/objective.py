@@ -1,0 +1,240 @@
+"""What a fit makes small: data and priors as residuals of the parameters that it varies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from hotlever.errors import ComputationError
+from hotlever.fitting.models import Prediction
+from hotlever.fitting.residuals import Residuals
+from hotlever.probe import Probe
+from hotlever.probe.parameters import parameters_of
+from hotlever.probe.priors import JointPrior, Prior
+from hotlever.types import Array
+
+#: Scaled residual given to trial parameters for which the lever has no state: far beyond any
+#: real one, so that a search turns back.
+UNSOLVED = 10.0
+#: A datum that alone decides a parameter says nothing of its own noise.
+_LEAST_FREE = 0.05
+
+
+class Objective:
+    """Weighted residuals of data and priors, over parameters divided by their scales.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    probe : Probe
+        Whose parameters are varied, (p,) of them.
+    names : sequence of str
+        Parameters of the derivatives of predictions.
+    varied : list of str
+        Those of them that are varied.
+    priors : mapping of str to Prior, optional
+    joint : JointPrior, optional
+
+    Attributes
+    ----------
+    informed : bool
+        Whether there are priors; then residuals count standard deviations.
+    scale : ndarray, shape (p,)
+    bounds : ndarray, shape (2, p)
+        Of the scaled parameters.
+    """
+
+    def __init__(
+        self,
+        residuals: Residuals,
+        probe: Probe,
+        names: Sequence[str],
+        varied: list[str],
+        priors: Mapping[str, Prior] | None = None,
+        joint: JointPrior | None = None,
+    ) -> None:
+        self.residuals, self.names, self.varied = residuals, tuple(names), varied
+        self.columns = [self.names.index(name) for name in varied]
+        self._priors = {varied.index(name): prior for name, prior in (priors or {}).items()}
+        self._joint, self.informed = joint, bool(priors) or joint is not None
+        self._of_joint = [] if joint is None else [varied.index(name) for name in joint.names]
+        every = parameters_of(probe)
+        self.known = [every[name] for name in varied]
+        self.scale = np.array([one.scale for one in self.known])
+        self.bounds = np.array([[one.lower, one.upper] for one in self.known]).T / self.scale
+
+    def values(self, probe: Probe) -> Array:
+        """Return the varied parameters of a probe in their own units."""
+        return probe.at(self.varied)
+
+    def at(self, probe: Probe, scaled: Array) -> Probe:
+        """Return a probe with other values of the varied parameters."""
+        return probe.moved(dict(zip(self.varied, (scaled * self.scale).tolist(), strict=True)))
+
+    def residual(self, values: Array, scaled: Array) -> Array:
+        """Return the residuals of data and priors, for predicted values (3, n)."""
+        return np.concatenate([self.residuals.weighted(values), self.from_priors(scaled)])
+
+    def jacobian(self, slopes: Array, scaled: Array) -> Array:
+        """Return their derivatives by the scaled parameters, for predicted slopes (3, n, k)."""
+        return np.concatenate([self._jacobian(slopes), self._of_priors(scaled)])
+
+    def squares(self, at: Prediction) -> float:
+        """Return the sum of squares of the weighted residuals and of the distance from priors."""
+        residual = self.residual(at.values, self.values(at.probe) / self.scale)
+        return float(residual @ residual)
+
+    def used_up(self, probe: Probe, slopes: Array) -> Array:
+        """Return how many degrees of freedom of each observable a fit with priors uses up."""
+        jacobian = self._jacobian(slopes)
+        leverage = np.zeros(self.residuals.data.shape)
+        leverage[self.residuals.present] = np.einsum(
+            "ij,jk,ik->i", jacobian, self._posterior(probe, slopes), jacobian
+        )
+        return np.asarray(leverage.sum(axis=1, keepdims=True))
+
+    def _posterior(self, probe: Probe, slopes: Array) -> Array:
+        """Return the covariance of the scaled parameters that data and priors leave."""
+        jacobian = self.jacobian(slopes, self.values(probe) / self.scale)
+        return inverse_or_nan(jacobian.T @ jacobian)
+
+    def covariance(self, at: Prediction) -> Array:
+        """Return the covariance of the varied parameters in their own units; NaN if singular.
+
+        With priors it is that of the posterior, linearised. Without, noise differs between
+        observables and along each of them by more than the weights know, so every datum's variance
+        is taken from its own residual, enlarged by its leverage h (MacKinnon and White's HC3,
+        J. Econometrics 29, 305 (1985)): C = A⁻¹ Jᵀ V J A⁻¹ with A = JᵀJ and V = r² / (1 − h)².
+        """
+        residual = self.residuals.weighted(at.values)
+        jacobian = self._jacobian(at.slopes)
+        if self.informed:
+            return self._posterior(at.probe, at.slopes) * np.outer(self.scale, self.scale)
+        inverse = inverse_or_nan(jacobian.T @ jacobian)
+        if residual.size <= self.scale.size:
+            return np.full_like(inverse, np.nan)
+        leverage = np.einsum("ij,jk,ik->i", jacobian, inverse, jacobian)
+        influence = inverse @ jacobian.T * (residual / np.maximum(1.0 - leverage, _LEAST_FREE))
+        return np.asarray(influence @ influence.T * np.outer(self.scale, self.scale))
+
+    def shares(self, at: Prediction) -> dict[str, Array]:
+        """Return what adds up to the covariance that priors and data leave.
+
+        By the name of each prior, and of the data as ``measurement``: the estimate is, to first
+        order, a weighted sum of all of them, each with an error of its own.
+        """
+        if not self.informed:
+            return {"measurement": self.covariance(at)}
+        jacobian = self._jacobian(at.slopes)
+        prior = self._of_priors(self.values(at.probe) / self.scale)
+        names = [*(self.varied[place] for place in self._priors), *["fit"] * len(self._of_joint)]
+        left = self._posterior(at.probe, at.slopes) * self.scale[:, None]
+        found = {"measurement": left @ (jacobian.T @ jacobian) @ left.T}
+        for name, row in zip(names, prior, strict=True):
+            found[name] = found.get(name, 0.0) + np.outer(left @ row, left @ row)
+        return found
+
+    def from_priors(self, scaled: Array) -> Array:
+        """Return how far parameters are from their priors, in standard deviations."""
+        values = scaled * self.scale
+        own = [prior.deviation(values[place]) for place, prior in self._priors.items()]
+        if self._joint is not None:
+            own = [*own, *self._joint.deviations(values[self._of_joint])]
+        return np.array(own)
+
+    def _of_priors(self, scaled: Array) -> Array:
+        """Return the derivatives of `from_priors` by the scaled parameters."""
+        rows, values = np.zeros((len(self._priors), scaled.size)), scaled * self.scale
+        for row, (place, prior) in zip(rows, self._priors.items(), strict=True):
+            row[place] = prior.slope(values[place]) * self.scale[place]
+        if self._joint is not None:
+            joint = np.zeros((len(self._of_joint), scaled.size))
+            joint[:, self._of_joint] = self._joint.slopes(values[self._of_joint])
+            rows = np.concatenate([rows, joint * self.scale])
+        return rows
+
+    def _jacobian(self, slopes: Array) -> Array:
+        """Return the derivatives of the weighted residuals by the scaled parameters."""
+        return self.residuals.jacobian(slopes[:, :, self.columns] * self.scale)
+
+
+class Vicinity:
+    """Residuals and their derivatives near a prediction, without solving a lever.
+
+    Other predictions say how values bend on the way to them: by what they differ there from what
+    is expected, growing as the square of the distance. Distances are measured by what data and
+    priors tell, so that those along the narrow valleys that a search follows are kept apart from
+    those across (Schnabel and Frank, SIAM J. Numer. Anal. 21, 815 (1984)).
+
+    Parameters
+    ----------
+    objective : Objective
+    at : Prediction
+    others : sequence of Prediction
+    """
+
+    def __init__(
+        self, objective: Objective, at: Prediction, others: Sequence[Prediction] = ()
+    ) -> None:
+        self.objective, self._at = objective, at
+        self.origin = objective.values(at.probe) / objective.scale
+        self._bends: list[tuple[Array, Array]] = []
+        self._latest: tuple[Array, tuple[Array, Array]] | None = None
+        jacobian = objective.jacobian(at.slopes, self.origin)
+        for other in others:
+            there = objective.values(other.probe) / objective.scale
+            along = jacobian.T @ (jacobian @ (there - self.origin))
+            size = float(along @ (there - self.origin))
+            with suppress(ComputationError):
+                missed = other.values - self._predicted(there)[0]
+                # the product with this direction is 1 at the other prediction
+                if size > 0:
+                    self._bends.append((along / size, missed))
+
+    def predict(self, scaled: Array) -> tuple[Array, Array]:
+        """Return I_h, V_r and T_tip (3, n), and their derivatives by all parameters (3, n, k).
+
+        Raises
+        ------
+        ComputationError
+            If the lever has no such states.
+        """
+        # asked for twice, for the residuals and their derivatives
+        if self._latest is None or not np.array_equal(self._latest[0], scaled):
+            self._latest = scaled.copy(), self._predicted(scaled)
+        return self._latest[1]
+
+    def _predicted(self, scaled: Array) -> tuple[Array, Array]:
+        objective = self.objective
+        parameters = self._at.probe.at(objective.names)
+        parameters[objective.columns] = scaled * objective.scale
+        values, slopes = self._at.nearby.predict(parameters)
+        for along, missed in self._bends:
+            way = float(along @ (scaled - self.origin))
+            values = values + missed * way**2
+            slopes[:, :, objective.columns] += missed[:, :, None] * (
+                2.0 * way * along / objective.scale
+            )
+        return values, slopes
+
+    def residual(self, scaled: Array) -> Array:
+        """Return the residuals of data and priors; large ones if the lever has no such states."""
+        try:
+            return self.objective.residual(self.predict(scaled)[0], scaled)
+        except ComputationError:
+            data = np.full(self.objective.residuals.size, UNSOLVED)
+            return np.concatenate([data, self.objective.from_priors(scaled)])
+
+    def jacobian(self, scaled: Array) -> Array:
+        """Return their derivatives by the scaled parameters."""
+        return self.objective.jacobian(self.predict(scaled)[1], scaled)
+
+
+def inverse_or_nan(matrix: Array) -> Array:
+    """Return the inverse of a matrix; NaN if it is singular."""
+    try:
+        return np.asarray(np.linalg.inv(matrix), dtype=float)
+    except np.linalg.LinAlgError:
+        return np.full_like(matrix, np.nan)

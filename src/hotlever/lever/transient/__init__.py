@@ -1,0 +1,30 @@
+"""Levers in time: wave forms, what a lever shows under them, and its time constants."""
+
+from hotlever.lever.transient.history import followed, history_csv, write_history
+from hotlever.lever.transient.modes import rise_times, time_constants
+from hotlever.lever.transient.small_signals import spectrum
+from hotlever.lever.transient.waveform import (
+    Waveform,
+    pulse,
+    ramp,
+    read_waveform,
+    sine,
+    step,
+    switched_off,
+)
+
+__all__ = [
+    "Waveform",
+    "followed",
+    "history_csv",
+    "pulse",
+    "ramp",
+    "read_waveform",
+    "rise_times",
+    "sine",
+    "spectrum",
+    "step",
+    "switched_off",
+    "time_constants",
+    "write_history",
+]

@@ -1,0 +1,304 @@
+"""What a lever shows in time, as a dataset: a history."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+
+from hotlever.datasets import csv_text, labelled, write_dataset
+from hotlever.errors import ComputationError, HistoryEndError, InputError
+from hotlever.lever.dataset import laws_end_K
+from hotlever.lever.state import State
+from hotlever.lever.transient.driven import DrivenLever
+from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
+from hotlever.lever.transient.waveform import Piece, Waveform
+from hotlever.types import Array, Progress
+
+if TYPE_CHECKING:
+    from hotlever.lever.lever import Lever
+
+#: Columns of a file in time.
+TIME_COLUMNS = (
+    *("time_us", "bias_V", "current_mA", "lever_V"),
+    *("reader_V", "tip_K", "power_mW"),
+)
+#: What is followed between the ends of each step, in this order.
+_FOLLOWED = (
+    *("lever_V", "current_mA", "reader_V", "tip_K", "max_K"),
+    *("supplied_nJ", "stored_nJ", "lost_nJ"),
+)
+#: Errors are at most this share of the rise that a lever would end with, so that a response is
+#: resolved however weak it is; but never less than this (K), which is near rounding errors.
+_SHARE_OF_RISE, _LEAST_TOLERANCE = 2e-3, 1e-6
+#: Parts of the time that progress is told in.
+_PARTS = 1000
+_AIR_NOTE = (
+    "the air answers at once, as if it were at rest at every moment: what it takes up itself is "
+    "left out (heat goes 15 µm into air in 10 µs)"
+)
+
+# Told a time (µs) and the state there.
+Seen = Callable[[float, State], None]
+
+
+class _Observer:
+    """Reads off the ends of steps, one after the other, what is `_FOLLOWED`."""
+
+    def __init__(self, lever: Lever) -> None:
+        space = lever.space
+        self._equations, self._space = lever.equations, space
+        # what is held there leaves without a flux at rest
+        ends = space.end_test[0]
+        self._held = np.stack([np.ones_like(ends), ends]) * space.weights[:, 0]
+        self._at_ends: float | None = None
+        self._added = np.zeros(2)
+        self._end: tuple[Array, Array, Array] | None = None
+
+    def read(self, step: Step) -> tuple[Array, Array]:
+        """Return values and slopes (per µs) at both ends of the next step, each (8, 2)."""
+        start = self._end
+        # after a jump of the bias the potentials are others
+        if start is None or not np.array_equal(start[0], step.x[:, 0]):
+            start = self._read(step, 0)
+        self._added = self._added + step.added
+        end = self._end = self._read(step, 1)
+        return np.stack([start[1], end[1]], axis=1), np.stack([start[2], end[2]], axis=1)
+
+    def _read(self, step: Step, end: int) -> tuple[Array, Array, Array]:
+        """Return the unknowns at one end of a step, and values and slopes there."""
+        equations, space = self._equations, self._space
+        x, moving, rates = step.x[:, [end]], step.slopes[:, [end]], step.rates[:, end]
+        density, by_T = equations.heat_density(equations.at(x)[0].T)
+        stored, at_ends = (self._held @ density)[:, 0]
+        rise = space.temperature.at_points(moving)[0]
+        stored_by, at_ends_by = (self._held @ (by_T * rise))[:, 0]
+        if self._at_ends is None:
+            self._at_ends = float(at_ends)
+        rises, base = space.rises(x)[:, 0], equations.base_temperature_K
+        hottest = rises.argmax()
+        supplied, left = self._added
+        values = [*equations.observed(x)[:, 0], base + space.tip_rise(x)[0], base + rises[hottest]]
+        slopes = [
+            *equations.observed_change(x, moving)[:, 0],
+            space.tip_rise(moving)[0],
+            space.rises(moving)[hottest, 0],
+        ]
+        values += [supplied, stored, left - (at_ends - self._at_ends)]
+        slopes += [rates[0], stored_by, rates[1] - at_ends_by]
+        return x[:, 0], np.array(values), np.array(slopes)
+
+
+def follow(
+    lever: Lever, waveform: Waveform, until: float, tolerance_K: float
+) -> Iterator[tuple[Piece, Step]]:
+    """Give the steps of a lever under a wave form, each with the piece it belongs to."""
+    x = _at_rest(lever, waveform.before_V)
+    rise = _SHARE_OF_RISE * _expected_rise(lever, waveform.highest_V)
+    tolerance_K = max(min(tolerance_K, rise), _LEAST_TOLERANCE)
+    length = None
+    for piece in waveform.pieces(until):
+        problem = DrivenLever(lever.equations, lever.circuit, piece.bias)
+        stepper = Stepper(problem, tolerance_K)
+        first = None if piece.jumps else length
+        for step in stepper.steps(piece.start, piece.end, x, piece.longest, first):
+            yield piece, step
+            x = step.x[:, 1:]
+        length = stepper.length
+
+
+def _expected_rise(lever: Lever, bias: float) -> float:
+    """Return the rise of the tip (K) at a bias (V), were the lever not to change with it."""
+    first, _ = lever.equations.cold()
+    shown = lever.equations.observed_change(np.zeros_like(first), first)[:, 0]
+    return float((bias / lever.circuit.bias(shown[0], shown[1])) ** 2)
+
+
+def _at_rest(lever: Lever, bias: float) -> Array:
+    """Return the state at rest; the other polarity has the potentials reversed."""
+    if bias == 0.0:
+        return np.zeros((lever.space.size + 1, 1))
+    (state,) = lever.solve([abs(bias)])
+    return np.where(lever.space.is_temperature[:, None], state.x, np.sign(bias) * state.x)
+
+
+def followed(
+    lever: Lever,
+    waveform: Waveform,
+    until: float | None = None,
+    at: ArrayLike | None = None,
+    *,
+    tolerance_K: float = 0.1,
+    per_step: int = 1,
+    seen: Seen | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Follow a lever in time under a bias that changes.
+
+    Parameters
+    ----------
+    lever : Lever
+        At rest before the wave form begins.
+    waveform : Waveform
+        Such as `pulse` or `read_waveform` return; see `hotlever.lever.transient.waveform`.
+    until : float, optional
+        Time (µs) to stop at; by default the last one asked for, or what the wave form usually
+        takes.
+    at : array_like, optional
+        Times (µs) to report. By default those at which the solver stepped: after the bias has
+        jumped the first is a moment later.
+    tolerance_K : float
+        Largest error of a step (K) that is accepted, less where the lever hardly heats; that of
+        the whole is of this order.
+    per_step : int
+        Times to report for each step of the solver, where none are asked for; more than one make
+        a smooth curve.
+    seen : callable, optional
+        Called with each time reported (µs) and the `State` there, whose fields it may keep.
+    progress : callable, optional
+        Called with the share of the time done, in thousandths, and 1000.
+
+    Returns
+    -------
+    xarray.Dataset
+        One variable for each of `TIME_COLUMNS`, the highest temperature and the energies on the
+        dimension ``time`` (µs); probe, material, circuit, wave form and version as attributes.
+
+    Raises
+    ------
+    InputError
+        If a time or the tolerance is out of bounds.
+    HistoryEndError
+        If silicon melts or a step fails; ``partial`` holds the dataset up to there, and
+        ``time_reached`` is when (µs).
+    """
+    asked = None if at is None else _checked_times(at)
+    if until is None:
+        until = waveform.usual_end if asked is None else float(asked[-1])
+    if not 0 < until < np.inf or (asked is not None and asked[-1] > until):
+        raise InputError(
+            f"found an end at {until:g} µs, expected a finite one after all times asked for"
+        )
+    if not 1e-4 <= tolerance_K <= 10.0:
+        raise InputError(f"found a tolerance of {tolerance_K:g} K, expected 1e-4 to 10 K")
+    rows, reached, failure = _Rows(lever, asked, per_step, seen), 0.0, ""
+    try:
+        for piece, step in follow(lever, waveform, until, tolerance_K):
+            end = rows.add(piece, step)
+            reached = step.end if end is None else end
+            if end is not None:
+                failure = f"{lever.equations.limit[1]} after {end:.6g} µs"
+                break
+            if progress is not None:
+                progress(int(_PARTS * reached / until), _PARTS)
+    except ComputationError as error:
+        failure = f"the lever could be followed up to {reached:.6g} µs only: {error}"
+    data = _dataset(lever, waveform, rows)
+    if failure:
+        raise HistoryEndError(failure, reached, data)
+    return data
+
+
+class _Rows:
+    """Rows of a history: at the times asked for, or where the solver stepped."""
+
+    def __init__(self, lever: Lever, asked: Array | None, per_step: int, seen: Seen | None) -> None:
+        self._lever, self._asked, self._per_step, self._seen = lever, asked, per_step, seen
+        self._observer = _Observer(lever)
+        self.time: list[float] = []
+        self.bias: list[float] = []
+        self.followed: list[Array] = []
+
+    def add(self, piece: Piece, step: Step) -> float | None:
+        """Add the rows of a step; return when silicon melts, if it does."""
+        values, slopes = self._observer.read(step)
+        if not self.time and (self._asked is None or self._asked[0] == 0.0):
+            self._add(piece, step, values, slopes, 0.0)
+        melts = _melts(step, values, slopes, self._lever.equations.limit[0])
+        end = step.end if melts is None else melts
+        if self._asked is None:
+            inside = np.linspace(step.start, end, self._per_step + 1)[1:]
+        else:
+            inside = self._asked[(self._asked > step.start) & (self._asked <= end)]
+        for t in inside.tolist():
+            self._add(piece, step, values, slopes, t)
+        return melts
+
+    def _add(self, piece: Piece, step: Step, values: Array, slopes: Array, t: float) -> None:
+        self.time.append(t)
+        self.bias.append(piece.bias(t))
+        self.followed.append(hermite(step.start, step.end, values, slopes, t))
+        if self._seen is not None:
+            self._seen(t, State(self._lever, step.between(t)))
+
+
+def _melts(step: Step, values: Array, slopes: Array, limit_K: float) -> float | None:
+    """Return when the hottest place reaches a limit within a step."""
+    row = [_FOLLOWED.index("max_K")]
+    if values[row[0], 1] < limit_K:
+        return None
+
+    def above(t: float) -> float:
+        found = hermite(step.start, step.end, values[row], slopes[row], t)
+        return float(found[0]) - limit_K
+
+    return float(brentq(above, step.start, step.end)) if above(step.start) < 0 else step.start
+
+
+def _checked_times(at: ArrayLike) -> Array:
+    times = np.unique(np.atleast_1d(np.asarray(at, dtype=float)))
+    if not times.size or not (np.isfinite(times) & (times >= 0)).all():
+        raise InputError("found a time that is negative or not finite, expected times in µs")
+    if times[-1] == 0.0:
+        raise InputError("found no time but 0, expected a later one too")
+    return times
+
+
+def _dataset(lever: Lever, waveform: Waveform, rows: _Rows) -> xr.Dataset:
+    followed = np.array(rows.followed).reshape(-1, len(_FOLLOWED)).T
+    columns = dict(zip(_FOLLOWED, followed, strict=True))
+    time, bias = np.array(rows.time), np.array(rows.bias)
+    columns["power_mW"] = columns["lever_V"] * columns["current_mA"]
+    # the reader, where there is none, is NaN throughout
+    variables = {"time_us": time, "bias_V": bias}
+    more = ("max_K", "supplied_nJ", "stored_nJ", "lost_nJ")
+    variables |= {name: columns[name] for name in (*TIME_COLUMNS[2:], *more)}
+    notes = [] if lever.space.air is None else [_AIR_NOTE]
+    limit = laws_end_K(lever.probe)
+    beyond = time[columns["max_K"] > limit]
+    if beyond.size:
+        notes.append(
+            f"from {beyond[0]:.4g} µs on part of the lever is above {limit:.0f} K, where the "
+            "material laws are extrapolated"
+        )
+    return labelled(
+        variables,
+        "time",
+        {"time": time},
+        **{name: json.dumps(section) for name, section in lever.probe.values().items()},
+        medium=lever.medium,
+        waveform=waveform.text,
+        notes="\n".join(notes),
+    )
+
+
+def write_history(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a history as ``.csv`` (the columns of `TIME_COLUMNS`) or ``.nc`` (everything).
+
+    Raises
+    ------
+    InputError
+        If the suffix is neither, or the file cannot be written.
+    """
+    write_dataset(data, path, TIME_COLUMNS)
+
+
+def history_csv(data: xr.Dataset) -> str:
+    """Return a history as CSV text, one row per time; empty where a value does not exist."""
+    return csv_text(data, TIME_COLUMNS)

@@ -1,0 +1,177 @@
+"""Time constants of a lever at an operating point, and how long it takes to heat and to cool.
+
+A small change of a state obeys M dx/dt + J x = 0, with M and J the derivatives of what is stored
+and of the rest, the circuit's row among them. It is a sum of modes; each decays with a time
+constant τ, J⁻¹ M x = τ x. Heating changes the resistance that heats, so that the time constants
+depend on what the source holds. A negative one is the runaway beyond a fold.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+from scipy.sparse.linalg import LinearOperator, eigs
+
+from hotlever.datasets import labelled
+from hotlever.errors import ComputationError, unknown_name
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.space import LEVER, Fluxes
+from hotlever.lever.state import State
+from hotlever.lever.transient.driven import InCircuit
+from hotlever.lever.transient.waveform import Waveform, step, switched_off
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from hotlever.lever.lever import Lever
+
+#: What the source holds: the bias behind the series resistor, or at the lever itself.
+Source = Literal["bias", "voltage", "current", "power"]
+#: Time constants are found to this relative accuracy.
+_ACCURATE = 1e-9
+#: Points of a history for each step of the solver.
+_PER_STEP = 8
+
+
+def stored_change(equations: LeverEquations, x: Array, change: Array) -> Array:
+    """Return how what is stored (nJ) changes with the unknowns, (size + 1, n)."""
+    by_T = equations.heat_density(equations.at(x)[0].T)[1]
+    heat = by_T * equations.space.temperature.at_points(change)[0]
+    nothing = np.zeros((equations.space.potential.kinds, *heat.shape))
+    return equations.space.weak_form(Fluxes(heat, nothing, nothing))
+
+
+@one_blas_thread
+def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tuple[Array, Array]:
+    """Return the slowest modes of a state.
+
+    Parameters
+    ----------
+    state : State
+    source : {"bias", "voltage", "current", "power"}
+        What is held while the lever changes; `power` needs some.
+    count : int
+
+    Returns
+    -------
+    time_constants : ndarray, shape (count,)
+        µs, the slowest first; negative for a mode that grows.
+    changes : ndarray, shape (size + 1, count)
+        The modes, in the unknowns of the lever's space.
+
+    Raises
+    ------
+    InputError
+        If there is no such source.
+    ComputationError
+        If they are not found.
+    """
+    if source not in get_args(Source):
+        raise unknown_name("source", source, get_args(Source))
+    equations, x = state.lever.equations, state.x
+    held = {
+        "bias": (1.0, state.lever.circuit.series_kohm),
+        "voltage": (1.0, 0.0),
+        "current": (0.0, 1.0),
+        "power": (state.current_mA, state.lever_V),
+    }[source]
+    gradient = equations.observed_gradient(x)
+    row = held[0] * gradient[..., 0] + held[1] * gradient[..., 1]
+    if not np.any(row):
+        raise ComputationError("without power nothing is held where the source holds the power")
+    factors = InCircuit(equations.factorised(x, LEVER), row)
+
+    def relaxed(change: Array) -> Array:
+        stored = stored_change(equations, x, change.reshape(-1, 1))
+        return factors.solve(stored, np.arange(1))[:, 0]
+
+    size = len(x)
+    operator: Any = LinearOperator((size, size), matvec=relaxed, dtype=float)
+    begin = np.where(equations.space.is_temperature, 1.0, 0.0)
+    try:
+        constants, changes = eigs(operator, count, v0=begin, tol=_ACCURATE)
+    except RuntimeError as error:
+        raise ComputationError(f"no time constants were found: {error}") from error
+    order = np.argsort(-np.abs(constants))
+    return constants.real[order], changes.real[:, order]
+
+
+def time_constants(
+    lever: Lever, bias: ArrayLike, source: Source = "bias", count: int = 4
+) -> xr.Dataset:
+    """Return the slowest time constants of a lever at some biases (V).
+
+    Returns
+    -------
+    xarray.Dataset
+        ``time_constant_us`` on the dimensions ``bias`` and ``mode``, and the tip temperature.
+
+    Raises
+    ------
+    InputError, ComputationError
+        See `slowest_modes` and `Lever.solve`.
+
+    Examples
+    --------
+    >>> from hotlever import Lever, Probe
+    >>> lever = Lever(Probe.reference())
+    >>> found = time_constants(lever, [1.0, 8.0])
+    >>> found.time_constant_us.sel(mode=1).values.round().tolist()
+    [21.0, 72.0]
+    """
+    states = lever.solve(bias)
+    found = np.array([slowest_modes(state, source, count)[0] for state in states])
+    return labelled(
+        {
+            "time_constant_us": (("bias", "mode"), found),
+            "tip_K": [state.tip_K for state in states],
+        },
+        coordinates={"bias": np.atleast_1d(bias), "mode": np.arange(1, count + 1)},
+        source=source,
+    )
+
+
+def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
+    """Return how long heating and cooling take between 10 and 90 % of the tip's rise.
+
+    The bias is switched on, and, when the lever has come to rest, off.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``heating_us`` and ``cooling_us``, and the tip temperature at rest, by ``bias`` (V).
+
+    Raises
+    ------
+    InputError, ComputationError
+        See `Lever.solve` and `hotlever.lever.transient.history.followed`.
+
+    Examples
+    --------
+    >>> from hotlever import Lever, Probe
+    >>> found = rise_times(Lever(Probe.reference()), [4.0])
+    >>> found.heating_us.values.round().tolist(), found.cooling_us.values.round().tolist()
+    ([50.0], [43.0])
+    """
+    states = lever.solve(bias)
+    base, columns = lever.circuit.base_temperature_K, np.empty((3, len(states)))
+    for place, state in enumerate(states):
+        until = 20.0 * float(slowest_modes(state)[0][0])
+        rise = state.tip_K - base
+
+        def crossed(waveform: Waveform, until: float = until, rise: float = rise) -> float:
+            history = lever.pulse(waveform, until, per_step=_PER_STEP)
+            share = (history.tip_K.values - base) / rise
+            share = share if share[-1] > 0.5 else 1.0 - share
+            early, late = np.interp([0.1, 0.9], np.maximum.accumulate(share), history.time)
+            return float(late - early)
+
+        off = switched_off(state.bias_V)
+        columns[:, place] = state.tip_K, crossed(step(state.bias_V)), crossed(off)
+    names = ("tip_K", "heating_us", "cooling_us")
+    return labelled(
+        dict(zip(names, columns, strict=True)), coordinates={"bias": np.atleast_1d(bias)}
+    )

@@ -1,0 +1,304 @@
+"""Steps in time of ``d/dt stored(x) + rest(t, x) = 0``. It knows no physics.
+
+Rows in which nothing is stored are algebraic. The method is the ESDIRK part of ARK4(3)6L[2]SA
+(Kennedy and Carpenter, Appl. Numer. Math. 44, 139 (2003)): order four with an error estimate of
+order three, L-stable and stiffly accurate, so that each step ends with the algebraic rows
+fulfilled. What is stored is the variable that is stepped, so that sums over rows are conserved as
+the sum of the rest says, whatever the tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from hotlever.errors import ComputationError, NewtonError
+from hotlever.lever.newton import NewtonOptions, find_roots
+from hotlever.lever.space import Factors
+from hotlever.types import Array, Index
+
+#: Of the stages: the common diagonal, their times as shares of a step, their weights; the last are
+#: also those of the step. And the weights of the embedded method of order three.
+GAMMA = 1 / 4
+TIMES = np.array([0.0, 1 / 2, 83 / 250, 31 / 50, 17 / 20, 1.0])
+STAGES = np.zeros((6, 6))
+STAGES[1, :2] = 1 / 4, 1 / 4
+STAGES[2, :3] = 8611 / 62500, -1743 / 31250, 1 / 4
+STAGES[3, :4] = 5012029 / 34652500, -654441 / 2922500, 174375 / 388108, 1 / 4
+STAGES[4, :4] = (
+    15267082809 / 155376265600,
+    -71443401 / 120774400,
+    730878875 / 902184768,
+    2285395 / 8070912,
+)
+STAGES[4, 4] = 1 / 4
+STAGES[5] = 82889 / 524892, 0.0, 15625 / 83664, 69875 / 102672, -2260 / 8211, 1 / 4
+WEIGHTS = STAGES[5]
+EMBEDDED = np.array(
+    [
+        4586570599 / 29645900160,
+        0.0,
+        178811875 / 945068544,
+        814220225 / 1159782912,
+        -3700637 / 11593932,
+        61727 / 225920,
+    ]
+)
+
+#: Within this time (1/rate) nothing that is stored changes.
+_INSTANT_RATE = 1e9
+#: A step is made so much shorter than its error asks for; by these factors at least and at most;
+#: and by this one where Newton's method fails.
+_SAFETY, _LEAST, _MOST, _FAILED = 0.9, 0.2, 6.0, 0.25
+#: Exponents of a PI controller for errors of order four.
+_PROPORTIONAL, _INTEGRAL = 0.04, 0.22
+#: The first step changes so many tolerances, were it explicit.
+_FIRST = 20.0
+#: Newton's method stops at this share of the tolerance. A larger one would cost the balance of
+#: what is stored, and save no time.
+_NEWTON_SHARE = 1e-4
+#: A stage in the middle of a step. How far the cubic through the ends is from it counts as an error
+#: too, for that is shown; but stages are of order two, and the cubic is nearer to the solution.
+_MIDDLE, _OFF = 3, 0.07
+#: The shortest step, as a share of the time reached.
+_SHORTEST = 1e-12
+
+
+class Problem(Protocol):
+    """What is stepped in time, for one column of unknowns (size + 1, 1).
+
+    Attributes
+    ----------
+    scale, step_limit : ndarray, shape (size + 1, 1)
+        See `hotlever.lever.newton.Equations`.
+    """
+
+    scale: Array
+    step_limit: Array
+
+    def stored(self, x: Array) -> Array:
+        """Return what is stored, (size + 1, 1); zero in algebraic rows."""
+        ...
+
+    def rest(self, t: float, x: Array) -> Array:
+        """Return what is lost per unit of time, or the algebraic residual, (size + 1, 1)."""
+        ...
+
+    def factorised(self, x: Array, rate: float) -> Factors:
+        """Return the factorised Jacobian of ``rate × stored + rest``."""
+        ...
+
+    def size_of(self, change: Array) -> float:
+        """Return the size of a change of the unknowns, by which tolerances are meant."""
+        ...
+
+    def rates(self, x: Array) -> Array:
+        """Return quantities (k,) that are added up over time."""
+        ...
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step, and what is between its ends.
+
+    Attributes
+    ----------
+    start, end : float
+        Times.
+    x, slopes : ndarray, shape (size + 1, 2)
+        The unknowns at both ends, and their derivatives by time.
+    rates : ndarray, shape (k, 2)
+        `Problem.rates` at both ends.
+    added : ndarray, shape (k,)
+        Their integrals over the step.
+    """
+
+    start: float
+    end: float
+    x: Array
+    slopes: Array
+    rates: Array
+    added: Array
+
+    def between(self, t: float) -> Array:
+        """Return the unknowns at a time within the step, (size + 1, 1)."""
+        return hermite(self.start, self.end, self.x, self.slopes, t)[:, None]
+
+
+def hermite(start: float, end: float, values: Array, slopes: Array, t: float) -> Array:
+    """Return the cubic through values (k, 2) at two times, with slopes there, at a third, (k,)."""
+    length = end - start
+    after, before = (t - start) / length, (end - t) / length
+    value = before**2 * (1 + 2 * after), after**2 * (1 + 2 * before)
+    slope = length * before**2 * after, -length * after**2 * before
+    return np.asarray(values @ np.array(value) + slopes @ np.array(slope))
+
+
+class _Stage:
+    """The equations of a stage; see `hotlever.lever.newton.Equations`."""
+
+    def __init__(self, problem: Problem, t: float, stored: Array, rate: float) -> None:
+        self._problem, self._t, self._stored, self._rate = problem, t, stored, rate
+        self.scale, self.step_limit = problem.scale, problem.step_limit
+
+    def residual(self, x: Array, which: Index) -> Array:
+        rest = self._problem.rest(self._t, x)
+        return rest + self._rate * (self._problem.stored(x) - self._stored)
+
+    def factorised(self, x: Array, which: Index) -> Factors:
+        return self._problem.factorised(x, self._rate)
+
+
+def _predictors() -> list[Array]:
+    """Return weights that extrapolate to each stage.
+
+    Of the start, the slope there times the step, and the stages before it: those of the polynomial
+    through all of these.
+    """
+    found = []
+    for stage in range(1, len(TIMES)):
+        degree = np.arange(stage + 1)
+        known = TIMES[1:stage, None] ** degree
+        rows = np.vstack([degree == 0, degree == 1, known])
+        found.append(np.linalg.solve(rows.T, TIMES[stage] ** degree))
+    return found
+
+
+_PREDICTORS = _predictors()
+
+
+class Stepper:
+    """Steps a problem from one time to another, restarting where its `Problem.rest` jumps.
+
+    Parameters
+    ----------
+    problem : Problem
+    tolerance : float
+        Largest estimated error of a step, by `Problem.size_of`.
+
+    Attributes
+    ----------
+    accepted, rejected : int
+        Steps.
+    length : float
+        Of the step to try next.
+    """
+
+    def __init__(self, problem: Problem, tolerance: float) -> None:
+        self._problem, self._tolerance = problem, tolerance
+        self._newton = NewtonOptions(
+            tolerance=_NEWTON_SHARE * tolerance, keep_while=0.5, max_iterations=12
+        )
+        self.accepted = self.rejected = 0
+        self.length = 0.0
+
+    def steps(
+        self, start: float, end: float, x: Array, longest: float, first: float | None = None
+    ) -> Iterator[Step]:
+        """Give the steps from one time to another, none longer than a given one.
+
+        What is stored at `x` is kept, the algebraic rows are fulfilled first. The length of the
+        first step is tried as given, or found from how fast things change.
+
+        Raises
+        ------
+        ComputationError
+            If no step is short enough.
+        """
+        here, last = self._settled(start, x), 1.0
+        speed = max(self._problem.size_of(here.slope), 1e-300)
+        self.length = first or _FIRST * self._tolerance / speed
+        while here.t < end:
+            then = _next(here.t, min(self.length, longest), end)
+            try:
+                step, there, error = self._step(here, then)
+                share = max(error / self._tolerance, 1e-6)
+                change = _SAFETY * share**-_INTEGRAL * last**_PROPORTIONAL
+                change = min(max(change, _LEAST), _MOST if share <= 1.0 else _SAFETY)
+            except NewtonError:
+                share, change = np.inf, _FAILED
+            self.length = change * (then - here.t)
+            if share <= 1.0:
+                yield step
+                self.accepted, here, last = self.accepted + 1, there, share
+                continue
+            self.rejected += 1
+            if self.length < _SHORTEST * max(abs(here.t), 1.0):
+                raise ComputationError(f"no step in time is short enough at {here.t:.6g} µs")
+
+    def _settled(self, t: float, x: Array) -> _Reached:
+        """Fulfil the algebraic rows, nothing that is stored being changed; and find the slopes."""
+        problem, rate = self._problem, _INSTANT_RATE
+        stage = _Stage(problem, t, problem.stored(x), rate)
+        found = find_roots(stage, x, NewtonOptions(tolerance=1e-9))
+        x = found.x
+        slope = -rate * found.factors.solve(problem.rest(t + 1.0 / rate, x), _ONE)
+        return _Reached(t, x, slope, problem.stored(x), -problem.rest(t, x), problem.rates(x))
+
+    def _step(self, here: _Reached, then: float) -> tuple[Step, _Reached, float]:
+        """Try a step; return it, what it reaches, and its error."""
+        length = then - here.t
+        problem, rate, factors = self._problem, 1.0 / (GAMMA * length), None
+        states, slopes, flows, rates = [here.x], [here.slope], [here.flow], [here.rates]
+        stored = here.stored
+        for stage in range(1, len(TIMES)):
+            known = here.stored + length * _sum(STAGES[stage], flows)
+            guess = _sum(_PREDICTORS[stage - 1], [here.x, length * here.slope, *states[1:]])
+            equations = _Stage(problem, here.t + TIMES[stage] * length, known, rate)
+            found = find_roots(equations, guess, self._newton, factors)
+            x, factors = found.x, found.factors
+            stored = problem.stored(x)
+            states.append(x)
+            flows.append(rate * (stored - known))
+            rates.append(problem.rates(x))
+            # the same method, read as one that steps the unknowns
+            slopes.append(rate * (x - here.x - length * _sum(STAGES[stage], slopes)))
+        assert factors is not None
+        there = _Reached(then, states[-1], slopes[-1], stored, flows[-1], rates[-1])
+        step = Step(
+            here.t,
+            then,
+            np.hstack([here.x, there.x]),
+            np.hstack([here.slope, there.slope]),
+            np.stack([here.rates, there.rates], axis=1),
+            length * _sum(WEIGHTS, rates),
+        )
+        difference = length * rate * _sum(WEIGHTS - EMBEDDED, flows)
+        error = problem.size_of(factors.solve(difference, _ONE))
+        off = step.between(here.t + TIMES[_MIDDLE] * length) - states[_MIDDLE]
+        return step, there, max(error, _OFF * problem.size_of(off))
+
+
+@dataclass(frozen=True)
+class _Reached:
+    """A time, the unknowns there and their slopes, what is stored and its slope, the rates."""
+
+    t: float
+    x: Array
+    slope: Array
+    stored: Array
+    flow: Array
+    rates: Array
+
+
+_ONE: Index = np.arange(1)
+
+
+def _next(t: float, length: float, end: float) -> float:
+    """Return the end of a step, so that no tiny one is left before the last."""
+    steps = (end - t) / length
+    if steps <= 1.001:
+        return end
+    return t + (0.5 * (end - t) if steps < 2.0 else length)
+
+
+def _sum(weights: Array, columns: list[Array]) -> Array:
+    """Return the sum of some columns with the first of the weights."""
+    total = np.zeros_like(columns[0])
+    for weight, column in zip(weights, columns, strict=False):
+        if weight:
+            total += weight * column
+    return total

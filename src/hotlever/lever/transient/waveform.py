@@ -1,0 +1,267 @@
+"""Wave forms: a bias that changes in time, smooth between its corners.
+
+Times are in µs and begin at zero; before, the lever rests at the wave form's `before_V`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from hotlever.errors import InputError, shown
+from hotlever.tables import read_table
+from hotlever.units import name_and_unit, setting
+
+#: Biases (V), times (µs) and numbers of pulses that a wave form may have at most.
+MOST_BIAS, LONGEST, MOST_PULSES = 1e4, 1e12, 100_000
+#: What a wave form is followed for beyond its last corner (µs), if nobody says; and periods.
+_AFTERWARDS, _PERIODS = 100.0, 10
+#: After a step it takes so long (µs) until next to nothing changes.
+_SETTLING = 1000.0
+#: Steps per period of a sine, so that none is overlooked.
+_PER_PERIOD = 20
+_TIME, _BIAS = re.compile("t|time", re.I), re.compile("V|V_?b|bias|voltage", re.I)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A smooth part of a wave form.
+
+    Attributes
+    ----------
+    start, end : float
+        µs.
+    bias : callable
+        V_b (V) at a time (µs).
+    jumps : bool
+        Whether the bias jumps at its start.
+    longest : float
+        The longest time (µs) over which it may be taken to be smooth.
+    """
+
+    start: float
+    end: float
+    bias: Callable[[float], float]
+    jumps: bool = False
+    longest: float = math.inf
+
+
+class Waveform(ABC):
+    """A bias that changes in time: `step`, `pulse`, `ramp`, `sine` or from `read_waveform`.
+
+    Attributes
+    ----------
+    text : str
+        What it is, in words.
+    before_V : float
+        Bias (V) at which the lever rests before it begins.
+    highest_V : float
+        Largest bias (V) of either sign.
+    usual_end : float
+        Time (µs) for which it is followed if nobody says.
+    """
+
+    text: str
+    before_V: float
+    highest_V: float
+    usual_end: float
+
+    @abstractmethod
+    def pieces(self, until: float) -> Iterator[Piece]:
+        """Give the smooth parts up to a time (µs)."""
+
+
+@dataclass(frozen=True)
+class Polyline(Waveform):
+    """Straight lines between times (µs) and biases (V); a time given twice is a jump."""
+
+    text: str
+    times: tuple[float, ...]
+    volts: tuple[float, ...]
+    usual_end: float
+    before_V: float = 0.0
+
+    @property
+    def highest_V(self) -> float:  # type: ignore[override]
+        """Largest bias (V) of either sign."""
+        return max(map(abs, (self.before_V, *self.volts)))
+
+    def pieces(self, until: float) -> Iterator[Piece]:
+        """Give the smooth parts up to a time (µs); after the last corner the bias stays."""
+        last = self.before_V
+        for (start, low), (end, high) in pairwise(
+            [*zip(self.times, self.volts, strict=True), (math.inf, self.volts[-1])]
+        ):
+            if start >= until:
+                return
+            if end > start:
+                line = _Line(start, low, (high - low) / (end - start))
+                yield Piece(start, min(end, until), line, low != last)
+                last = high
+
+
+@dataclass(frozen=True)
+class _Line:
+    start: float
+    volts: float
+    slope: float
+
+    def __call__(self, t: float) -> float:
+        return self.volts + self.slope * (t - self.start)
+
+
+@dataclass(frozen=True)
+class Sine(Waveform):
+    """An offset and a sine (V) of some frequency (Hz), from rest at the offset."""
+
+    text: str
+    before_V: float
+    amplitude_V: float
+    frequency_Hz: float
+
+    @property
+    def highest_V(self) -> float:  # type: ignore[override]
+        """Largest bias (V) of either sign."""
+        return abs(self.before_V) + abs(self.amplitude_V)
+
+    @property
+    def usual_end(self) -> float:  # type: ignore[override]
+        """Ten periods (µs)."""
+        return _PERIODS * 1e6 / self.frequency_Hz
+
+    def pieces(self, until: float) -> Iterator[Piece]:
+        """Give the one smooth part up to a time (µs)."""
+        per_us = 2e-6 * math.pi * self.frequency_Hz
+
+        def bias(t: float) -> float:
+            return self.before_V + self.amplitude_V * math.sin(per_us * t)
+
+        yield Piece(0.0, until, bias, longest=1e6 / self.frequency_Hz / _PER_PERIOD)
+
+
+def step(volts: float) -> Waveform:
+    """Return a bias that is switched on at t = 0 and stays."""
+    _check(volts)
+    return Polyline(f"step to {volts:g} V", (0.0,), (volts,), _SETTLING)
+
+
+def switched_off(volts: float) -> Waveform:
+    """Return a bias at which the lever has come to rest, and that is switched off at t = 0."""
+    _check(volts)
+    return Polyline(f"{volts:g} V switched off", (0.0,), (0.0,), _SETTLING, volts)
+
+
+def pulse(volts: float, length: float, period: float | None = None, count: int = 1) -> Waveform:
+    """Return a rectangular pulse of some length (µs), or several, one each period (µs).
+
+    Raises
+    ------
+    InputError
+        If a value is out of bounds, or the period not longer than the pulse.
+
+    Examples
+    --------
+    >>> [(piece.start, piece.end, piece.bias(5.0)) for piece in pulse(10.0, 5.0).pieces(20.0)]
+    [(0.0, 5.0, 10.0), (5.0, 20.0, 0.0)]
+    """
+    _check(volts, length)
+    if not 1 <= count <= MOST_PULSES:
+        raise InputError(f"found {count} pulses, expected from 1 to {MOST_PULSES}")
+    text = f"pulse of {volts:g} V for {length:g} µs"
+    if period is None:
+        if count > 1:
+            raise InputError(f"found {count} pulses without a period, expected a period too")
+        period = length + _AFTERWARDS
+    elif not length < period <= LONGEST:
+        raise InputError(
+            f"found a period of {period:g} µs, expected more than the {length:g} µs of the pulse"
+        )
+    else:
+        text += f" each {period:g} µs, {count} times"
+    starts = period * np.arange(count)
+    times = np.stack([starts, starts + length, starts + length, starts + period], axis=1)
+    volt = np.tile([volts, volts, 0.0, 0.0], count)
+    end = max(float(times[-1, -1]), float(times[-1, 1]) + _AFTERWARDS)
+    return Polyline(text, tuple(times.ravel().tolist()), tuple(volt.tolist()), end)
+
+
+def ramp(volts: float, length: float) -> Waveform:
+    """Return a bias that rises from zero within some time (µs) and stays."""
+    _check(volts, length)
+    text = f"ramp to {volts:g} V within {length:g} µs"
+    return Polyline(text, (0.0, length), (0.0, volts), length + _AFTERWARDS)
+
+
+def sine(offset: float, amplitude: float, frequency_Hz: float) -> Waveform:
+    """Return a sine about an offset (V), at which the lever rests before."""
+    _check(offset)
+    _check(amplitude)
+    if not 1e6 / LONGEST <= frequency_Hz <= 1e12:
+        raise InputError(f"found a frequency of {frequency_Hz:g} Hz, expected 1e-6 to 1e12 Hz")
+    text = f"{offset:g} V + {amplitude:g} V sine of {frequency_Hz:g} Hz"
+    return Sine(text, offset, amplitude, frequency_Hz)
+
+
+def _check(volts: float, length: float = 1.0) -> None:
+    if not abs(volts) <= MOST_BIAS:
+        raise InputError(f"found a bias of {volts:g} V, expected at most {MOST_BIAS:g} V")
+    if not 1e-6 <= length <= LONGEST:
+        raise InputError(f"found a time of {length:g} µs, expected from 1e-6 to {LONGEST:g} µs")
+
+
+def read_waveform(path: str | os.PathLike[str]) -> Waveform:
+    """Read a wave form from a table of times and biases, with straight lines between its rows.
+
+    Times count from the first row; a time given twice is a jump. The lever rests at the first
+    bias before, and the last one stays.
+
+    Raises
+    ------
+    InputError
+        If a column is missing, has no known unit, or the times fall.
+    """
+    expected = "a header row like 'time (us),bias (V)'"
+    table = read_table(path, expected)
+    headings = [_name_and_unit(heading) for heading in table.names]
+    columns = []
+    for known, inside, what in ((_TIME, "us", "time"), (_BIAS, "V", "bias")):
+        place = next((k for k, (name, _) in enumerate(headings) if known.fullmatch(name)), None)
+        if place is None:
+            found = shown(",".join(table.names))
+            raise InputError(
+                f"{table.where(-1)}: no {what} column in '{found}', expected {expected}"
+            )
+        where = f"{table.where(-1)}: unit of the {what}"
+        columns.append(
+            setting(f"1{headings[place][1]}", inside, where) * table.numbers(place, what)
+        )
+    times, volts = columns
+    times = times - times[0]
+    for wrong, meant in (
+        (~np.isfinite(times + volts), "a time and a bias"),
+        (np.abs(volts) > MOST_BIAS, f"a bias of at most {MOST_BIAS:g} V"),
+        (np.diff(times, prepend=0.0) < 0, "a time not before the last"),
+    ):
+        if wrong.any():
+            raise InputError(f"{table.where(int(wrong.argmax()))}: expected {meant}")
+    if times[-1] > LONGEST:
+        raise InputError(f"{path}: lasts {times[-1]:g} µs, expected at most {LONGEST:g} µs")
+    name = os.path.basename(os.fspath(path))
+    end = float(times[-1]) or _SETTLING
+    points = tuple(times.tolist()), tuple(volts.tolist())
+    return Polyline(f"wave form of {name}", *points, end, float(volts[0]))
+
+
+def _name_and_unit(heading: str) -> tuple[str, str]:
+    """Split ``time (us)``, or ``time_us`` as in our own files."""
+    name, unit = name_and_unit(heading)
+    if unit is None and "_" in heading:
+        name, _, unit = heading.rpartition("_")
+    return name, unit or ""

@@ -1,0 +1,71 @@
+"""Limits of the tip temperature where it is no linear function of what is unknown."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hotlever.calibration.limits import BAND, profile_of_tip
+
+TIPS, SLOPES = np.array([300.0, 500.0, 800.0]), np.array([1.0, 10.0, 20.0])
+
+
+class OneUnknown:
+    """An objective with one unknown x, of which is known that it is 0 ± 1, and nothing else."""
+
+    names, columns = ("x",), [0]
+    scale, bounds = np.ones(1), np.array([[-9.0], [9.0]])
+    residuals = SimpleNamespace(size=0)
+
+    def values(self, probe):
+        return probe.at(["x"])
+
+    def residual(self, values, scaled):
+        return scaled.copy()
+
+    def jacobian(self, slopes, scaled):
+        return np.ones((1, 1))
+
+
+def prediction(bend):
+    """Return the prediction T = T₀ + b (x + bend x²) at three biases, at x = 0."""
+
+    def predict(x):
+        tip, slope = TIPS + SLOPES * (x[0] + bend * x[0] ** 2), SLOPES * (1 + 2 * bend * x[0])
+        return np.stack([0 * tip, 0 * tip, tip]), np.stack([0 * tip, 0 * tip, slope])[:, :, None]
+
+    values, slopes = predict(np.zeros(1))
+    probe = SimpleNamespace(at=lambda names: np.zeros(1))
+    return SimpleNamespace(
+        values=values, slopes=slopes, probe=probe, nearby=SimpleNamespace(predict=predict)
+    )
+
+
+def test_what_is_linear_has_the_linearised_error():
+    profile = profile_of_tip(OneUnknown(), prediction(0.0), [], np.eye(1))
+    np.testing.assert_allclose([profile.below, profile.above], 1.0, rtol=1e-3)
+    assert profile.linear
+    low, high = profile.limits(TIPS, SLOPES, np.zeros(3))
+    np.testing.assert_allclose([TIPS - low, high - TIPS], [BAND * SLOPES] * 2)
+
+
+@pytest.mark.parametrize("bend", [0.12, -0.15])
+def test_what_bends_has_other_limits_either_way(bend):
+    profile = profile_of_tip(OneUnknown(), prediction(bend), [], np.eye(1))
+    assert not profile.linear
+    # as far as x is pulled, x standard errors away the tip is b |x + bend x²| away
+    low, high = profile.limits(TIPS[1:], SLOPES[1:], np.zeros(2))
+    wide, narrow = (high - TIPS[1:], TIPS[1:] - low)[:: 1 if bend > 0 else -1]
+    for away, way in ((wide, np.sign(bend)), (narrow, -np.sign(bend))):
+        exact = np.abs(way + bend * BAND) * BAND * SLOPES[1:]
+        # the pulled estimate is not exactly 95 % away
+        np.testing.assert_allclose(away, exact, rtol=0.1)
+    assert np.all(wide > 1.5 * narrow)
+
+
+def test_other_errors_are_the_same_either_way():
+    profile = profile_of_tip(OneUnknown(), prediction(0.0), [], np.eye(1))
+    low, high = profile.limits(TIPS, np.zeros(3), np.full(3, 2.0))
+    np.testing.assert_allclose([TIPS - low, high - TIPS], 2.0 * BAND)

@@ -1,0 +1,76 @@
+"""Time constants: what a history does late, the runaway, and what the source holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever.errors import ComputationError, InputError
+from hotlever.lever.transient import rise_times, time_constants
+from hotlever.lever.transient.driven import DrivenLever
+from hotlever.lever.transient.modes import slowest_modes
+from hotlever.lever.transient.runge_kutta import Stepper
+from hotlever.probe import Circuit
+
+
+def slowest(lever, bias, source="bias"):
+    return float(time_constants(lever, [bias], source).time_constant_us[0, 0])
+
+
+@pytest.mark.parametrize(
+    ("bias", "source", "runs_away"),
+    [
+        (4.0, "bias", False),
+        (8.268, "bias", False),
+        (4.0, "voltage", False),
+        (10.0, "voltage", True),
+    ],
+)
+def test_a_small_change_decays_or_grows_as_its_mode_says(coarse, bias, source, runs_away):
+    """Beyond the fold, a state that the resistor holds is no longer held without it."""
+    (state,) = coarse.solve([bias])
+    constants, changes = slowest_modes(state, source)
+    assert (constants[0] < 0) == runs_away
+    assert (constants[1:] > 0).all()
+    moved = changes[:, [0]] / coarse.space.tip_rise(changes[:, 0])
+    start = state.x + 1e-3 * moved
+    circuit = coarse.circuit if source == "bias" else Circuit(series_resistance_ohm=0.0)
+    held = bias if source == "bias" else state.lever_V
+    problem = DrivenLever(coarse.equations, circuit, lambda t: held)
+    until = 2.0 * abs(constants[0])
+    *_, last = Stepper(problem, 1e-6).steps(0.0, until, start, np.inf)
+    left = float(coarse.space.tip_rise(last.x[:, 1] - state.x[:, 0]))
+    assert left == pytest.approx(1e-3 * np.exp(2.0 if runs_away else -2.0), rel=2e-3)
+
+
+def test_without_power_the_source_does_not_matter(coarse):
+    found = [slowest(coarse, 0.01, source) for source in ("bias", "voltage", "current", "power")]
+    np.testing.assert_allclose(found, found[0], rtol=1e-4)
+
+
+def test_heating_that_raises_the_resistance_slows_a_driven_current_down(coarse):
+    """Below the knee: a current heats more when the resistance rises, a voltage less."""
+    found = {name: slowest(coarse, 6.5, name) for name in ("voltage", "power", "bias", "current")}
+    assert found["voltage"] < found["power"] < found["bias"] < found["current"]
+
+
+def test_rise_times_are_read_off_histories(coarse):
+    found = rise_times(coarse, [1.0, 8.268])
+    tau = slowest(coarse, 1.0)
+    # several modes: less than ln 9 of the slowest
+    assert 1.5 * tau < float(found.heating_us[0]) < np.log(9.0) * tau
+    assert float(found.cooling_us[0]) == pytest.approx(float(found.heating_us[0]), rel=0.05)
+    # a hot lever is slow to heat towards its knee, and fast to cool
+    assert float(found.heating_us[1]) > 2.0 * float(found.cooling_us[1])
+    assert found.tip_K.values[1] == pytest.approx(coarse.solve([8.268])[0].tip_K)
+
+
+def test_what_does_not_exist_is_refused(coarse):
+    with pytest.raises(InputError, match="did you mean 'voltage'"):
+        time_constants(coarse, [1.0], "voltag")
+    with pytest.raises(ComputationError, match="without power"):
+        time_constants(coarse, [0.0], "power")
+
+
+def test_in_air_a_lever_is_faster(coarse, in_air):
+    assert slowest(in_air, 2.0) < 0.9 * slowest(coarse, 2.0)

@@ -1,0 +1,99 @@
+"""``hotlever pulse``: wave forms from words, files out, and how it ends."""
+
+from __future__ import annotations
+
+import csv
+import io
+from xml.etree import ElementTree
+
+import pytest
+import xarray as xr
+
+
+def rows(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_a_step_at_some_times(run):
+    status, out, err = run("pulse", "--step", "4", "--at", "0.1us,1us,5000ns,0.02ms,100us")
+    assert (status, err) == (0, "")
+    assert out.startswith("time_us,bias_V,current_mA,lever_V,reader_V,tip_K,power_mW\n")
+    found = rows(out)
+    assert [row["time_us"] for row in found] == ["0.1", "1", "5", "20", "100"]
+    tip = [float(row["tip_K"]) for row in found]
+    assert tip == pytest.approx([296.9, 300.8, 307.6, 321.3, 335.7], abs=0.2)
+
+
+def test_a_pulse_writes_table_figure_and_fields(run, tmp_path):
+    status, out, _ = run(
+        "pulse", "--pulse", "10V,5us", "--until", "20us", "--set", "c_kappa=0.7",
+        "-o", "a.csv", "--plot", "a.png", "--fields", "fields",
+    )  # fmt: skip
+    assert (status, out) == (0, "")
+    found = rows((tmp_path / "a.csv").read_text())
+    series = ElementTree.parse(tmp_path / "fields" / "fields.pvd").findall(".//DataSet")
+    # the rows are where the solver stepped, however smooth the figure is
+    assert len(found) == len(series) < 40
+    assert [float(part.get("timestep", "")) for part in series] == pytest.approx(
+        [float(row["time_us"]) for row in found]
+    )
+    assert all((tmp_path / "fields" / part.get("file", "")).is_file() for part in series)
+    assert (tmp_path / "a.png").stat().st_size > 5000
+
+
+def test_a_file_gives_the_bias(run, tmp_path):
+    (tmp_path / "wave.csv").write_text("time (us),bias (V)\n0,0\n10,4\n")
+    assert run("pulse", "--waveform", "wave.csv", "-o", "a.nc")[0] == 0
+    with xr.open_dataset(tmp_path / "a.nc") as data:
+        assert data.bias_V.values[-1] == 4.0
+        assert data.attrs["waveform"] == "wave form of wave.csv"
+        assert float(abs(data.supplied_nJ - data.stored_nJ - data.lost_nJ).max()) < 1e-5
+
+
+def test_ramps_sines_and_trains_in_any_medium(run):
+    train = ("--pulse", "5V,1us", "--period", "4us", "--count", "2", "--until", "8us")
+    for words in (("--ramp", "4,10us"), ("--sine", "3V+0.5V@200kHz", "--until", "9us"), train):
+        status, out, _ = run("pulse", *words)
+        assert status == 0
+        assert len(rows(out)) > 5
+    status, _, err = run("pulse", "--step", "3", "--at", "1us", "--medium", "air")
+    assert status == 0
+    assert "the air answers at once" in err
+
+
+def test_what_was_reached_before_silicon_melts_is_written(run, tmp_path):
+    status, _, err = run("pulse", "--step", "40", "-o", "a.csv", "--plot", "a.svg")
+    assert status == 1
+    assert err.splitlines()[-1].startswith("hotlever: silicon melts after 1.25")
+    assert 1600 < float(rows((tmp_path / "a.csv").read_text())[-1]["tip_K"]) < 1687
+    assert (tmp_path / "a.svg").is_file()
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ((), "found none: expected one of --step, --pulse"),
+        (("--step", "1", "--ramp", "1,2us"), "found --step, --ramp: expected one of"),
+        (("--step", "x"), "--step: found 'x', expected a number with a unit like V"),
+        (("--step", "1e9"), "--step: found a bias of 1e+09 V"),
+        (("--pulse", "10V"), "--pulse: found '10V', expected V,TIME"),
+        (("--pulse", "10V,5"), "--pulse: found '5', expected a number with a unit like us"),
+        (("--pulse", "10V,5us", "--count", "3"), "without a period"),
+        (("--pulse", "10V,5us", "--period", "4us", "--count", "3"), "period of 4 µs"),
+        (("--step", "1", "--count", "3"), "--count: goes with --pulse"),
+        (("--ramp", "8V,-1us"), "--ramp: found a time of -1 µs"),
+        (("--sine", "3V"), "--sine: found '3V', expected V+V@FREQ"),
+        (("--sine", "3V+1V@5us"), "--sine: found '5us', expected a number with a unit like Hz"),
+        (("--step", "1", "--at", "1"), "--at: found '1', expected a number with a unit like us"),
+        (("--step", "1", "--until", "-1us"), "found an end at -1 µs"),
+        (("--waveform", "none.csv"), "none.csv: no such file"),
+        (("--step", "1", "--medium", "water"), "--medium water"),
+        (("--step", "1", "-o", "a.txt"), "unknown file type"),
+    ],
+)
+def test_bad_input_gets_one_line_and_status_two(run, words, found, tmp_path):
+    status, out, err = run("pulse", *words)
+    assert (status, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert found in err
+    assert list(tmp_path.iterdir()) == []
