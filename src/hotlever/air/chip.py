@@ -95,6 +95,15 @@ class BaseLine:
         return np.concatenate([level, corners[..., 2:]], axis=-1)
 
 
+def lever_axes(layout: Layout) -> Array:
+    """Return unit vectors along a lever and across it, (2, 2); x and y where that means nothing."""
+    try:
+        line = BaseLine.of(layout, "the direction of the lever")
+    except InputError:
+        return np.eye(2)
+    return np.stack([line.along, line.across])
+
+
 def chip_panels(layout: Layout, refinement: float = 1.0) -> Panels:
     """Return the front and the lower face of the chip body.
 

@@ -58,13 +58,17 @@ def cover(shape: Polygon, exposed: BaseGeometry, depths: Array, size: Size) -> A
         Corners of quadrilaterals; in a triangle the last two are the same.
     """
     panels = [
-        corners
+        quadrilateral
         for face in _faces(shape, exposed, depths)
         for piece in _convex(face)
         for cell in _divided(piece, size)
-        for corners in _quadrilaterals(cell)
+        for quadrilateral in _quadrilaterals(cell)
     ]
-    return np.array(panels).reshape(-1, 4, 2)
+    corners = np.array(panels).reshape(-1, 4, 2)
+    diagonals = corners[:, 2:] - corners[:, :2]
+    area = np.abs(diagonals[:, 0, 0] * diagonals[:, 1, 1] - diagonals[:, 0, 1] * diagonals[:, 1, 0])
+    # narrower ones come of rounding
+    return corners[area > _NARROWEST * np.linalg.norm(diagonals, axis=2).sum(axis=1)]
 
 
 def divided(at: Array, size: Array) -> Array:

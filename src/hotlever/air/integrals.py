@@ -37,7 +37,7 @@ def potential(points: Array, corners: Array) -> Array:
     lengths = np.linalg.norm(np.roll(corners, -1, axis=-2) - corners, axis=-1)
     along = (np.roll(corners, -1, axis=-2) - corners) / np.maximum(lengths, _TINY)[..., None]
     area_vector = np.cross(
-        corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
+        corners[..., 2, :] - corners[..., 0, :], corners[..., -1, :] - corners[..., 1, :]
     )
     normal = area_vector / np.linalg.norm(area_vector, axis=-1, keepdims=True)
     outward = np.cross(along, normal[..., None, :])

@@ -138,7 +138,8 @@ class _Outline:
     def _exposed(self, layout: Layout) -> tuple[list[Array], Array]:
         """Return the edges that no terminal holds, and the sharp corners between two of them."""
         ends = [LineString(self._seen([one.start, one.end])) for one in layout.terminals]
-        held = shapely.union_all(ends).buffer(_ON_LINE, cap_style="flat")
+        off = _ON_LINE + shapely.hausdorff_distance(self._shape, self._exact)
+        held = shapely.union_all(ends).buffer(off, cap_style="flat")
         edges, corners = [], []
         for ring in rings(self._shape):
             free = [
