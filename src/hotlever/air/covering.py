@@ -31,8 +31,10 @@ _NARROWEST = 1e-5
 _MITRE = 10.0
 #: A cut goes on so much farther than to the other side, for rounding.
 _BEYOND = 1.0 + 1e-6
-#: Inside a face an outline that turns by less (rad) is as good as straight.
-_STRAIGHT = 0.05
+#: Inside a face an outline that turns by less (rad) is as good as straight, or part of a curve.
+_STRAIGHT, _CURVED = 0.05, 0.5
+#: How far the last curve may be off its depth, as a share of its strip's width.
+_OFF_CURVE = 0.05
 #: A corner that turns by less (rad) is none.
 _IN_LINE = 1e-6
 #: Places at which the size is asked for along a face.
@@ -111,6 +113,9 @@ def _faces(shape: Polygon, exposed: BaseGeometry, depths: Array) -> list[Polygon
     for depth in depths:
         rim = exposed.buffer(depth, cap_style="square", join_style="mitre", mitre_limit=_MITRE)
         layer, inner = inner, shape.difference(rim, grid_size=_GRID)
+        # strips have the corners of the outline; what is inside the last needs fewer
+        last = depth == depths[-1]
+        inner = inner.simplify(_OFF_CURVE * (depth - above) if last else 10 * _GRID)
         if inner.is_empty:
             break
         for one in parts(inner):
@@ -157,16 +162,19 @@ def _convex(face: Polygon) -> list[Polygon]:
     """Cut a face into pieces that are convex but for corners that hardly turn.
 
     At each corner that points inwards one of its edges goes on, the one that is sooner at the
-    other side.
+    other side; from a curve a cut goes straight across.
     """
     cuts = []
     for ring in rings(face):
-        for number in np.flatnonzero(turns(ring) < -_STRAIGHT):
-            corner = ring[number]
-            rays = [
-                _ray(face, corner, corner - other)
-                for other in (ring[number - 1], ring[(number + 1) % len(ring)])
-            ]
+        along = np.roll(ring, -1, axis=0) - ring
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        before, turned = np.roll(along, 1, axis=0), turns(ring)
+        for number in np.flatnonzero(turned < -_STRAIGHT):
+            ways = [before[number], -along[number]]
+            if turned[number] > -_CURVED:
+                x, y = before[number] + along[number]
+                ways = [np.array([-y, x])]
+            rays = [_ray(face, ring[number], way) for way in ways]
             cuts.append(min(rays, key=_length_and_slope))
     return _cut_by(face, [face.boundary, *cuts]) if cuts else [face]
 

@@ -168,7 +168,7 @@ class _Outline:
         # one panel between two depths, until panels are as large as anywhere
         most = np.log(max(2.0, 2.0 * self._largest / self._edge)) / self._growth
         depths = self._edge / self._growth * np.expm1(self._growth * np.arange(1.0, most + 1.0))
-        exposed = MultiLineString([edge.tolist() for edge in self._edges])
+        exposed = shapely.line_merge(MultiLineString([edge.tolist() for edge in self._edges]))
         return cover(self._shape, exposed, depths, self.size)
 
     def divided_edges(self) -> list[Array]:
