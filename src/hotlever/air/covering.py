@@ -20,7 +20,7 @@ from shapely.geometry.polygon import orient
 
 from hotlever.types import Array
 
-#: Largest edge that a panel may have at each of some places (n, 2), shape (n,).
+# the largest edge that a panel may have at each of some places (n, 2), shape (n,)
 Size = Callable[[Array], Array]
 
 #: Where lines cross, coordinates are rounded to this (µm).

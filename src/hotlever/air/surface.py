@@ -19,8 +19,8 @@ from hotlever.probe.layout import Layout
 from hotlever.types import Array, Index
 
 #: Largest panels, as a share of the lever's length, and growth of the size with the distance from
-#: edges and from the heater.
-_LARGEST, _GROWTH = 0.03, 1.2
+#: edges, and from the heater.
+_LARGEST, _GROWTH, _FROM_HEATER = 0.025, 1.2, 0.4
 #: Share of the size at an edge by which a panel may be off a curve that is made of short lines.
 _OFF_CURVE = 0.1
 #: Panels are small at corners of the outline that turn by more (rad).
@@ -104,7 +104,7 @@ class _Outline:
 
     def __init__(self, layout: Layout, options: PanelOptions) -> None:
         fine = 1.0 / options.refinement
-        self._growth = fine * _GROWTH
+        self._growth, self._from_heater = fine * _GROWTH, fine * _FROM_HEATER
         self._edge = fine * options.edge * layout.thickness_um
         first = next(one for one in layout.terminals if one.name == "supply")
         self._origin = np.array(first.start)
@@ -157,7 +157,7 @@ class _Outline:
         size = np.full(len(places), self._largest)
         points = shapely.points(places)
         for shape, smallest in self._heaters:
-            size = np.minimum(size, smallest + self._growth * shapely.distance(points, shape))
+            size = np.minimum(size, smallest + self._from_heater * shapely.distance(points, shape))
         if len(self._corners):
             away = np.linalg.norm(places[:, None] - self._corners, axis=2).min(axis=1)
             size = np.minimum(size, self._edge + self._growth * away)

@@ -113,8 +113,8 @@ def temperature_slices(state: State) -> xr.Dataset:
     layout = _solid(state).solid.layout
     tip = np.array(layout.tip)
     directions = lever_axes(layout)
-    turned = np.abs(directions[0]).max() < 1.0 - 1e-9
-    names = ("along", "across") if turned else ("x", "y")
+    as_drawn = np.allclose(directions, np.eye(2), rtol=0, atol=1e-9)
+    names = ("x", "y") if as_drawn else ("along", "across")
     corners = np.array([corner for region in layout.regions for corner in region.outline])
     seen = corners @ directions.T
     far, near = 0.675 * np.ptp(seen, axis=0).max(), 2.0 * layout.heater.sides.max()
