@@ -1,34 +1,46 @@
 """Drawn levers: against parametric ones, against FEniCS, and how good the doping by distances is.
 
-python benchmarks/drawings.py [same|peer|doping]
+python benchmarks/drawings.py [same|peer|doping|air|solid]
 
 same: the reference probe as a drawing against the parametric one, results and time. peer: slanted
 levers and a bent heater against legacy FEniCS on the same mesh. doping: the distance to each border
 against diffusion solved in the plane, for heaters of several shapes; between
-parallel borders both are the same, which shows how good the diffusion is solved.
+parallel borders both are the same, which shows how good the diffusion is solved. air: the panels of
+each lever, what making its operator costs beside a parametric lever of as many panels, and what
+finer panels change. solid: levers in air against the full 3-D simulation.
 """
 
 from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from scipy.sparse.linalg import splu
 from scipy.special import erfcinv
 from skfem import Basis, ElementTriP1
 from skfem.models.poisson import laplace, mass
 
+from hotlever.air.operator import PanelledAir
+from hotlever.air.surface import PanelOptions, lever_surface
 from hotlever.lever import Lever
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.space import PlacedFilm
+from hotlever.lever3d import SolidLever
 from hotlever.materials import LOW_DOPED
-from hotlever.probe import MeshOptions, Probe, mesh_layout
+from hotlever.probe import Layout, MeshOptions, Probe, mesh_layout
+from hotlever.probe.surroundings import Surroundings
+from hotlever.spieser2017 import BASE_TEMPERATURE_K
+from hotlever.threads import one_blas_thread
 from problems import BIAS, peer_problem, processor_seconds, solve_with_peer, table
 
 #: Of the diffusion in the plane: largest edge in the heater (share of its width), and time steps.
 FINE, STEPS = MeshOptions(heater=0.02, lever=0.05), 400
+#: Biases of levers in air (V).
+IN_AIR = [4.0, 12.0]
 
 
 def box(x0: float, y0: float, x1: float, y1: float) -> list[list[float]]:
@@ -148,6 +160,64 @@ def doping() -> None:
     table(["heater", "largest", "rms", "I_h", "R_h", "T_tip (K)"], rows)
 
 
+def air() -> None:
+    """Print the cost of the operators of the air, and the error of the panels."""
+    rows = []
+    reference = Probe.reference().layout()
+    for name, probe in levers().items():
+        layout = probe.layout()
+        count, seconds = operator_cost(layout, PanelOptions())
+        # the reference probe with as many panels
+        low, high = 0.3, 2.0
+        for _ in range(8):
+            middle = (low + high) / 2
+            few = len(lever_surface(reference, PanelOptions(refinement=middle)).panels) < count
+            low, high = (middle, high) if few else (low, middle)
+        as_many, parametric = operator_cost(reference, PanelOptions(refinement=low))
+        own, fine = (
+            Lever(probe.in_medium("air"), MeshOptions(panels=panels)).sweep(IN_AIR)
+            for panels in (1.0, 2.0)
+        )
+        rows.append(
+            [
+                name,
+                count,
+                f"{seconds:.2f}",
+                as_many,
+                f"{parametric:.2f}",
+                f"{seconds / parametric:.2f}",
+                *differences(own, fine),
+            ]
+        )
+    print("making the operator: CPU seconds; then panels against those of half the size\n")
+    heads = ["heater", "panels", "s", "parametric panels", "s", "ratio (≤ 2)"]
+    table([*heads, "rise of T_tip", "I_h", "heat into air"], rows)
+
+
+def operator_cost(layout: Layout, options: PanelOptions) -> tuple[int, float]:
+    """Panels of a lever, and the processor seconds that its operator takes."""
+    count = len(lever_surface(layout, options).panels)
+    make = partial(PanelledAir, layout, Surroundings(), BASE_TEMPERATURE_K, options)
+    return count, processor_seconds(one_blas_thread(make), 3)
+
+
+def solid() -> None:
+    """Print the fast model less the full 3-D simulation."""
+    rows = []
+    for name, probe in levers().items():
+        in_air = probe.in_medium("air")
+        full, fast = (lever.sweep(IN_AIR) for lever in (SolidLever(in_air), Lever(in_air)))
+        rows.append([name, f"{full.tip_K.values.max():.0f}", *differences(fast, full)])
+    table(["heater", "T_tip (K)", "rise of T_tip (≤ 5e-3)", "I_h (≤ 1e-3)", "heat into air"], rows)
+
+
+def differences(one: xr.Dataset, other: xr.Dataset) -> list[str]:
+    """The largest relative ones of rise, current and heat into the air."""
+    rise = (one.tip_K - BASE_TEMPERATURE_K) / (other.tip_K - BASE_TEMPERATURE_K)
+    ratios = (rise, one.current_mA / other.current_mA, one.air_heat_mW / other.air_heat_mW)
+    return [f"{float(np.abs(ratio - 1).max()):.1e}" for ratio in ratios]
+
+
 def share_by_distance(low: PlacedFilm, delta: float) -> np.ndarray:
     """The share of the high-doped silicon's dopant by `tapered_doping`."""
     from hotlever.materials.doping import tapered_doping
@@ -179,6 +249,6 @@ def diffused_share(probe: Probe, points: np.ndarray) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    kinds = {"same": same, "peer": peer, "doping": doping}
+    kinds = {"same": same, "peer": peer, "doping": doping, "air": air, "solid": solid}
     for kind in sys.argv[1:] or kinds:
         kinds[kind]()

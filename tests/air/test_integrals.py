@@ -36,7 +36,7 @@ def test_separate_rectangles(one, other):
     high = low + rng.uniform(0.3, 1, (2, 3))
     first, second = rectangle(one, low[0], high[0]), rectangle(other, low[1], high[1])
     expected = by_gauss(first, second)
-    assert (first.flat_axis[0], second.flat_axis[0]) == (one, other)
+    assert (first.frame[0][0], second.frame[0][0]) == (one, other)
     assert rectangle_pairs(first, second)[0] == pytest.approx(expected, rel=1e-11)
     (points,), (weights,) = first.points(12)
     assert weights @ potential(points, second.corners[0]) == pytest.approx(expected, rel=1e-11)
@@ -71,7 +71,7 @@ def test_far_expansion_has_order_four():
 
 
 def test_quadrature_and_closed_form_agree_in_the_matrix():
-    # the same rectangles, turned away from the axes: then Gauss points are used
+    # the same rectangles, tilted: then Gauss points are used
     lines = np.array([0.0, 0.1, 0.4, 1.0])
     corners = [
         [[a, c, z], [b, c, z], [b, d, z], [a, d, z]]
@@ -82,15 +82,54 @@ def test_quadrature_and_closed_form_agree_in_the_matrix():
     panels = Panels(np.array(corners))
     angle = 0.3
     turn = np.array(
-        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+        [[np.cos(angle), 0, -np.sin(angle)], [0, 1, 0], [np.sin(angle), 0, np.cos(angle)]]
     )
-    turned = Panels(panels.corners @ turn.T)
-    assert (panels.flat_axis == 2).all()
-    assert (turned.flat_axis == -1).all()
-    exact, quadrature = single_layer_matrix(panels), single_layer_matrix(turned)
+    tilted = Panels(panels.corners @ turn.T)
+    assert (panels.frame[0] == 2).all()
+    assert (tilted.frame[0] == -1).all()
+    exact, quadrature = single_layer_matrix(panels), single_layer_matrix(tilted)
     assert np.abs(quadrature / exact - 1).max() < 2e-3  # six Gauss points each way
     heats = [panels.areas @ np.linalg.solve(layer, panels.areas) for layer in (exact, quadrature)]
     assert heats[1] == pytest.approx(heats[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("angle", [0.3, 1e-9, np.pi / 2, 2.0, -3.0])
+def test_rectangles_turned_in_the_plane_are_still_in_one_frame(angle):
+    low, high = np.array([[0, 0, 0], [0.5, 0.2, 0.1], [0.1, 2, 0]]), np.array([1, 3, 2.5])
+    panels = Panels(
+        np.concatenate([rectangle(axis, low[axis], high).corners for axis in (2, 1, 0)])
+    )
+    cosine, sine = np.cos(angle), np.sin(angle)
+    turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+    turned = Panels(panels.corners @ turn.T)
+    assert (panels.frame[0] == [2, 1, 0]).all()
+    assert (turned.frame[0] >= 0).all()
+    exact = single_layer_matrix(panels)
+    np.testing.assert_allclose(single_layer_matrix(turned), exact, rtol=1e-10)
+
+
+def test_what_is_no_rectangle_has_no_frame():
+    trapezoid = [[0, 0, 0], [2, 0, 0], [1.9, 1, 0], [0.1, 1, 0]]
+    triangle = [[0, 0, 0], [2, 0, 0], [0, 1, 0], [0, 1, 0]]
+    rhombus = [[0, 0, 0], [2, 0, 0], [3, 1, 0], [1, 1, 0]]
+    leaning = [[0, 0, 0], [2, 0, 0], [2, 1, 1], [0, 1, 1]]
+    panels = Panels(np.array([trapezoid, triangle, rhombus, leaning], dtype=float))
+    assert (panels.frame[0] == -1).all()
+
+
+def test_trapezoids_and_triangles_by_gauss_points():
+    """A rectangle in two pieces that have no closed form is the rectangle."""
+    other = rectangle(1, (1.2, -0.3, 0.1), (2.5, 0, 0.6))
+    whole = rectangle(2, (0, 0, 0), (2, 1, 0))
+    corners = [
+        [[0, 0, 0], [1.3, 0, 0], [0.8, 1, 0], [0, 1, 0]],
+        [[1.3, 0, 0], [2, 0, 0], [2, 1, 0], [2, 1, 0]],
+        [[1.3, 0, 0], [2, 1, 0], [0.8, 1, 0], [0.8, 1, 0]],
+    ]
+    matrix = single_layer_matrix(Panels(np.concatenate([np.array(corners), other.corners])))
+    exact = single_layer_matrix(Panels(np.concatenate([whole.corners, other.corners])))
+    assert matrix[:3, :3].sum() == pytest.approx(exact[0, 0], rel=1e-3)
+    assert matrix[:3, 3].sum() == pytest.approx(exact[0, 1], rel=1e-4)
 
 
 def test_panel_geometry():

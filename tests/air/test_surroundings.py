@@ -69,7 +69,7 @@ def test_the_chip_takes_up_heat_and_is_large_enough(monkeypatch):
 
     with_chip = heated_at_the_front(True)
     assert with_chip > 1.15 * heated_at_the_front(False)
-    monkeypatch.setattr("hotlever.air.surface.REACH", 32.0)
+    monkeypatch.setattr("hotlever.air.chip.REACH", 32.0)
     assert heated_at_the_front(True) == pytest.approx(with_chip, rel=1e-3)
 
 

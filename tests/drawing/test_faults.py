@@ -10,8 +10,6 @@ from reference_drawing import reference_library
 from drawn import box, drawn, library_of, reference_points, written
 from hotlever.drawing.fault import DrawingError
 from hotlever.errors import InputError
-from hotlever.lever import Lever
-from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
 
 BOW = [[50.58, -9.88], [54.4, 9.88], [54.4, -9.88], [50, 9.88]]
@@ -239,8 +237,6 @@ def test_a_dxf_outline_that_is_open(tmp_path):
 
 def test_what_a_drawing_cannot_do_yet_is_refused_where_it_is_met(run, tmp_path):
     probe = Probe.from_values(reference_points(), "probe.toml")
-    with pytest.raises(InputError, match=r"air: region .*drawn lever can be simulated in vacuum"):
-        Lever(probe.in_medium("air"), COARSE)
     probe.to_file(tmp_path / "probe.toml")
     data = "V_b (V), I_h (mA)\n" + "".join(f"{v}, {0.1 * v}\n" for v in range(1, 9))
     (tmp_path / "iv.csv").write_text(data, encoding="utf-8")

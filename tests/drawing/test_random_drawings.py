@@ -1,4 +1,4 @@
-"""Random drawings, valid and broken: each is solved, or refused in one line."""
+"""Random drawings, valid and broken: each is solved, in air too, or refused in one line."""
 
 from __future__ import annotations
 
@@ -77,16 +77,16 @@ def broken(draw):
     return values
 
 
-def solved(values):
+def solved(values, **surroundings):
     """What the lever shows at a bias, None if the drawing is refused in one line."""
     try:
-        lever = Lever(Probe.from_values(values, "probe.toml"), COARSE)
+        lever = Lever(Probe.from_values(values, "probe.toml").with_(**surroundings), COARSE)
         shown = lever.dataset(lever.solve([0.5]))
     except HotleverError as refused:
         return check_told(str(refused))
     # no silent gap: what goes in comes out
     np.testing.assert_allclose(shown.ground_current_mA, shown.current_mA, rtol=1e-6)
-    np.testing.assert_allclose(shown.end_heat_mW, shown.power_mW, rtol=1e-6)
+    np.testing.assert_allclose(shown.end_heat_mW + shown.air_heat_mW, shown.power_mW, rtol=1e-6)
     assert shown.current_mA.item() > 0
     return shown
 
@@ -109,3 +109,16 @@ def test_valid_drawings_are_solved(values):
 @given(broken())
 def test_broken_drawings_are_solved_or_refused(values):
     solved(values)
+
+
+@few
+@given(levers(), st.booleans())
+def test_valid_drawings_are_solved_in_air(values, chip):
+    shown = solved(values, medium="air", chip=chip)
+    assert 0 < shown.air_heat_mW.item() < shown.power_mW.item()
+
+
+@few
+@given(broken())
+def test_broken_drawings_are_solved_in_air_or_refused(values):
+    solved(values, medium="air")

@@ -34,40 +34,52 @@ def potential(points: Array, corners: Array) -> Array:
     ndarray, shape (...)
         µm.
     """
-    following = np.roll(corners, -1, axis=-2)
-    edges = following - corners
-    lengths = np.linalg.norm(edges, axis=-1)
-    along = edges / np.maximum(lengths, _TINY)[..., None]
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=-2) - corners, axis=-1)
+    along = (np.roll(corners, -1, axis=-2) - corners) / np.maximum(lengths, _TINY)[..., None]
     area_vector = np.cross(
-        corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
+        corners[..., 2, :] - corners[..., 0, :], corners[..., -1, :] - corners[..., 1, :]
     )
     normal = area_vector / np.linalg.norm(area_vector, axis=-1, keepdims=True)
     outward = np.cross(along, normal[..., None, :])
-    to_start = corners - points[..., None, :]
-    height = np.abs(np.einsum("...d,...d->...", to_start[..., 0, :], normal))[..., None]
-    across = np.einsum("...kd,...kd->...k", to_start, outward)
-    start = np.einsum("...kd,...kd->...k", to_start, along)
-    end = start + lengths
-    square = across**2 + height**2
-    nearest = np.maximum(np.sqrt(square), _TINY)
+    # from every corner, seen from the point
+    to_corner = corners - points[..., None, :]
+    distance = np.sqrt(np.einsum("...kd,...kd->...k", to_corner, to_corner))
+    height = np.abs(np.einsum("...d,...d->...", to_corner[..., 0, :], normal))
+    across = np.einsum("...kd,...kd->...k", to_corner, outward)
+    both = distance + np.roll(distance, -1, axis=-1)
+    # ∫ 1/R along an edge is 2 artanh(length / both)
+    terms = across * np.log((both + lengths) / np.maximum(both - lengths, _TINY * both + _TINY))
+    total: Array = terms.sum(axis=-1)
+    return total - height * _solid_angle(to_corner, distance)
 
-    def angle(position: Array) -> Array:
-        distance = np.sqrt(square + position**2)
-        return np.arctan2(across * position, square + height * distance)
 
-    terms = across * (np.arcsinh(end / nearest) - np.arcsinh(start / nearest))
-    terms -= height * (angle(end) - angle(start))
-    total: Array = np.where(lengths > 0, terms, 0.0).sum(axis=-1)
-    return total
+def _solid_angle(to_corner: Array, distance: Array) -> Array:
+    """Return the solid angle of a convex polygon, of its corners as seen from a point.
+
+    By triangles (A. van Oosterom and J. Strackee, IEEE Trans. Biomed. Eng. 30, 125 (1983)).
+    """
+    first, angle = to_corner[..., 0, :], np.zeros(to_corner.shape[:-2])
+    for k in range(1, to_corner.shape[-2] - 1):
+        second, third = to_corner[..., k, :], to_corner[..., k + 1, :]
+        a, b, c = (distance[..., one] for one in (0, k, k + 1))
+        volume = np.einsum("...d,...d->...", first, np.cross(second, third))
+        rest = (
+            a * b * c
+            + np.einsum("...d,...d->...", first, second) * c
+            + np.einsum("...d,...d->...", first, third) * b
+            + np.einsum("...d,...d->...", second, third) * a
+        )
+        angle += 2.0 * np.arctan2(np.abs(volume), rest)
+    return angle
 
 
 def rectangle_pairs(first: Panels, second: Panels) -> Array:
-    """Return ∫∫ 1/R over pairs of axis-parallel rectangles.
+    """Return ∫∫ 1/R over pairs of rectangles whose sides are parallel to the same three axes.
 
     Parameters
     ----------
     first, second : Panels, n each
-        The pairs; ``flat_axis`` of none is −1.
+        The pairs; by their `frame` both are rectangles turned by the same angle.
 
     Returns
     -------
@@ -75,13 +87,22 @@ def rectangle_pairs(first: Panels, second: Panels) -> Array:
         µm³.
     """
     result = np.empty(len(first))
-    low = [panels.corners.min(axis=1) for panels in (first, second)]
-    high = [panels.corners.max(axis=1) for panels in (first, second)]
+    (axis, angle), (other_axis, other_angle) = first.frame, second.frame
+    # the same axes at angles of next to 0 and π/2
+    swapped = np.abs(angle - other_angle) > np.pi / 4
+    other_axis = np.where(swapped & (other_axis < 2), 1 - other_axis, other_axis)
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    low, high = [], []
+    for panels in (first, second):
+        x, y, z = np.moveaxis(panels.corners, 2, 0)
+        turned = np.stack([cosine * x + sine * y, cosine * y - sine * x, z], axis=2)
+        low.append(turned.min(axis=1))
+        high.append(turned.max(axis=1))
     # differences of the coordinates: high − low, low − low, high − high, low − high
     differences = np.stack([high[0] - low[1], low[0] - low[1], high[0] - high[1], low[0] - high[1]])
     for one in range(3):
         for other in range(3):
-            pairs = (first.flat_axis == one) & (second.flat_axis == other)
+            pairs = (axis == one) & (other_axis == other)
             d = differences[:, pairs]
             if one == other:
                 u, v = (axis for axis in range(3) if axis != one)

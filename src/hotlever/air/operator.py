@@ -15,9 +15,10 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
+from hotlever.air.chip import BaseLine, chip_panels
 from hotlever.air.panels import Mirror, Panels, mirror_group
 from hotlever.air.single_layer import layer_potential, single_layer_matrix
-from hotlever.air.surface import PanelOptions, chip_panels, lever_surface
+from hotlever.air.surface import PanelOptions, lever_surface
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout
@@ -80,8 +81,8 @@ def air_operator(
     Raises
     ------
     InputError
-        If a region of the layout is not an axis-parallel rectangle, or the surface below crosses
-        the lever.
+        If the surface below crosses the lever; or, with a chip or a tilted surface, the leg ends
+        are not on one line (see `hotlever.air.chip.BaseLine`).
     ComputationError
         If the dimensions of the lever differ too much.
     """
@@ -145,7 +146,7 @@ class PanelledAir:
         progress: Progress | None = None,
     ) -> None:
         self.surface = lever_surface(layout, options, mirrored=surroundings.symmetric)
-        chip = [chip_panels(layout, options)] if surroundings.chip else []
+        chip = [chip_panels(layout, options.refinement)] if surroundings.chip else []
         self.panels = Panels(np.concatenate([one.corners for one in (self.surface.panels, *chip)]))
         most = int(_MOST_PANELS * options.refinement**2)
         if len(self.panels) > most:
@@ -204,7 +205,10 @@ def _mirrors_below(
     if surroundings.surface_gap_um is None:
         return []
     tilt = math.radians(surroundings.surface_tilt_deg)
-    normal = np.array([-math.sin(tilt), 0.0, math.cos(tilt)])
+    normal = np.array([0.0, 0.0, 1.0])
+    if tilt != 0:
+        along = BaseLine.of(layout, "surface_tilt_deg").along
+        normal = np.array([*(-math.sin(tilt) * along), math.cos(tilt)])
     below_tip = np.array([*layout.tip, -layout.thickness_um / 2 - surroundings.surface_gap_um])
     point = below_tip - surroundings.jump_length_um(base_temperature_K) * normal
     if ((panels.corners - point) @ normal).min() <= 0:

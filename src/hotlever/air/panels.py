@@ -16,6 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from hotlever.types import Array, Index
 
+#: Share of its radius by which a rectangle's corners may be off.
+_RECTANGLE = 1e-6
+
 
 @dataclass(frozen=True)
 class Mirror:
@@ -120,15 +123,34 @@ class Panels:
         return np.asarray(total / self.areas[:, None, None])
 
     @cached_property
-    def flat_axis(self) -> Index:
-        """Coordinate axis normal to each axis-parallel rectangle; −1 for any other panel."""
-        edges = np.roll(self.corners, -1, axis=1) - self.corners
-        tolerance = 1e-12 * self.radii[:, None]
-        along = np.abs(edges) > tolerance[:, :, None]
-        proper = (along.sum(axis=2) == 1).all(axis=1)
-        thin = ~along.any(axis=1)
-        single = thin.sum(axis=1) == 1
-        return np.where(proper & single, np.argmax(thin, axis=1), -1)
+    def frame(self) -> tuple[Index, Array]:
+        """How rectangles that lie flat or stand upright are turned.
+
+        Returns
+        -------
+        axis : ndarray of int, shape (n,)
+            Of the coordinate axes turned about z by the angle, the one normal to the panel; −1 of
+            a panel that is no such rectangle.
+        angle : ndarray, shape (n,)
+            From 0 to π/2; next to both it means the same.
+        """
+        sides = np.roll(self.corners, -1, axis=1) - self.corners
+        tolerance = _RECTANGLE * self.radii
+        level = np.abs(sides[:, :, 2]) < tolerance[:, None]
+        upright = np.linalg.norm(sides[:, :, :2], axis=2) < tolerance[:, None]
+        # the first side, or the second where the first is upright
+        x, y, _ = np.where(upright[:, :1], sides[:, 1], sides[:, 0]).T
+        quarters = np.floor(np.arctan2(y, x) / (np.pi / 2)).astype(np.intp)
+        angle = np.arctan2(y, x) - quarters * (np.pi / 2)
+        opposite = np.linalg.norm(sides[:, :2] + sides[:, 2:], axis=2).max(axis=1) < tolerance
+        first, second = np.moveaxis(sides[:, :2], 1, 0)
+        shorter = np.linalg.norm(sides[:, :2], axis=2).min(axis=1)
+        square = np.abs(np.einsum("nd,nd->n", first, second)) < tolerance * shorter
+        proper = opposite & square & (shorter > 0)
+        flat = level.all(axis=1)
+        standing = (level ^ upright).all(axis=1)
+        axis = np.where(flat, 2, np.where(standing, 1 - quarters % 2, -1))
+        return np.where(proper, axis, -1), angle
 
     def points(self, order: int) -> tuple[Array, Array]:
         """Return Gauss points (n, order², 3) and weights (n, order²) on each panel."""

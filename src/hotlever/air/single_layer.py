@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hotlever.air.integrals import far_pairs, potential, rectangle_pairs
 from hotlever.air.panels import IDENTITY, Mirror, Panels
@@ -19,11 +20,13 @@ from hotlever.types import Array, Index, Progress
 
 #: Pairs whose centroids are this many times the sum of their radii apart are far.
 FAR = 3.0
-#: Gauss points per direction for near pairs that have no closed form: touching, and others.
-TOUCHING_ORDER, NEAR_ORDER = 6, 4
-_TOUCHING = 1.5
-#: Panels expanded, and pairs integrated, at once: arrays that stay in the cache.
-_ROWS, _PAIRS = 32, 8192
+#: Gauss points per direction for near pairs that have no closed form, and up to how many times the
+#: sum of their radii the centroids are apart.
+ORDERS = ((8, 0.5), (6, 1.0), (4, 1.5), (3, 2.0), (2, np.inf))
+#: Rectangles turned by less (rad) against each other are parallel.
+_SAME_ANGLE = 2e-6
+#: Panels expanded, pairs integrated and Gauss points taken at once: arrays that stay in the cache.
+_ROWS, _PAIRS, _POINTS = 32, 8192, 8192
 
 
 @one_blas_thread
@@ -61,7 +64,7 @@ def single_layer_matrix(
             half = rows[i] <= j
             near.append((rows[i][half], j[half]))
         first, second = (np.concatenate(numbers) for numbers in zip(*near, strict=True))
-        closed = (panels.flat_axis[first] >= 0) & (images.flat_axis[second] >= 0)
+        closed = _in_one_frame(panels.frame, images.frame, first, second)
         for pairs, integrals in ((closed, rectangle_pairs), (~closed, _by_quadrature)):
             some_i, some_j = first[pairs], second[pairs]
             for start in range(0, some_i.size, _PAIRS):
@@ -109,18 +112,31 @@ def layer_potential(points: Array, panels: Panels, density: Array) -> Array:
     return result / (4.0 * np.pi)
 
 
-def _by_quadrature(first: Panels, second: Panels) -> Array:
-    """Integrate 1/R over pairs of any panels: in closed form on one, by Gauss points on the other.
+def _in_one_frame(
+    frame: tuple[Index, Array], other: tuple[Index, Array], first: Index, second: Index
+) -> NDArray[np.bool_]:
+    """Whether pairs of panels are rectangles with sides along the same three axes."""
+    (axis, angle), (other_axis, other_angle) = frame, other
+    between = np.abs(angle[first] - other_angle[second])
+    same = np.minimum(between, np.pi / 2 - between) < _SAME_ANGLE
+    return (axis[first] >= 0) & (other_axis[second] >= 0) & same
 
-    Both ways are averaged, so that swapping the panels changes nothing.
+
+def _by_quadrature(first: Panels, second: Panels) -> Array:
+    """Integrate 1/R over pairs of any panels.
+
+    In closed form over the larger of the two and by Gauss points over the other.
     """
-    gaps = np.linalg.norm(first.centres - second.centres, axis=1)
-    touching = gaps < _TOUCHING * (first.radii + second.radii)
-    result = np.zeros(len(first))
-    for pairs, order in ((touching, TOUCHING_ORDER), (~touching, NEAR_ORDER)):
-        one, other = first.chosen(pairs), second.chosen(pairs)
-        for panels, source in ((one, other), (other, one)):
-            points, weights = panels.points(order)
-            values = potential(points, source.corners[:, None])
-            result[pairs] += np.einsum("nq,nq->n", weights, values) / 2
+    gaps = np.linalg.norm(first.centres - second.centres, axis=1) / (first.radii + second.radii)
+    smaller = (first.radii <= second.radii)[:, None, None]
+    under = Panels(np.where(smaller, first.corners, second.corners))
+    source = np.where(smaller, second.corners, first.corners)
+    result = np.empty(len(first))
+    which = np.searchsorted([farthest for _, farthest in ORDERS], gaps, side="right")
+    for number, (order, _) in enumerate(ORDERS):
+        here = np.flatnonzero(which == number)
+        for pairs in np.array_split(here, 1 + here.size * order**2 // _POINTS):
+            points, weights = under.chosen(pairs).points(order)
+            values = potential(points, source[pairs, None])
+            result[pairs] = np.einsum("nq,nq->n", weights, values)
     return result

@@ -1,36 +1,34 @@
-"""The surfaces of a lever and of the chip that holds it, as panels.
+"""The surface of a lever as panels.
 
-The lever is a plate of its true thickness with top, bottom and side faces. The flux into air is
-singular at the edges and its source is the heater, so panels are small at both. The leg ends are
-at base temperature and have no panels.
-
-The chip body is a block behind x = 0 whose lower face continues the lever's lower face and which
-rises above it, as where a lever is etched from the device layer and the tip points away from the
-chip. Its faces reach `REACH` lever lengths to all sides.
+The lever is a plate of its true thickness and of any outline, with top, bottom and side faces. The
+flux into air is singular at the edges and its source is the heater, so panels are small at both.
+The leg ends are at base temperature and have no panels; borders between regions are no edges.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+import shapely
+from shapely import LineString, MultiLineString, Polygon
 
+from hotlever.air.covering import cover, divided, parts, rings, turns
 from hotlever.air.panels import Panels
-from hotlever.errors import InputError
-from hotlever.probe.layout import Layout, Region
+from hotlever.probe.layout import Layout
 from hotlever.types import Array, Index
 
-#: Extent of the chip in lever lengths; four times as much changes the loss by less than 2e-4.
-REACH = 8.0
 #: Largest panels, as a share of the lever's length, and growth of the size with the distance from
-#: edges and from the heater.
-_LARGEST, _GROWTH = 0.03, 1.2
-#: Panels of the chip at the lever's root, as a share of its width, and their growth with distance.
-_ROOT, _ROOT_GROWTH = 0.1, 0.5
-_ON_LINE = 1e-6  # µm
+#: edges, and from the heater.
+_LARGEST, _GROWTH, _FROM_HEATER = 0.025, 1.2, 0.4
+#: Share of the size at an edge by which a panel may be off a curve that is made of short lines.
+_OFF_CURVE = 0.1
+#: Panels are small at corners of the outline that turn by more (rad).
+_SHARP = 0.4
+#: How far off (µm) a line is still on another; where regions touch coordinates are rounded to less.
+_ON_LINE, _GRID = 1e-5, 1e-8
+#: Shorter edges (µm) beside a terminal are left out.
+_SHORTEST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -82,73 +80,116 @@ def lever_surface(
     options : PanelOptions, optional
     mirrored : bool
         Only above the mid-plane: enough where the surroundings are symmetric about it.
-
-    Raises
-    ------
-    InputError
-        If a region is not an axis-parallel rectangle.
     """
-    sizes = _Sizes(layout, options or PanelOptions())
-    boxes = [_rectangle(region) for region in layout.regions]
+    outline = _Outline(layout, options or PanelOptions())
     half = layout.thickness_um / 2
-    upright = sizes.upright(half, mirrored)
-    corners = []
-    for box in boxes:
-        # by the axis (0 or 1) that a side is normal to, and at which end of it (0 low, 1 high)
-        exposed = {side: _exposed(box, *side, boxes, layout) for side in product((0, 1), (0, 1))}
-        # an edge that is shared along its whole length is no edge of the lever
-        x, y = (
-            sizes.breaks(box[0, axis], box[1, axis], axis, [bool(exposed[axis, n]) for n in (0, 1)])
-            for axis in (0, 1)
-        )
-        corners += [grid(2, z, x, y) for z in ([half] if mirrored else [half, -half])]
-        for (axis, end), intervals in exposed.items():
-            for low, high in intervals:
-                along = sizes.breaks(low, high, 1 - axis, (True, True))
-                corners.append(grid(axis, box[end, axis], along, upright))
+    upright = outline.upright(half, mirrored)
+    cells = outline.cells()
+    corners = [np.insert(cells, 2, z, axis=2) for z in ([half] if mirrored else [half, -half])]
+    corners += [_wall(line, upright) for line in outline.divided_edges()]
     panels = Panels(np.concatenate(corners))
-    places = panels.corners.mean(axis=1)[:, :2].round(9)
-    sites, site = np.unique(places, axis=0, return_inverse=True)
-    return LeverSurface(panels, sites, site.ravel())
+    sites, site = np.unique(panels.centres[:, :2].round(9), axis=0, return_inverse=True)
+    placed = panels.corners.copy()
+    placed[..., :2] = outline.on_the_lever(panels.corners[..., :2])
+    within = outline.on_the_lever(outline.moved_inside(sites))
+    return LeverSurface(Panels(placed), within, site.ravel())
 
 
-def chip_panels(layout: Layout, options: PanelOptions) -> Panels:
-    """Return the front and the lower face of the chip body."""
-    (x0, low), (x1, high) = layout.box
-    half, reach = layout.thickness_um / 2, REACH * (x1 - x0)
-    smallest = _ROOT * (high - low) / options.refinement
+class _Outline:
+    """The outline of a lever, and how large panels may be where.
 
-    def breaks(start: float, stop: float, near: tuple[float, float]) -> Array:
-        at = np.linspace(start, stop, 20001)
-        away = np.abs(at - at.clip(*near))
-        return divided(at, smallest + _ROOT_GROWTH / options.refinement * away)
-
-    across = breaks(low - reach, high + reach, (low, high))
-    up = breaks(half, half + reach, (half, half))
-    behind = breaks(x0 - reach, x0, (x0, x0))
-    return Panels(np.concatenate([grid(0, x0, across, up), grid(2, -half, behind, across)]))
-
-
-class _Sizes:
-    """How large panels may be where."""
+    It is seen from its supply leg end, along which the first coordinate runs: so a lever has the
+    same panels anywhere on a wafer and in any orientation.
+    """
 
     def __init__(self, layout: Layout, options: PanelOptions) -> None:
-        self._heater = layout.heater.box
         fine = 1.0 / options.refinement
-        self._growth = fine * _GROWTH
+        self._growth, self._from_heater = fine * _GROWTH, fine * _FROM_HEATER
         self._edge = fine * options.edge * layout.thickness_um
-        self._narrow = fine * options.heater * layout.heater.narrow_um
-        self._largest = fine * _LARGEST * float(np.ptp(layout.box, axis=0).max())
+        first = next(one for one in layout.terminals if one.name == "supply")
+        self._origin = np.array(first.start)
+        x, y = (self._origin - first.end) / np.linalg.norm(self._origin - first.end)
+        self._axes = np.array([[x, y], [-y, x]])
+        shapes = {
+            region: Polygon(self._seen(region.outline), [self._seen(hole) for hole in region.holes])
+            for region in layout.regions
+        }
+        #: As drawn, and with fewer corners where it is curved.
+        self._exact = shapely.union_all(list(shapes.values()), grid_size=_GRID)
+        simplified = parts(self._exact.simplify(_OFF_CURVE * self._edge))
+        self._shape = max(simplified, key=lambda part: part.area)
+        around = np.array(shapely.minimum_rotated_rectangle(self._shape).exterior.coords)
+        length = np.linalg.norm(np.diff(around, axis=0), axis=1).max()
+        self._largest = fine * _LARGEST * float(length)
+        self._heaters = [
+            (shape, fine * options.heater * region.narrow_um)
+            for region, shape in shapes.items()
+            if region.part == "heater"
+        ]
+        self._edges, self._corners = self._exposed(layout)
 
-    def breaks(self, low: float, high: float, axis: int, edges: Sequence[bool]) -> Array:
-        """Divide an interval along an axis; `edges` says which ends are edges of the lever."""
-        at = np.linspace(low, high, 2001)
-        away = np.abs(at - at.clip(*self._heater[:, axis]))
-        size = np.minimum(self._largest, self._narrow + self._growth * away)
-        for end, is_edge in zip((low, high), edges, strict=True):
-            if is_edge:
-                size = np.minimum(size, self._edge + self._growth * np.abs(at - end))
-        return divided(at, size)
+    def _seen(self, places: object) -> Array:
+        return (np.asarray(places) - self._origin) @ self._axes.T
+
+    def on_the_lever(self, places: Array) -> Array:
+        """Return places (..., 2) of the outline in the coordinates of the layout."""
+        return places @ self._axes + self._origin
+
+    def _exposed(self, layout: Layout) -> tuple[list[Array], Array]:
+        """Return the edges that no terminal holds, and the sharp corners between two of them."""
+        ends = [LineString(self._seen([one.start, one.end])) for one in layout.terminals]
+        off = _ON_LINE + shapely.hausdorff_distance(self._shape, self._exact)
+        held = shapely.union_all(ends).buffer(off, cap_style="flat")
+        edges, corners = [], []
+        for ring in rings(self._shape):
+            free = [
+                [one for one in parts(LineString(pair).difference(held), "LineString")
+                 if one.length > _SHORTEST]
+                for pair in zip(ring, np.roll(ring, -1, axis=0), strict=True)
+            ]  # fmt: skip
+            edges += [np.array(one.coords) for some in free for one in some]
+            exposed = np.array([bool(some) for some in free])
+            corners.append(ring[(np.abs(turns(ring)) > _SHARP) & exposed & np.roll(exposed, 1)])
+        return edges, np.concatenate(corners)
+
+    def size(self, places: Array) -> Array:
+        """Return the largest edge (µm) that a panel may have at some places (n, 2)."""
+        size = np.full(len(places), self._largest)
+        points = shapely.points(places)
+        for shape, smallest in self._heaters:
+            size = np.minimum(size, smallest + self._from_heater * shapely.distance(points, shape))
+        if len(self._corners):
+            away = np.linalg.norm(places[:, None] - self._corners, axis=2).min(axis=1)
+            size = np.minimum(size, self._edge + self._growth * away)
+        return size
+
+    def cells(self) -> Array:
+        """Return panels (n, 4, 2) on a face."""
+        # one panel between two depths, until panels are as large as anywhere
+        most = np.log(max(2.0, 2.0 * self._largest / self._edge)) / self._growth
+        depths = self._edge / self._growth * np.expm1(self._growth * np.arange(1.0, most + 1.0))
+        exposed = shapely.line_merge(MultiLineString([edge.tolist() for edge in self._edges]))
+        return cover(self._shape, exposed, depths, self.size)
+
+    def divided_edges(self) -> list[Array]:
+        """Return the breaks (k, 2) between panels along every exposed edge."""
+        lines = []
+        for start, end in self._edges:
+            share = np.linspace(0.0, 1.0, 513)
+            length = np.linalg.norm(end - start)
+            size = self.size(start + share[:, None] * (end - start))
+            breaks = divided(share, size / length)
+            lines.append(start + breaks[:, None] * (end - start))
+        return lines
+
+    def moved_inside(self, places: Array) -> Array:
+        """Return places (n, 2), those beyond a curve moved onto it."""
+        points = shapely.points(places)
+        outside = shapely.distance(points, self._exact) > 0
+        nearest = shapely.shortest_line(self._exact, points[outside])
+        moved = places.copy()
+        moved[outside] = shapely.get_coordinates(shapely.get_point(nearest, 0))
+        return moved
 
     def upright(self, half: float, mirrored: bool) -> Array:
         """Divide a side face from bottom (or the mid-plane) to top."""
@@ -156,58 +197,10 @@ class _Sizes:
         return divided(at, self._edge + self._growth * (half - np.abs(at)))
 
 
-def divided(at: Array, size: Array) -> Array:
-    """Return break points between the ends of `at` whose distances follow `size`."""
-    counted = cumulative_trapezoid(1.0 / size, at, initial=0.0)
-    pieces = max(1, int(np.ceil(counted[-1] - 1e-6)))
-    breaks = np.interp(np.linspace(0.0, counted[-1], pieces + 1), counted, at)
-    breaks[[0, -1]] = at[[0, -1]]
-    return breaks
-
-
-def grid(axis: int, at: float, u: Array, v: Array) -> Array:
-    """Return the corners (cells, 4, 3) of all cells between two sets of lines in a plane.
-
-    The plane is normal to a coordinate axis and stands at a place on it.
-    """
-    corners_u = np.stack([u[:-1], u[1:], u[1:], u[:-1]], axis=1)[:, None]
-    corners_v = np.stack([v[:-1], v[:-1], v[1:], v[1:]], axis=1)
-    cells = np.stack(np.broadcast_arrays(corners_u, corners_v), axis=-1).reshape(-1, 4, 2)
-    return np.insert(cells, axis, at, axis=2)
-
-
-def _rectangle(region: Region) -> Array:
-    """Return the least and largest corner of a region, and refuse what is no rectangle."""
-    outline, box = np.array(region.outline), region.box
-    at_corner = np.abs(outline[:, None] - box).min(axis=1).max() < _ON_LINE
-    if len(outline) != 4 or not at_corner:
-        raise InputError(
-            f"air: region '{region.name}' has {len(outline)} corners, expected a rectangle "
-            "parallel to the axes; a drawn lever can be simulated in vacuum only so far"
-        )
-    return box
-
-
-def _exposed(
-    box: Array, axis: int, end: int, boxes: list[Array], layout: Layout
-) -> list[tuple[float, float]]:
-    """Return the parts of a side that touch neither another region nor a terminal."""
-    other, line = 1 - axis, box[end, axis]
-    covered = [
-        (neighbour[0, other], neighbour[1, other])
-        for neighbour in boxes
-        if abs(neighbour[1 - end, axis] - line) < _ON_LINE
-    ]
-    for terminal in layout.terminals:
-        ends = np.array([terminal.start, terminal.end])
-        if np.abs(ends[:, axis] - line).max() < _ON_LINE:
-            covered.append((ends[:, other].min(), ends[:, other].max()))
-    free = [(float(box[0, other]), float(box[1, other]))]
-    for low, high in covered:
-        free = [
-            piece
-            for start, stop in free
-            for piece in ((start, min(stop, low)), (max(start, high), stop))
-            if piece[1] - piece[0] > _ON_LINE
-        ]
-    return free
+def _wall(line: Array, heights: Array) -> Array:
+    """Return the corners (cells, 4, 3) of upright panels over a divided line (k, 2)."""
+    ends = np.stack([line[:-1], line[1:], line[1:], line[:-1]], axis=1)[:, None]
+    up = np.stack([heights[:-1], heights[:-1], heights[1:], heights[1:]], axis=1)[..., None]
+    shape = (len(line) - 1, len(heights) - 1, 4)
+    level, upwards = np.broadcast_to(ends, (*shape, 2)), np.broadcast_to(up, (*shape, 1))
+    return np.concatenate([level, upwards], axis=-1).reshape(-1, 4, 3)

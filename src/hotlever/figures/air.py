@@ -41,7 +41,8 @@ def air_loss(
     title : str
         Of the map.
     """
-    top = (panels.flat_axis == 2) & (panels.centres[:, 2] > 0)
+    heights = panels.corners[..., 2]
+    top = heights.min(axis=1) > heights.max() * (1 - 1e-9)
     values = 1e3 * flux[top]
     strongest = float(np.abs(values).max())
     with figure(7.0, 6.0, 2, 1, height_ratios=(1.5, 1.0), letters=True) as (made, (upper, lower)):

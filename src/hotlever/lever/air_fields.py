@@ -8,7 +8,9 @@ from functools import cached_property
 
 import meshio
 import numpy as np
+import shapely
 import xarray as xr
+from shapely import Polygon
 
 from hotlever.air.operator import PanelledAir
 from hotlever.air.panels import Panels
@@ -73,9 +75,9 @@ class AirFields:
         """Return the heat (mW) that each region of the layout loses to the air."""
         heat = self._air.operator.matrix @ self._theta(state)
         sites, regions = self._air.operator.sites, self._lever.space.mesh.layout.regions
-        boxes = np.array([(np.min(r.outline, axis=0), np.max(r.outline, axis=0)) for r in regions])
-        outside = np.maximum(boxes[:, 0] - sites[:, None], sites[:, None] - boxes[:, 1])
-        region = outside.max(axis=2).argmin(axis=1)
+        places = shapely.points(sites)
+        away = [shapely.distance(places, Polygon(one.outline, one.holes)) for one in regions]
+        region = np.argmin(away, axis=0)
         return {one.name: float(heat[region == k].sum()) for k, one in enumerate(regions)}
 
     def shares(self, states: Sequence[State]) -> xr.Dataset:

@@ -8,6 +8,7 @@ import meshio
 import numpy as np
 import xarray as xr
 
+from hotlever.air.chip import lever_axes
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file
@@ -105,14 +106,20 @@ def temperature_slices(state: State) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``temperature`` (slice, z, place) at ``along_um`` of the slice's ``axis``, x or y, and
-        ``z_um``; bias, tip and base temperature as attributes.
+        ``temperature`` (slice, z, place) at ``along_um`` and ``z_um``; bias, tip and base
+        temperature as attributes. ``along_um`` is x or y, as ``axis`` says, or the distance from
+        the origin along or across a lever that is turned on the wafer.
     """
     layout = _solid(state).solid.layout
-    tip = np.array([*layout.tip, 0.0])
-    low, high = layout.box
-    far, near = 0.675 * (high - low).max(), 2.0 * layout.heater.sides.max()
-    middle = np.array([low[0] + high[0], 2.0 * tip[1], 0.0]) / 2
+    tip = np.array(layout.tip)
+    directions = lever_axes(layout)
+    as_drawn = np.allclose(directions, np.eye(2), rtol=0, atol=1e-9)
+    names = ("x", "y") if as_drawn else ("along", "across")
+    corners = np.array([corner for region in layout.regions for corner in region.outline])
+    seen = corners @ directions.T
+    far, near = 0.675 * np.ptp(seen, axis=0).max(), 2.0 * layout.heater.sides.max()
+    # in the middle of the lever, at the tip's place across it
+    middle = np.array([(seen[:, 0].min() + seen[:, 0].max()) / 2, tip @ directions[1]]) @ directions
     slices = {
         "along the lever": (0, middle, far),
         "across, at the tip": (1, tip, far),
@@ -121,16 +128,17 @@ def temperature_slices(state: State) -> xr.Dataset:
     }
     axis, centre, reach = (np.array(column) for column in zip(*slices.values(), strict=True))
     z = reach[:, None] * np.linspace(-1.0, 1.0, _SLICE_POINTS)
-    along = centre[range(4), axis][:, None] + z
-    points = np.tile(centre[:, None, None], (1, _SLICE_POINTS, _SLICE_POINTS, 1))
-    points[range(4), ..., axis] = along[:, None]
+    along = np.einsum("sd,sd->s", centre, directions[axis])[:, None] + z
+    level = centre[:, None] + z[..., None] * directions[axis][:, None]
+    points = np.empty((4, _SLICE_POINTS, _SLICE_POINTS, 3))
+    points[..., :2] = level[:, None]
     points[..., 2] = z[..., None]
     temperature = temperature_at(state, points.reshape(-1, 3)).reshape(points.shape[:-1])
     return labelled(
         {"temperature": (("slice", "z", "place"), temperature)},
         coordinates={
             "slice": list(slices),
-            "axis": ("slice", np.array(["x", "y"])[axis]),
+            "axis": ("slice", np.array(names)[axis]),
             "along_um": (("slice", "place"), along),
             "z_um": (("slice", "z"), z),
         },

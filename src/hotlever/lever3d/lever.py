@@ -23,11 +23,12 @@ from hotlever.lever.lever import Lever
 from hotlever.lever.state import State
 from hotlever.lever3d.still_air import OpenAir, ngsolve
 from hotlever.probe import Probe
-from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid
+from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid, middle_and_reach
 from hotlever.types import Array, Index, Progress
 
-#: Radius of the sphere of air in the paper (µm).
-SPHERE_RADIUS = 60.0
+#: Radius of the sphere of air: that of the paper (µm), or so many times as far as a lever reaches
+#: from its middle.
+SPHERE_RADIUS, _ROOM = 60.0, 2.0
 #: Nodes nearer than this (µm) are the same.
 _SAME_UM = 1e-6
 
@@ -43,8 +44,9 @@ class SolidLever(Lever):
     probe : Probe or path
         Its surroundings say whether it is in vacuum or in air, and then in free space.
     mesh : SolidMeshOptions, optional
-    sphere_radius_um : float
-        Radius of the meshed air around the lever. The air reaches to infinity with any radius.
+    sphere_radius_um : float, optional
+        Radius of the meshed air around the lever: the paper's 60 µm by default, or more around a
+        large lever. The air reaches to infinity with any radius.
     air_order : int
         Order of the elements in the air, 2 or more; on the lever θ is quadratic.
 
@@ -60,7 +62,7 @@ class SolidLever(Lever):
         probe: Probe | str | os.PathLike[str],
         mesh: SolidMeshOptions | None = None,
         *,
-        sphere_radius_um: float = SPHERE_RADIUS,
+        sphere_radius_um: float | None = None,
         air_order: int = 3,
     ) -> None:
         self._options, self._sphere_radius_um, self._air_order = mesh, sphere_radius_um, air_order
@@ -85,12 +87,13 @@ class SolidLever(Lever):
                     "[surroundings]: the full 3-D simulation knows free space only; expected no "
                     "surface below, no chip and no temperature jump"
                 )
-        radius, layout = self._sphere_radius_um, self.probe.layout()
+        layout = self.probe.layout()
         if any(region.films for region in layout.regions):
             raise InputError(
                 "[layers]: the full 3-D simulation knows one material across the thickness, "
                 "expected a lever without films"
             )
+        radius = self._sphere_radius_um or max(SPHERE_RADIUS, _ROOM * middle_and_reach(layout)[1])
         solid = mesh_solid(layout, self._options, sphere_radius_um=radius if in_air else None)
         space = FullSpace(solid, FiniteElements(solid.elements, ElementTetP2(), 4))
         if not in_air:

@@ -18,7 +18,7 @@ from skfem import MeshTet
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout
 from hotlever.probe.mesh import ON_LINE, MeshSizes, ProbeMesh, face_of, terminal_facets
-from hotlever.types import Index
+from hotlever.types import Array, Index
 
 #: Largest edge on the sphere, as a share of its radius: with longer ones Netgen fails to pair
 #: the sphere with the image ball.
@@ -100,14 +100,11 @@ def mesh_solid(
 
     _check_size(layout)
     options = options or SolidMeshOptions()
-    low, high = layout.box
-    middle = (low + high) / 2
+    middle, reach = middle_and_reach(layout)
     centre = (float(middle[0]), float(middle[1]), 0.0)
     shape = _silicon(layout, options)
-    largest = options.lever * (high - low).max() / options.refinement
+    largest = options.lever * np.ptp(layout.box, axis=0).max() / options.refinement
     if sphere_radius_um is not None:
-        corners = np.array([point for region in layout.regions for point in region.outline])
-        reach = np.linalg.norm(corners - middle, axis=1).max()
         if not sphere_radius_um > 1.1 * reach:
             raise InputError(
                 f"a sphere of radius {sphere_radius_um:g} µm does not hold the lever with some "
@@ -120,6 +117,13 @@ def mesh_solid(
     except Exception as error:  # Netgen's own type is not exported
         raise ComputationError(f"Netgen could not mesh the lever: {error}") from error
     return _take_out_silicon(mesh, layout, centre)
+
+
+def middle_and_reach(layout: Layout) -> tuple[Array, float]:
+    """Return the middle of a lever's box, and how far away from it its corners are (µm)."""
+    middle = layout.box.mean(axis=0)
+    corners = np.array([point for region in layout.regions for point in region.outline])
+    return middle, float(np.linalg.norm(corners - middle, axis=1).max())
 
 
 def _check_size(layout: Layout) -> None:

@@ -18,8 +18,9 @@ Medium = Literal["vacuum", "air"]
 class Surroundings(Record):
     """What is around a lever: vacuum by default, and free space in air. The rest counts in air.
 
-    The surface is isothermal and tilted about the lever's y axis; its gap is the tip's height and
-    what is between tip and surface. The chip is a block behind x = 0 (`hotlever.air.surface`).
+    The surface is isothermal and tilted about the base line, on which the leg ends lie; its gap is
+    the tip's height and what is between tip and surface. The chip is a block behind that line
+    (`hotlever.air.chip`).
     The jump is that of `hotlever.materials.air.temperature_jump_length`; at other surfaces than
     the lever's its length is taken at the base temperature.
     """
