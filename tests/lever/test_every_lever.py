@@ -80,6 +80,7 @@ KINDS: dict[str, Callable[[pytest.FixtureRequest], One]] = {
     "solid": lambda _: One(SolidLever(Probe.reference(), SOLID), 4.0),
     "boron-doped": lambda _: One(Lever(p_type_probe(), COARSE), 9.5),
     "metal film": lambda _: One(Lever(metal_film_probe(), COARSE), 4.0),
+    "metal film, in air": lambda _: One(Lever(metal_film_probe().in_medium("air"), COARSE), 4.0),
 }
 #: Of every lever.
 NAMES = (
