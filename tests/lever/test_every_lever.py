@@ -231,11 +231,11 @@ def test_a_model_of_it_refuses_a_bias_beyond_the_fold_in_one_line(one, resistanc
     if one.hottest_V < 9.0:
         pytest.skip("its ramps do not reach the knee")
     probe = one.probe.with_(series_resistance_ohm=resistance)
-    model = ForwardModel(one.solver, None, np.array([0.0, 1.0, 20.0]))
+    model = ForwardModel(one.solver, None, np.array([0.0, 1.0, 20.0]), one.names)
     with pytest.raises(BranchEndError, match=r"no steady state|silicon melts"):
         model.predict(probe)
     # with biases below it all is well, the row at zero bias included
-    values = ForwardModel(one.solver, None, np.array([1.0, 0.0])).predict(probe).values
+    values = ForwardModel(one.solver, None, np.array([1.0, 0.0]), one.names).predict(probe).values
     assert values[0, 1] == 0.0
     assert values[2].tolist()[1] == pytest.approx(293.0)
     assert values[2, 0] > 293.0

@@ -9,11 +9,11 @@ import pytest
 from bare import bare_equations
 from skfem import MeshTri
 
-from hotlever.lever import equations as lever_equations
 from hotlever.lever.state import State
 from hotlever.lever.transient.driven import DrivenLever
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.runge_kutta import Stepper
+from hotlever.materials.kinds import MetalFilm
 from hotlever.probe import Circuit, Terminal
 from hotlever.spieser2017 import published
 
@@ -26,24 +26,17 @@ DIFFUSIVITY, END = 100.0 * KAPPA / CAPACITY, SIGMA * BIAS**2 / (8.0 * KAPPA)
 
 
 @pytest.fixture
-def strip(monkeypatch):
+def strip():
     """Equations of a strip with constant laws."""
-
-    def constant(value, **partials):
-        def law(T, *arguments):
-            return value + 0.0 * T, {"T": 0.0 * T, **partials}
-
-        return law
-
-    monkeypatch.setattr(lever_equations, "thermal_conductivity", constant(KAPPA))
-    monkeypatch.setattr(lever_equations, "conductivity_high_doped", constant(SIGMA))
-    monkeypatch.setattr(
-        lever_equations, "enthalpy", lambda T: (CAPACITY * T, {"T": CAPACITY + 0.0 * T})
+    film = MetalFilm(
+        resistivity=1.0 / SIGMA, tcr=0.0, kappa=KAPPA, heat_capacity=CAPACITY, melting_point_K=4000
     )
     mesh = MeshTri.init_tensor(np.linspace(0, LENGTH, 21), np.linspace(0, WIDTH, 3))
     supply = Terminal("supply", (LENGTH, 0.0), (LENGTH, WIDTH))
     ground = Terminal("ground", (0.0, 0.0), (0.0, WIDTH))
-    return bare_equations(mesh, supply, ground, (0.5 * LENGTH, 0.5 * WIDTH), MATERIAL)
+    return bare_equations(
+        mesh, supply, ground, (0.5 * LENGTH, 0.5 * WIDTH), MATERIAL, stack={"film": (film, 0.4)}
+    )
 
 
 class Alone(DrivenLever):
