@@ -103,9 +103,10 @@ def test_strips_along_edges_are_narrow(name):
     cells = shapely.polygons(surface.panels.corners[is_level(surface)][:, :, :2])
     face, _ = faces(layout)
     ends = shapely.union_all([LineString([t.start, t.end]) for t in layout.terminals])
-    edges = face.boundary.difference(ends.buffer(1.0)).buffer(0.02)
+    edges = face.boundary.difference(ends.buffer(1e-5)).buffer(0.02)
     along = shapely.area(shapely.intersection(cells, edges)) / 0.02
-    beside = along > 0.1
+    # at a leg end a panel inside touches the end of an edge
+    beside = (along > 0.1) & (shapely.distance(cells, ends) > 0.1)
     assert beside.sum() > 50
     widths = shapely.area(cells)[beside] / along[beside]
     assert widths.max() < 0.8 * layout.thickness_um
