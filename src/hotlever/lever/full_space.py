@@ -37,8 +37,6 @@ class FullSpace(Space):
     ----------
     parts : dict of str to ndarray of int
         Quadrature points of the regions of each part.
-    end_test : ndarray, shape (1 + dimension, points)
-        Values and slopes of the function that is one at the leg ends.
     ground_test : ndarray, shape (dimension, points)
         Slopes of the function that is one at ground.
     """

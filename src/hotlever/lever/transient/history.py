@@ -185,7 +185,7 @@ def followed(
         If silicon melts or a step fails; ``partial`` holds the dataset up to there, and
         ``time_reached`` is when (µs).
     """
-    asked = None if at is None else _checked_times(at)
+    asked = None if at is None else checked_times(at)
     if until is None:
         until = waveform.usual_end if asked is None else float(asked[-1])
     if not 0 < until < np.inf or (asked is not None and asked[-1] > until):
@@ -258,7 +258,14 @@ def _melts(step: Step, values: Array, slopes: Array) -> float | None:
     return float(brentq(above, step.start, step.end)) if above(step.start) < 0 else step.start
 
 
-def _checked_times(at: ArrayLike) -> Array:
+def checked_times(at: ArrayLike) -> Array:
+    """Return times (µs) in order, each once.
+
+    Raises
+    ------
+    InputError
+        If one is negative or not finite, or there is none but 0.
+    """
     times = np.unique(np.atleast_1d(np.asarray(at, dtype=float)))
     if not times.size or not (np.isfinite(times) & (times >= 0)).all():
         raise InputError("found a time that is negative or not finite, expected times in µs")
