@@ -58,6 +58,12 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "tip_per_power_deg": ("deg", "phase of the tip temperature against the power"),
     "tip_per_bias_K_per_V": ("K/V", "change of the tip temperature by that of the bias"),
     "tip_per_bias_deg": ("deg", "phase of the tip temperature against the bias"),
+    **{
+        f"{name}_harmonic{kind}": (unit, f"{what} harmonic of the lever voltage")
+        for name in ("first", "second", "third")
+        for kind, unit, what in (("_V", "V", name), ("_deg", "deg", f"phase of the {name}"))
+    },
+    "mean_tip_K": ("K", "mean tip temperature"),
     # along the heater
     "position": ("µm", "position along the heater"),
     "temperature": ("K", "temperature"),

@@ -46,25 +46,41 @@ def reduced_in_time(lever: Lever, snapshots: Array) -> Lever:
     Lever
         Its space is a `hotlever.lever.reduced.ReducedSpace` on few points.
     """
-    full, x = lever.space, snapshots
-    hot = full.is_temperature[:-1]
-    first, _ = lever.equations.cold()
-    lift = first[:-1, 0] / first[-1, 0]
-    free = (x[:-1] - np.outer(lift, x[-1])).T
-    modes_T = _modes(np.where(hot, free, 0.0))
-    modes_V = _modes(np.where(hot, 0.0, free))
-    # a lever that cools is hottest elsewhere
-    hottest = np.where(hot[:, None], x[:-1], 0.0)
-    hottest = np.unique(np.argsort(-hottest, axis=0)[:_HOT])
-    every = ReducedSpace(full, modes_T, modes_V, lift, hottest)
-    weights = full.weights[:, 0]
-    points, few = empirical_rule(_integrands(lever, every, x), weights, _RULE)
+    every = space_of_modes(lever, snapshots)
+    weights = lever.space.weights[:, 0]
+    points, few = empirical_rule(_integrands(lever, every, snapshots), weights, _RULE)
     other = copy(lever)
     space = every.at_points(points, few)
     other.space = cast("Any", space)
     base = lever.circuit.base_temperature_K
     other.equations = TabulatedEquations(space, lever.probe.material, base)
     return other
+
+
+def space_of_modes(lever: Lever, snapshots: Array, origin: Array | None = None) -> ReducedSpace:
+    """Return the space of the modes of some states, at all points.
+
+    Where an origin (size + 1, 1) is given, differences from it count as much as it does itself.
+    """
+    full, x = lever.space, snapshots
+    hot = full.is_temperature[:-1]
+    first, _ = lever.equations.cold()
+    lift = first[:-1, 0] / first[-1, 0]
+    free = (x[:-1] - np.outer(lift, x[-1])).T
+    own = None if origin is None else (origin[:-1, 0] - lift * origin[-1, 0])
+    modes: list[Array] = []
+    for rows in (hot, ~hot):
+        vectors = np.where(rows, free, 0.0)
+        if own is not None:
+            here = np.where(rows, own, 0.0)
+            away = vectors - here
+            size = np.linalg.norm(away, axis=1).max()
+            vectors = np.vstack([away / size, here / max(float(np.linalg.norm(here)), 1e-300)])
+        modes.append(_modes(vectors))
+    # a lever that cools is hottest elsewhere
+    hottest = np.where(hot[:, None], x[:-1], 0.0)
+    hottest = np.unique(np.argsort(-hottest, axis=0)[:_HOT])
+    return ReducedSpace(full, modes[0], modes[1], lift, hottest)
 
 
 def on_all_nodes(lever: Lever, state: State) -> State:
