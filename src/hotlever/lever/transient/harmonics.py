@@ -102,7 +102,7 @@ def harmonics(
     columns: dict[str, ArrayLike] = {"frequency_Hz": frequency, "mean_tip_K": mean}
     for place, name in enumerate(HARMONICS):
         columns[f"{name}_harmonic_V"] = np.abs(lever_V[:, place])
-        columns[f"{name}_harmonic_deg"] = np.degrees(np.angle(lever_V[:, place]))
+        columns[f"{name}_harmonic_deg"] = np.degrees(np.unwrap(np.angle(lever_V[:, place])))
     shown = {"bias_V": offset_V, "amplitude_V": amplitude_V}
     return labelled(columns, "frequency", {"frequency": frequency}, **shown)
 
