@@ -8,7 +8,7 @@ from bare import bare_equations
 from skfem import MeshTri
 
 from hotlever.lever import equations as lever_equations
-from hotlever.lever.transient.harmonics import HarmonicBalance
+from hotlever.lever.transient.sinusoidal import HarmonicBalance
 from hotlever.probe import Circuit, Terminal
 from hotlever.spieser2017 import published
 

@@ -29,7 +29,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.state import State
 from hotlever.lever.transient import pulse
-from hotlever.lever.transient.settled import settled
+from hotlever.lever.transient.periodic import settled
 from hotlever.materials.air import ATMOSPHERE, HEAT_RATIO, thermal_conductivity_of_air
 from hotlever.materials.heat import heat_capacity
 from hotlever.probe import Probe

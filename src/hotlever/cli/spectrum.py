@@ -51,7 +51,7 @@ def spectrum_command(
 ) -> None:
     """Show impedance and thermal response to small signals at a bias, or harmonics."""
     from hotlever.lever import Lever
-    from hotlever.lever.transient.harmonics import HARMONIC_COLUMNS, harmonics
+    from hotlever.lever.transient.sinusoidal import HARMONIC_COLUMNS, harmonics
     from hotlever.lever.transient.small_signals import SPECTRUM_COLUMNS, spectrum
 
     swing = None if amplitude is None else setting(amplitude, "V", "--amplitude", bare=True)

@@ -10,8 +10,8 @@ import numpy as np
 from hotlever import figures
 from hotlever.lever import Lever
 from hotlever.lever.transient import pulse, rise_times, spectrum, step, time_constants
-from hotlever.lever.transient.harmonics import harmonics
 from hotlever.lever.transient.modes import Source
+from hotlever.lever.transient.sinusoidal import harmonics
 from hotlever.report.page import Page
 from hotlever.steps import each
 from hotlever.text import sentence

@@ -6,7 +6,7 @@ import pytest
 
 from hotlever.errors import HistoryEndError
 from hotlever.lever.transient import pulse
-from hotlever.lever.transient.settled import settled
+from hotlever.lever.transient.periodic import settled
 
 
 def test_a_train_settles_as_if_it_were_followed(coarse):

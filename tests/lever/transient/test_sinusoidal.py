@@ -7,8 +7,8 @@ import pytest
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.transient import sine, spectrum
-from hotlever.lever.transient.harmonics import HARMONIC_COLUMNS, harmonics
-from hotlever.lever.transient.settled import settled
+from hotlever.lever.transient.periodic import settled
+from hotlever.lever.transient.sinusoidal import HARMONIC_COLUMNS, harmonics
 
 
 def test_a_weak_first_harmonic_is_the_small_signal(coarse):
