@@ -40,8 +40,8 @@ from hotlever.types import Array, Index, Progress
 HEAT_CAPACITY_SPREAD = 0.03
 #: What is told of a pulse: its highest tip temperature, that at its end, and the mean during it.
 MOMENTS = ("peak", "end", "mean")
-#: Columns of the table.
 _KINDS = ("_K", "_stderr_K", "_low_K", "_high_K")
+#: Columns of the table.
 PULSE_COLUMNS = ("height_V", *(f"{moment}{kind}" for moment in MOMENTS for kind in _KINDS))
 #: Heights that are followed with the coarse mesh, and which of them with the fine one and for
 #: moved levers.

@@ -126,7 +126,7 @@ def _report(
 ) -> None:
     """Write the page of a lever in time."""
     from hotlever.lever import Lever
-    from hotlever.report.transient_page import transient_page
+    from hotlever.report.transient_pages import transient_page
 
     given = [name for name, value in others.items() if value is not None]
     if given:

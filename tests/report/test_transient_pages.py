@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hotlever import Lever, Probe
 from hotlever.lever.lever import COARSE
-from hotlever.report.transient_page import transient_page
+from hotlever.report.transient_pages import transient_page
 
 
 def test_the_page_shows_steps_trains_time_constants_and_spectra(tmp_path):
