@@ -59,6 +59,12 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "tip_per_power_deg": ("deg", "phase of the tip temperature against the power"),
     "tip_per_bias_K_per_V": ("K/V", "change of the tip temperature by that of the bias"),
     "tip_per_bias_deg": ("deg", "phase of the tip temperature against the bias"),
+    **{
+        f"{name}_harmonic{kind}": (unit, f"{what} harmonic of the lever voltage")
+        for name in ("first", "second", "third")
+        for kind, unit, what in (("_V", "V", name), ("_deg", "deg", f"phase of the {name}"))
+    },
+    "mean_tip_K": ("K", "mean tip temperature"),
     # along the heater
     "position": ("µm", "position along the heater"),
     "temperature": ("K", "temperature"),
@@ -85,6 +91,14 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "scatter": ("of the quantity", "standard deviation between the levers"),
     "mean_stderr": ("of the quantity", "mean of the standard errors"),
     "chi_square": ("1", "chi-square of the values about their weighted mean"),
+    "height": ("V", "height of the pulse"),
+    "height_V": ("V", "height of the pulse"),
+    "peak_K": ("K", "highest tip temperature of the pulse"),
+    "peak_stderr_K": ("K", "standard error of the highest tip temperature"),
+    "end_K": ("K", "tip temperature at the end of the pulse"),
+    "end_stderr_K": ("K", "standard error of the tip temperature at the end"),
+    "mean_K": ("K", "mean tip temperature during the pulse"),
+    "mean_stderr_K": ("K", "standard error of the mean tip temperature"),
     "budget_K": ("K", "standard error of the tip temperature by source"),
     # knee, design and air
     "knee_K": ("K", "tip temperature at the knee"),

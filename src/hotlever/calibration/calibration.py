@@ -13,6 +13,7 @@ from pydantic import Field
 from hotlever import __version__
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.power_law import PowerLaw
+from hotlever.calibration.pulses import PulseCalibration, PulseSection
 from hotlever.calibration.words import calibration_text
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
@@ -74,6 +75,8 @@ class Calibration:
     probe : Probe
     measurement : Measurement
     notes : list of str
+    pulse : PulseCalibration, optional
+        Of the same lever in a pulse.
     """
 
     route: str
@@ -91,6 +94,7 @@ class Calibration:
     priors: dict[str, PriorUse] = field(default_factory=dict)
     reason: str = ""
     notes: list[str] = field(default_factory=list)
+    pulse: PulseCalibration | None = None
 
     @property
     def describes_data(self) -> bool:
@@ -169,6 +173,7 @@ class Calibration:
             "priors": {name: vars(use) for name, use in self.priors.items()},
             "describes_data": self.describes_data,
             "reason": self.reason,
+            **({} if self.pulse is None else {"pulse": self.pulse.content()}),
             "probe": self.probe.values(),
             "data": embed(self.measurement),
             "notes": self.notes,
@@ -181,7 +186,9 @@ class Calibration:
         write_text(path, json_text(self.content()))
 
     def table_csv(self) -> str:
-        """Return the table as CSV, to load into an instrument."""
+        """Return the table as CSV, to load into an instrument; that of the pulse if there is."""
+        if self.pulse is not None:
+            return self.pulse.table_csv()
         frame = self.table[list(TABLE_COLUMNS)].to_dataframe()
         return str(frame.to_csv(index=False, float_format="%.6g", na_rep="nan"))
 
@@ -213,6 +220,7 @@ class _CalibrationFile(Section):
     probe: dict[str, dict[str, Any]]
     data: EmbeddedMeasurement
     notes: list[str]
+    pulse: PulseSection | None = None
 
 
 def read_calibration(path: str | os.PathLike[str]) -> Calibration:
@@ -258,4 +266,5 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
         priors=found.priors,
         reason=found.reason,
         notes=found.notes,
+        pulse=None if found.pulse is None else found.pulse.calibration(f"{path}: pulse"),
     )

@@ -102,21 +102,40 @@ class Estimated:
         values.append(float(circuit.bias(point.lever_V, point.current_mA)))
         return Knee(*values, *np.sqrt(np.sum(self._knee_changes() ** 2, axis=0)).tolist())
 
+    @property
+    def varied(self) -> list[str]:
+        """The parameters that were estimated."""
+        return self._estimate.options.varied
+
+    @property
+    def shares(self) -> dict[str, Array]:
+        """What adds up to their covariance (p, p), by source; independent of each other."""
+        return _shares(self._estimate)
+
+    def directions(self, least: float = 0.0) -> list[dict[str, float]]:
+        """Return changes of the parameters by one standard error, independent of each other.
+
+        They are along the axes of the correlation, those left out whose variance is less than
+        some share of a parameter's.
+        """
+        covariance = self._estimate.covariance
+        scale = np.sqrt(np.diag(covariance))
+        variances, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
+        steps = (axes * np.sqrt(np.maximum(variances, 0.0)) * scale[:, None]).T
+        kept = variances >= least
+        return [dict(zip(self.varied, step.tolist(), strict=True)) for step in steps[kept]]
+
     def _knee_changes(self) -> Array:
         """Return V_l, I_h, P_l and V_b of the knee one standard error away on each axis."""
-        found, known = self._estimate, self._estimate.problem.model.names
-        at = found.optimum.prediction
+        known = self._estimate.problem.model.names
+        at = self._estimate.optimum.prediction
         origin, circuit = at.probe.at(known), self.probe.circuit
-        places = [known.index(name) for name in found.options.varied]
         changes = []
-        scale = np.sqrt(np.diag(found.covariance))
-        variances, axes = np.linalg.eigh(found.covariance / np.outer(scale, scale))
-        for axis in (axes * np.sqrt(np.maximum(variances, 0.0)) * scale[:, None]).T:
+        for direction in self.directions():
+            axis = np.array([direction.get(name, 0.0) for name in known])
             ends = []
             for way in (_ASIDE, -_ASIDE):
-                moved = origin.copy()
-                moved[places] += way * axis
-                knee = at.nearby.branch_at(moved).knee
+                knee = at.nearby.branch_at(origin + way * axis).knee
                 if knee is None:  # beyond the measured range
                     return np.full((1, 4), np.nan)
                 shown = [knee.lever_V, knee.current_mA, knee.power_mW]
@@ -218,15 +237,12 @@ def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Pr
     bias = np.linspace(present.min(), min(present.max(), highest), _ROWS)
     predicted = found.predicted(bias)
     slopes = found.slopes(predicted)[list(OBSERVABLES).index("tip")]
-    parts: dict[str, Array] = {}
-    for name, share in found.problem.objective.shares(found.optimum.prediction).items():
-        source = name if name in ("measurement", "fit") else _source(name)
-        variance = np.einsum("bi,ij,bj->b", slopes, share, slopes)
-        parts[source] = parts.get(source, 0.0) + variance
+    parts: dict[str, Array] = {
+        source: np.einsum("bi,ij,bj->b", slopes, share, slopes)
+        for source, share in _shares(found).items()
+    }
     tip = predicted.values[2]
-    of_model = _error_of_model(
-        best.surroundings.medium, bias, tip - best.circuit.base_temperature_K
-    )
+    of_model = error_of_model(best.surroundings.medium, bias, tip - best.circuit.base_temperature_K)
     stderr = np.sqrt(np.sum(list(parts.values()), axis=0))
     (low, high), lopsided = _limits(found, tip, stderr, of_model)
     parts["model"] = of_model**2
@@ -251,6 +267,15 @@ def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Pr
     )
 
 
+def _shares(found: Estimate) -> dict[str, Array]:
+    """Return what adds up to the covariance of the varied parameters, by source."""
+    shares: dict[str, Array] = {}
+    for name, share in found.problem.objective.shares(found.optimum.prediction).items():
+        source = name if name in ("measurement", "fit") else _source(name)
+        shares[source] = shares.get(source, 0.0) + share
+    return shares
+
+
 def _limits(
     found: Estimate, tip: Array, stderr: Array, of_model: Array
 ) -> tuple[tuple[Array, Array], list[str]]:
@@ -270,7 +295,7 @@ def _limits(
     ]
 
 
-def _error_of_model(medium: str, bias: Array, rise: Array) -> Array:
+def error_of_model(medium: str, bias: Array, rise: Array) -> Array:
     """Return by how much the tip may be off since the model is (K); most where the tip is steep."""
     # a rise that grows as the square of the bias is that of a lever of constant properties
     steepness = 0.5 * np.gradient(np.log(rise), np.log(bias))

@@ -17,6 +17,7 @@ from hotlever.calibration.limits import BAND
 from hotlever.calibration.plausibility import check_plausible, remarks
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.power_law_fit import fit_power_law
+from hotlever.calibration.pulses import PulseTiming, pulse_calibration
 from hotlever.calibration.rule import ByRule, by_rule
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import ComputationError, InputError
@@ -42,6 +43,7 @@ def calibrate(
     law: PowerLaw | None = None,
     medium: str | None = None,
     priors: Mapping[str, Prior | str] | None = None,
+    pulse: PulseTiming | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
     """Find the tip temperature of a lever from its I-V curve.
@@ -68,8 +70,10 @@ def calibrate(
         What is known beforehand, in place of some of the usual priors, such as
         ``{"n_d": "3.3e17 ± 15%"}``; see `hotlever.probe.priors`. If empty there are none, and
         dimensions are held.
+    pulse : PulseTiming, optional
+        Of pulses whose tip temperature is wanted too (`hotlever.calibration.pulses`).
     progress : callable, optional
-        Called with solved branches and how many there usually are.
+        Called with solved branches, then with followed pulses, and how many there usually are.
 
     Raises
     ------
@@ -95,6 +99,11 @@ def calibrate(
     known = measured if law is None else replace(measured, medium=None)
     probe, notes = with_measured_circuit(origin, known, medium if law is None else "vacuum")
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
+        if pulse is not None:
+            raise InputError(
+                "the paper's rule says nothing about a pulse; expected a probe or a fit, in the "
+                "medium of the data"
+            )
         return _by_rule(measured, probe, law, route, notes)
     causes = Causes(measured, probe, priors)
     check_plausible(measured, probe, causes)
@@ -104,7 +113,11 @@ def calibrate(
         raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
     if found.reason:
         found = replace(found, reason=f"{found.reason}; {causes.named(fit is not None)}")
-    return _by_estimate(measured, found, route, [*notes, *remarks(measured, found.tip_K)])
+    result = _by_estimate(measured, found, route, [*notes, *remarks(measured, found.tip_K)])
+    if pulse is None:
+        return result
+    pulsed = pulse_calibration(found, pulse, progress)
+    return replace(result, pulse=pulsed, notes=[*result.notes, *pulsed.notes])
 
 
 def _by_estimate(

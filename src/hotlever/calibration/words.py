@@ -11,6 +11,7 @@ from hotlever.text import aligned, value_with_error
 
 if TYPE_CHECKING:
     from hotlever.calibration.calibration import Calibration
+    from hotlever.calibration.pulses import PulseCalibration
 
 #: Tip temperatures (K) at which the error budget is printed.
 _SHOWN, _FEW = (400.0, 600.0, 800.0, 900.0, 1000.0, 1100.0, 1200.0), 4
@@ -41,6 +42,7 @@ def calibration_text(calibration: Calibration) -> str:
         "",
         *_budget_lines(calibration),
         "",
+        *([] if calibration.pulse is None else [*_pulse_lines(calibration.pulse), ""]),
         *prior_lines(calibration.priors),
         f"sure to ± {stated:.0f} K (standard error, largest in the table): {_verdict(calibration)}",
     ]
@@ -114,6 +116,22 @@ def _budget_lines(calibration: Calibration) -> list[str]:
         kelvins = [f"{np.interp(shown, tip, error[known]):.1f}" for error in errors]
         rows.append([f"{shown:.0f}", f"{power:.3f}", *kelvins])
     return aligned(rows, right=True)
+
+
+def _pulse_lines(pulse: PulseCalibration) -> list[str]:
+    """Return heights of the pulse for some peak temperatures, with the error by source."""
+    table, sources = pulse.table, pulse.table.source.values.tolist()
+    first, last = table.peak_K.values[[0, -1]]
+    wanted = np.linspace(first, last, _FEW + 2)[1:].round(0 if last - first > 50 else 1)
+    heads = ("peak (K)", "height (V)", "± (K)", "end (K)", "mean (K)", *sources)
+    rows = [[head.rjust(7) for head in heads]]
+    for peak in np.minimum(wanted, last).tolist():
+        height = float(pulse.height_for(peak))
+        errors = [table.peak_stderr_K.values, *table.budget_K.values]
+        kelvins = [f"{np.interp(height, table.height_V, error):.1f}" for error in errors]
+        others = [f"{pulse.tip_temperature(height, one):.0f}" for one in ("end", "mean")]
+        rows.append([f"{peak:.0f}", f"{height:.3f}", kelvins[0], *others, *kelvins[1:]])
+    return [f"{pulse.timing.text}:", *aligned(rows, right=True)]
 
 
 def _verdict(calibration: Calibration) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from typer import Argument, Option
 
@@ -22,6 +23,10 @@ from hotlever.cli.options import (
 from hotlever.cli.output import give, note, progress, tell_table
 from hotlever.errors import ComputationError, InputError
 from hotlever.files import Outputs, write_text
+from hotlever.units import setting
+
+if TYPE_CHECKING:
+    from hotlever.calibration.pulses import PulseTiming
 
 
 @app.command("calibrate")
@@ -35,8 +40,13 @@ def calibrate_command(
     column: ColumnOption = None,
     medium: MediumOption = None,
     prior: PriorOption = None,
+    pulse: str | None = Option(
+        None, metavar="TIME[,PERIOD]", help="Calibrate a pulse too, such as 5us or 5us,100us."
+    ),
     output: File = Option(None, "-o", "--output", help="Calibration file (JSON)."),
-    table: File = Option(None, help="Write the table for an instrument to this CSV file."),
+    table: File = Option(
+        None, help="Write the table for an instrument, or for its pulses, to this CSV file."
+    ),
     plot: PlotFile = None,
 ) -> None:
     """Find the tip temperature of a lever from its I-V curve, with its error."""
@@ -50,6 +60,7 @@ def calibrate_command(
     if len(several) > 1:
         raise InputError(f"{' and '.join(several)}: expected at most one of {', '.join(given)}")
     check_medium(medium)
+    timing = None if pulse is None else _timing(pulse)
     columns = parse_columns(column or [])
     outputs = Outputs(data, *given.values(), *column_files(column))
     outputs.file(output)
@@ -71,6 +82,7 @@ def calibrate_command(
             law=None if power_law is None else read_power_law(power_law),
             medium=medium,
             priors=priors,
+            pulse=timing,
             progress=update,
         )
     note(*result.notes)
@@ -86,3 +98,21 @@ def calibrate_command(
     give(result.text() + "\n")
     if not result.describes_data:
         raise ComputationError(f"{data}: no lever like this one shows these data: {result.reason}")
+
+
+def _timing(text: str) -> PulseTiming:
+    """Parse ``5us`` or ``5us,100us``.
+
+    Examples
+    --------
+    >>> _timing("5us,0.1ms")
+    PulseTiming(length_us=5.0, period_us=100.0)
+    """
+    from hotlever.calibration.pulses import PulseTiming
+
+    length, comma, period = text.partition(",")
+    each = setting(period, "us", "--pulse") if comma else None
+    try:
+        return PulseTiming(setting(length, "us", "--pulse"), each)
+    except InputError as error:
+        raise error if str(error).startswith("--") else InputError(f"--pulse: {error}") from None

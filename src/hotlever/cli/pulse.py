@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import count as count_up
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -55,15 +56,22 @@ def pulse_command(
     ),
     plot: PlotFile = None,
     fields: File = Option(None, help="Write the fields as a series of VTU to this folder."),
+    report: File = Option(
+        None, help="Folder for a page of the lever in time; goes without a wave form."
+    ),
 ) -> None:
     """Follow a lever in time: steps, pulses, ramps, sines, or what a file says."""
     from hotlever.lever import Lever
     from hotlever.lever.transient import history_csv, write_history
 
+    texts = {"--step": step, "--pulse": pulse, "--ramp": ramp, "--sine": sine}
     repeated = {"--period": period, "--count": count}
-    wave = _waveform(
-        {"--step": step, "--pulse": pulse, "--ramp": ramp, "--sine": sine}, repeated, waveform
-    )
+    if report is not None:
+        others = {**texts, **repeated, "--waveform": waveform, "--until": until, "--at": at}
+        others |= {"--output": output, "--plot": plot, "--fields": fields}
+        _report(report, others, probe_file, medium, settings)
+        return
+    wave = _waveform(texts, repeated, waveform)
     end = None if until is None else setting(until, "us", "--until")
     times = None if at is None else [setting(one, "us", "--at") for one in at.split(",")]
     if times is not None and len(times) > MOST_TIMES:
@@ -107,6 +115,34 @@ def pulse_command(
         give(history_csv(data))
     if failure is not None:
         raise failure
+
+
+def _report(
+    folder: Path,
+    others: Mapping[str, object],
+    probe_file: Path | None,
+    medium: str | None,
+    settings: list[str] | None,
+) -> None:
+    """Write the page of a lever in time."""
+    from hotlever.lever import Lever
+    from hotlever.report.transient_pages import transient_page
+
+    given = [name for name, value in others.items() if value is not None]
+    if given:
+        raise InputError(f"{given[0]}: does not go with --report, which has wave forms of its own")
+    check_medium(medium)
+    outputs = Outputs(probe_file)
+    outputs.folder(folder)
+    probe = load_probe(probe_file)
+    probe = probe.with_(**parse_settings(settings, probe))
+    with progress("air") as update:
+        lever = Lever(probe if medium is None else probe.in_medium(medium), progress=update)
+    with progress("sections") as update:
+        page = transient_page(lever, update)
+    with outputs.together():
+        written = page.write(folder)
+    give(f"{written}\n")
 
 
 def _waveform(

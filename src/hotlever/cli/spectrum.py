@@ -37,6 +37,9 @@ def spectrum_command(
     frequency: str = Option(
         "1Hz:10MHz:71", metavar="START:STOP:COUNT", help="Spaced evenly in the logarithm."
     ),
+    amplitude: str | None = Option(
+        None, metavar="V", help="Of a sine about the bias: harmonics of V_l instead (3ω method)."
+    ),
     medium: MediumOption = None,
     settings: list[str] | None = Option(
         None, "--set", metavar="NAME=VALUE", help="Change a value of the probe file."
@@ -46,10 +49,12 @@ def spectrum_command(
     ),
     plot: PlotFile = None,
 ) -> None:
-    """Show impedance and thermal response to small signals at a bias."""
+    """Show impedance and thermal response to small signals at a bias, or harmonics."""
     from hotlever.lever import Lever
+    from hotlever.lever.transient.sinusoidal import HARMONIC_COLUMNS, harmonics
     from hotlever.lever.transient.small_signals import SPECTRUM_COLUMNS, spectrum
 
+    swing = None if amplitude is None else setting(amplitude, "V", "--amplitude", bare=True)
     volts, frequencies = setting(bias, "V", "--bias", bare=True), _frequencies(frequency)
     check_medium(medium)
     outputs = Outputs(probe_file)
@@ -60,17 +65,22 @@ def spectrum_command(
     with progress("air") as update:
         lever = Lever(probe if medium is None else probe.in_medium(medium), progress=update)
     with progress("spectrum") as update:
-        (state,) = lever.solve([volts], update)
-        data = spectrum(state, frequencies)
+        if swing is None:
+            (state,) = lever.solve([volts], update)
+            data = spectrum(state, frequencies)
+        else:
+            data = harmonics(lever, volts, swing, frequencies, update)
+    columns = SPECTRUM_COLUMNS if swing is None else HARMONIC_COLUMNS
     with outputs.together():
         if output is not None:
-            write_dataset(data, output, SPECTRUM_COLUMNS)
+            write_dataset(data, output, columns)
         if plot is not None:
             from hotlever import figures
 
-            figures.save_figure(figures.small_signals(data), plot)
+            draw = figures.small_signals if swing is None else figures.harmonics
+            figures.save_figure(draw(data), plot)
     if output is None:
-        give(csv_text(data, SPECTRUM_COLUMNS))
+        give(csv_text(data, columns))
 
 
 def _frequencies(text: str) -> Array:

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hotlever.calibration.calibration import Calibration
+from hotlever.calibration.pulses import PulseCalibration
 from hotlever.figures.style import (
     BLACK,
     BLUE,
@@ -36,7 +37,8 @@ def calibration_curves(calibration: Calibration) -> Figure:
     """Draw the tip temperature against power and bias with its band, the knee and the budget.
 
     Where the lever does not show what was measured, the difference stands in place of the budget,
-    with the rows marked that are off, and no band is drawn.
+    with the rows marked that are off, and no band is drawn. The peak of a pulse, if calibrated,
+    stands beside the static curve.
     """
     table, knee, described = calibration.table, calibration.knee, calibration.describes_data
     power, tip = table.power_mW, table.tip_K
@@ -64,6 +66,8 @@ def calibration_curves(calibration: Calibration) -> Figure:
             base = calibration.base_temperature_K
             by_power.annotate(" knee", (knee.power_mW, base), color=VERMILION)
         by_power.legend(loc="upper left")
+        if calibration.pulse is not None:
+            _pulse(by_bias, calibration.pulse)
         iv.plot(measured.lever_V, measured.current_mA, **MEASURED)
         text = "calibrated lever" if described else "the nearest lever"
         iv.plot(table.lever_V, table.current_mA, color=BLUE, label=text)
@@ -126,6 +130,14 @@ def twins(found: xr.Dataset) -> Figure:
         for axes in (by_way, by_bias):
             axes.legend(loc="lower left", bbox_to_anchor=(0.1, 1.0), ncols=2, borderpad=0.1)
     return made
+
+
+def _pulse(axes: Axes, pulse: PulseCalibration) -> None:
+    """Draw the peak of a pulse by its height, with its band."""
+    table = pulse.table
+    axes.fill_between(table.height_V, table.peak_low_K, table.peak_high_K, color=ORANGE, alpha=0.4)
+    axes.plot(table.height_V, table.peak_K, color=VERMILION, label=f"peak of {pulse.timing.text}")
+    axes.legend(loc="upper left")
 
 
 def _budget(axes: Axes, table: xr.Dataset) -> None:

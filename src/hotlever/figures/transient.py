@@ -75,3 +75,22 @@ def small_signals(spectrum: xr.Dataset) -> Figure:
             axes.set_xscale("log")
             axes.legend()
     return made
+
+
+def harmonics(data: xr.Dataset) -> Figure:
+    """Draw amplitude and phase of the harmonics of the lever voltage."""
+    with figure(7.4, 3.2, 1, 2, letters=True) as (made, (size, phase)):
+        for name, colour in (("first", BLUE), ("second", GREEN), ("third", VERMILION)):
+            volts = data[f"{name}_harmonic_V"]
+            # without an offset there is no second harmonic, but for rounding errors
+            if float(volts.max()) < 1e-9 * float(data.first_harmonic_V.max()):
+                continue
+            size.plot(data.frequency, volts, color=colour, label=f"{name} harmonic")
+            angle = data[f"{name}_harmonic_deg"]
+            phase.plot(data.frequency, angle, color=colour, label=f"{name} harmonic")
+        size.set(xlabel="frequency (Hz)", ylabel="amplitude of V$_l$ (V)", yscale="log")
+        phase.set(xlabel="frequency (Hz)", ylabel="phase (°)")
+        for axes in (size, phase):
+            axes.set_xscale("log")
+            axes.legend()
+    return made

@@ -38,6 +38,17 @@ def balance_slopes(equations: LeverEquations, x: Array, slopes: Array) -> Array:
     return _balances(equations.space, equations.flux_changes(x, slopes), theta)
 
 
+def heat_left(equations: LeverEquations, x: Array) -> Array:
+    """Return the heat that leaves states by the leg ends and into the air (mW), (n,)."""
+    space, fluxes = equations.space, equations.fluxes(x)
+    heat = space.weighted(np.concatenate([fluxes.heat_source[None], fluxes.heat]))
+    left = -np.einsum("dp,dpn->n", space.end_test, heat)
+    if space.air is not None:
+        into_air, at_ends = space.air.heat(equations.kirchhoff(x)[0])
+        left += into_air - at_ends
+    return np.asarray(left)
+
+
 def _balances(space: Space, fluxes: Fluxes, theta: Array | None) -> Array:
     """Return the balances of fluxes and of θ at the sites of the air; all are linear in both."""
     assert isinstance(space, FullSpace)  # a reduced lever has no ends

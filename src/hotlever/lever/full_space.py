@@ -40,8 +40,6 @@ class FullSpace(Space):
         Quadrature points of the regions of each part.
     conducting : ndarray of bool, shape (elements,)
         Where a current may flow.
-    end_test : ndarray, shape (1 + dimension, points)
-        Values and slopes of the function that is one at the leg ends.
     ground_test : ndarray, shape (dimension, points)
         Slopes of the function that is one at ground.
     """

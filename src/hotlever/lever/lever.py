@@ -340,9 +340,9 @@ class Lever:
         >>> history.tip_K.values.round().tolist()
         [410.0, 293.0]
         """
-        from hotlever.lever.transient.history import followed
+        from hotlever.lever.transient.trains import followed_on_modes
 
-        return followed(self, waveform, until, at, **options)
+        return followed_on_modes(self, waveform, until, at, **options)
 
     def knee(self) -> xr.Dataset:
         """Return the knee of the I-V curve, dV_l/dI_h = 0, as a sweep of one state.

@@ -52,13 +52,18 @@ class ReducedSpace(Space):
         Changes of the full free values, of temperatures only and of potentials only.
     lift : ndarray, shape (full.size,)
         Potentials of a state with V_l = 1 V.
+    hot : ndarray of int, optional
+        Unknowns among which the highest temperature is; by default those where the first, largest
+        mode is largest.
 
     Attributes
     ----------
     modes : ndarray, shape (size, full.size)
     """
 
-    def __init__(self, full: FullSpace, modes_T: Array, modes_V: Array, lift: Array) -> None:
+    def __init__(
+        self, full: FullSpace, modes_T: Array, modes_V: Array, lift: Array, hot: Index | None = None
+    ) -> None:
         self.full, self.lift = full, lift
         self.modes = np.concatenate([modes_T, modes_V])
         self.count, self.size = len(modes_T), len(modes_T) + len(modes_V)
@@ -75,7 +80,7 @@ class ReducedSpace(Space):
             full.potential.kinds,
             slice(self.count, None),
         )
-        self.weights, self.films = full.weights, full.films
+        self.weights, self.films, self.end_test = full.weights, full.films, full.end_test
         self.thickness_um, self.plate_um = full.thickness_um, full.plate_um
         unknowns, weights = full.tip
         self.tip = (np.arange(self.count), modes_T[:, unknowns] @ weights)
@@ -84,8 +89,8 @@ class ReducedSpace(Space):
             unknowns, weights = full.reader
             values = np.vstack([modes_V, lift])[:, unknowns] @ weights
             self.reader = (np.arange(self.count, self.size + 1), values)
-        # where it is hottest: the nodes on which the first, largest mode is largest
-        hot = np.argsort(-np.abs(modes_T[0]))[:60]
+        if hot is None:
+            hot = np.argsort(-np.abs(modes_T[0]))[:60]
         self._hot = modes_T[:, hot]
         self.air = None if full.air is None else ReducedAir(full.air, modes_T, self.size)
 
@@ -94,7 +99,7 @@ class ReducedSpace(Space):
         space = copy(self)
         space.temperature = self.temperature.among(points)
         space.potential = self.potential.among(points)
-        space.weights = weights[:, None]
+        space.weights, space.end_test = weights[:, None], self.end_test[:, points]
         space.thickness_um = at_some(self.thickness_um, points)
         space.plate_um = at_some(self.plate_um, points)
         space.films = tuple(film.among(points) for film in self.films)
@@ -177,7 +182,7 @@ class ReducedAir:
 
     def __init__(self, full: AirLoss, modes: Array, size: int) -> None:
         self.filling, self.gas_conductivity = full.filling, full.gas_conductivity
-        self._size, self._count = size, len(modes)
+        self._size, self._count, self.heat = size, len(modes), full.heat
         self._samples = full.sampling[:, : modes.shape[1]] @ modes.T
         self._spread = self._samples.T @ full.operator.matrix
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -211,26 +211,42 @@ def _empirical_rule(
     the tolerance: a non-negative least-squares problem on random combinations of their
     integrands.
     """
-    rng = np.random.default_rng(options.seed)
     weights = space.weights[:, 0]
     T = space.temperature.matrix.reshape(space.temperature.kinds, weights.size, -1)
     V = space.potential.matrix.reshape(space.potential.kinds, weights.size, -1)
+
+    def integrands() -> Iterator[Array]:
+        for one in training:
+            for column in range(1, one.branch.u.size):
+                fluxes = one.branch.equations.fluxes(one.branch.x[:, [column]])
+                heat = np.concatenate([fluxes.heat_source[None], fluxes.heat])[..., 0]
+                power = -fluxes.heat_source[:, 0] @ weights
+                lever_V = one.branch.x[-1, column]
+                yield np.einsum("dqm,dq->mq", T, heat) / power
+                yield np.einsum("dqm,dq->mq", V, fluxes.charge[..., 0]) * (lever_V / power)
+
+    return empirical_rule(integrands(), weights, options)
+
+
+def empirical_rule(
+    integrands: Iterable[Array], weights: Array, options: ReductionOptions
+) -> tuple[Index, Array]:
+    """Choose points and positive weights that integrate given integrands as all points do.
+
+    Parameters
+    ----------
+    integrands : iterable of ndarray, shape (k, points)
+        Of integrals that compare in size.
+    weights : ndarray, shape (points,)
+        Of all points.
+    options : ReductionOptions
+    """
+    rng = np.random.default_rng(options.seed)
     sketch = np.zeros((options.sketch, weights.size))
-    for one in training:
-        for column in range(1, one.branch.u.size):
-            fluxes = one.branch.equations.fluxes(one.branch.x[:, [column]])
-            heat = np.concatenate([fluxes.heat_source[None], fluxes.heat])[..., 0]
-            power = -fluxes.heat_source[:, 0] @ weights
-            lever_V = one.branch.x[-1, column]
-            integrands = np.concatenate(
-                [
-                    np.einsum("dqm,dq->mq", T, heat) / power,
-                    np.einsum("dqm,dq->mq", V, fluxes.charge[..., 0]) * (lever_V / power),
-                ]
-            )
-            rows = rng.integers(0, options.sketch, len(integrands))
-            signs = rng.choice((-1.0, 1.0), len(integrands))
-            np.add.at(sketch, rows, signs[:, None] * integrands * weights)
+    for some in integrands:
+        rows = rng.integers(0, options.sketch, len(some))
+        signs = rng.choice((-1.0, 1.0), len(some))
+        np.add.at(sketch, rows, signs[:, None] * some * weights)
     values, vectors = np.linalg.eigh(sketch @ sketch.T)
     kept = values > (options.rule_tolerance**2) * values[-1]
     directions = (vectors[:, kept] / np.sqrt(values[kept])).T @ sketch

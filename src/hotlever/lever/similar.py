@@ -38,8 +38,20 @@ class SimilarLevers:
         self._moving = MovingMesh(lever.space.mesh, lever.probe)
         self._by_inverse_gap: Array | None = None
 
+    def lever(self, probe: Probe) -> Lever:
+        """Return the lever of a similar probe, on the same mesh moved."""
+        return Lever(probe, space=self._space(probe))
+
     def equations(self, probe: Probe, names: tuple[str, ...] = ()) -> LeverEquations:
         """Return the equations of a probe, with the motions of the dimensions among some names."""
+        space = self._space(probe, names)
+        dimensions = [name for name in names if name in dimensions_of(probe)]
+        motions = {name: motion_of(space, self._moving.movement(name)) for name in dimensions}
+        base = probe.circuit.base_temperature_K
+        return LeverEquations(space, probe.kinds, base, motions)
+
+    def _space(self, probe: Probe, names: tuple[str, ...] = ()) -> FullSpace:
+        """Return mesh, operators and air of a similar probe, for derivatives by some names."""
         space = self._lever.space
         own = self._lever.probe
         if (probe.shape, probe.tip) != (own.shape, own.tip):
@@ -47,10 +59,7 @@ class SimilarLevers:
         space = copy(space)
         # air takes up from a place nearly what it took before the place moved a little
         space.air = self._air(probe, names)
-        dimensions = [name for name in names if name in dimensions_of(probe)]
-        motions = {name: motion_of(space, self._moving.movement(name)) for name in dimensions}
-        base = probe.circuit.base_temperature_K
-        return LeverEquations(space, probe.kinds, base, motions)
+        return space
 
     def _air(self, probe: Probe, names: tuple[str, ...]) -> AirLoss | None:
         """Return the air around a similar probe."""

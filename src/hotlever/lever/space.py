@@ -207,6 +207,8 @@ class Space(ABC):
         Unknowns and weights that give the rise of the tip temperature.
     reader : tuple of (ndarray of int, ndarray), or None
         The same for the reader voltage V_r; None without a reader.
+    end_test : ndarray, shape (1 + dimension, points)
+        Values and slopes of the function that is one at the leg ends.
     air : AirLoss, ReducedAir or None
         The air around the lever; see `hotlever.lever.air_loss`.
     """
@@ -221,6 +223,7 @@ class Space(ABC):
     is_temperature: NDArray[np.bool_]
     tip: tuple[Index, Array]
     reader: tuple[Index, Array] | None
+    end_test: Array
     air: Any
 
     def fields(self, x: Array, base_temperature_K: float) -> Fields:

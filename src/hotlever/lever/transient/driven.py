@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hotlever.lever.balances import BALANCES, balance_columns
+from hotlever.lever.balances import heat_left
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.space import LEVER, Factors
 from hotlever.probe import Circuit
@@ -96,6 +96,5 @@ class DrivenLever:
 
     def rates(self, x: Array) -> Array:
         """Return the power, and the heat that leaves as it does at rest (mW), (2,)."""
-        power = float(x[-1, 0] * self.equations.balance(x)[-1, 0])
-        shown = dict(zip(BALANCES, balance_columns(self.equations, x)[0], strict=True))
-        return np.array([power, shown["end_heat_mW"] + shown["air_heat_mW"]])
+        power = x[-1, 0] * self.equations.balance(x)[-1, 0]
+        return np.array([power, heat_left(self.equations, x)[0]])

@@ -96,10 +96,14 @@ class _Observer:
 
 
 def follow(
-    lever: Lever, waveform: Waveform, until: float, tolerance_K: float
+    lever: Lever,
+    waveform: Waveform,
+    until: float,
+    tolerance_K: float,
+    start: State | None = None,
 ) -> Iterator[tuple[Piece, Step]]:
     """Give the steps of a lever under a wave form, each with the piece it belongs to."""
-    x = _at_rest(lever, waveform.before_V)
+    x = _at_rest(lever, waveform.before_V) if start is None else start.x
     rise = _SHARE_OF_RISE * _expected_rise(lever, waveform.highest_V)
     tolerance_K = max(min(tolerance_K, rise), _LEAST_TOLERANCE)
     length = None
@@ -136,6 +140,7 @@ def followed(
     *,
     tolerance_K: float = 0.1,
     per_step: int = 1,
+    start: State | None = None,
     seen: Seen | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -144,7 +149,6 @@ def followed(
     Parameters
     ----------
     lever : Lever
-        At rest before the wave form begins.
     waveform : Waveform
         Such as `pulse` or `read_waveform` return; see `hotlever.lever.transient.waveform`.
     until : float, optional
@@ -159,6 +163,8 @@ def followed(
     per_step : int
         Times to report for each step of the solver, where none are asked for; more than one make
         a smooth curve.
+    start : State, optional
+        Where the lever is when the wave form begins; at rest by default.
     seen : callable, optional
         Called with each time reported (µs) and the `State` there, whose fields it may keep.
     progress : callable, optional
@@ -178,7 +184,7 @@ def followed(
         If silicon melts or a step fails; ``partial`` holds the dataset up to there, and
         ``time_reached`` is when (µs).
     """
-    asked = None if at is None else _checked_times(at)
+    asked = None if at is None else checked_times(at)
     if until is None:
         until = waveform.usual_end if asked is None else float(asked[-1])
     if not 0 < until < np.inf or (asked is not None and asked[-1] > until):
@@ -189,7 +195,7 @@ def followed(
         raise InputError(f"found a tolerance of {tolerance_K:g} K, expected 1e-4 to 10 K")
     rows, reached, failure = _Rows(lever, asked, per_step, seen), 0.0, ""
     try:
-        for piece, step in follow(lever, waveform, until, tolerance_K):
+        for piece, step in follow(lever, waveform, until, tolerance_K, start):
             end = rows.add(piece, step)
             reached = step.end if end is None else end
             if end is not None:
@@ -251,7 +257,14 @@ def _melts(step: Step, values: Array, slopes: Array, limit_K: float) -> float | 
     return float(brentq(above, step.start, step.end)) if above(step.start) < 0 else step.start
 
 
-def _checked_times(at: ArrayLike) -> Array:
+def checked_times(at: ArrayLike) -> Array:
+    """Return times (µs) in order, each once.
+
+    Raises
+    ------
+    InputError
+        If one is negative or not finite, or there is none but 0.
+    """
     times = np.unique(np.atleast_1d(np.asarray(at, dtype=float)))
     if not times.size or not (np.isfinite(times) & (times >= 0)).all():
         raise InputError("found a time that is negative or not finite, expected times in µs")

@@ -18,6 +18,7 @@ from hotlever.lever.space import LEVER
 from hotlever.lever.state import State
 from hotlever.lever.transient.modes import stored_change
 from hotlever.threads import one_blas_thread
+from hotlever.types import Array
 
 #: Frequencies (Hz) that are answered; and the real ones (1/µs) that the answers are expanded in,
 #: from slower than the slowest mode to faster than all frequencies asked for.
@@ -60,9 +61,7 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
     >>> found.impedance_real_ohm.values.round(-2).tolist()  # nearly level at rest
     [200.0, 3300.0]
     """
-    frequency = np.atleast_1d(np.asarray(frequency_Hz, dtype=float))
-    if not frequency.size or not ((frequency >= LOWEST) & (frequency <= HIGHEST)).all():
-        raise InputError(f"expected frequencies from {LOWEST:g} to {HIGHEST:g} Hz")
+    frequency = checked_frequencies(frequency_Hz)
     if state.current_mA == 0.0:
         raise InputError("found no current, expected a bias at which the lever is heated")
     equations, x = state.lever.equations, state.x
@@ -108,3 +107,17 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
     }
     seen = {name: getattr(state, name) for name in ("bias_V", "lever_V", "current_mA", "tip_K")}
     return labelled(columns, "frequency", {"frequency": frequency}, **seen)
+
+
+def checked_frequencies(frequency_Hz: ArrayLike) -> Array:
+    """Return frequencies (Hz) as an array.
+
+    Raises
+    ------
+    InputError
+        If one is out of bounds, or there is none.
+    """
+    frequency = np.atleast_1d(np.asarray(frequency_Hz, dtype=float))
+    if not frequency.size or not ((frequency >= LOWEST) & (frequency <= HIGHEST)).all():
+        raise InputError(f"expected frequencies from {LOWEST:g} to {HIGHEST:g} Hz")
+    return frequency

@@ -66,12 +66,18 @@ class Waveform(ABC):
         Largest bias (V) of either sign.
     usual_end : float
         Time (µs) for which it is followed if nobody says.
+    period : float or None
+        Of pulses that are repeated (µs),
+    count : int
+        and how many there are.
     """
 
     text: str
     before_V: float
     highest_V: float
     usual_end: float
+    period: float | None = None
+    count: int = 1
 
     @abstractmethod
     def pieces(self, until: float) -> Iterator[Piece]:
@@ -87,6 +93,8 @@ class Polyline(Waveform):
     volts: tuple[float, ...]
     usual_end: float
     before_V: float = 0.0
+    period: float | None = None
+    count: int = 1
 
     @property
     def highest_V(self) -> float:  # type: ignore[override]
@@ -189,7 +197,8 @@ def pulse(volts: float, length: float, period: float | None = None, count: int =
     times = np.stack([starts, starts + length, starts + length, starts + period], axis=1)
     volt = np.tile([volts, volts, 0.0, 0.0], count)
     end = max(float(times[-1, -1]), float(times[-1, 1]) + _AFTERWARDS)
-    return Polyline(text, tuple(times.ravel().tolist()), tuple(volt.tolist()), end)
+    corners = tuple(times.ravel().tolist()), tuple(volt.tolist())
+    return Polyline(text, *corners, end, period=period, count=count)
 
 
 def ramp(volts: float, length: float) -> Waveform:

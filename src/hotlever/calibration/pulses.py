@@ -1,0 +1,378 @@
+"""What a calibrated lever does in a pulse: temperatures by the pulse's height, with their errors.
+
+The lever that the calibration has estimated is followed in time at some heights. What the estimate
+is uncertain in is the same as at rest, but a pulse depends on it otherwise: levers that are moved
+along the main directions of the estimate's covariance are followed too. The heat capacity is one
+more uncertain parameter. A lever that holds more heat does the same more slowly, so that its pulse
+is that of a shorter one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+from scipy.integrate import simpson
+from scipy.interpolate import CubicSpline, PchipInterpolator
+
+from hotlever.calibration.inference import Estimated, error_of_model
+from hotlever.calibration.limits import BAND
+from hotlever.datasets import csv_text, labelled
+from hotlever.errors import ComputationError, InputError, unknown_name
+from hotlever.fitting.embedded import Number, Section, array
+from hotlever.lever import Lever
+from hotlever.lever.equations import BASE
+from hotlever.lever.lever import COARSE
+from hotlever.lever.similar import SimilarLevers
+from hotlever.lever.state import State
+from hotlever.lever.transient import pulse
+from hotlever.lever.transient.periodic import settled
+from hotlever.materials.air import ATMOSPHERE, HEAT_RATIO, thermal_conductivity_of_air
+from hotlever.materials.heat import heat_capacity
+from hotlever.probe import Probe
+from hotlever.types import Array, Index, Progress
+
+#: Standard deviation of the heat capacity: tables of pure silicon differ by 1 to 2 %, and doping,
+#: oxides and metal on a lever are not in them.
+HEAT_CAPACITY_SPREAD = 0.03
+#: What is told of a pulse: its highest tip temperature, that at its end, and the mean during it.
+MOMENTS = ("peak", "end", "mean")
+_KINDS = ("_K", "_stderr_K", "_low_K", "_high_K")
+#: Columns of the table.
+PULSE_COLUMNS = ("height_V", *(f"{moment}{kind}" for moment in MOMENTS for kind in _KINDS))
+#: Heights that are followed with the coarse mesh, and which of them with the fine one and for
+#: moved levers.
+_HEIGHTS, _SOME = 13, (12, 9, 6, 3)
+#: Points of a history for each step, and how far directions are followed (standard errors).
+_PER_STEP, _ASIDE = 8, 0.5
+#: Directions of the covariance that matter: share of the variance of a parameter that they have,
+#: and of that of the highest pulse that may be left out at others.
+_LEAST_VARIANCE, _LEFT_OUT = 1e-3, 2e-3
+#: How often a single pulse is followed for longer to find its peak.
+_LONGER = 8
+
+
+@dataclass(frozen=True)
+class PulseTiming:
+    """Length of a rectangular pulse and the period of its repetition (µs), if it is repeated."""
+
+    length_us: float
+    period_us: float | None = None
+
+    def __post_init__(self) -> None:
+        pulse(1.0, self.length_us, self.period_us)
+
+    @property
+    def text(self) -> str:
+        """What it is, in words."""
+        each = "" if self.period_us is None else f" each {self.period_us:g} µs"
+        return f"a pulse of {self.length_us:g} µs{each}"
+
+    def scaled(self, factor: float) -> PulseTiming:
+        """Return the timing stretched by a factor."""
+        period = None if self.period_us is None else factor * self.period_us
+        return PulseTiming(factor * self.length_us, period)
+
+
+@dataclass(frozen=True)
+class PulseCalibration:
+    """Tip temperatures of a calibrated lever in a pulse.
+
+    Attributes
+    ----------
+    timing : PulseTiming
+        A repeated pulse is one of a train that has settled.
+    table : xarray.Dataset
+        `PULSE_COLUMNS` on the dimension ``height``, over the heights of the calibrated range; and
+        ``budget_K``, the standard error of the peak by ``source``.
+    notes : list of str
+    """
+
+    timing: PulseTiming
+    table: xr.Dataset
+    notes: list[str]
+
+    def tip_temperature(self, height_V: ArrayLike, moment: str = "peak") -> Array:
+        """Return the tip temperature (K) by the height of the pulse (V); NaN out of range.
+
+        Parameters
+        ----------
+        height_V : array_like
+        moment : {"peak", "end", "mean"}
+        """
+        return self._read(height_V, "height_V", _column(moment))
+
+    def height_for(self, tip_K: ArrayLike, moment: str = "peak") -> Array:
+        """Return the height (V) of the pulse for a tip temperature (K); NaN out of range.
+
+        Parameters
+        ----------
+        tip_K : array_like
+        moment : {"peak", "end", "mean"}
+        """
+        return self._read(tip_K, _column(moment), "height_V")
+
+    def _read(self, at: ArrayLike, along: str, column: str) -> Array:
+        x, y = self.table[along].values, self.table[column].values
+        return np.interp(np.asarray(at, dtype=float), x, y, left=np.nan, right=np.nan)
+
+    def content(self) -> dict[str, Any]:
+        """Return the section of the calibration file."""
+        budget = self.table.budget_K
+        return {
+            "length_us": self.timing.length_us,
+            "period_us": self.timing.period_us,
+            "table": self.table[list(PULSE_COLUMNS)].to_dataframe().to_dict("records"),
+            "budget_K": dict(
+                zip(budget.source.values.tolist(), budget.values.tolist(), strict=True)
+            ),
+            "notes": self.notes,
+        }
+
+    def table_csv(self) -> str:
+        """Return the table as CSV, to load into an instrument."""
+        return csv_text(self.table, PULSE_COLUMNS)
+
+
+class PulseSection(Section):
+    """What a calibration file holds of a pulse; see `PulseCalibration.content`."""
+
+    length_us: float
+    period_us: float | None = None
+    table: list[dict[str, Number]]
+    budget_K: dict[str, list[Number]]
+    notes: list[str]
+
+    def calibration(self, where: str) -> PulseCalibration:
+        """Return what was written; `where` names the file in an error.
+
+        Raises
+        ------
+        InputError
+            If the table is none.
+        """
+        rows = len(self.table)
+        columns = {
+            name: array([row.get(name) for row in self.table], (rows,), f"{where}: table: {name}")
+            for name in PULSE_COLUMNS
+        }
+        budget = {
+            source: array(errors, (rows,), f"{where}: budget_K: {source}")
+            for source, errors in self.budget_K.items()
+        }
+        if not rows or not budget or not np.all(np.diff(columns["height_V"]) > 0):
+            raise InputError(f"{where}: expected rows of rising height_V, and their budget")
+        try:
+            timing = PulseTiming(self.length_us, self.period_us)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+        return PulseCalibration(timing, _table(columns, budget), self.notes)
+
+
+def pulse_calibration(
+    found: Estimated, timing: PulseTiming, progress: Progress | None = None
+) -> PulseCalibration:
+    """Return what an estimated lever does in a pulse, over the heights of its measured range.
+
+    Parameters
+    ----------
+    found : Estimated
+    timing : PulseTiming
+    progress : callable, optional
+        Called with the pulses followed and how many there are, about.
+
+    Raises
+    ------
+    ComputationError
+        If the lever cannot be followed in time.
+    """
+    levers = _Pulsed(found, timing, progress)
+    rise = [levers.rise(place) for place in range(_HEIGHTS)]
+    directions = found.directions(_LEAST_VARIANCE)
+    corrections, changes = [], []
+    kept: Index = np.arange(len(directions))
+    for place in _SOME:
+        corrections.append(levers.corrected(place))
+        rows = np.zeros((len(directions) + 1, len(MOMENTS)))
+        rows[-1] = levers.slower(place)
+        for one in kept:
+            rows[one] = levers.along(place, directions[one])
+        changes.append(rows)
+        if place == _SOME[0]:
+            kept = _main(rows[:-1])
+    some = levers.heights[list(_SOME)]
+    bias = found.bias_V
+    tip = _interpolated(levers.heights, np.array(rise), bias)
+    tip *= 1.0 + _through(some, np.array(corrections), bias)
+    slopes = tip[:, None] * _through(some, np.array(changes), bias)
+    # with the base the whole lever gets warmer
+    slopes[:, :-1] += np.array([[one.get(BASE, 0.0)] for one in directions])
+    return _put_together(found, timing, tip, slopes, directions)
+
+
+class _Pulsed:
+    """Rises of the tip (K) in pulses of an estimated lever, and of others like it.
+
+    Rises are those of `MOMENTS`, shape (3,); those of other levers are relative to it.
+    """
+
+    def __init__(self, found: Estimated, timing: PulseTiming, progress: Progress | None) -> None:
+        self._probe, self._timing, self._progress = found.probe, timing, progress
+        self.heights = np.linspace(found.bias_V[0], found.bias_V[-1], _HEIGHTS)
+        self._coarse = Lever(found.probe, COARSE)
+        self._similar = SimilarLevers(self._coarse)
+        self._fine: Lever | None = None
+        self._known: dict[int, tuple[Array, State | None]] = {}
+        self._done, self._all = 0, 2 * (_HEIGHTS + len(found.varied))
+
+    def rise(self, place: int) -> Array:
+        """Return the rises of the coarse lever at one of the heights."""
+        if place not in self._known:
+            # a train settles sooner from where one that is a little lower has
+            near = self._known.get(place - 1, (None, None))[1]
+            self._known[place] = self._follow(self._coarse, self._timing, place, near)
+        return self._known[place][0]
+
+    def corrected(self, place: int) -> Array:
+        """Return how those of the fine lever differ."""
+        self._fine = self._fine or Lever(self._probe)
+        return self._follow(self._fine, self._timing, place, None)[0] / self.rise(place) - 1.0
+
+    def slower(self, place: int) -> Array:
+        """Return how those of a lever differ whose heat capacity is larger by its error."""
+        faster = self._timing.scaled(1.0 / (1.0 + HEAT_CAPACITY_SPREAD))
+        return self._near(self._coarse, faster, place) / self.rise(place) - 1.0
+
+    def along(self, place: int, direction: dict[str, float]) -> Array:
+        """Return how those of a lever differ one standard error along a direction, linearised."""
+        names = list(direction)
+        step = np.array(list(direction.values()))
+        failure: ComputationError | None = None
+        for way in (-_ASIDE, _ASIDE):
+            values = self._probe.at(names) + way * step
+            try:
+                probe = self._probe.moved(dict(zip(names, values.tolist(), strict=True)))
+                rise = self._near(self._similar.lever(probe), self._timing, place)
+            except ComputationError as error:
+                failure = error  # it melts, or its mesh turns over
+                continue
+            return (rise / self.rise(place) - 1.0) / way
+        raise failure or ComputationError("no lever")
+
+    def _near(self, lever: Lever, timing: PulseTiming, place: int) -> Array:
+        """Return the rises of a lever that is nearly the coarse one."""
+        return self._follow(lever, timing, place, self._known[place][1])[0]
+
+    def _follow(
+        self, lever: Lever, timing: PulseTiming, place: int, near: State | None
+    ) -> tuple[Array, State | None]:
+        """Return the rises, and the state in which a settled period begins."""
+        length, period = timing.length_us, timing.period_us
+        wave = pulse(float(self.heights[place]), length)
+        begin = None
+        if period is None:
+            for longer in range(1, _LONGER + 1):
+                history = lever.pulse(wave, length * 2.0**longer, per_step=_PER_STEP)
+                if int(history.tip_K.values.argmax()) < history.sizes["time"] - 1:
+                    break
+        else:
+            history, begin = settled(lever, wave, period, start=near, per_step=_PER_STEP)
+        self._done += 1
+        if self._progress is not None:
+            self._progress(self._done, max(self._all, self._done + 1))
+        time, tip = history.time.values, history.tip_K.values
+        during = time <= length
+        mean = simpson(tip[during], x=time[during]) / np.ptp(time[during])
+        found = np.array([tip.max(), tip[during][-1], mean])
+        return found - lever.circuit.base_temperature_K, begin
+
+
+def _main(changes: Array) -> Index:
+    """Return the directions (rows) that hold nearly all of the variance."""
+    shares = (changes**2 / (changes**2).sum(axis=0)).max(axis=1)
+    order = np.argsort(shares)
+    return np.sort(order[np.cumsum(shares[order]) > _LEFT_OUT])
+
+
+def _interpolated(heights: Array, rise: Array, at: Array) -> Array:
+    """Return rises (n, k) at some heights at others: over V² they hardly change when cold."""
+    curve = CubicSpline(heights, np.log(rise / heights[:, None] ** 2))
+    return np.asarray(at[:, None] ** 2 * np.exp(curve(at)))
+
+
+def _through(heights: Array, values: Array, at: Array) -> Array:
+    """Return values (n, ...) at falling heights at others; below the lowest they stay."""
+    curve = PchipInterpolator(heights[::-1], values[::-1])
+    return np.asarray(curve(np.maximum(at, heights.min())))
+
+
+def _put_together(
+    found: Estimated,
+    timing: PulseTiming,
+    rise: Array,
+    slopes: Array,
+    directions: list[dict[str, float]],
+) -> PulseCalibration:
+    """Make the table, of rises (n, moments) and their changes (n, directions + 1, moments)."""
+    # changes by directions to changes by parameters, of which units differ by many orders
+    steps = np.array([[one[name] for name in found.varied] for one in directions])
+    scale = np.abs(steps).max(axis=0)
+    inverse = np.linalg.pinv(steps / scale) / scale[:, None]
+    by_parameter = np.einsum("pd,ndm->nmp", inverse, slopes[:, :-1])
+    parts = {
+        source: np.sqrt(np.einsum("nmp,pq,nmq->nm", by_parameter, share, by_parameter))
+        for source, share in found.shares.items()
+    }
+    slow = np.abs(slopes[:, -1])
+    parts["heat capacity"] = slow
+    medium, notes = found.probe.surroundings.medium, []
+    base = found.probe.circuit.base_temperature_K
+    if medium == "air":
+        share = _share_of_air(found.probe, timing.length_us)
+        parts["air at rest"] = slow * share / HEAT_CAPACITY_SPREAD
+        notes.append(
+            "the air is taken to be at rest at every moment; what it takes up itself is less than "
+            f"{100.0 * share:.1f} % of what the lever holds, and counts as an error"
+        )
+    of_model = [error_of_model(medium, found.bias_V, column) for column in rise.T]
+    parts["model"] = np.stack(of_model, axis=1)
+    total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
+    columns: dict[str, Array] = {"height_V": found.bias_V}
+    for place, moment in enumerate(MOMENTS):
+        tip, stderr = base + rise[:, place], total[:, place]
+        values = tip, stderr, tip - BAND * stderr, tip + BAND * stderr
+        columns |= {f"{moment}{kind}": one for kind, one in zip(_KINDS, values, strict=True)}
+    budget = {source: part[:, MOMENTS.index("peak")] for source, part in parts.items()}
+    return PulseCalibration(timing, _table(columns, budget), notes)
+
+
+def _share_of_air(probe: Probe, time_us: float) -> float:
+    """Return the heat that air takes up from a plate by that in the plate, as they get warm.
+
+    Of a half space on either side whose surface warms evenly in time (Carslaw and Jaeger,
+    Conduction of Heat in Solids, 2.5), cold: when it is hot, the air is thinner.
+    """
+    T = probe.circuit.base_temperature_K
+    kappa = probe.surroundings.gas_conductivity * float(thermal_conductivity_of_air(T)[0])
+    # of an ideal gas, in J cm⁻³ K⁻¹
+    capacity = 1e-4 * ATMOSPHERE * HEAT_RATIO / ((HEAT_RATIO - 1.0) * T)
+    per_area = 2.0 * 4.0 / 3.0 * np.sqrt(kappa * capacity * 1e-6 * time_us / np.pi)
+    return float(per_area / (1e-4 * probe.layout().thickness_um * heat_capacity(T)[0]))
+
+
+def _table(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:
+    errors = (("source", "height"), np.array(list(budget.values())))
+    return labelled(
+        {**columns, "budget_K": errors},
+        "height",
+        {"height": columns["height_V"], "source": list(budget)},
+    )
+
+
+def _column(moment: str) -> str:
+    if moment not in MOMENTS:
+        raise unknown_name("moment", moment, MOMENTS)
+    return f"{moment}_K"

@@ -1,0 +1,176 @@
+"""A reduced lever in time: modes of histories of the full one, and the same equations on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from hotlever.lever.equations import Conductivities, LeverEquations
+from hotlever.lever.reduced import ReducedSpace
+from hotlever.lever.reduction import ReductionOptions, empirical_rule
+from hotlever.lever.space import Space
+from hotlever.lever.state import State
+from hotlever.materials import Kind
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from hotlever.lever.lever import Lever
+
+#: Modes whose part of the snapshots is less, relative, are left out; and the accuracy of the rule.
+_LEAST_MODE = 1e-5
+_RULE = ReductionOptions(rule_tolerance=1e-5)
+#: Places of each snapshot that are looked at for the highest temperature.
+_HOT = 20
+#: Temperatures (K) at which laws are tabulated.
+_NODE_STEP = 5.0
+_NODES = np.arange(250.0, 1750.0, _NODE_STEP)
+
+
+@one_blas_thread
+def reduced_in_time(lever: Lever, snapshots: Array) -> Lever:
+    """Return the lever on modes of its states in time.
+
+    Parameters
+    ----------
+    lever : Lever
+        The full one.
+    snapshots : ndarray, shape (size + 1, n)
+        States of it, some with power.
+
+    Returns
+    -------
+    Lever
+        Its space is a `hotlever.lever.reduced.ReducedSpace` on few points.
+    """
+    every = space_of_modes(lever, snapshots)
+    weights = lever.space.weights[:, 0]
+    points, few = empirical_rule(_integrands(lever, every, snapshots), weights, _RULE)
+    other = copy(lever)
+    space = every.at_points(points, few)
+    other.space = cast("Any", space)
+    base = lever.circuit.base_temperature_K
+    other.equations = TabulatedEquations(space, lever.probe.kinds, base)
+    return other
+
+
+def space_of_modes(lever: Lever, snapshots: Array, origin: Array | None = None) -> ReducedSpace:
+    """Return the space of the modes of some states, at all points.
+
+    Where an origin (size + 1, 1) is given, differences from it count as much as it does itself.
+    """
+    full, x = lever.space, snapshots
+    hot = full.is_temperature[:-1]
+    first, _ = lever.equations.cold()
+    lift = first[:-1, 0] / first[-1, 0]
+    free = (x[:-1] - np.outer(lift, x[-1])).T
+    own = None if origin is None else (origin[:-1, 0] - lift * origin[-1, 0])
+    modes: list[Array] = []
+    for rows in (hot, ~hot):
+        vectors = np.where(rows, free, 0.0)
+        if own is not None:
+            here = np.where(rows, own, 0.0)
+            away = vectors - here
+            size = np.linalg.norm(away, axis=1).max()
+            vectors = np.vstack([away / size, here / max(float(np.linalg.norm(here)), 1e-300)])
+        modes.append(_modes(vectors))
+    # a lever that cools is hottest elsewhere
+    hottest = np.where(hot[:, None], x[:-1], 0.0)
+    hottest = np.unique(np.argsort(-hottest, axis=0)[:_HOT])
+    return ReducedSpace(full, modes[0], modes[1], lift, hottest)
+
+
+def on_all_nodes(lever: Lever, state: State) -> State:
+    """Return the state of a full lever that one of its reduced lever stands for."""
+    space = cast("ReducedSpace", state.lever.space)
+    return State(lever, space.expanded(state.x))
+
+
+class TabulatedEquations(LeverEquations):
+    """The equations of a lever, with the laws of each point looked up by its temperature.
+
+    In thousands of steps with one material the laws would take most of the time. Between nodes
+    they are cubics through values and slopes: within 1e-6, and 2e-4 at the step in the slope of κ.
+    """
+
+    def __init__(
+        self, space: Space, materials: Mapping[str, Kind], base_temperature_K: float
+    ) -> None:
+        super().__init__(space, materials, base_temperature_K)
+        self._found: tuple[Array, Array, Array] | None = None
+        T = np.broadcast_to(_NODES, (space.weights.size, _NODES.size))
+        laws, (heat, heat_by) = super().conductivities(T), super().heat_density(T)
+        values = np.stack([laws.kappa, laws.sigma, heat])
+        slopes = np.stack([laws.kappa_by["T"], laws.sigma_by["T"], heat_by]) * _NODE_STEP
+        rise, first, last = np.diff(values), slopes[..., :-1], slopes[..., 1:]
+        table = [
+            values[..., :-1],
+            first,
+            3.0 * rise - 2.0 * first - last,
+            first + last - 2.0 * rise,
+        ]
+        # the order of looking up: points, nodes, powers, laws
+        self._table = np.ascontiguousarray(np.stack(table).transpose(2, 3, 0, 1))
+        self._every = np.arange(space.weights.size)[:, None]
+
+    def _look_up(self, T: Array) -> tuple[Array, Array]:
+        """Return κ, σ and the heat (3, points, n), and their slopes."""
+        if self._found is None or self._found[0] is not T:
+            place = (T - _NODES[0]) / _NODE_STEP
+            node = np.minimum(np.maximum(place, 0.0), _NODES.size - 2.0).astype(np.intp)
+            along = np.minimum(np.maximum(place - node, 0.0), 1.0)[..., None]
+            a, b, c, d = np.moveaxis(self._table[self._every, node], 2, 0)
+            values = a + along * (b + along * (c + along * d))
+            slopes = (b + along * (2.0 * c + 3.0 * along * d)) / _NODE_STEP
+            # Newton's method may stray beyond the nodes
+            beyond = place - node - along[..., 0]
+            values = values + slopes * (_NODE_STEP * beyond)[..., None]
+            self._found = T, np.moveaxis(values, -1, 0), np.moveaxis(slopes, -1, 0)
+        return self._found[1:]
+
+    def conductivities(self, T: Array, names: Sequence[str] = ("T",)) -> Conductivities:
+        """See `LeverEquations.conductivities`; derivatives by parameters are not looked up."""
+        if tuple(names) != ("T",):
+            return super().conductivities(T, names)
+        values, slopes = self._look_up(T)
+        return Conductivities(values[0], values[1], {"T": slopes[0]}, {"T": slopes[1]})
+
+    def heat_density(self, T: Array) -> tuple[Array, Array]:
+        """See `LeverEquations.heat_density`."""
+        values, slopes = self._look_up(T)
+        return values[2], slopes[2]
+
+
+def _modes(vectors: Array) -> Array:
+    """Return the modes of vectors (n, size) that matter; their largest entry is one."""
+    values, combinations = np.linalg.eigh(vectors @ vectors.T)
+    kept = values > _LEAST_MODE**2 * values[-1]
+    modes = combinations[:, kept][:, ::-1].T @ vectors
+    modes = np.linalg.qr(modes.T)[0].T
+    return np.asarray(modes / np.abs(modes).max(axis=1, keepdims=True))
+
+
+def _integrands(lever: Lever, space: ReducedSpace, x: Array) -> Iterator[Array]:
+    """Give what the equations integrate at some states, each kind by its largest size."""
+    full, equations = lever.space, lever.equations
+    weights = space.weights[:, 0]
+    T = space.temperature.matrix.reshape(space.temperature.kinds, weights.size, -1)
+    V = space.potential.matrix.reshape(space.potential.kinds, weights.size, -1)
+    fluxes = equations.fluxes(x)
+    stored = equations.heat_density(equations.at(x)[0].T)[0]
+    power = float(np.max(-fluxes.heat_source.T @ weights))
+    heat, volt = float(np.max(stored.T @ weights)), float(np.abs(x[-1]).max())
+    ends = full.end_test
+    for place in range(x.shape[1]):
+        source, flux = fluxes.heat_source[:, place], fluxes.heat[..., place]
+        held = stored[:, place] / heat
+        yield T[0].T * (source / power)
+        yield np.einsum("dqm,dq->mq", T[1:], flux / power)
+        yield T[0].T * held
+        yield np.einsum("dqm,dq->mq", V, fluxes.charge[..., place] * (volt / power))
+        # what the heat balance is told by
+        at_ends = source * ends[0] + np.einsum("dq,dq->q", ends[1:], flux)
+        yield np.stack([held, held * ends[0], at_ends / power])

@@ -1,0 +1,149 @@
+"""Long trains of pulses, followed on modes where those are certified by the full lever.
+
+Modes are those of the first periods. On them the whole train is followed; then the full lever is
+followed from states early and late in the train, and tells how far the reduced one departs within
+a period, and from that to the next. Where it departs too far, what the full lever did there joins
+the snapshots, and the train is followed once more.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from hotlever.errors import ComputationError
+from hotlever.lever.state import State
+from hotlever.lever.transient.history import Seen, checked_times, followed
+from hotlever.lever.transient.reduced import on_all_nodes, reduced_in_time
+from hotlever.lever.transient.waveform import Waveform
+from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from hotlever.lever.lever import Lever
+
+#: Periods from which modes pay; those that are followed to make them, or to compare; and how
+#: often they are made.
+FEWEST, _PERIODS, _ROUNDS = 20, 2, 4
+#: Points of a history for each step, where levers are compared.
+_PER_STEP = 2
+#: Most of what a departure within a period grows to, as it is carried on by the next ones.
+_LARGEST_RATIO = 0.97
+
+
+def followed_on_modes(
+    lever: Lever,
+    waveform: Waveform,
+    until: float | None = None,
+    at: ArrayLike | None = None,
+    *,
+    tolerance_K: float = 0.1,
+    seen: Seen | None = None,
+    **options: Any,
+) -> xr.Dataset:
+    """Follow a lever in time, on modes if the wave form is repeated often and they suffice.
+
+    Parameters and errors are those of `hotlever.lever.transient.history.followed`; ``notes`` of the
+    dataset say whether modes were used, and how far from the full lever they are.
+    """
+    given = {"tolerance_K": tolerance_K, **options}
+    end, period = waveform.usual_end if until is None else until, waveform.period
+    if at is not None and until is None:
+        end = float(checked_times(at)[-1])
+    if period is None or waveform.count < FEWEST or not FEWEST * period <= end < np.inf:
+        return followed(lever, waveform, until, at, seen=seen, **given)
+    try:
+        return _Train(lever, waveform, period, end, given).followed(at, seen)
+    except ComputationError:
+        # it melts, or is like no train that modes are good for
+        return followed(lever, waveform, until, at, seen=seen, **given)
+
+
+class _Train:
+    def __init__(
+        self, lever: Lever, waveform: Waveform, period: float, end: float, options: dict[str, Any]
+    ) -> None:
+        self._lever, self._waveform, self._period = lever, waveform, period
+        self._end, self._options = end, options
+        whole = min(waveform.count, int(end / period * (1.0 + 1e-9)))
+        self._places = (_PERIODS, whole - _PERIODS)
+        self._snapshots: list[Array] = []
+
+    def followed(self, at: ArrayLike | None, seen: Seen | None) -> xr.Dataset:
+        """Return the history on modes that are certified.
+
+        Raises
+        ------
+        ComputationError
+            If there are none.
+        """
+        self._full(None)
+        tolerance = self._options["tolerance_K"]
+        starts = self._period * np.array(self._places, dtype=float)
+        for _ in range(_ROUNDS):
+            reduced = reduced_in_time(self._lever, np.hstack(self._snapshots))
+            times = None if at is None else np.union1d(checked_times(at), starts)
+            states: list[tuple[float, State]] = []
+            history = followed(
+                reduced,
+                self._waveform,
+                self._end,
+                times,
+                seen=lambda t, state, states=states: states.append((t, state)),  # type: ignore[misc]
+                **self._options,
+            )
+            known = np.array([t for t, _ in states])
+            begins = [states[int(np.abs(known - t).argmin())][1] for t in starts.tolist()]
+            away = max(self._departure(state) for state in begins)
+            if away < tolerance:
+                break
+        else:
+            raise ComputationError(f"modes of the first periods are off by {away:.2g} K")
+        if at is not None:
+            history = history.isel(time=np.isin(known, checked_times(at)))
+        if seen is not None:
+            for t, state in states:
+                if at is None or t in history.time:
+                    seen(t, on_all_nodes(self._lever, state))
+        note = (
+            f"followed on {reduced.space.size} modes, within {away:.1g} K of the full lever as "
+            f"compared from periods {self._places[0] + 1} and {self._places[1] + 1} on"
+        )
+        history.attrs["notes"] = "\n".join(filter(None, [history.attrs["notes"], note]))
+        return history
+
+    def _full(self, start: State | None) -> xr.Dataset:
+        """Follow the full lever over some periods, and keep its states."""
+
+        def seen(t: float, state: State) -> None:
+            self._snapshots.append(state.x)
+
+        return followed(
+            self._lever,
+            self._waveform,
+            _PERIODS * self._period,
+            start=start,
+            tolerance_K=self._options["tolerance_K"],
+            per_step=_PER_STEP,
+            seen=seen,
+        )
+
+    def _departure(self, start: State) -> float:
+        """Estimate how far (K) the reduced lever departs from the full one in the long run."""
+        full = self._full(on_all_nodes(self._lever, start))
+        other = followed(
+            start.lever,
+            self._waveform,
+            _PERIODS * self._period,
+            full.time.values,
+            start=start,
+            tolerance_K=self._options["tolerance_K"],
+        )
+        away = np.abs(full.tip_K.values - other.tip_K.values)
+        first = full.time.values <= self._period
+        one, two = away[first], away[~first]
+        # what is carried on to a later period decays, at a rate that the ends of two tell
+        ratio = min(max(two[-1] / max(one[-1], 1e-12) - 1.0, 0.0), _LARGEST_RATIO)
+        return float(max(one.max(), two.max()) + one[-1] * ratio / (1.0 - ratio))

@@ -1,0 +1,134 @@
+"""The page of a lever in time: steps, a train of pulses, time constants, spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import get_args
+
+import numpy as np
+
+from hotlever import figures
+from hotlever.lever import Lever
+from hotlever.lever.transient import pulse, rise_times, spectrum, step, time_constants
+from hotlever.lever.transient.modes import Source
+from hotlever.lever.transient.sinusoidal import harmonics
+from hotlever.report.page import Page
+from hotlever.steps import each
+from hotlever.text import sentence
+from hotlever.types import Progress
+
+#: Operating points, as shares of the bias of the knee: beyond it a lever may run away.
+_SHARES = (0.25, 0.5, 0.75, 0.9)
+#: Length, period (µs) and number of the pulses; points of a curve for each step of the solver.
+_LENGTH, _PERIOD, _COUNT, _PER_STEP = 5.0, 50.0, 10, 8
+#: Frequencies (Hz) of spectra and harmonics; the drive as a share of the bias.
+_FREQUENCIES, _DRIVE = np.geomspace(10.0, 1e7, 49), 0.05
+
+
+def transient_page(lever: Lever, progress: Progress | None = None) -> Page:
+    """Return the page of a lever in time.
+
+    Parameters
+    ----------
+    lever : Lever
+    progress : callable, optional
+        Called with the sections done and their number.
+
+    Raises
+    ------
+    ComputationError
+        If the lever cannot be solved or followed.
+    """
+    branch = lever.branch_past_knee()
+    knee = branch.knee
+    highest = float(
+        branch.bias([branch.hottest_K], lever.circuit)[0]
+        if knee is None
+        else lever.circuit.bias(knee.lever_V, knee.current_mA)
+    )
+    biases = [round(share * highest, 2) for share in _SHARES]
+    page = Page(
+        "A lever in time",
+        f"A {lever.probe.shape.shape} lever in {lever.medium}, with "
+        f"{lever.circuit.series_resistance_ohm:g} Ω in series. "
+        + (
+            f"Biases are shares of {highest:.2f} V, where it is hottest."
+            if knee is None
+            else f"Biases are shares of {highest:.2f} V, that of its knee."
+        ),
+    )
+    sections: dict[str, Callable[[Page, Lever, list[float]], None]] = {
+        "A step": _step,
+        "A train of pulses": _train,
+        "Time constants": _time_constants,
+        "Small signals": _small_signals,
+        "Harmonics": _harmonics,
+    }
+    for heading, section in each(sections.items(), progress):
+        page.heading(heading)
+        section(page, lever, biases)
+    return page
+
+
+def _step(page: Page, lever: Lever, biases: list[float]) -> None:
+    bias = biases[-1]
+    history = lever.pulse(step(bias), per_step=_PER_STEP)
+    page.figure("step", figures.history_overview(history), f"The bias is switched to {bias:g} V.")
+    times = [1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0]
+    rows = []
+    for one in biases:
+        tip = lever.pulse(step(one), at=times).tip_K.values
+        rows.append([f"{one:g}", *(f"{value:.0f}" for value in tip)])
+    heads = ["bias (V)", *(f"{time:g} µs" for time in times)]
+    page.table(heads, rows, "Tip temperature (K) so long after the bias was switched on.")
+    for text in filter(None, history.attrs["notes"].split("\n")):
+        page.text(sentence(text))
+
+
+def _train(page: Page, lever: Lever, biases: list[float]) -> None:
+    wave = pulse(biases[-1], _LENGTH, _PERIOD, _COUNT)
+    history = lever.pulse(wave, per_step=_PER_STEP)
+    page.figure("train", figures.history_overview(history), f"{sentence(wave.text)}")
+    kept = history.stored_nJ + history.lost_nJ
+    off = float(np.abs(history.supplied_nJ - kept).max() / history.supplied_nJ.max())
+    page.text(f"Of the heat supplied all but {off:.0e} is stored or lost.")
+
+
+def _time_constants(page: Page, lever: Lever, biases: list[float]) -> None:
+    columns = {
+        source: time_constants(lever, biases, source, count=1) for source in get_args(Source)
+    }
+    times = rise_times(lever, biases)
+    rows = []
+    for place, bias in enumerate(biases):
+        slowest = [found.time_constant_us.values[place, 0] for found in columns.values()]
+        around = [times.heating_us.values[place], times.cooling_us.values[place]]
+        tip = times.tip_K.values[place]
+        rows.append([f"{bias:g}", f"{tip:.0f}", *(f"{one:.1f}" for one in (*slowest, *around))])
+    held = [f"{source} held" for source in columns]
+    page.table(
+        ["bias (V)", "tip (K)", *held, "heating", "cooling"],
+        rows,
+        "The slowest time constant (µs) by what the source holds, negative for what grows; "
+        "and times from 10 to 90 %.",
+    )
+
+
+def _small_signals(page: Page, lever: Lever, biases: list[float]) -> None:
+    for bias in (biases[1], biases[-1]):
+        (state,) = lever.solve([bias])
+        made = figures.small_signals(spectrum(state, _FREQUENCIES))
+        page.figure(
+            f"spectrum_{bias:g}V", made, f"At {bias:g} V, with the tip at {state.tip_K:.0f} K."
+        )
+
+
+def _harmonics(page: Page, lever: Lever, biases: list[float]) -> None:
+    bias = biases[1]
+    drive = _DRIVE * bias
+    found = harmonics(lever, bias, drive, _FREQUENCIES)
+    page.figure(
+        "harmonics",
+        figures.harmonics(found),
+        f"Harmonics of the lever voltage under a sine of {drive:.2g} V about {bias:g} V.",
+    )

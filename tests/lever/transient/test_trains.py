@@ -1,0 +1,65 @@
+"""Trains of pulses on modes: as the full lever, and saying so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever.errors import HistoryEndError
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.full_space import FullSpace
+from hotlever.lever.transient import followed, pulse, step
+from hotlever.lever.transient.reduced import reduced_in_time
+
+TRAIN = pulse(9.0, 4.0, 20.0, 20)
+TIMES = [4.0, 60.0, 64.0, 384.0, 396.0, 400.0]
+
+
+@pytest.fixture(scope="module")
+def states():
+    return []
+
+
+@pytest.fixture(scope="module")
+def train(coarse, states):
+    return coarse.pulse(TRAIN, at=TIMES, seen=lambda t, state: states.append((t, state)))
+
+
+def test_a_train_on_modes_is_that_of_the_full_lever(coarse, train, states):
+    full = followed(coarse, TRAIN, at=TIMES)
+    np.testing.assert_array_equal(train.time, TIMES)
+    np.testing.assert_allclose(train.tip_K, full.tip_K, atol=0.1)
+    np.testing.assert_allclose(train.max_K, full.max_K, atol=0.1)
+    for name in ("current_mA", "reader_V", "stored_nJ", "lost_nJ", "supplied_nJ"):
+        np.testing.assert_allclose(train[name], full[name], rtol=5e-3, atol=1e-3)
+    assert "modes, within 0.0" in train.attrs["notes"]
+    assert "modes" not in full.attrs["notes"]
+    assert [t for t, _ in states] == TIMES
+    for (_, state), tip in zip(states, train.tip_K.values, strict=True):
+        assert isinstance(state.lever.space, FullSpace)
+        assert state.tip_K == pytest.approx(tip, abs=1e-6)
+
+
+def test_what_melts_or_is_short_is_followed_in_full(coarse):
+    with pytest.raises(HistoryEndError, match=r"melts after 1\.2"):
+        coarse.pulse(pulse(40.0, 4.0, 20.0, 30))
+    assert not coarse.pulse(pulse(9.0, 4.0, 20.0, 30), at=[4.0]).attrs["notes"]
+
+
+def test_laws_that_are_looked_up_are_the_laws(coarse):
+    snapshots = []
+    followed(coarse, step(8.0), 50.0, seen=lambda t, state: snapshots.append(state.x))
+    reduced = reduced_in_time(coarse, np.hstack(snapshots))
+    exact = LeverEquations(reduced.space, coarse.probe.kinds, 293.0)
+    T = np.random.default_rng(0).uniform(293.0, 1600.0, (reduced.space.weights.size, 3))
+    looked_up, true = reduced.equations.conductivities(T), exact.conductivities(T)
+    np.testing.assert_allclose(looked_up.kappa, true.kappa, rtol=2e-4)
+    np.testing.assert_allclose(looked_up.sigma, true.sigma, rtol=1e-6)
+    np.testing.assert_allclose(looked_up.sigma_by["T"], true.sigma_by["T"], rtol=1e-3, atol=1e-6)
+    for found, expected in zip(
+        reduced.equations.heat_density(T), exact.heat_density(T), strict=True
+    ):
+        np.testing.assert_allclose(found, expected, rtol=1e-5)
+    # Newton's method may stray beyond the table
+    hot = np.full_like(T, 2500.0)
+    assert (reduced.equations.heat_density(hot)[0] > exact.heat_density(T)[0]).all()
