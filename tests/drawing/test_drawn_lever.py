@@ -5,11 +5,11 @@ from __future__ import annotations
 import gdstk
 import numpy as np
 import pytest
-from drawn import LAYERS, TERMINALS, TIP, box, drawn, library_of, pointed_lever, turned, written
-from drawn import reference_points as points
 from reference_drawing import reference_library
 from skfem import MeshTri
 
+from drawn import LAYERS, TERMINALS, TIP, box, drawn, library_of, pointed_lever, turned, written
+from drawn import reference_points as points
 from hotlever.drawing.sheet import read_sheet
 from hotlever.lever import Lever, read_sweep, write_sweep
 from hotlever.lever.full_space import FullSpace

@@ -5,9 +5,9 @@ from __future__ import annotations
 import gdstk
 import numpy as np
 import pytest
-from drawn import TIP, box, library_of, pointed_lever, turned, written
 from reference_drawing import reference_library
 
+from drawn import TIP, box, library_of, pointed_lever, turned, written
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
