@@ -75,7 +75,7 @@ class BaseLine:
                 f"surroundings: {needed_by} takes leg ends of supply and ground on one line; "
                 f"({x:.6g}, {y:.6g}) µm is {off.max():.3g} µm off it"
             )
-        corners = np.array([corner for region in layout.regions for corner in region.outline])
+        corners = layout.corners
         behind = line.seen(corners)[:, 0]
         if behind.min() < -_OFF_LINE:
             x, y = corners[behind.argmin()]
@@ -113,8 +113,7 @@ def chip_panels(layout: Layout, refinement: float = 1.0) -> Panels:
         If leg ends are not on one line, or the lever is on both sides of it.
     """
     line = BaseLine.of(layout, "the chip")
-    corners = np.array([corner for region in layout.regions for corner in region.outline])
-    seen = line.seen(corners)
+    seen = line.seen(layout.corners)
     low, high = float(seen[:, 1].min()), float(seen[:, 1].max())
     half, reach = layout.thickness_um / 2, REACH * float(seen[:, 0].max())
     smallest = _ROOT * (high - low) / refinement

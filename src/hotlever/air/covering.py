@@ -24,7 +24,7 @@ from hotlever.types import Array
 Size = Callable[[Array], Array]
 
 #: Where lines cross, coordinates are rounded to this (µm).
-_GRID = 1e-8
+GRID = 1e-8
 #: Narrower pieces (µm) are left out: they come of rounding.
 _NARROWEST = 1e-5
 #: A strip reaches so many times its depth into the corner between two edges, at most.
@@ -112,10 +112,10 @@ def _faces(shape: Polygon, exposed: BaseGeometry, depths: Array) -> list[Polygon
     above = 0.0
     for depth in depths:
         rim = exposed.buffer(depth, cap_style="square", join_style="mitre", mitre_limit=_MITRE)
-        layer, inner = inner, shape.difference(rim, grid_size=_GRID)
+        layer, inner = inner, shape.difference(rim, grid_size=GRID)
         # strips have the corners of the outline; what is inside the last needs fewer
         last = depth == depths[-1]
-        inner = inner.simplify(_OFF_CURVE * (depth - above) if last else 10 * _GRID)
+        inner = inner.simplify(_OFF_CURVE * (depth - above) if last else 10 * GRID)
         if inner.is_empty:
             break
         for one in parts(inner):
@@ -139,20 +139,20 @@ def _mitres(inner: Polygon, shape: Polygon, layer: BaseGeometry, step: float) ->
         ends.append(ring + step * both * reach[:, None] * _BEYOND)
     pairs = np.stack([np.concatenate(starts), np.concatenate(ends)], axis=1)
     # on the edge of the shape a curve ends
-    pairs = pairs[shapely.distance(shapely.points(pairs[:, 0]), shape.boundary) > 10 * _GRID]
+    pairs = pairs[shapely.distance(shapely.points(pairs[:, 0]), shape.boundary) > 10 * GRID]
     clipped = shapely.intersection(shapely.linestrings(pairs), layer.difference(inner))
     # what lies beyond the curve above belongs to another corner
     return [
         part
         for line, corner in zip(clipped, shapely.points(pairs[:, 0]), strict=True)
         for part in parts(line, "LineString")
-        if part.distance(corner) < 10 * _GRID
+        if part.distance(corner) < 10 * GRID
     ]
 
 
 def _cut_by(shape: Polygon, lines: list[LineString]) -> list[Polygon]:
     """Return the faces that lines make of a polygon, without what comes of rounding."""
-    noded = shapely.union_all(lines, grid_size=_GRID)
+    noded = shapely.union_all(lines, grid_size=GRID)
     faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
     inside = shapely.covers(shape, shapely.point_on_surface(faces))
     return [face for face in faces[inside] if face.area > _NARROWEST * face.length]
@@ -240,7 +240,7 @@ def _between(ring: Array, left: float, right: float) -> tuple[float, float]:
 
 def _quadrilaterals(cell: Polygon) -> list[Array]:
     """Return the corners (4, 2) of quadrilaterals and triangles that make up a cell."""
-    cell = cell.simplify(10 * _GRID)
+    cell = cell.simplify(10 * GRID)
     ring = rings(cell)[0]
     ring = ring[np.abs(turns(ring)) > _IN_LINE]
     if len(ring) < 3:

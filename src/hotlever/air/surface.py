@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiLineString, Polygon
 
-from hotlever.air.covering import cover, divided, parts, rings, turns
+from hotlever.air.covering import GRID, cover, divided, parts, rings, turns
 from hotlever.air.panels import Panels
 from hotlever.probe.layout import Layout
 from hotlever.types import Array, Index
@@ -26,7 +26,7 @@ _OFF_CURVE = 0.1
 #: Panels are small at corners of the outline that turn by more (rad).
 _SHARP = 0.4
 #: How far off (µm) a line is still on another; where regions touch coordinates are rounded to less.
-_ON_LINE, _GRID = 1e-5, 1e-8
+_ON_LINE = 1e-5
 #: Shorter edges (µm) beside a terminal are left out.
 _SHORTEST = 1e-3
 
@@ -115,7 +115,7 @@ class _Outline:
             for region in layout.regions
         }
         #: As drawn, and with fewer corners where it is curved.
-        self._exact = shapely.union_all(list(shapes.values()), grid_size=_GRID)
+        self._exact = shapely.union_all(list(shapes.values()), grid_size=GRID)
         simplified = parts(self._exact.simplify(_OFF_CURVE * self._edge))
         self._shape = max(simplified, key=lambda part: part.area)
         around = np.array(shapely.minimum_rotated_rectangle(self._shape).exterior.coords)

@@ -14,7 +14,7 @@ from scipy import optimize
 
 from hotlever.errors import ComputationError
 from hotlever.fitting.models import Prediction
-from hotlever.fitting.objective import UNSOLVED, Objective, Vicinity
+from hotlever.fitting.objective import UNSOLVED, Objective, Vicinity, inside
 from hotlever.types import Array
 
 #: Standard errors that 95 % of a normal distribution lie within.
@@ -128,10 +128,9 @@ class _Pulled:
             self.tip_K(start)
         except ComputationError:
             start = self._vicinity.origin
-        inside = np.clip(start, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
         found = optimize.least_squares(
             self._residual,
-            inside,
+            inside(start, low, high),
             self._jacobian,
             (low, high),
             x_scale="jac",

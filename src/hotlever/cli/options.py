@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from typer import Argument, Option
 
+from hotlever.cli.output import progress
 from hotlever.errors import InputError, quoted
 from hotlever.files import Outputs
 
 if TYPE_CHECKING:
+    from hotlever.lever import Lever
     from hotlever.probe import Probe
     from hotlever.types import Array
 
@@ -48,6 +50,13 @@ PriorOption = Annotated[
         help="What is known beforehand, as n_d=3.3e17±15%, dimensions=±2% or none; repeated.",
     ),
 ]
+SettingsOption = Annotated[
+    list[str] | None,
+    Option("--set", metavar="NAME=VALUE", help="Change a value of the probe file."),
+]
+DataOutput = Annotated[
+    File, Option("-o", "--output", help="FILE.csv or FILE.nc; standard output if left out.")
+]
 MediumOption = Annotated[str | None, Option(help="vacuum or air; what the files say if left out.")]
 
 
@@ -71,11 +80,23 @@ def options_of(function: Callable[..., Any], name: str) -> Callable[[Callable[..
     return decorate
 
 
-def load_probe(path: Path | None) -> Probe:
-    """Read a probe file, or return the reference probe."""
+def load_probe(
+    path: Path | None, settings: list[str] | None = None, medium: str | None = None
+) -> Probe:
+    """Read a probe file, or take the reference probe, and change some of its values."""
     from hotlever.probe import Probe
 
-    return Probe.reference() if path is None else Probe.from_file(path)
+    probe = Probe.reference() if path is None else Probe.from_file(path)
+    probe = probe.with_(**parse_settings(settings, probe)) if settings else probe
+    return probe if medium is None else probe.in_medium(medium)
+
+
+def make_lever(probe: Probe) -> Lever:
+    """Mesh a probe, and make the air around it."""
+    from hotlever.lever import Lever
+
+    with progress("air") as update:
+        return Lever(probe, progress=update)
 
 
 def check_plot(outputs: Outputs, plot: Path | None) -> None:

@@ -11,14 +11,16 @@ from typer import Option
 
 from hotlever.cli.application import app
 from hotlever.cli.options import (
+    DataOutput,
     File,
     MediumOption,
     PlotFile,
     ProbeFile,
+    SettingsOption,
     check_medium,
     check_plot,
     load_probe,
-    parse_settings,
+    make_lever,
 )
 from hotlever.cli.output import give, note, progress
 from hotlever.errors import HistoryEndError, InputError
@@ -48,12 +50,8 @@ def pulse_command(
         None, metavar="TIME,...", help="Times to report; where the solver stepped if left out."
     ),
     medium: MediumOption = None,
-    settings: list[str] | None = Option(
-        None, "--set", metavar="NAME=VALUE", help="Change a value of the probe file."
-    ),
-    output: File = Option(
-        None, "-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."
-    ),
+    settings: SettingsOption = None,
+    output: DataOutput = None,
     plot: PlotFile = None,
     fields: File = Option(None, help="Write the fields as a series of VTU to this folder."),
     report: File = Option(
@@ -61,7 +59,6 @@ def pulse_command(
     ),
 ) -> None:
     """Follow a lever in time: steps, pulses, ramps, sines, or what a file says."""
-    from hotlever.lever import Lever
     from hotlever.lever.transient import history_csv, write_history
 
     texts = {"--step": step, "--pulse": pulse, "--ramp": ramp, "--sine": sine}
@@ -81,15 +78,13 @@ def pulse_command(
     outputs.file(output, ".csv", ".nc")
     check_plot(outputs, plot)
     outputs.folder(fields)
-    probe = load_probe(probe_file)
-    probe = probe.with_(**parse_settings(settings, probe))
+    probe = load_probe(probe_file, settings, medium)
     failure: HistoryEndError | None = None
     # a figure has smooth curves, the table the steps alone
     per_step = _CURVE if plot is not None and times is None else 1
     states: list[tuple[float, State]] = []
     told = count_up()
-    with progress("air") as update:
-        lever = Lever(probe if medium is None else probe.in_medium(medium), progress=update)
+    lever = make_lever(probe)
     with progress("pulse") as update:
 
         def seen(t: float, state: State) -> None:
@@ -125,7 +120,6 @@ def _report(
     settings: list[str] | None,
 ) -> None:
     """Write the page of a lever in time."""
-    from hotlever.lever import Lever
     from hotlever.report.transient_pages import transient_page
 
     given = [name for name, value in others.items() if value is not None]
@@ -134,10 +128,7 @@ def _report(
     check_medium(medium)
     outputs = Outputs(probe_file)
     outputs.folder(folder)
-    probe = load_probe(probe_file)
-    probe = probe.with_(**parse_settings(settings, probe))
-    with progress("air") as update:
-        lever = Lever(probe if medium is None else probe.in_medium(medium), progress=update)
+    lever = make_lever(load_probe(probe_file, settings, medium))
     with progress("sections") as update:
         page = transient_page(lever, update)
     with outputs.together():

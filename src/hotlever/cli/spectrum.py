@@ -8,17 +8,17 @@ from typer import Option
 
 from hotlever.cli.application import app
 from hotlever.cli.options import (
-    File,
+    DataOutput,
     MediumOption,
     PlotFile,
     ProbeFile,
+    SettingsOption,
     check_medium,
     check_plot,
     load_probe,
-    parse_settings,
+    make_lever,
 )
 from hotlever.cli.output import give, progress
-from hotlever.datasets import csv_text, write_dataset
 from hotlever.errors import InputError
 from hotlever.files import Outputs
 from hotlever.units import setting
@@ -41,16 +41,12 @@ def spectrum_command(
         None, metavar="V", help="Of a sine about the bias: harmonics of V_l instead (3ω method)."
     ),
     medium: MediumOption = None,
-    settings: list[str] | None = Option(
-        None, "--set", metavar="NAME=VALUE", help="Change a value of the probe file."
-    ),
-    output: File = Option(
-        None, "-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."
-    ),
+    settings: SettingsOption = None,
+    output: DataOutput = None,
     plot: PlotFile = None,
 ) -> None:
     """Show impedance and thermal response to small signals at a bias, or harmonics."""
-    from hotlever.lever import Lever
+    from hotlever.datasets import csv_text, write_dataset
     from hotlever.lever.transient.sinusoidal import HARMONIC_COLUMNS, harmonics
     from hotlever.lever.transient.small_signals import SPECTRUM_COLUMNS, spectrum
 
@@ -60,10 +56,7 @@ def spectrum_command(
     outputs = Outputs(probe_file)
     outputs.file(output, ".csv", ".nc")
     check_plot(outputs, plot)
-    probe = load_probe(probe_file)
-    probe = probe.with_(**parse_settings(settings, probe))
-    with progress("air") as update:
-        lever = Lever(probe if medium is None else probe.in_medium(medium), progress=update)
+    lever = make_lever(load_probe(probe_file, settings, medium))
     with progress("spectrum") as update:
         if swing is None:
             (state,) = lever.solve([volts], update)

@@ -10,15 +10,17 @@ from typer import Option
 
 from hotlever.cli.application import app
 from hotlever.cli.options import (
+    DataOutput,
     File,
     MediumOption,
     ProbeFile,
+    SettingsOption,
     SweepPlot,
     check_medium,
     check_plot,
     load_probe,
+    make_lever,
     parse_bias,
-    parse_settings,
 )
 from hotlever.cli.output import give, note, progress
 from hotlever.errors import ComputationError, unknown_name
@@ -41,12 +43,8 @@ def sweep_command(
         help="flat: the lever in its plane; full-3d: its true thickness and the air around it "
         "(minutes; goes on where it was stopped).",
     ),
-    settings: list[str] | None = Option(
-        None, "--set", metavar="NAME=VALUE", help="Change a value of the probe file."
-    ),
-    output: File = Option(
-        None, "-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."
-    ),
+    settings: SettingsOption = None,
+    output: DataOutput = None,
     plot: SweepPlot = None,
     fields: File = Option(None, help="Write the fields at each bias as VTU to this folder."),
 ) -> None:
@@ -61,9 +59,7 @@ def sweep_command(
     outputs.file(output, ".csv", ".nc")
     check_plot(outputs, plot)
     outputs.folder(fields)
-    probe = load_probe(probe_file)
-    probe = probe.with_(**parse_settings(settings, probe))
-    lever = _lever(probe if medium is None else probe.in_medium(medium), model)
+    lever = _lever(load_probe(probe_file, settings, medium), model)
     states: list[State] = []
     with progress("sweep") as update:
         data, failure = _reached(lambda: lever.sweep(values, progress=update))
@@ -105,10 +101,7 @@ def _lever(probe: Probe, model: str) -> Lever:
         with progress("mesh and air"):
             return SolidLever(probe)
 
-    from hotlever.lever import Lever
-
-    with progress("air") as update:
-        return Lever(probe, progress=update)
+    return make_lever(probe)
 
 
 def _write_fields(lever: Lever, states: list[State], folder: Path) -> None:

@@ -8,7 +8,7 @@ voltages at a given tip temperature are nearly powers of the parameters, a few r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from scipy import optimize
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting.models import ForwardModel, Prediction
-from hotlever.fitting.objective import Objective, Vicinity, inverse_or_nan
+from hotlever.fitting.objective import Objective, Vicinity, inside, inverse_or_nan
 from hotlever.fitting.residuals import Residuals
 from hotlever.probe import Probe
 from hotlever.probe.priors import JointPrior, Prior
@@ -135,11 +135,12 @@ class LeastSquares:
             if confirmed is self.model:
                 return found
             self.model = confirmed
-            known, self._at_hand = [*self.others(found.prediction), found.prediction], {}
-            for one in known:
-                # with what the fast lever lacked, another one may melt below the highest bias
-                with nullcontext() if one is found.prediction else suppress(ComputationError):
-                    self._at_hand[one.probe] = confirmed.predict(one.probe, one)
+            others, self._at_hand = self.others(found.prediction), {}
+            for other in others:
+                # with what the fast lever lacked, it may melt below the highest bias
+                with suppress(ComputationError):
+                    self._at_hand[other.probe] = confirmed.predict(other.probe, other)
+            self._at_hand[found.probe] = confirmed.predict(found.probe, found.prediction)
             previous, found = found, self.solve(found.probe)
             if self.ended or self._settled(previous, found):
                 return found
@@ -234,12 +235,10 @@ class LeastSquares:
         value, (lower, upper) = near.origin, objective.bounds
         room = far * np.maximum(np.abs(value), 0.1)
         low, high = np.maximum(lower, value - room), np.minimum(upper, value + room)
-        # the search begins within its bounds
         begin = value if start is None else objective.values(start) / objective.scale
-        inside = np.clip(begin, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
         found = optimize.least_squares(
             near.residual,
-            inside,
+            inside(begin, low, high),
             near.jacobian,
             (low, high),
             x_scale="jac",

@@ -79,7 +79,7 @@ class Objective:
 
     def jacobian(self, slopes: Array, scaled: Array) -> Array:
         """Return their derivatives by the scaled parameters, for predicted slopes (3, n, k)."""
-        return np.concatenate([self._jacobian(slopes), self._of_priors(scaled)])
+        return np.concatenate([self.of_data(slopes), self.of_priors(scaled)])
 
     def squares(self, at: Prediction) -> float:
         """Return the sum of squares of the weighted residuals and of the distance from priors."""
@@ -88,7 +88,7 @@ class Objective:
 
     def used_up(self, probe: Probe, slopes: Array) -> Array:
         """Return how many degrees of freedom of each observable a fit with priors uses up."""
-        jacobian = self._jacobian(slopes)
+        jacobian = self.of_data(slopes)
         leverage = np.zeros(self.residuals.data.shape)
         leverage[self.residuals.present] = np.einsum(
             "ij,jk,ik->i", jacobian, self._posterior(probe, slopes), jacobian
@@ -109,7 +109,7 @@ class Objective:
         J. Econometrics 29, 305 (1985)): C = A⁻¹ Jᵀ V J A⁻¹ with A = JᵀJ and V = r² / (1 − h)².
         """
         residual = self.residuals.weighted(at.values)
-        jacobian = self._jacobian(at.slopes)
+        jacobian = self.of_data(at.slopes)
         if self.informed:
             return self._posterior(at.probe, at.slopes) * np.outer(self.scale, self.scale)
         inverse = inverse_or_nan(jacobian.T @ jacobian)
@@ -127,8 +127,8 @@ class Objective:
         """
         if not self.informed:
             return {"measurement": self.covariance(at)}
-        jacobian = self._jacobian(at.slopes)
-        prior = self._of_priors(self.values(at.probe) / self.scale)
+        jacobian = self.of_data(at.slopes)
+        prior = self.of_priors(self.values(at.probe) / self.scale)
         names = [*(self.varied[place] for place in self._priors), *["fit"] * len(self._of_joint)]
         left = self._posterior(at.probe, at.slopes) * self.scale[:, None]
         found = {"measurement": left @ (jacobian.T @ jacobian) @ left.T}
@@ -144,7 +144,7 @@ class Objective:
             own = [*own, *self._joint.deviations(values[self._of_joint])]
         return np.array(own)
 
-    def _of_priors(self, scaled: Array) -> Array:
+    def of_priors(self, scaled: Array) -> Array:
         """Return the derivatives of `from_priors` by the scaled parameters."""
         rows, values = np.zeros((len(self._priors), scaled.size)), scaled * self.scale
         for row, (place, prior) in zip(rows, self._priors.items(), strict=True):
@@ -155,7 +155,7 @@ class Objective:
             rows = np.concatenate([rows, joint * self.scale])
         return rows
 
-    def _jacobian(self, slopes: Array) -> Array:
+    def of_data(self, slopes: Array) -> Array:
         """Return the derivatives of the weighted residuals by the scaled parameters."""
         return self.residuals.jacobian(slopes[:, :, self.columns] * self.scale)
 
@@ -180,6 +180,7 @@ class Vicinity:
     ) -> None:
         self.objective, self._at = objective, at
         self.origin = objective.values(at.probe) / objective.scale
+        self._parameters = at.probe.at(objective.names)
         self._bends: list[tuple[Array, Array]] = []
         self._latest: tuple[Array, tuple[Array, Array]] | None = None
         jacobian = objective.jacobian(at.slopes, self.origin)
@@ -208,7 +209,7 @@ class Vicinity:
 
     def _predicted(self, scaled: Array) -> tuple[Array, Array]:
         objective = self.objective
-        parameters = self._at.probe.at(objective.names)
+        parameters = self._parameters.copy()
         parameters[objective.columns] = scaled * objective.scale
         values, slopes = self._at.nearby.predict(parameters)
         for along, missed in self._bends:
@@ -230,6 +231,12 @@ class Vicinity:
     def jacobian(self, scaled: Array) -> Array:
         """Return their derivatives by the scaled parameters."""
         return self.objective.jacobian(self.predict(scaled)[1], scaled)
+
+
+def inside(scaled: Array, low: Array, high: Array) -> Array:
+    """Return where a search begins that must begin within its bounds."""
+    margin = 1e-6 * (high - low)
+    return np.clip(scaled, low + margin, high - margin)
 
 
 def inverse_or_nan(matrix: Array) -> Array:

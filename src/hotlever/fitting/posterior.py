@@ -22,6 +22,7 @@ from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting.diagnostics import effective_sample_size, split_rhat
 from hotlever.fitting.ensembles import Chains, Gaussian, sample
+from hotlever.fitting.objective import Objective
 from hotlever.fitting.result import Fit
 from hotlever.fitting.rough import RoughModel, rough_model
 from hotlever.materials import full_name
@@ -42,25 +43,21 @@ class FitPosterior:
     """Posterior density of a fit's varied parameters, over their scales."""
 
     def __init__(self, fit: Fit, model: RoughModel, noise: Noise) -> None:
-        self._model, self._probe, self._names = model, fit.probe, fit.names
-        every = parameters_of(fit.probe)
-        known = [every[name] for name in fit.names]
-        self.scale = np.array([one.scale for one in known])
-        self.optimum = fit.probe.at(fit.names) / self.scale
-        priors = fit.known_before
-        self._priors = [(fit.names.index(name), prior) for name, prior in priors.items()]
-        self.lower = np.array([one.lower for one in known]) / self.scale
-        self.upper = np.array([one.upper for one in known]) / self.scale
-        self._residuals = fit.residuals()
+        self._model, self._probe, self._residuals = model, fit.probe, fit.residuals()
+        self._objective = Objective(
+            self._residuals, fit.probe, model.names, fit.names, fit.known_before
+        )
+        self.scale, (self.lower, self.upper) = self._objective.scale, self._objective.bounds
+        self.optimum = self._objective.values(fit.probe) / self.scale
         # the data that share a noise scale
         self._group = np.nonzero(self._residuals.present)[0] * (noise == "each")
         self._counts = np.bincount(self._group)
         stated = [np.isfinite(fit.measurement.error(name)).any() for name in fit.observables]
-        self._known = np.array(stated) if self._priors and noise == "each" else False
+        self._known = np.array(stated) if self._objective.informed and noise == "each" else False
 
     def probe(self, point: Array) -> Probe:
         """Return the probe of a point."""
-        return self._probe.moved(dict(zip(self._names, point * self.scale, strict=True)))
+        return self._objective.at(self._probe, point)
 
     def log_probability(self, point: Array) -> float:
         """Return the logarithm of the density; −∞ where the lever has no such state."""
@@ -71,9 +68,8 @@ class FitPosterior:
         except ComputationError:
             return -math.inf
         squares = self._squares(self._residuals.weighted(values))
-        away = sum(prior.deviation(point[k] * self.scale[k]) ** 2 for k, prior in self._priors)
         unlikely = np.where(self._known, squares, self._counts * np.log(squares))
-        return float(-0.5 * (unlikely.sum() + away))
+        return float(-0.5 * (unlikely.sum() + np.sum(self._objective.from_priors(point) ** 2)))
 
     def linearised(self) -> Gaussian:
         """Return the posterior of the model linearised at its own material, as a normal one.
@@ -81,16 +77,15 @@ class FitPosterior:
         The weights follow from the residuals and the residuals from the weights; a few dozen
         rounds settle both. Directions that the data leave open are closed by the priors.
         """
-        varied = [self._model.names.index(name) for name in self._names]
+        objective = self._objective
         residual = self._residuals.weighted(self._model.predict(self._probe))
-        jacobian = self._residuals.jacobian(self._model.slopes[:, :, varied] * self.scale)
-        prior = np.diag(12.0 / (self.upper - self.lower) ** 2)
-        pull, step = np.zeros(len(varied)), np.zeros(len(varied))
-        for place, one in self._priors:
-            value = self.optimum[place] * self.scale[place]
-            slope = one.slope(value) * self.scale[place]
-            prior[place, place] = slope**2
-            pull[place] = slope * one.deviation(value)
+        jacobian = objective.of_data(self._model.slopes)
+        of_priors = objective.of_priors(self.optimum)
+        pull = of_priors.T @ objective.from_priors(self.optimum)
+        step = np.zeros(self.scale.size)
+        # what has no prior of its own is uniform within its bounds
+        uniform = np.where(of_priors.any(axis=0), 0.0, 12.0 / (self.upper - self.lower) ** 2)
+        prior = np.diag(uniform) + of_priors.T @ of_priors
         for _ in range(50):
             squares = self._squares(residual + jacobian @ step)
             weights = np.where(self._known, 1.0, self._counts / squares)[self._group]

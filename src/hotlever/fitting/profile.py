@@ -10,7 +10,8 @@ from scipy.special import chdtri
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting.least_squares import LeastSquares
-from hotlever.fitting.models import ForwardModel, Prediction, forward_model
+from hotlever.fitting.models import ForwardModel, forward_model
+from hotlever.fitting.objective import Objective
 from hotlever.fitting.residuals import Residuals
 from hotlever.fitting.result import Fit
 from hotlever.probe import Probe
@@ -73,28 +74,20 @@ def profile_likelihood(
     model = _model(result, residuals)
     near = model.predict(result.probe)
     priors = result.known_before
-    own = priors.pop(name, None)
+    whole = Objective(residuals, result.probe, model.names, result.names, priors)
     # with priors, residuals are in standard deviations
-    informed = bool(priors) or own is not None
-    variance = 1.0 if informed else _noise_variance(result, name, residuals.size)
-
-    def squares(at: Prediction, probe: Probe) -> float:
-        residual = residuals.weighted(at.values)
-        away = {one: prior.deviation(float(probe.at([one])[0])) for one, prior in priors.items()}
-        if own is not None:
-            away[name] = own.deviation(float(probe.at([name])[0]))
-        return float(residual @ residual) + sum(one**2 for one in away.values())
-
-    least = squares(near, result.probe) if informed else result.sum_of_squares
+    variance = 1.0 if whole.informed else _noise_variance(result, name, residuals.size)
+    least = whole.squares(near) if whole.informed else result.sum_of_squares
+    of_others = {one: prior for one, prior in priors.items() if one != name}
 
     def refit(value: float, start: Probe) -> tuple[float, Probe]:
         """Fit the others with the parameter at `value`; return Δχ² and where."""
         nonlocal near
         held = start.moved({name: value})
-        problem = LeastSquares(model, residuals, held, others, near=near, priors=priors)
+        problem = LeastSquares(model, residuals, held, others, near=near, priors=of_others)
         found = problem.solve(held)
         near = found.prediction
-        return (squares(near, near.probe) - least) / variance, found.probe
+        return (whole.squares(near) - least) / variance, found.probe
 
     # without a standard error, a tenth of the bounds' distance is a step as good as any
     step = (optimum.stderr or 0.1 * (known.upper - known.lower)) * _REACH / (points // 2)

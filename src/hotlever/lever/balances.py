@@ -40,25 +40,27 @@ def balance_slopes(equations: LeverEquations, x: Array, slopes: Array) -> Array:
 
 def heat_left(equations: LeverEquations, x: Array) -> Array:
     """Return the heat that leaves states by the leg ends and into the air (mW), (n,)."""
-    space, fluxes = equations.space, equations.fluxes(x)
+    theta = None if equations.space.air is None else equations.kirchhoff(x)[0]
+    by_ends, into_air, _ = _heat_out(equations.space, equations.fluxes(x), theta)
+    return by_ends + into_air
+
+
+def _heat_out(space: Space, fluxes: Fluxes, theta: Array | None) -> tuple[Array, Array, Array]:
+    """Return the heat through the leg ends and into the air, and the heat source by point."""
     heat = space.weighted(np.concatenate([fluxes.heat_source[None], fluxes.heat]))
-    left = -np.einsum("dp,dpn->n", space.end_test, heat)
-    if space.air is not None:
-        into_air, at_ends = space.air.heat(equations.kirchhoff(x)[0])
-        left += into_air - at_ends
-    return np.asarray(left)
+    by_ends = -np.einsum("dp,dpn->n", space.end_test, heat)
+    into_air = np.zeros_like(by_ends)
+    if theta is not None:
+        into_air, at_ends = space.air.heat(theta)
+        by_ends = by_ends - at_ends
+    return by_ends, into_air, heat[0]
 
 
 def _balances(space: Space, fluxes: Fluxes, theta: Array | None) -> Array:
     """Return the balances of fluxes and of θ at the sites of the air; all are linear in both."""
     assert isinstance(space, FullSpace)  # a reduced lever has no ends
-    heat = space.weighted(np.concatenate([fluxes.heat_source[None], fluxes.heat]))
-    heat_source, charge = heat[0], space.weighted(fluxes.charge)
-    end_heat = -np.einsum("dp,dpn->n", space.end_test, heat)
-    air_heat = np.zeros_like(end_heat)
-    if theta is not None:
-        air_heat, at_ends = space.air.heat(theta)
-        end_heat = end_heat - at_ends
+    end_heat, air_heat, heat_source = _heat_out(space, fluxes, theta)
+    charge = space.weighted(fluxes.charge)
     joule = [_joule(heat_source, space.parts[part]) for part in ("heater", "leg 1", "leg 2")]
     ground = -np.einsum("dp,dpn->n", space.ground_test, charge)
     return np.stack([*joule, ground, end_heat, air_heat], axis=-1)

@@ -65,9 +65,10 @@ def sweep_dataset(
     return labelled(
         variables,
         coordinates=coordinates,
-        **{name: json.dumps(section) for name, section in probe.values().items()},
-        medium=probe.surroundings.medium,
-        notes="\n".join([*notes, *_range_notes(probe, columns["bias_V"], columns["max_K"])]),
+        **probe_attributes(probe),
+        notes="\n".join(
+            [*notes, *range_notes(probe, "a bias of {} V", columns["bias_V"], columns["max_K"])]
+        ),
     )
 
 
@@ -87,22 +88,25 @@ def _resistance(heat_mW: Array, current_mA: Array) -> Array:
     return np.divide(1000.0 * heat_mW, current_mA**2, out=nothing, where=current_mA > 0)
 
 
-def laws_end_K(probe: Probe) -> float:
-    """Return the temperature (K) beyond which a law of a probe's materials is extrapolated."""
-    laws = [law for kind in probe.made_of.values() for law in kind.laws]
-    return min(law.temperature_range[1] for law in laws)
+def range_notes(probe: Probe, where: str, along: Array, max_K: Array) -> list[str]:
+    """Say from where on the laws are used beyond the temperatures they are meant for.
 
-
-def _range_notes(probe: Probe, bias_V: Array, max_K: Array) -> list[str]:
-    """Say where the laws are used beyond the temperatures they are meant for."""
-    limit = laws_end_K(probe)
-    beyond = bias_V[max_K > limit]
+    `where` has the place of a number in it, the least of those of `along` that it is true of.
+    """
+    limit = min(law.temperature_range[1] for kind in probe.made_of.values() for law in kind.laws)
+    beyond = along[max_K > limit]
     if not beyond.size:
         return []
     return [
-        f"from a bias of {beyond.min():.4g} V part of the lever is above {limit:.0f} K, "
+        f"from {where.format(f'{beyond.min():.4g}')} part of the lever is above {limit:.0f} K, "
         "where the material laws are extrapolated"
     ]
+
+
+def probe_attributes(probe: Probe) -> dict[str, str]:
+    """Return what a dataset says of its probe, which `probe_of` reads."""
+    sections = {name: json.dumps(section) for name, section in probe.values().items()}
+    return {**sections, "medium": probe.surroundings.medium}
 
 
 def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:

@@ -16,6 +16,7 @@ operator fills the plate itself with air too; κ is therefore κ_Si − κ_air w
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -124,8 +125,12 @@ class LeverEquations:
         Thickness included, at temperatures (K), (points, n).
         """
         held, by = self._stacks.heat(T)
-        cold, _ = self._stacks.heat(np.full((len(T), 1), self.base_temperature_K))
-        return held - cold, by
+        return held - self._cold_heat, by
+
+    @cached_property
+    def _cold_heat(self) -> Array:
+        """The enthalpy at the base temperature (nJ/µm²), (points, 1)."""
+        return self._stacks.heat(np.full_like(self.space.weights, self.base_temperature_K))[0]
 
     def stored(self, x: Array) -> Array:
         """Return the heat stored in states (nJ), tested as `balance` tests, (size + 1, n).

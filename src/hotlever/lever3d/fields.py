@@ -115,8 +115,7 @@ def temperature_slices(state: State) -> xr.Dataset:
     directions = lever_axes(layout)
     as_drawn = np.allclose(directions, np.eye(2), rtol=0, atol=1e-9)
     names = ("x", "y") if as_drawn else ("along", "across")
-    corners = np.array([corner for region in layout.regions for corner in region.outline])
-    seen = corners @ directions.T
+    seen = layout.corners @ directions.T
     far, near = 0.675 * np.ptp(seen, axis=0).max(), 2.0 * layout.heater.sides.max()
     # in the middle of the lever, at the tip's place across it
     middle = np.array([(seen[:, 0].min() + seen[:, 0].max()) / 2, tip @ directions[1]]) @ directions

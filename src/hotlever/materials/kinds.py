@@ -7,6 +7,8 @@ of the modules beside this one; here is said which kind follows which, and with 
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from collections.abc import Callable
 from typing import ClassVar, Literal
 
 from pydantic import Field
@@ -88,9 +90,9 @@ class Kind(Record):
         }
 
     @property
+    @abstractmethod
     def laws(self) -> tuple[Law, ...]:
         """Of thermal and, if it conducts, electrical conductivity."""
-        raise NotImplementedError
 
     @property
     def highest_K(self) -> float:
@@ -101,23 +103,23 @@ class Kind(Record):
         """Say what happens to a material of this name above its highest temperature."""
         return f"the laws of '{name}' end"
 
+    @abstractmethod
     def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
         """Return κ (W cm⁻¹ K⁻¹) of a film, with its derivatives.
 
         They are by ``T``, by parameters, and by ``thickness_um`` where κ depends on it.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), with its derivatives by ``T``, by parameters and by ``n``.
 
         The doping `n` (cm⁻³) matters to a `LowDopedSilicon` only.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def enthalpy(self, T: Array) -> Evaluated:
         """Return the heat held above that at 298.15 K (J cm⁻³), with its derivative by ``T``."""
-        raise NotImplementedError
 
 
 class Silicon(Kind):
@@ -179,58 +181,49 @@ class LowDopedSilicon(Silicon):
         name: OF_SILICON[name] for name in ("c_kappa", "delta", "n_d", "p", "impurity_exponent")
     }
     usual: ClassVar = ("c_kappa", "delta", "n_d", "p")
+    #: Laws by temperature, doping, p and the impurity exponent; and where σ is least.
+    conductivity: ClassVar[Law]
+    inversion: ClassVar[Callable[..., Array]]
 
     delta: float = bounded(OF_SILICON["delta"])
     n_d: float = bounded(OF_SILICON["n_d"])
     p: float = bounded(OF_SILICON["p"])
     impurity_exponent: float = impurity_exponent()
 
+    @property
+    def laws(self) -> tuple[Law, ...]:
+        """Of thermal and electrical conductivity."""
+        return self._heat, type(self).conductivity
+
+    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
+        """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
+        return type(self).conductivity(T, n, self.p, self.impurity_exponent)
+
     def inversion_temperature(self, n: Array | None = None) -> Array:
         """Return the temperature (K) at which the resistivity of a doping (cm⁻³) is highest.
 
         Of its own doping by default; NaN where there is none below 1700 K.
         """
-        raise NotImplementedError
+        doping = self.n_d if n is None else n
+        return type(self).inversion(doping, self.p, self.impurity_exponent)
 
 
 class NSilicon(LowDopedSilicon):
     """Silicon doped with phosphorus, as in the paper."""
 
+    conductivity: ClassVar = conductivity_low_doped
+    inversion: ClassVar = inversion_temperature
+
     kind: Literal["n-silicon"] = "n-silicon"
-
-    @property
-    def laws(self) -> tuple[Law, ...]:
-        """Of thermal and electrical conductivity."""
-        return self._heat, conductivity_low_doped
-
-    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
-        """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
-        return conductivity_low_doped(T, n, self.p, self.impurity_exponent)
-
-    def inversion_temperature(self, n: Array | None = None) -> Array:
-        """Return it (K), see `LowDopedSilicon.inversion_temperature`."""
-        doping = self.n_d if n is None else n
-        return inversion_temperature(doping, self.p, self.impurity_exponent)
 
 
 class PSilicon(LowDopedSilicon):
     """Silicon doped with boron."""
 
+    conductivity: ClassVar = conductivity_p
+    inversion: ClassVar = inversion_temperature_p
+
     kind: Literal["p-silicon"] = "p-silicon"
-
-    @property
-    def laws(self) -> tuple[Law, ...]:
-        """Of thermal and electrical conductivity."""
-        return self._heat, conductivity_p
-
-    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
-        """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
-        return conductivity_p(T, n, self.p, self.impurity_exponent)
-
-    def inversion_temperature(self, n: Array | None = None) -> Array:
-        """Return it (K), see `LowDopedSilicon.inversion_temperature`."""
-        doping = self.n_d if n is None else n
-        return inversion_temperature_p(doping, self.p, self.impurity_exponent)
 
 
 class HighDopedSilicon(Silicon):

@@ -15,7 +15,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import elementwise
 
 from hotlever.materials.laws import FORMULA_TO, Evaluated, Law, Partials, law
 from hotlever.types import Array
@@ -327,6 +326,9 @@ def highest_resistivity(conductivity: Callable[..., Evaluated], *parameters: Arr
     def slope(T: Array, *arguments: Array) -> Array:
         sigma, partials = conductivity(T, *arguments)
         return partials["T"] / sigma
+
+    # takes a quarter of a second to load, which not every command has to wait for
+    from scipy.optimize import elementwise
 
     root = elementwise.find_root(slope, (cold, hot), args=tuple(arguments))
     return np.where(root.success, root.x, np.nan)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import expn
 
 from hotlever.materials.laws import Evaluated, law
 from hotlever.materials.silicon import thermal_conductivity
@@ -50,6 +49,9 @@ def thermal_conductivity_of_layer(T: ArrayLike, thickness_um: ArrayLike) -> Eval
 
 def _share(depth: Array) -> tuple[Array, Array]:
     """Sondheimer's Eq. 12 with diffuse surfaces, by thickness over Λ, and its derivative."""
+    # loaded where it is wanted, as every command loads this module
+    from scipy.special import expn
+
     third, fifth = expn(3, depth), expn(5, depth)
     share = 1.0 - 1.5 * (0.25 - third + fifth) / depth
     slope = (1.0 - share) / depth - 1.5 * (expn(2, depth) - expn(4, depth)) / depth

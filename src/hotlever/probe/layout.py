@@ -238,6 +238,11 @@ class Layout:
         boxes = np.array([region.box for region in self.regions])
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
+    @property
+    def corners(self) -> Array:
+        """Corners of the outlines of all regions (µm), shape (n, 2)."""
+        return np.array([corner for region in self.regions for corner in region.outline])
+
     def reentrant_corners(self) -> list[Point]:
         """Corners where lever or conductor spans more than 180°, at which fields are singular.
 

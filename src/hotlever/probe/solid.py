@@ -122,8 +122,7 @@ def mesh_solid(
 def middle_and_reach(layout: Layout) -> tuple[Array, float]:
     """Return the middle of a lever's box, and how far away from it its corners are (µm)."""
     middle = layout.box.mean(axis=0)
-    corners = np.array([point for region in layout.regions for point in region.outline])
-    return middle, float(np.linalg.norm(corners - middle, axis=1).max())
+    return middle, float(np.linalg.norm(layout.corners - middle, axis=1).max())
 
 
 def _check_size(layout: Layout) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
@@ -14,7 +13,7 @@ from scipy.optimize import brentq
 
 from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import ComputationError, HistoryEndError, InputError
-from hotlever.lever.dataset import laws_end_K
+from hotlever.lever.dataset import probe_attributes, range_notes
 from hotlever.lever.state import State
 from hotlever.lever.transient.driven import DrivenLever
 from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
@@ -46,6 +45,15 @@ _AIR_NOTE = (
 
 # Told a time (µs) and the state there.
 Seen = Callable[[float, State], None]
+
+
+def kept_in(states: list[tuple[float, State]]) -> Seen:
+    """Return what keeps all times and states that it is told."""
+
+    def seen(t: float, state: State) -> None:
+        states.append((t, state))
+
+    return seen
 
 
 class _Observer:
@@ -283,19 +291,12 @@ def _dataset(lever: Lever, waveform: Waveform, rows: _Rows) -> xr.Dataset:
     more = ("max_K", "supplied_nJ", "stored_nJ", "lost_nJ")
     variables |= {name: columns[name] for name in (*TIME_COLUMNS[2:], *more)}
     notes = [] if lever.space.air is None else [_AIR_NOTE]
-    limit = laws_end_K(lever.probe)
-    beyond = time[columns["max_K"] > limit]
-    if beyond.size:
-        notes.append(
-            f"from {beyond[0]:.4g} µs on part of the lever is above {limit:.0f} K, where the "
-            "material laws are extrapolated"
-        )
+    notes += range_notes(lever.probe, "{} µs on", time, columns["max_K"])
     return labelled(
         variables,
         "time",
         {"time": time},
-        **{name: json.dumps(section) for name, section in lever.probe.values().items()},
-        medium=lever.medium,
+        **probe_attributes(lever.probe),
         waveform=waveform.text,
         notes="\n".join(notes),
     )

@@ -9,7 +9,7 @@ import xarray as xr
 
 from hotlever.errors import ComputationError
 from hotlever.lever.state import State
-from hotlever.lever.transient.history import followed
+from hotlever.lever.transient.history import followed, kept_in
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.types import Array
 
@@ -64,24 +64,24 @@ def settled(
     """
     rises, begins, last = lever.space.rises, [start], 0.0
     for _ in range(_MOST):
-        reached: list[State] = []
+        reached: list[tuple[float, State]] = []
         history = followed(
             lever,
             waveform,
             period,
             start=begins[-1],
             tolerance_K=tolerance_K,
-            seen=lambda t, state, reached=reached: reached.append(state),  # type: ignore[misc]
+            seen=kept_in(reached),
             **options,
         )
-        before = begins[-1]
-        change = reached[-1].x - (0.0 if before is None else before.x)
+        before, (_, last_state) = begins[-1], reached[-1]
+        change = last_state.x - (0.0 if before is None else before.x)
         size = float(np.abs(rises(change)).max())
         # all that is still to come, a geometric series
         left = size**2 / (last - size) if size < last else np.inf
         if size < 0.1 * tolerance_K or left < tolerance_K:
             return history, before or State(lever, np.zeros_like(change))
-        begins.append(reached[-1])
+        begins.append(last_state)
         last = size
         if len(begins) > _KNOWN:
             columns = [one.x for one in begins if one is not None]

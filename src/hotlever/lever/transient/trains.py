@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from hotlever.errors import ComputationError
 from hotlever.lever.state import State
-from hotlever.lever.transient.history import Seen, checked_times, followed
+from hotlever.lever.transient.history import Seen, checked_times, followed, kept_in
 from hotlever.lever.transient.reduced import on_all_nodes, reduced_in_time
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.types import Array
@@ -91,7 +91,7 @@ class _Train:
                 self._waveform,
                 self._end,
                 times,
-                seen=lambda t, state, states=states: states.append((t, state)),  # type: ignore[misc]
+                seen=kept_in(states),
                 **self._options,
             )
             known = np.array([t for t, _ in states])

@@ -62,10 +62,6 @@ class Waveform(ABC):
         What it is, in words.
     before_V : float
         Bias (V) at which the lever rests before it begins.
-    highest_V : float
-        Largest bias (V) of either sign.
-    usual_end : float
-        Time (µs) for which it is followed if nobody says.
     period : float or None
         Of pulses that are repeated (µs),
     count : int
@@ -74,10 +70,18 @@ class Waveform(ABC):
 
     text: str
     before_V: float
-    highest_V: float
-    usual_end: float
     period: float | None = None
     count: int = 1
+
+    @property
+    @abstractmethod
+    def highest_V(self) -> float:
+        """Largest bias (V) of either sign."""
+
+    @property
+    @abstractmethod
+    def usual_end(self) -> float:
+        """Time (µs) for which it is followed if nobody says."""
 
     @abstractmethod
     def pieces(self, until: float) -> Iterator[Piece]:
@@ -91,15 +95,20 @@ class Polyline(Waveform):
     text: str
     times: tuple[float, ...]
     volts: tuple[float, ...]
-    usual_end: float
+    end: float
     before_V: float = 0.0
     period: float | None = None
     count: int = 1
 
     @property
-    def highest_V(self) -> float:  # type: ignore[override]
+    def highest_V(self) -> float:
         """Largest bias (V) of either sign."""
         return max(map(abs, (self.before_V, *self.volts)))
+
+    @property
+    def usual_end(self) -> float:
+        """Time (µs) for which it is followed if nobody says."""
+        return self.end
 
     def pieces(self, until: float) -> Iterator[Piece]:
         """Give the smooth parts up to a time (µs); after the last corner the bias stays."""
@@ -135,12 +144,12 @@ class Sine(Waveform):
     frequency_Hz: float
 
     @property
-    def highest_V(self) -> float:  # type: ignore[override]
+    def highest_V(self) -> float:
         """Largest bias (V) of either sign."""
         return abs(self.before_V) + abs(self.amplitude_V)
 
     @property
-    def usual_end(self) -> float:  # type: ignore[override]
+    def usual_end(self) -> float:
         """Ten periods (µs)."""
         return _PERIODS * 1e6 / self.frequency_Hz
 
