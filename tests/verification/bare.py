@@ -59,7 +59,7 @@ def bare_equations(
         {"supply": edges(supply), "ground": edges(ground)},
     )
     space = FullSpace(probe_mesh, FiniteElements(mesh, element, quadrature))
-    return LeverEquations(space, kinds, 293.0)
+    return LeverEquations(space, kinds, Circuit(base_temperature_K=293.0))
 
 
 def state_at(equations: LeverEquations, voltage: float) -> np.ndarray:

@@ -11,7 +11,7 @@ from test_kohlrausch import GROUND, HIGH_DOPED, SUPPLY
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
-from hotlever.probe import Layout, Region
+from hotlever.probe import Circuit, Layout, Region
 from hotlever.probe.solid import SolidMeshOptions, mesh_solid
 from hotlever.spieser2017 import published
 
@@ -27,7 +27,7 @@ def highest(voltage, refinement):
     )
     mesh = mesh_solid(layout, sizes)
     space = FullSpace(mesh, FiniteElements(mesh.elements, ElementTetP2(), 4))
-    equations = LeverEquations(space, published("option III").material.kinds, 293.0)
+    equations = LeverEquations(space, published("option III").material.kinds, Circuit())
     return 293.0 + space.rises(state_at(equations, voltage)).max()
 
 

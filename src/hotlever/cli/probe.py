@@ -130,20 +130,20 @@ def _described(probe: Probe, layout: Layout, name: str) -> list[str]:
     ]
     if probe.shape.shape == "drawing":
         dimensions += [f"  {text}" for text in _regions(layout)]
-    terminals = dict.fromkeys(terminal.name for terminal in layout.terminals)
     return [
         f"{name}: {probe.shape.shape}, {layout.thickness_um:g} µm thick",
         *dimensions,
-        f"  tip at ({x:g}, {y:g}) µm; terminals {', '.join(terminals)}",
+        f"  tip at ({x:g}, {y:g}) µm; terminals {', '.join(layout.terminal_names)}",
         f"circuit: series resistance {circuit.series_resistance_ohm:g} ohm, "
         f"base temperature {circuit.base_temperature_K:g} K",
+        *(f"  {name}: {contact}" for name, contact in circuit.contacts.items()),
         *_materials(probe),
         *(
             []
             if silicon is None
             else [f"inversion temperature of the heater: {silicon.inversion_temperature():.1f} K"]
         ),
-        f"mesh: {mesh_layout(layout).elements.nelements} triangles",
+        f"mesh: {mesh_layout(layout, wiring=probe.wiring).elements.nelements} triangles",
     ]
 
 

@@ -150,6 +150,15 @@ def sweep_overview(sweep: xr.Dataset) -> Figure:
         current, voltage, tip, iv = grid.ravel()
         current.plot(sweep.bias_V, sweep.current_mA, "o-", color=BLUE)
         current.set(ylabel="heater current I$_h$ (mA)")
+        terminals = [name for name in map(str, sweep.data_vars) if name.endswith("_mA")]
+        others = [name for name in terminals if name not in ("current_mA", "ground_current_mA")]
+        for name, colour in zip(others, COLOURS[1:], strict=False):
+            label = f"at {name.removesuffix('_mA')}"
+            current.plot(sweep.bias_V, sweep[name], "s-", color=colour, label=label)
+        if others:
+            current.lines[0].set_label("I$_h$, swept supply")
+            current.set(ylabel="current into the lever (mA)")
+            current.legend()
         voltage.plot(sweep.bias_V, sweep.lever_V, "o-", color=BLUE, label="lever V$_l$")
         if sweep.reader_V.notnull().any():
             voltage.plot(sweep.bias_V, sweep.reader_V, "s-", color=GREEN, label="reader V$_r$")

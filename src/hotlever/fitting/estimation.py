@@ -314,7 +314,7 @@ def _observables(
     """Return what is to be fitted: by default all that has data and that the probe can show."""
     where = measurement.path or "measurement"
     found = measurement.observables
-    if "reader" not in [terminal.name for terminal in probe.layout().terminals]:
+    if "reader" not in probe.layout().terminal_names:
         found = tuple(name for name in found if name != "reader")
         if "reader" in (options.observables or ()):
             raise InputError(f"{where}: reader: the probe has no reader; fit {', '.join(found)}")

@@ -19,7 +19,7 @@ from hotlever.lever.curve import spline_through
 from hotlever.lever.following import Follower
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.newton import NewtonOptions, find_roots
-from hotlever.lever.pinned import AtTip
+from hotlever.lever.pinned import Pinned
 from hotlever.lever.reduced import ReducedLever, ReducedSpace
 from hotlever.lever.reduction import cached_reduction, can_be_reduced, known_reduction
 from hotlever.lever.sensitivities import Linearised, at_fixed_bias, by_parameter
@@ -252,7 +252,7 @@ class ForwardModel:
         if isinstance(space, ReducedSpace):
             some = np.unique(np.linspace(1, fast.u.size - 1, _CORRECTED_AT).astype(int))
             u, guess = fast.u[some], space.expanded(fast.x[:, some])
-            found = find_roots(AtTip(equations, u**2), guess, NewtonOptions(tolerance=1e-5))
+            found = find_roots(Pinned(equations, u**2), guess, NewtonOptions(tolerance=1e-5))
             x = found.x
         else:
             branch = Follower(equations).until(self.reach(probe))

@@ -7,6 +7,7 @@ import numpy as np
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.space import Fluxes, Space
+from hotlever.probe.circuit import Wiring
 from hotlever.types import Array, Index
 
 #: What `balance_columns` returns: Joule heat of heater and legs (mW; NaN without legs), current to
@@ -21,21 +22,42 @@ BALANCES = (
 )
 
 
+def balance_names(wiring: Wiring) -> tuple[str, ...]:
+    """Return what `balance_columns` returns: `BALANCES`, and what terminals show.
+
+    These are the potential (V) and the current into the lever (mA) of those that the paper's
+    circuit does not have.
+    """
+    volts = [name for name in _measured(wiring) if name != "reader"]
+    currents = [name for name in _conducting(wiring) if name != "ground"]
+    return (*BALANCES, *(f"{name}_V" for name in volts), *(f"{name}_mA" for name in currents))
+
+
+def _measured(wiring: Wiring) -> tuple[str, ...]:
+    """Return the terminals whose potential follows."""
+    return (*wiring.senses, *wiring.contacts)
+
+
+def _conducting(wiring: Wiring) -> tuple[str, ...]:
+    """Return the terminals that a current passes, beside the swept supply."""
+    return (*wiring.grounds, *wiring.contacts)
+
+
 def balance_columns(equations: LeverEquations, x: Array) -> Array:
-    """Return the `BALANCES` of states (size + 1, n), shape (n, 6).
+    """Return what is at the terminals, and where heat goes, of states (size + 1, n), (n, k).
 
     Currents and heats at terminals are consistent fluxes: reactions of the weak form at the nodes
-    that are held.
+    of each. The names are `balance_names`.
     """
     theta = None if equations.space.air is None else equations.kirchhoff(x)[0]
-    return _balances(equations.space, equations.fluxes(x), theta)
+    return _balances(equations, x, equations.fluxes(x), theta)
 
 
 def balance_slopes(equations: LeverEquations, x: Array, slopes: Array) -> Array:
-    """Return how the `BALANCES` of states change with changes (size + 1, n) of them, (n, 6)."""
+    """Return how the `balance_columns` of states change with changes (size + 1, n) of them."""
     air = equations.space.air
     theta = None if air is None else equations.kirchhoff(x)[1] * air.rise(slopes)
-    return _balances(equations.space, equations.flux_changes(x, slopes), theta)
+    return _balances(equations, slopes, equations.flux_changes(x, slopes), theta)
 
 
 def heat_left(equations: LeverEquations, x: Array) -> Array:
@@ -56,14 +78,26 @@ def _heat_out(space: Space, fluxes: Fluxes, theta: Array | None) -> tuple[Array,
     return by_ends, into_air, heat[0]
 
 
-def _balances(space: Space, fluxes: Fluxes, theta: Array | None) -> Array:
-    """Return the balances of fluxes and of θ at the sites of the air; all are linear in both."""
+def _balances(equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array | None) -> Array:
+    """Return the balances of states, fluxes and θ at the sites of the air; all are linear."""
+    space = equations.space
     assert isinstance(space, FullSpace)  # a reduced lever has no ends
     end_heat, air_heat, heat_source = _heat_out(space, fluxes, theta)
     charge = space.weighted(fluxes.charge)
     joule = [_joule(heat_source, space.parts[part]) for part in ("heater", "leg 1", "leg 2")]
-    ground = -np.einsum("dp,dpn->n", space.ground_test, charge)
-    return np.stack([*joule, ground, end_heat, air_heat], axis=-1)
+    into = {
+        name: np.einsum("dp,dpn->n", space.charge_tests[name], charge)
+        for name in _conducting(space.wiring)
+    }
+    ground = [-into[name] for name in into if equations.circuit.contact(name).kind == "ground"]
+    volts = [
+        np.tensordot(weights, x[unknowns], axes=1)
+        for name in _measured(space.wiring)
+        if name != "reader"
+        for unknowns, weights in [space.potential_at(name)]
+    ]
+    currents = [into[name] for name in into if name != "ground"]
+    return np.stack([*joule, sum(ground), end_heat, air_heat, *volts, *currents], axis=-1)
 
 
 def _joule(heat_source: Array, points: Index) -> Array:

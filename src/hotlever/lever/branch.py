@@ -6,6 +6,8 @@ fields follow from the temperature, folds or not. So states are solved at tip te
 through both give every state between. All curves run over u = √(T_tip − T_base), in which they are
 smooth down to zero power: the potential begins as u, the temperature as u².
 
+A lever that more than the swept supply heats is followed otherwise (`hotlever.lever.held`).
+
 A sweep reads the branch in a circuit: a slow ramp of the bias takes the first state whose bias
 V_l + R_s I_h has been reached. The fold of a ramp is a maximum of that bias, the knee of the I-V
 curve the maximum of V_l.
@@ -30,6 +32,8 @@ from hotlever.types import Array
 #: Points between two states at which a bias is first looked for, and steps of Newton's method
 #: from there.
 _SAMPLES, _NEWTON_STEPS = 8, 6
+#: Where a branch's values have the rises of the hottest place and of the tip.
+HIGHEST_RISE, TIP_RISE = len(SHOWN), len(SHOWN) + 1
 
 
 @dataclass(frozen=True)
@@ -55,16 +59,17 @@ class Reading:
     Attributes
     ----------
     u : ndarray, shape (n,)
-        √(T_tip − T_base) at each bias asked for; NaN beyond the last that has a state.
+        Where on the branch each bias asked for is; NaN beyond the last that has a state.
     jumps : list of tuple of float
         Bias and tip temperature at each fold that the ramp passes.
-    last_V, last_K : float
-        The highest bias that has a state on the branch, and the tip temperature there.
+    last_V, last_u, last_K : float
+        The highest bias that has a state on the branch, where that is, and the tip temperature.
     """
 
     u: Array
     jumps: list[tuple[float, float]]
     last_V: float
+    last_u: float
     last_K: float
 
     def notes(self, bias: Array) -> list[str]:
@@ -99,18 +104,19 @@ class Reach:
 
 @dataclass(frozen=True)
 class Branch:
-    """States of a lever at rising tip temperatures, and the curves through them.
+    """States of a lever one after the other, and the curves through them.
 
     Attributes
     ----------
     equations : LeverEquations
     u : ndarray, shape (k,)
-        √(T_tip − T_base) (K^½) of the states, the first at zero power.
+        √(T_tip − T_base) (K^½) of the states, the first at zero power. Of a lever that does not
+        start cold: how far along the branch they are, the first without a bias.
     x, slopes : ndarray, shape (size + 1, k)
         The states, and their derivatives by u.
-    values, value_slopes : ndarray, shape (k, 4)
-        V_l (V), I_h (mA), V_r (V) and the highest rise (K) of each state, and their derivatives
-        by u.
+    values, value_slopes : ndarray, shape (k, 5)
+        V_l (V), I_h (mA), V_r (V), the highest rise and that of the tip (K) of each state, and
+        their derivatives by u.
 
     Examples
     --------
@@ -131,7 +137,7 @@ class Branch:
 
     @cached_property
     def curve(self) -> PPoly:
-        """V_l (V), I_h (mA), V_r (V) and the highest rise (K) by u."""
+        """V_l (V), I_h (mA), V_r (V), the highest rise and that of the tip (K) by u."""
         return self.through(self.values, self.value_slopes)
 
     @property
@@ -156,10 +162,17 @@ class Branch:
     @property
     def hottest_K(self) -> float:
         """Highest tip temperature (K)."""
-        return self.base_temperature_K + self.end_u**2
+        return float(self.tip_K(self.end_u))
+
+    def tip_K(self, u: ArrayLike) -> Array:
+        """Return tip temperatures (K) at some places of the branch."""
+        u = np.asarray(u, dtype=float)
+        if self.equations.circuit.starts_cold:
+            return np.asarray(self.base_temperature_K + u**2)
+        return np.asarray(self.base_temperature_K + self.curve(u)[..., TIP_RISE])
 
     def u_at(self, tip_K: ArrayLike) -> Array:
-        """Return u at tip temperatures (K); NaN outside the branch."""
+        """Return u at tip temperatures (K) of a lever that starts cold; NaN outside the branch."""
         rise = np.asarray(tip_K, dtype=float) - self.base_temperature_K
         inside = (rise >= 0) & (rise <= self.end_u**2 * (1 + 1e-12))
         return np.sqrt(np.where(inside, np.maximum(rise, 0.0), np.nan))
@@ -235,7 +248,7 @@ class Branch:
     def point(self, u: float) -> OperatingPoint:
         """Return the operating point at u."""
         lever, current, *_ = self.curve(u).tolist()
-        return OperatingPoint(lever, current, lever * current, self.base_temperature_K + u**2)
+        return OperatingPoint(lever, current, lever * current, float(self.tip_K(u)))
 
     @cached_property
     def _states(self) -> PPoly:
@@ -245,9 +258,14 @@ class Branch:
         """Return the states at some u, shape (size + 1, n)."""
         return np.asarray(self._states(u)).T
 
+    def states_slope(self, u: Array) -> Array:
+        """Return the derivatives of the states by u at some u, shape (size + 1, n)."""
+        return np.asarray(self._states(u, 1)).T
+
     def through(self, values: Array, slopes: Array) -> PPoly:
         """Return the curve through some quantities of the states and their slopes, (k, ...)."""
-        return smooth_curve(self.u, values, slopes, steps_of(self.equations))
+        steps = steps_of(self.equations) if self.equations.circuit.starts_cold else ()
+        return smooth_curve(self.u, values, slopes, steps)
 
     # --- in a circuit -----------------------------------------------------------------------------
 
@@ -255,7 +273,8 @@ class Branch:
         """Find the states that a slow ramp from zero takes at some biases (V), in any order."""
         curve = PPoly(circuit.bias(self.curve.c[..., 0], self.curve.c[..., 1]), self.curve.x)
         u = np.full(bias.shape, np.nan)
-        reading = Reading(u, [], 0.0, self.base_temperature_K)
+        # what is at no bias is found to rounding errors
+        reading = Reading(u, [], min(0.0, float(curve(0.0))), 0.0, float(self.tip_K(0.0)))
         for low, high in pairwise([0.0, *self._turns(curve).tolist(), self.end_u]):
             highest = float(curve(high))
             if highest <= reading.last_V:
@@ -264,17 +283,17 @@ class Branch:
             jumps = [*reading.jumps, (reading.last_V, reading.last_K)] if fell else reading.jumps
             here = np.flatnonzero(np.isnan(u) & (bias <= highest))
             u[here] = _crossing(curve, low, high, bias[here])
-            reading = Reading(u, jumps, highest, self.base_temperature_K + high**2)
+            reading = Reading(u, jumps, highest, high, float(self.tip_K(high)))
         return reading
 
     def ended(self, reading: Reading) -> BranchEndError:
         """Return the error that says where a ramp of the bias ends."""
         bias, tip = reading.last_V, reading.last_K
         limit, end = self.equations.limit
-        if self.melts and tip == self.hottest_K:
+        if self.melts and reading.last_u == self.end_u:
             text = f"{end} at a bias of {bias:.4f} V, where the tip is at {tip:.1f} K"
         else:
-            at = self.point(float(np.sqrt(tip - self.base_temperature_K)))
+            at = self.point(reading.last_u)
             text = (
                 f"the branch of a slow bias ramp ends at a bias of {bias:.4f} V (lever "
                 f"{at.lever_V:.4f} V, current {at.current_mA:.4f} mA, tip {tip:.1f} K): above it "

@@ -12,7 +12,7 @@ import numpy as np
 from hotlever.lever.branch import Branch
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import Lever
-from hotlever.lever.pinned import AtTip
+from hotlever.lever.pinned import Pinned
 from hotlever.lever.reduced import ReducedSpace
 from hotlever.lever.sensitivities import at_fixed_bias
 from hotlever.threads import one_blas_thread
@@ -44,11 +44,10 @@ def estimated_error(lever: Lever, branch: Branch, u: Array) -> Array:
     """
     space = branch.equations.space
     assert isinstance(space, ReducedSpace)
-    base = branch.base_temperature_K
-    equations = LeverEquations(lever.space, branch.equations.materials, base)
+    equations = LeverEquations(lever.space, branch.equations.materials, lever.circuit)
     reduced = branch.states(u)
     x, every = space.expanded(reduced), np.arange(u.size)
-    problem = AtTip(equations, u**2)
+    problem = Pinned(equations, u**2)
     factors = problem.factorised(x, every)
     first = x - factors.solve(problem.residual(x, every), every)
     second = -factors.solve(problem.residual(first, every), every)

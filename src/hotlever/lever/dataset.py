@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import InputError
 from hotlever.files import read_text
-from hotlever.lever.balances import BALANCES
+from hotlever.lever.balances import BALANCES, balance_names
 from hotlever.probe import Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.probe import SECTIONS
@@ -45,24 +45,30 @@ def sweep_dataset(
     """Return what is observed of n states of a lever.
 
     Shown are ``lever_V``, ``current_mA``, ``reader_V``, ``tip_K`` and ``max_K``; the balances,
-    (n, 6), are `BALANCES`; sensitivities, (3, n, p), are of `OBSERVABLES` by what a fit
+    (n, k), are `balance_columns`; sensitivities, (3, n, p), are of `OBSERVABLES` by what a fit
     usually varies.
     """
-    columns = {**shown, **dict(zip(BALANCES, balances.T, strict=True))}
+    names = balance_names(probe.wiring)
+    columns = {**shown, **dict(zip(names, balances.T, strict=True))}
+    at_terminals = names[len(BALANCES) :]
     columns["bias_V"] = probe.circuit.bias(shown["lever_V"], shown["current_mA"])
     columns["power_mW"] = shown["lever_V"] * shown["current_mA"]
     for part in ("heater", "leg1", "leg2"):
         columns[f"{part}_ohm"] = _resistance(columns[f"{part}_mW"], shown["current_mA"])
+    if probe.wiring.contacts:
+        # the same current does not pass all parts
+        columns["leg2_ohm"] = np.full_like(columns["leg2_ohm"], np.nan)
     columns["legs_ohm"] = columns["leg1_ohm"] + columns["leg2_ohm"]
     # where all of the conductor is the heater there are no legs
     whole = np.where(np.isnan(columns["legs_ohm"]), 0.0, columns["legs_ohm"])
     columns["lever_ohm"] = whole + columns["heater_ohm"]
-    variables: dict[str, Any] = {name: columns[name] for name in (*SWEEP_COLUMNS, *_MORE)}
+    every = (*SWEEP_COLUMNS, *at_terminals, *_MORE)
+    variables: dict[str, Any] = {name: columns[name] for name in every}
     coordinates: dict[str, Any] = {"bias": columns["bias_V"]}
     if sensitivities is not None:
         variables["sensitivity"] = (("observable", "bias", "parameter"), sensitivities)
         coordinates |= {"observable": list(OBSERVABLES), "parameter": list(usual_parameters(probe))}
-    return labelled(
+    data = labelled(
         variables,
         coordinates=coordinates,
         **probe_attributes(probe),
@@ -70,6 +76,11 @@ def sweep_dataset(
             [*notes, *range_notes(probe, "a bias of {} V", columns["bias_V"], columns["max_K"])]
         ),
     )
+    for column in at_terminals:
+        terminal, _, unit = column.rpartition("_")
+        meaning = "potential of" if unit == "V" else "current into the lever at"
+        data[column].attrs = {"units": unit, "long_name": f"{meaning} terminal {terminal}"}
+    return data
 
 
 def at_bias(data: xr.Dataset, bias: Array) -> xr.Dataset:
@@ -85,7 +96,7 @@ def at_bias(data: xr.Dataset, bias: Array) -> xr.Dataset:
 def _resistance(heat_mW: Array, current_mA: Array) -> Array:
     """Return Joule heat over the square of the current (Ω); NaN without current."""
     nothing = np.full_like(heat_mW, np.nan)
-    return np.divide(1000.0 * heat_mW, current_mA**2, out=nothing, where=current_mA > 0)
+    return np.divide(1000.0 * heat_mW, current_mA**2, out=nothing, where=current_mA != 0)
 
 
 def range_notes(probe: Probe, where: str, along: Array, max_K: Array) -> list[str]:
@@ -98,7 +109,7 @@ def range_notes(probe: Probe, where: str, along: Array, max_K: Array) -> list[st
     if not beyond.size:
         return []
     return [
-        f"from {where.format(f'{beyond.min():.4g}')} part of the lever is above {limit:.0f} K, "
+        f"from {where.format(f'{beyond.min().round(9):.4g}')} part of the lever is above {limit:.0f} K, "
         "where the material laws are extrapolated"
     ]
 
@@ -117,12 +128,18 @@ def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
     InputError
         If the suffix is neither, or the file cannot be written.
     """
-    write_dataset(data, path, SWEEP_COLUMNS)
+    write_dataset(data, path, _in_a_file(data))
 
 
 def sweep_csv(data: xr.Dataset) -> str:
     """Return a sweep as CSV text, one row per bias; empty where a value does not exist."""
-    return csv_text(data, SWEEP_COLUMNS)
+    return csv_text(data, _in_a_file(data))
+
+
+def _in_a_file(data: xr.Dataset) -> list[str]:
+    """Return the columns of a sweep's file: the usual ones, and those of other terminals."""
+    own = balance_names(probe_of(data).wiring)[len(BALANCES) :]
+    return [*SWEEP_COLUMNS, *own]
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:

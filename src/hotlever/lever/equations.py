@@ -4,10 +4,12 @@ Heat (paper's first equation, with the sign corrected) and charge::
 
     −∇·(κ ∇T) = σ |∇V|² − heat lost to air,    ∇·(σ ∇V) = 0,
 
-with T = base temperature at all terminals, V = 0 at ground, V = V_l on the supply contact and no
-current into the reader. One more condition, the *pin*, selects a state: its tip temperature. The
-circuit does not enter: what a lever shows at a tip temperature does not depend on it. Units are
-µm, V, mA, mW and K. Several states stand side by side, see `hotlever.lever.space`.
+with T = base temperature at all terminals (or what each is held at), V = 0 at ground, V = V_l on
+the contact of the swept supply, no current into sense contacts, and into other contacts what their
+supplies give by Ohm's law, J − G V. One more condition, the *pin*, selects a state: its tip
+temperature. What is behind the swept supply does not enter: what a lever shows at a tip temperature
+does not depend on it. Units are µm, V, mA, mW and K. Several states stand side by side, see
+`hotlever.lever.space`.
 
 The loss to air is linear in θ = ∫κ_air dT on the surface (`hotlever.air.operator`). The air
 operator fills the plate itself with air too; κ is therefore κ_Si − κ_air where there is air.
@@ -16,6 +18,7 @@ operator fills the plate itself with air too; κ is therefore κ_Si − κ_air w
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +28,7 @@ from hotlever.lever.space import LEVER, TIP, Factors, Fields, Fluxes, Pin, Space
 from hotlever.lever.stack import GAS, PER_CM_TO_MILLI_PER_UM, Conductivities, Stacks
 from hotlever.materials import Kind
 from hotlever.materials.air import kirchhoff_variable
+from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 
 #: What an instrument shows of a state, in the order of `LeverEquations.observed`.
@@ -45,7 +49,8 @@ class LeverEquations:
     space : Space
     materials : mapping of str to Kind
         What it is made of, by name.
-    base_temperature_K : float
+    circuit : Circuit
+        What is wired to the terminals, and how warm they are.
     motions : mapping of str to Motion, optional
         Of the dimensions by which derivatives may be asked for.
 
@@ -60,11 +65,13 @@ class LeverEquations:
         self,
         space: Space,
         materials: Mapping[str, Kind],
-        base_temperature_K: float,
+        circuit: Circuit,
         motions: Mapping[str, Motion] | None = None,
     ) -> None:
         self.space, self.materials, self.motions = space, materials, motions or {}
-        self.base_temperature_K = base_temperature_K
+        self.circuit, self.base_temperature_K = circuit, circuit.base_temperature_K
+        self.conductance, self.source_mA = circuit.norton(space.wired)
+        self.end_rises = circuit.end_rises()
         self._stacks = Stacks(space, materials, self.motions)
         self._latest: tuple[Array, tuple[Fields, Conductivities]] | None = None
         self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]
@@ -90,9 +97,22 @@ class LeverEquations:
         """Return the fields of states (size + 1, n), and κ and σ, at the quadrature points."""
         # residual, Jacobian and derivatives are asked for at the same states one by one
         if self._latest is None or self._latest[0] is not x:
-            fields = self.space.fields(x, self.base_temperature_K)
+            moved = self.space.fields(x)
+            T, grad_T = self.base_temperature_K + moved.T, moved.grad_T
+            for name, rise in self.end_rises.items():
+                value, slope = np.split(self.space.end_tests[name][..., None], [1])
+                T, grad_T = T + rise * value[0], grad_T + rise * slope
+            fields = Fields(T, grad_T, moved.grad_V)
             self._latest = (x, (fields, self.conductivities(fields.T)))
         return self._latest[1]
+
+    def driven(self, share: float) -> LeverEquations:
+        """Return the same with held supplies and warmer leg ends at a share of their values."""
+        other = copy(self)
+        other.source_mA = share * self.source_mA
+        other.end_rises = {name: share * rise for name, rise in self.end_rises.items()}
+        other._latest = None
+        return other
 
     # --- the equations ------------------------------------------------------------------------
 
@@ -108,9 +128,15 @@ class LeverEquations:
     def balance(self, x: Array) -> Array:
         """Return the residuals of heat and charge, and last the current I_h (mA), (size + 1, n)."""
         weak = self.space.weak_form(self.fluxes(x))
+        weak[self.space.contacts] += self._into_contacts(x) - self.source_mA[:, None]
         if self.space.air is not None:
             weak += self.space.air.weak_form(self.kirchhoff(x)[0])
         return weak
+
+    def _into_contacts(self, x: Array) -> Array:
+        """Return G V (mA) at the contacts, (contacts, ...), of states or of changes of them."""
+        potential = x[self.space.contacts]
+        return self.conductance.reshape(-1, *(1,) * (x.ndim - 1)) * potential
 
     def kirchhoff(self, x: Array) -> tuple[Array, Array]:
         """Return θ (mW/µm) and κ (mW/(K µm)) of the gas at the sites of the air operator."""
@@ -159,7 +185,7 @@ class LeverEquations:
             sigma=laws.sigma,
         )
         kappa_air = None if self.space.air is None else self.kirchhoff(x)[1]
-        return self.space.factorised(tangent, kappa_air, pin)
+        return self.space.factorised(tangent, kappa_air, pin, self.conductance)
 
     # --- derivatives --------------------------------------------------------------------------
 
@@ -169,7 +195,7 @@ class LeverEquations:
         There may be one change of each state, (size + 1, n), or several, (size + 1, n, k).
         """
         fields, laws = self.at(x)
-        moved = self.space.fields(change, 0.0)
+        moved = self.space.fields(change)
 
         def fitting(known: Array) -> Array:
             return known if change.ndim == 2 else known[..., None]
@@ -188,6 +214,7 @@ class LeverEquations:
     def balance_change(self, x: Array, change: Array) -> Array:
         """Return how `balance` changes with the unknowns: the Jacobian times changes."""
         weak = self.space.weak_form(self.flux_changes(x, change))
+        weak[self.space.contacts] += self._into_contacts(change)
         if self.space.air is not None:
             kappa = self.kirchhoff(x)[1]
             kappa = kappa if change.ndim == 2 else kappa[..., None]
@@ -261,11 +288,11 @@ class LeverEquations:
                 break
         return change
 
-    def along(self, x: Array, factors: Factors) -> Array:
-        """Return the derivative of states by the tip temperature, (size + 1, n) per kelvin."""
+    def along(self, x: Array, factors: Factors, pin: Pin = TIP) -> Array:
+        """Return the derivative of states by the tip temperature (K) or another pin."""
         unit = np.zeros_like(x)
         unit[-1] = 1.0
-        return self.solve_linear(x, factors, unit)
+        return self.solve_linear(x, factors, unit, pin)
 
     def cold(self) -> tuple[Array, Array]:
         """Return how the state leaves the one without power, by u = √(rise of the tip).
@@ -283,13 +310,19 @@ class LeverEquations:
         unit[-1] = 1.0
         factors = self.factorised(nothing, LEVER)
         potential = self.solve_linear(nothing, factors, unit, LEVER)
-        grad_V = self.space.fields(potential, 0.0).grad_V
+        grad_V = self.space.fields(potential).grad_V
         joule = self.at(nothing)[1].sigma * square(grad_V)
         heat = self.space.weak_form(Fluxes(joule, 0.0 * grad_V, 0.0 * grad_V))
         heat[-1] = 0.0
         rise = self.solve_linear(nothing, factors, heat, LEVER)
         per_square_volt = self.space.tip_rise(rise)
         return potential / np.sqrt(per_square_volt), rise / per_square_volt
+
+    def power(self, x: Array) -> Array:
+        """Return the power (mW) that the swept supply and others put into states, (n,)."""
+        into = self.space.weak_form(self.fluxes(x))
+        contacts = self.space.contacts
+        return np.asarray(x[-1] * into[-1] + (x[contacts] * into[contacts]).sum(axis=0))
 
     # --- what is measured ------------------------------------------------------------------------
 
@@ -312,7 +345,7 @@ class LeverEquations:
         unit = np.zeros((len(x), 1))
         unit[-1] = 1.0
         # the current is the charge equation tested with the function that is one on the supply
-        supply = self.space.fields(unit, 0.0).grad_V
+        supply = self.space.fields(unit).grad_V
         along = laws.sigma_by["T"] * (fields.grad_V * supply).sum(axis=0)
         flat = np.zeros_like(fields.grad_V)
         gradient = np.zeros((*x.shape, len(SHOWN)))

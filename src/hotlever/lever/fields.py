@@ -71,9 +71,9 @@ class FieldMapper:
         centres = reference.p[:, reference.t].mean(axis=1)
         self._corners = FiniteElements(mesh.elements, element, corners)
         middle = centres, np.full(centres.shape[1], 0.5 / cuts**2)
-        space = FullSpace(mesh, FiniteElements(mesh.elements, element, middle))
-        base = lever.circuit.base_temperature_K
-        self._centres = LeverEquations(space, lever.probe.kinds, base)
+        elements = FiniteElements(mesh.elements, element, middle)
+        space = FullSpace(mesh, elements, lever.space.wiring)
+        self._centres = LeverEquations(space, lever.probe.kinds, lever.circuit)
 
     def map(self, state: State) -> FieldMap:
         """Return the fields of a state of the lever."""

@@ -11,7 +11,7 @@ from hotlever.lever.branch import Branch, steps_of
 from hotlever.lever.curve import hermite_weights
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
-from hotlever.lever.pinned import AtTip
+from hotlever.lever.pinned import Pinned
 from hotlever.types import Array
 
 #: Steps between the states of a branch: in u (K^½) where it is cold, in the tip temperature (K)
@@ -46,7 +46,7 @@ class Follower:
                 raise ComputationError(
                     f"no state was found with a tip at {base + u**2:.0f} K: {error}"
                 ) from error
-            self._branch = _joined(self._branch, found)
+            self._branch = joined(self._branch, found)
 
     def until(self, enough: Callable[[Branch], bool]) -> Branch:
         """Go on until the branch is long enough, or silicon melts.
@@ -69,7 +69,7 @@ class Follower:
                         f"{self._equations.base_temperature_K + here**2:.0f} K",
                         partial=self._branch,
                     )
-            self._branch, self._step = _joined(self._branch, found), step
+            self._branch, self._step = joined(self._branch, found), step
             if self._branch.u[-1] in self._steps:
                 self._step = _AFTER_STEP_K  # where the law settles, the curve bends
         return self._branch
@@ -90,7 +90,7 @@ class Follower:
     def _solved(self, u: float, guess: Array) -> Branch:
         """Find the state at u near a guess, and its slope."""
         at = np.array([u])
-        problem = AtTip(self._equations, at**2)
+        problem = Pinned(self._equations, at**2)
         return _part(self._equations, at, find_roots(problem, guess, _OPTIONS))
 
 
@@ -103,34 +103,37 @@ def _landing(u: float, step: float, steps: Array) -> float:
 
 def branch_of(equations: LeverEquations, u: Array, found: NewtonResult) -> Branch:
     """Return the branch of states solved together at some u, after the one without power."""
-    return _joined(_cold(equations, equations.cold()[0]), _part(equations, u, found))
+    return joined(_cold(equations, equations.cold()[0]), _part(equations, u, found))
 
 
 def _cold(equations: LeverEquations, slope: Array) -> Branch:
     """Return the state without power."""
-    return _with_values(equations, np.zeros(1), np.zeros_like(slope), slope)
+    return part_of(equations, np.zeros(1), np.zeros_like(slope), slope)
 
 
 def _part(equations: LeverEquations, u: Array, found: NewtonResult) -> Branch:
     """Return a part of a branch that was solved."""
     slopes = 2.0 * u * equations.along(found.x, found.factors)
-    return _with_values(equations, u, found.x, slopes)
+    return part_of(equations, u, found.x, slopes)
 
 
-def _with_values(equations: LeverEquations, u: Array, x: Array, slopes: Array) -> Branch:
+def part_of(equations: LeverEquations, u: Array, x: Array, slopes: Array) -> Branch:
+    """Return the part of a branch with some states and their slopes, (size + 1, k)."""
     rises, by_u = equations.space.rises(x), equations.space.rises(slopes)
     hottest = rises.argmax(axis=0), np.arange(u.size)
-    values = np.vstack([equations.observed(x), rises[hottest]])
-    value_slopes = np.vstack([equations.observed_change(x, slopes), by_u[hottest]])
+    tip, tip_by = equations.space.tip_rise(x), equations.space.tip_rise(slopes)
+    values = np.vstack([equations.observed(x), rises[hottest], tip])
+    value_slopes = np.vstack([equations.observed_change(x, slopes), by_u[hottest], tip_by])
     return Branch(equations, u, x, slopes, values.T, value_slopes.T)
 
 
-def _joined(branch: Branch, hotter: Branch) -> Branch:
+def joined(branch: Branch, after: Branch) -> Branch:
+    """Return a branch with another part after it."""
     return Branch(
         branch.equations,
-        np.append(branch.u, hotter.u),
-        np.hstack([branch.x, hotter.x]),
-        np.hstack([branch.slopes, hotter.slopes]),
-        np.vstack([branch.values, hotter.values]),
-        np.vstack([branch.value_slopes, hotter.value_slopes]),
+        np.append(branch.u, after.u),
+        np.hstack([branch.x, after.x]),
+        np.hstack([branch.slopes, after.slopes]),
+        np.vstack([branch.values, after.values]),
+        np.vstack([branch.value_slopes, after.value_slopes]),
     )

@@ -1,12 +1,13 @@
 """The full lever: finite elements on a mesh, sparse Jacobians.
 
 The unknowns are the temperature and the potential at the nodes, without those held at the base
-temperature or at ground; the nodes of the supply contact share one unknown, the lever voltage.
-Where nothing conducts there is no potential.
+temperature or at ground; the nodes of a contact share one unknown, that of the swept supply the
+lever voltage. Where nothing conducts there is no potential.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import copy
 from typing import Any, get_args
 
@@ -18,6 +19,7 @@ from hotlever.air.operator import AirOperator
 from hotlever.lever.air_loss import AirLoss, AirSolver
 from hotlever.lever.elements import FiniteElements, sums_by_index
 from hotlever.lever.space import FAR, LinearMap, Pin, PlacedFilm, Space, Tangent, at_some
+from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Film, Layout, Part
 from hotlever.probe.mesh import ProbeMesh
 from hotlever.probe.solid import SolidMesh
@@ -33,48 +35,66 @@ class FullSpace(Space):
         Of triangles in the lever's plane, or of tetrahedra.
     elements : FiniteElements, optional
         Made on ``mesh.elements`` by default.
+    wiring : Wiring, optional
+        Which terminals are what; by default as in the paper.
 
     Attributes
     ----------
+    end_nodes, contact_nodes : dict of str to ndarray of int
+        Nodes of each terminal, and those of them that conduct.
     parts : dict of str to ndarray of int
         Quadrature points of the regions of each part.
     conducting : ndarray of bool, shape (elements,)
         Where a current may flow.
-    ground_test : ndarray, shape (dimension, points)
-        Slopes of the function that is one at ground.
+    charge_tests : dict of str to ndarray, shape (dimension, points)
+        Slopes of the function that is one where each terminal conducts.
     """
 
-    def __init__(self, mesh: ProbeMesh | SolidMesh, elements: FiniteElements | None = None) -> None:
+    def __init__(
+        self,
+        mesh: ProbeMesh | SolidMesh,
+        elements: FiniteElements | None = None,
+        wiring: Wiring | None = None,
+    ) -> None:
         self.mesh, self.air = mesh, None
+        self.wiring = wiring or Circuit().wiring(mesh.terminal_facets)
         self.elements = elements or FiniteElements(mesh.elements)
-        terminal_nodes = {
+        self.end_nodes = {
             name: self.elements.facet_nodes(facets) for name, facets in mesh.terminal_facets.items()
         }
-        ends = np.unique(np.concatenate(list(terminal_nodes.values())))
+        ends = np.unique(np.concatenate(list(self.end_nodes.values())))
         insulates = np.array([region.insulates for region in mesh.layout.regions])
         self.conducting = ~insulates[mesh.region]
         # a contact is where a terminal meets a conductor
         conducts = np.unique(self.elements.dofs[self.conducting])
-        contacts = {name: np.intersect1d(nodes, conducts) for name, nodes in terminal_nodes.items()}
-        ground, supply = contacts["ground"], contacts["supply"]
-        self._number_unknowns(ends, ground, supply, conducts)
+        self.contact_nodes = {
+            name: np.intersect1d(nodes, conducts) for name, nodes in self.end_nodes.items()
+        }
+        self._number_unknowns(ends, conducts)
         # in the middle of the silicon's thickness
         tip = np.zeros(len(self.elements.positions))
         tip[:2] = mesh.layout.tip
         (element,), (weights,), _ = self.elements.at_points(tip[None])
         self.tip = (self._T[self.elements.dofs[element]], weights)
+        self.wired = self.wiring.contacts
+        self.contacts = np.array([self._V[self.contact_nodes[name][0]] for name in self.wired], int)
         self._lay_out_matrix()
-        reader = contacts.get("reader")
-        self.reader = (
-            None if reader is None else (self._V[reader], np.full(reader.size, 1.0 / reader.size))
-        )
+        measured = "reader" in (*self.wiring.senses, *self.wired)
+        self.reader = self.potential_at("reader") if measured else None
         sampling, points = self.elements.sampling, self.elements.weights.size
         kinds = 1 + len(self.elements.positions)
         self.temperature = LinearMap(sampling @ self._selection(self._T), kinds)
         self.potential = LinearMap(sampling[points:] @ self._selection(self._V), kinds - 1)
         self.weights = self.elements.weights[:, None]
         self.end_test = self._sampled_sum(ends).reshape(kinds, points)
-        self.ground_test = self._sampled_sum(ground).reshape(kinds, points)[1:]
+        self.end_tests = {
+            name: self._sampled_sum(nodes).reshape(kinds, points)
+            for name, nodes in self.end_nodes.items()
+        }
+        self.charge_tests = {
+            name: self._sampled_sum(nodes).reshape(kinds, points)[1:]
+            for name, nodes in self.contact_nodes.items()
+        }
         region = np.repeat(mesh.region, self.elements.per_element)
         self._place_films(region)
         parts = np.array([one.part for one in mesh.layout.regions])[region]
@@ -82,15 +102,21 @@ class FullSpace(Space):
 
     # --- where things are -------------------------------------------------------------------------
 
-    def _number_unknowns(self, ends: Index, ground: Index, supply: Index, conducts: Index) -> None:
+    def _number_unknowns(self, ends: Index, conducts: Index) -> None:
         """Give every nodal value its unknown, in an order with little fill.
 
-        Values that are held get -1, the potential of the supply V_l.
+        Values that are held get -1, the potential of the swept supply V_l; a contact has that of
+        its first node.
         """
         order = _fill_reducing_order(self.elements.dofs, self.elements.size)
+        nodes, wiring = self.contact_nodes, self.wiring
         free = np.zeros((2, self.elements.size), dtype=bool)
         free[0], free[1, conducts] = True, True
-        free[0, ends] = free[1, ground] = free[1, supply] = False
+        free[0, ends] = free[1, nodes[wiring.swept]] = False
+        for name in wiring.grounds:
+            free[1, nodes[name]] = False
+        for name in wiring.contacts:
+            free[1, nodes[name][1:]] = False
         number = np.full((self.elements.size, 2), -1, dtype=np.intp)
         flat = free[:, order].T
         self.size = int(flat.sum())
@@ -98,9 +124,16 @@ class FullSpace(Space):
         places[flat] = np.arange(self.size)
         number[order] = places
         self._T, self._V = number.T.copy()
-        self._V[supply] = self.size
+        self._V[nodes[wiring.swept]] = self.size
+        for name in wiring.contacts:
+            self._V[nodes[name]] = self._V[nodes[name][0]]
         self.is_temperature = np.zeros(self.size + 1, dtype=bool)
         self.is_temperature[self._T[self._T >= 0]] = True
+
+    def potential_at(self, name: str) -> tuple[Index, Array]:
+        """Return unknowns and weights that give the mean potential of a terminal."""
+        nodes = self.contact_nodes[name]
+        return self._V[nodes], np.full(nodes.size, 1.0 / nodes.size)
 
     def _selection(self, unknowns: Index) -> csr_matrix:
         """Return the matrix from unknowns to nodal values, those held being zero."""
@@ -164,9 +197,16 @@ class FullSpace(Space):
             distances[: len(found), of_points == number, 0] = found
         return distances
 
-    def nodal(self, x: Array, base_temperature_K: float) -> tuple[Array, Array]:
-        """Return temperature (K) and potential (V) of a state at all nodes, each (nodes,)."""
+    def nodal(
+        self, x: Array, base_temperature_K: float, end_rises: Mapping[str, float] | None = None
+    ) -> tuple[Array, Array]:
+        """Return temperature (K) and potential (V) of a state at all nodes, each (nodes,).
+
+        Some leg ends may be warmer than the base temperature.
+        """
         T = base_temperature_K + np.where(self._T >= 0, x[self._T], 0.0)
+        for name, rise in (end_rises or {}).items():
+            T[self.end_nodes[name]] += rise
         return T, np.where(self._V >= 0, x[self._V], 0.0)
 
     def from_nodal(self, rise: Array, potential: Array, lever_V: float) -> Array:
@@ -232,19 +272,24 @@ class FullSpace(Space):
             count**2,  # after all others: dropped
         )
         pin = np.append(self.tip[0], self.size) * count + self.size
-        unique, slots = np.unique(np.append(keys.ravel(), pin), return_inverse=True)
+        diagonal = self.contacts * (count + 1)
+        every = np.concatenate([keys.ravel(), pin, diagonal])
+        unique, slots = np.unique(every, return_inverse=True)
         unique = unique[unique < count**2]
         self._entries = unique.size
         self._slots = slots[: keys.size].reshape(keys.shape)
-        self._pin_slots = slots[keys.size :]
+        self._pin_slots, self._contact_slots = np.split(slots[keys.size :], [pin.size])
         self._rows = (unique % count).astype(np.int32)
         self._starts = np.searchsorted(unique // count, np.arange(count + 1)).astype(np.int32)
 
-    def factorised(self, tangent: Tangent, kappa_air: Array | None, pin: Pin) -> SparseFactors:
+    def factorised(
+        self, tangent: Tangent, kappa_air: Array | None, pin: Pin, conductance: Array
+    ) -> SparseFactors:
         """Put the Jacobians of all states together, the row of the pin last, and factorise."""
         solvers = []
         for state in range(tangent.sigma.shape[-1]):
             entries = self._assembled(tangent.of(state))
+            entries[self._contact_slots] += conductance
             if self.air is None or kappa_air is None:
                 solvers.append(self._lu(entries, pin))
                 continue

@@ -17,16 +17,19 @@ from hotlever.air.operator import air_operator, change_with_gap
 from hotlever.air.surface import PanelOptions
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.balances import balance_columns, balance_slopes
-from hotlever.lever.branch import Branch, Reach, Reading
+from hotlever.lever.branch import HIGHEST_RISE, Branch, Reach, Reading
 from hotlever.lever.dataset import at_bias, checked_bias, sweep_dataset
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.following import Follower
 from hotlever.lever.full_space import FullSpace
+from hotlever.lever.held import HeldFollower, pin_along
 from hotlever.lever.pinned import state_at_bias
 from hotlever.lever.sensitivities import sensitivities_of
+from hotlever.lever.space import TIP, Pin
 from hotlever.lever.state import State
 from hotlever.materials import Material
 from hotlever.probe import Circuit, Layout, MeshOptions, Probe, mesh_layout
+from hotlever.probe.circuit import Wiring
 from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
@@ -75,15 +78,13 @@ class Lever:
         progress: Progress | None = None,
     ) -> None:
         self.probe, self._mesh = Probe.given(probe), mesh or MeshOptions()
-        self.space = space or _flat_space(self.probe.layout(), self._mesh)
+        self.space = space or _flat_space(self.probe.layout(), self._mesh, self.probe.wiring)
         if (self.space.air is None) != (self.medium == "vacuum"):
             self.space = self._surrounded(self.space, progress)
         self._prepare()
 
     def _prepare(self) -> None:
-        self.equations = LeverEquations(
-            self.space, self.probe.kinds, self.probe.circuit.base_temperature_K
-        )
+        self.equations = LeverEquations(self.space, self.probe.kinds, self.circuit)
         self._branch: Branch | None = None
 
     def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
@@ -138,8 +139,8 @@ class Lever:
 
     def with_probe(self, probe: Probe) -> Lever:
         """Return the lever of a probe of the same shape and tip; what is the same is shared."""
-        if probe.layout() != self.probe.layout():
-            raise InputError("another shape or tip needs a mesh of its own: make a new Lever")
+        if (probe.layout(), probe.wiring) != (self.probe.layout(), self.probe.wiring):
+            raise InputError("another shape, tip or wiring needs a new Lever")
         other = copy(self)
         other.probe = probe
         same_air = probe.surroundings == self.probe.surroundings and (
@@ -161,8 +162,9 @@ class Lever:
         ComputationError
             If a state was not found.
         """
-        target = np.sqrt(hottest_K - self.circuit.base_temperature_K)
-        return self._followed(lambda branch: bool(branch.u[-1] >= target), progress)
+        return self._followed(
+            lambda branch: bool(branch.tip_K(branch.u[-1]) >= hottest_K), progress
+        )
 
     def _followed(
         self, enough: Callable[[Branch], bool], progress: Progress | None = None
@@ -175,7 +177,8 @@ class Lever:
             return enough(branch)
 
         try:
-            self._branch = Follower(self.equations, self._branch).until(told)
+            follower = Follower if self.circuit.starts_cold else HeldFollower
+            self._branch = follower(self.equations, self._branch).until(told)
         except ComputationError as error:
             self._branch = error.partial
             raise
@@ -220,10 +223,14 @@ class Lever:
             if failure is not None and np.isnan(u):
                 failure.partial = states
                 raise failure
-            states.append(self.polished(branch.states(np.array([u])), value))
+            states.append(self._state_at(branch, u, value))
             if progress is not None:
                 progress(len(states), values.size)
         return states
+
+    def _state_at(self, branch: Branch, u: float, bias: float) -> State:
+        """Solve at a bias (V) from a place of the branch."""
+        return self.polished(branch.states(np.array([u])), bias, pin_along(branch, u))
 
     def _read(
         self, bias: Array, progress: Progress | None = None
@@ -242,11 +249,11 @@ class Lever:
         return branch, reading, failure or branch.ended(reading)
 
     @one_blas_thread
-    def polished(self, guess: Array, bias: float) -> State:
+    def polished(self, guess: Array, bias: float, pin: Pin = TIP) -> State:
         """Solve at a bias (V) from a nearby state, (size + 1, 1); see `state_at_bias`."""
-        if bias == 0.0:
+        if bias == 0.0 and self.circuit.starts_cold:
             return State(self, np.zeros_like(guess))
-        return State(self, state_at_bias(self.equations, self.circuit, bias, guess))
+        return State(self, state_at_bias(self.equations, self.circuit, bias, guess, pin))
 
     @one_blas_thread
     def sweep(
@@ -286,13 +293,18 @@ class Lever:
         -----
         Between the states of the branch the curves are within 2e-5 in V_l and I_h and 0.02 K of
         states solved by themselves (`solve`), a third of what the mesh is off by; within 5e-5 and
-        0.05 K where a leg gets hot faster than the tip.
+        0.05 K where a leg gets hot faster than the tip. Of a lever with held supplies each state is
+        solved by itself.
         """
         values = checked_bias(bias)
         branch, reading, failure = self._read(values, progress)
         here = np.flatnonzero(np.isfinite(reading.u))
         notes = reading.notes(values[here])
-        data = self._dataset(branch, reading.u[here], notes, sensitivities)
+        if self.circuit.starts_cold:
+            data = self._dataset(branch, reading.u[here], notes, sensitivities)
+        else:
+            places = zip(reading.u[here], values[here].tolist(), strict=True)
+            data = self.dataset([self._state_at(branch, u, bias) for u, bias in places], notes)
         data = at_bias(data, values[here])
         if failure is None:
             return data
@@ -318,7 +330,7 @@ class Lever:
         slopes = balance_slopes(self.equations, branch.x, branch.slopes)
         base = self.circuit.base_temperature_K
         shown = branch.shown(u)
-        shown |= {"tip_K": base + u**2, "max_K": base + branch.curve(u)[..., 3]}
+        shown |= {"tip_K": branch.tip_K(u), "max_K": base + branch.curve(u)[..., HIGHEST_RISE]}
         names = usual_parameters(self.probe) if sensitivities else ()
         found = sensitivities_of(branch, u, self.circuit, names) if sensitivities else None
         return sweep_dataset(self.probe, shown, branch.through(balances, slopes)(u), notes, found)
@@ -366,9 +378,9 @@ class Lever:
 
 
 @lru_cache(maxsize=4)
-def _flat_space(layout: Layout, mesh: MeshOptions) -> FullSpace:
+def _flat_space(layout: Layout, mesh: MeshOptions, wiring: Wiring) -> FullSpace:
     """Return mesh and operators of a layout in vacuum; levers of one shape share them."""
-    return FullSpace(mesh_layout(layout, mesh))
+    return FullSpace(mesh_layout(layout, mesh, wiring), wiring=wiring)
 
 
 def sweep(

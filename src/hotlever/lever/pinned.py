@@ -1,4 +1,4 @@
-"""States of a lever selected by their tip temperature, or by the bias in a circuit."""
+"""States of a lever selected by their tip temperature or another pin, or by the bias."""
 
 from __future__ import annotations
 
@@ -7,33 +7,39 @@ import numpy as np
 from hotlever.errors import NewtonError
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.newton import NewtonOptions, find_roots
-from hotlever.lever.space import Factors
+from hotlever.lever.space import TIP, Factors, Pin
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array, Index
 
 
-class AtTip:
-    """The equations of states whose tip is warmer by given rises (K); see `newton.Equations`."""
+class Pinned:
+    """The equations of states with given values of a pin, (n,); see `newton.Equations`.
 
-    def __init__(self, equations: LeverEquations, rise: Array) -> None:
-        self._equations, self._rise = equations, rise
+    By default these are how much warmer the tip is (K).
+    """
+
+    def __init__(self, equations: LeverEquations, values: Array, pin: Pin = TIP) -> None:
+        self._equations, self._values, self._pin = equations, values, pin
         self.scale, self.step_limit = equations.scale, equations.step_limit
 
     def residual(self, x: Array, which: Index) -> Array:
         """Return the residuals of heat, charge and pin, (size + 1, n)."""
         residual = self._equations.balance(x)
-        residual[-1] = self._equations.space.tip_rise(x) - self._rise[which]
+        residual[-1] = self._pin.of(self._equations.space, x) - self._values[which]
         return residual
 
     def factorised(self, x: Array, which: Index) -> Factors:
         """Return the factorised Jacobians."""
-        return self._equations.factorised(x)
+        return self._equations.factorised(x, self._pin)
 
 
-def state_at_bias(equations: LeverEquations, circuit: Circuit, bias: float, guess: Array) -> Array:
+def state_at_bias(
+    equations: LeverEquations, circuit: Circuit, bias: float, guess: Array, pin: Pin = TIP
+) -> Array:
     """Return the state at a bias (V) in a circuit, (size + 1, 1), from one nearby.
 
-    The state at the guess's tip temperature is moved along the branch, until it has the bias.
+    The state at the guess's tip temperature, or other pin that changes along the branch, is moved
+    along it until it has the bias.
 
     Raises
     ------
@@ -47,9 +53,10 @@ def state_at_bias(equations: LeverEquations, circuit: Circuit, bias: float, gues
     options = NewtonOptions()
     x, factors, along = guess, None, None
     for _ in range(options.max_iterations):
-        found = find_roots(AtTip(equations, equations.space.tip_rise(x)), x, options, factors)
+        here = Pinned(equations, pin.of(equations.space, x), pin)
+        found = find_roots(here, x, options, factors)
         if along is None:
-            along = equations.along(found.x, found.factors)
+            along = equations.along(found.x, found.factors, pin)
             by_tip = bias_of(equations.observed_change(found.x, along))
         factors = found.factors
         step = along * (bias - bias_of(equations.observed(found.x))) / by_tip

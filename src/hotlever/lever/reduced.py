@@ -24,11 +24,11 @@ from hotlever.lever.equations import LeverEquations
 from hotlever.lever.following import branch_of
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
-from hotlever.lever.pinned import AtTip
+from hotlever.lever.pinned import Pinned
 from hotlever.lever.sensitivities import Linearised
 from hotlever.lever.space import LinearMap, Pin, Space, Tangent, at_some
 from hotlever.materials import PARAMETERS, Material
-from hotlever.probe import Probe
+from hotlever.probe import Circuit, Probe
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
@@ -121,7 +121,9 @@ class ReducedSpace(Space):
         orthonormal = self.modes / (self.modes**2).sum(axis=1)[:, None]
         return np.concatenate([np.tensordot(orthonormal, free, axes=1), x[-1:]])
 
-    def factorised(self, tangent: Tangent, kappa_air: Array | None, pin: Pin) -> DenseFactors:
+    def factorised(
+        self, tangent: Tangent, kappa_air: Array | None, pin: Pin, conductance: Array
+    ) -> DenseFactors:
         """Put the Jacobians of all states together, the row of the pin last, and invert them."""
         states = tangent.sigma.shape[-1]
         matrices = np.zeros((states, self.size + 1, self.size + 1))
@@ -224,7 +226,8 @@ class ReducedLever:
     def equations(self, material: Material, *, few: bool = False) -> LeverEquations:
         """Return the equations of a material at all points, or at the few."""
         space = self.few_points if few else self.all_points
-        return LeverEquations(space, material.kinds, self.base_temperature_K)
+        circuit = Circuit(base_temperature_K=self.base_temperature_K)
+        return LeverEquations(space, material.kinds, circuit)
 
     @one_blas_thread
     def solved(self, material: Material, u: Array, guess: Array, factors: Any = None) -> Solved:
@@ -238,7 +241,7 @@ class ReducedLever:
             If a state was not found.
         """
         few = self.equations(material, few=True)
-        return few, find_roots(AtTip(few, u**2), guess, _NEARLY, factors)
+        return few, find_roots(Pinned(few, u**2), guess, _NEARLY, factors)
 
     @one_blas_thread
     def linearised(
@@ -263,7 +266,7 @@ class ReducedLever:
             u, guess, factors = near.branch.u[1:], near.states(probe)[:, 1:], near.factors
         few, found = self.solved(material, u, guess, factors)
         every = self.equations(material)
-        found = find_roots(AtTip(every, u**2), found.x, _DONE, found.factors)
+        found = find_roots(Pinned(every, u**2), found.x, _DONE, found.factors)
         # derivatives by the material are taken at the few points: exact ones cost too much here
         branch = branch_of(every, u, found)
         return Linearised.of(probe, names, branch, reach, few, found.factors)

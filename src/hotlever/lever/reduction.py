@@ -58,9 +58,10 @@ def can_be_reduced(probe: Probe, names: Collection[str]) -> bool:
     """Return whether a reduced lever serves: of one geometry, for the paper's silicon.
 
     With dimensions among the parameters it does not, since its modes are those of one geometry, nor
-    with other materials, for which there is no box of parameters to train it in.
+    with other materials, for which there is no box of parameters to train it in, nor in another
+    circuit than the paper's.
     """
-    return set(names) <= set(PARAMETERS) and not probe.materials
+    return set(names) <= set(PARAMETERS) and not probe.materials and probe.circuit.is_plain
 
 
 @one_blas_thread
@@ -80,10 +81,10 @@ def reduce(
     Raises
     ------
     ValueError
-        If the lever has named materials, see `can_be_reduced`.
+        If the lever has named materials or other circuits, see `can_be_reduced`.
     """
     if not can_be_reduced(lever.probe, ()):
-        raise ValueError("a reduced lever is of the paper's silicon only")
+        raise ValueError("a reduced lever is of the paper's silicon and circuit only")
     from scipy.stats import qmc  # takes long, and most commands reduce nothing
 
     options = options or ReductionOptions()

@@ -12,7 +12,7 @@ from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever
 from hotlever.lever.motion import motion_of
 from hotlever.lever.newton import NewtonOptions, find_roots
-from hotlever.lever.pinned import AtTip
+from hotlever.lever.pinned import Pinned
 from hotlever.lever.sensitivities import Linearised
 from hotlever.probe import Probe
 from hotlever.probe.moving import MovingMesh
@@ -47,15 +47,14 @@ class SimilarLevers:
         space = self._space(probe, names)
         dimensions = [name for name in names if name in dimensions_of(probe)]
         motions = {name: motion_of(space, self._moving.movement(name)) for name in dimensions}
-        base = probe.circuit.base_temperature_K
-        return LeverEquations(space, probe.kinds, base, motions)
+        return LeverEquations(space, probe.kinds, probe.circuit, motions)
 
     def _space(self, probe: Probe, names: tuple[str, ...] = ()) -> FullSpace:
         """Return mesh, operators and air of a similar probe, for derivatives by some names."""
         space = self._lever.space
         own = self._lever.probe
         if (probe.shape, probe.tip) != (own.shape, own.tip):
-            space = FullSpace(self._moving.at(probe))
+            space = FullSpace(self._moving.at(probe), wiring=space.wiring)
         space = copy(space)
         # air takes up from a place nearly what it took before the place moved a little
         space.air = self._air(probe, names)
@@ -108,6 +107,6 @@ class SimilarLevers:
             branch = Follower(equations).until(reach)
         else:
             u, guess = near.branch.u[1:], near.states(probe)[:, 1:]
-            found = find_roots(AtTip(equations, u**2), guess, NewtonOptions(), near.factors)
+            found = find_roots(Pinned(equations, u**2), guess, NewtonOptions(), near.factors)
             branch = branch_of(equations, u, found)
         return Linearised.of(probe, names, branch, reach)

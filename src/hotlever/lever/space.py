@@ -10,6 +10,7 @@ nothing else.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -207,8 +208,14 @@ class Space(ABC):
         Unknowns and weights that give the rise of the tip temperature.
     reader : tuple of (ndarray of int, ndarray), or None
         The same for the reader voltage V_r; None without a reader.
+    contacts : ndarray of int
+        Unknowns that are the potentials of contacts, beside the swept supply's.
+    wired : tuple of str
+        The names of their terminals.
     end_test : ndarray, shape (1 + dimension, points)
         Values and slopes of the function that is one at the leg ends.
+    end_tests : dict of str to ndarray
+        The same of each terminal by itself, where leg ends may differ.
     air : AirLoss, ReducedAir or None
         The air around the lever; see `hotlever.lever.air_loss`.
     """
@@ -223,13 +230,16 @@ class Space(ABC):
     is_temperature: NDArray[np.bool_]
     tip: tuple[Index, Array]
     reader: tuple[Index, Array] | None
+    contacts: Index = np.empty(0, dtype=np.intp)
+    wired: tuple[str, ...] = ()
     end_test: Array
+    end_tests: Mapping[str, Array]
     air: Any
 
-    def fields(self, x: Array, base_temperature_K: float) -> Fields:
-        """Return the fields of states, (size + 1, n); of changes of states with a base of 0."""
+    def fields(self, x: Array) -> Fields:
+        """Return the fields of states or of changes of them, (size + 1, n): T is the rise."""
         T = self.temperature.at_points(x)
-        return Fields(base_temperature_K + T[0], T[1:], self.potential.at_points(x))
+        return Fields(T[0], T[1:], self.potential.at_points(x))
 
     def weak_form(self, fluxes: Fluxes) -> Array:
         """Return the weak equations of the free values and last the current I_h, (size + 1, n).
@@ -264,10 +274,13 @@ class Space(ABC):
         """Return rises of the temperature (K), the highest among them, (places, n), of states."""
 
     @abstractmethod
-    def factorised(self, tangent: Tangent, kappa_air: Array | None, pin: Pin) -> Factors:
+    def factorised(
+        self, tangent: Tangent, kappa_air: Array | None, pin: Pin, conductance: Array
+    ) -> Factors:
         """Put the Jacobians of all states together, the row of the pin last, and factorise.
 
-        Where there is air, its κ is given at the sites (mW/(K µm)), (sites, n).
+        Where there is air, its κ is given at the sites (mW/(K µm)), (sites, n). Behind each of the
+        contacts is a conductance (mA/V).
         """
 
 

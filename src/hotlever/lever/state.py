@@ -59,4 +59,6 @@ class State:
     @cached_property
     def nodal(self) -> tuple[Array, Array]:
         """Temperature (K) and potential (V) at the nodes of the elements."""
-        return self.lever.space.nodal(self.x[:, 0], self.lever.circuit.base_temperature_K)
+        equations = self.lever.equations
+        base = equations.base_temperature_K
+        return self.lever.space.nodal(self.x[:, 0], base, equations.end_rises)

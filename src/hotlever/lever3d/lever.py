@@ -19,6 +19,7 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.lever.dataset import at_bias, checked_bias
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace
+from hotlever.lever.held import pin_along
 from hotlever.lever.lever import Lever
 from hotlever.lever.state import State
 from hotlever.lever3d.still_air import OpenAir, ngsolve
@@ -94,8 +95,10 @@ class SolidLever(Lever):
                 "expected a lever without films"
             )
         radius = self._sphere_radius_um or max(SPHERE_RADIUS, _ROOM * middle_and_reach(layout)[1])
-        solid = mesh_solid(layout, self._options, sphere_radius_um=radius if in_air else None)
-        space = FullSpace(solid, FiniteElements(solid.elements, ElementTetP2(), 4))
+        sphere, wiring = radius if in_air else None, self.probe.wiring
+        solid = mesh_solid(layout, self._options, sphere_radius_um=sphere, wiring=wiring)
+        elements = FiniteElements(solid.elements, ElementTetP2(), 4)
+        space = FullSpace(solid, elements, wiring)
         if not in_air:
             return space
         air = OpenAir(solid.netgen, solid.centre, radius, order=self._air_order)
@@ -176,7 +179,9 @@ class SolidLever(Lever):
         T, V = (self._from_flat @ values for values in flat.nodal)
         base = self.circuit.base_temperature_K
         guess = self.space.from_nodal(T - base, V, flat.lever_V)[:, None]
-        state = self.polished(guess, bias)
+        branch = self._flat.branch_to(bias)
+        (u,) = branch.read(self.circuit, np.array([bias])).u
+        state = self.polished(guess, bias, pin_along(branch, u))
         store_arrays(self._file(bias), {"x": state.x})
         return state
 

@@ -1,21 +1,120 @@
-"""The measuring circuit: a bias source, a series resistor, the lever."""
+"""The measuring circuit: what is wired to the terminals of a lever.
+
+The swept supply drives the heater current through a series resistor. Other terminals are at
+ground, are sensed without a current, or are held: by a supply of their own, of a voltage behind a
+resistor or of a current.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Self
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from hotlever.errors import InputError, unknown_name
 from hotlever.records import Record
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
+from hotlever.types import Array
+
+#: Resistance (kΩ) behind which a voltage is held where none is given: a micro-ohm, far less than
+#: any contact has.
+_NEARLY_NONE = 1e-9
+#: Largest voltage (V) and current (mA) of a held supply.
+_MOST = 1000.0
+
+
+def _resistance(meaning: str, default: float) -> Any:
+    return Field(default=default, ge=0, le=1e7, description=meaning)
+
+
+class Contact(Record):
+    """What is wired to one terminal (section ``[circuit.NAME]`` of a probe file).
+
+    Examples
+    --------
+    >>> Contact(kind="supply", bias_V=2.0, series_resistance_ohm=1000).kind
+    'supply'
+    """
+
+    kind: Literal["supply", "ground", "sense"]
+    bias_V: float | None = Field(
+        default=None, ge=-_MOST, le=_MOST, description="of a supply that holds a voltage"
+    )
+    current_mA: float | None = Field(
+        default=None, ge=-_MOST, le=_MOST, description="of a supply that holds a current"
+    )
+    series_resistance_ohm: float = _resistance("between the terminal and its supply or ground", 0.0)
+    base_temperature_K: float | None = Field(
+        default=None, ge=250, le=1000, description="of this leg end, if it is another"
+    )
+
+    @model_validator(mode="after")
+    def _has_what_its_kind_has(self) -> Self:
+        held = [name for name in ("bias_V", "current_mA") if getattr(self, name) is not None]
+        if self.kind != "supply" and held:
+            raise ValueError(f'{held[0]} means nothing with kind = "{self.kind}"')
+        if len(held) == 2:
+            raise ValueError("found bias_V and current_mA, expected one of them")
+        if self.series_resistance_ohm and (self.kind == "sense" or "current_mA" in held):
+            what = "a sense contact, which has no current" if self.kind == "sense" else "a current"
+            raise ValueError(f"series_resistance_ohm means nothing before {what}")
+        return self
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a supply drives it."""
+        return self.bias_V is not None or self.current_mA is not None
+
+    def __str__(self) -> str:
+        held = "" if self.bias_V is None else f", {self.bias_V:g} V"
+        held += "" if self.current_mA is None else f", {self.current_mA:g} mA"
+        behind, warm = self.series_resistance_ohm, self.base_temperature_K
+        after = f" behind {behind:g} ohm" if behind else ""
+        return f"{self.kind}{held}{after}" + ("" if warm is None else f", leg end at {warm:g} K")
+
+    @property
+    def norton(self) -> tuple[float, float]:
+        """Its conductance (mA/V) and short-circuit current (mA), as Norton has them."""
+        if self.current_mA is not None:
+            return 0.0, self.current_mA
+        conductance = 1.0 / max(self.series_resistance_ohm / 1000.0, _NEARLY_NONE)
+        return conductance, conductance * (self.bias_V or 0.0)
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """Which terminals are what.
+
+    Attributes
+    ----------
+    swept : str
+        The swept supply.
+    grounds : tuple of str
+        At ground, nothing between.
+    contacts : tuple of str
+        Each of one potential that follows from what is behind it.
+    senses : tuple of str
+        No current.
+    """
+
+    swept: str
+    grounds: tuple[str, ...]
+    contacts: tuple[str, ...]
+    senses: tuple[str, ...]
 
 
 class Circuit(Record):
     """The measuring circuit (section ``[circuit]`` of a probe file).
 
     The bias V_b drives the heater current I_h through the series resistor R_s and the lever,
-    V_b = V_l + R_s I_h. What a lever shows at a tip temperature does not depend on the circuit;
-    which tip temperature it takes at a bias does.
+    V_b = V_l + R_s I_h. What a lever shows at a tip temperature does not depend on R_s; which tip
+    temperature it takes at a bias does.
+
+    A terminal ``supply`` is the swept supply, ``ground`` is at ground, and others are sensed,
+    unless ``[circuit.NAME]`` says something else.
 
     Examples
     --------
@@ -23,12 +122,62 @@ class Circuit(Record):
     8.268
     """
 
-    series_resistance_ohm: float = Field(
-        default=5600.0, ge=0, le=1e7, description="between the bias source and the lever, R_s"
-    )
+    series_resistance_ohm: float = _resistance("between the bias source and the lever, R_s", 5600.0)
     base_temperature_K: float = Field(
         default=BASE_TEMPERATURE_K, ge=250, le=1000, description="of the leg ends"
     )
+    swept: str = Field(default="supply", description="terminal of the supply that is swept")
+    contacts: dict[str, Contact] = Field(default_factory=dict)
+
+    @classmethod
+    def of(cls, values: dict[str, Any], where: str) -> Self:
+        """Check `values` and make a circuit; `where` names their origin in an error."""
+        parts = contacts_apart(values)
+        given = parts.get("contacts", {}).items()
+        inside = {
+            name: one if isinstance(one, Contact) else Contact.of(one, f"{where[:-1]}.{name}]")
+            for name, one in given
+        }
+        return super().of({**parts, "contacts": inside}, where)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _sections_are_contacts(cls, values: Any) -> Any:
+        return contacts_apart(values) if isinstance(values, Mapping) else values
+
+    @model_validator(mode="after")
+    def _one_supply_is_swept(self) -> Self:
+        swept = self.contacts.get(self.swept)
+        if swept is not None and (swept.kind != "supply" or swept.is_held):
+            found = f'kind = "{swept.kind}"' if swept.kind != "supply" else "a value of its own"
+            raise ValueError(
+                f"{self.swept}: found {found}, expected a supply without a value: it is swept"
+            )
+        if swept is not None and swept.series_resistance_ohm:
+            raise ValueError(
+                f"{self.swept}: series_resistance_ohm of the swept supply stands in [circuit]"
+            )
+        for name, contact in self.contacts.items():
+            if name != self.swept and contact.kind == "supply" and not contact.is_held:
+                raise ValueError(
+                    f"{name}: expected bias_V or current_mA of a supply that is not swept; the "
+                    f"swept one is '{self.swept}'"
+                )
+        return self
+
+    @model_serializer(mode="wrap")
+    def _contacts_are_sections(self, given: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        values = given(self)
+        contacts = values.pop("contacts")
+        if self.swept == type(self).model_fields["swept"].default:
+            del values["swept"]
+        return {**values, **contacts}
+
+    def __hash__(self) -> int:
+        own = (self.series_resistance_ohm, self.base_temperature_K, self.swept)
+        return hash((*own, *self.contacts.items()))
+
+    # --- the swept supply -------------------------------------------------------------------------
 
     @property
     def series_kohm(self) -> float:
@@ -57,3 +206,105 @@ class Circuit(Record):
     def power(self, bias_V: Any, current_mA: Any) -> Any:
         """Return the power P_l = V_l I_h (mW) of a bias (V) and a current (mA)."""
         return self.lever_voltage(bias_V, current_mA) * current_mA
+
+    # --- the other terminals ----------------------------------------------------------------------
+
+    def contact(self, name: str) -> Contact:
+        """Return what is wired to a terminal."""
+        usual: dict[str, Literal["supply", "ground"]] = {self.swept: "supply", "ground": "ground"}
+        return self.contacts.get(name) or Contact(kind=usual.get(name, "sense"))
+
+    def wiring(self, terminals: Iterable[str], where: str = "probe") -> Wiring:
+        """Return what some terminals are.
+
+        Raises
+        ------
+        InputError
+            If one that is wired does not exist, ``supply`` is left without one, or nothing holds a
+            potential.
+        """
+        names = list(dict.fromkeys(terminals))
+        for name in (self.swept, *self.contacts):
+            if name not in names:
+                raise unknown_name("terminal", name, names, f"{where}: [circuit]")
+        if "supply" in names and "supply" not in (self.swept, *self.contacts):
+            raise InputError(
+                f"{where}: [circuit]: swept = \"{self.swept}\" leaves the terminal 'supply', "
+                "expected [circuit.supply] with what is wired to it"
+            )
+        others = {name: self.contact(name) for name in names if name != self.swept}
+        bare = [
+            name
+            for name, one in others.items()
+            if one.kind == "ground" and not one.series_resistance_ohm
+        ]
+        senses = tuple(name for name, one in others.items() if one.kind == "sense")
+        if not any(one.norton[0] for name, one in others.items() if name not in senses):
+            raise InputError(f"{where}: [circuit]: no terminal is at ground, expected one")
+        contacts = tuple(name for name in others if name not in (*bare, *senses))
+        return Wiring(self.swept, tuple(bare), contacts, senses)
+
+    def check(self, terminals: Iterable[str], medium: str, where: str) -> None:
+        """Refuse what does not fit some terminals in a medium.
+
+        Raises
+        ------
+        InputError
+            As `wiring`, or if in air leg ends are not at the base temperature.
+        """
+        self.wiring(terminals, where)
+        if medium == "air" and self.end_rises():
+            names = ", ".join(f"'{name}'" for name in self.end_rises())
+            raise InputError(
+                f"{where}: [circuit]: in air all leg ends have the base temperature, found another "
+                f"of {names}"
+            )
+
+    def norton(self, contacts: Iterable[str]) -> tuple[Array, Array]:
+        """Return conductances (mA/V) and short-circuit currents (mA) behind some contacts."""
+        pairs = [self.contact(name).norton for name in contacts]
+        conductance, current = np.reshape(pairs, (-1, 2)).T
+        return conductance, current
+
+    def end_rises(self) -> dict[str, float]:
+        """Return by how much leg ends are warmer than the base temperature (K), if they are."""
+        given = {name: one.base_temperature_K for name, one in self.contacts.items()}
+        rises = {name: T - self.base_temperature_K for name, T in given.items() if T is not None}
+        return {name: rise for name, rise in rises.items() if rise}
+
+    @property
+    def starts_cold(self) -> bool:
+        """Whether all of the lever is at the base temperature until the swept supply heats it."""
+        return not self.end_rises() and not any(one.norton[1] for one in self.contacts.values())
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is the paper's circuit: one supply, grounds and sense contacts."""
+        return not self.contacts and self.swept == "supply"
+
+    def need_cold_start(self, what: str) -> None:
+        """Refuse a lever that something else than the swept supply heats.
+
+        Raises
+        ------
+        InputError
+            Naming the terminal.
+        """
+        if not self.starts_cold:
+            warm = self.end_rises()
+            name = next(n for n, one in self.contacts.items() if one.norton[1] or n in warm)
+            raise InputError(
+                f"[circuit.{name}]: {what} takes a lever that only the swept supply heats, found "
+                f"{'a held supply' if self.contacts[name].norton[1] else 'a warmer leg end'}"
+            )
+
+
+def contacts_apart(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of ``[circuit]`` with the sections inside it under ``contacts``."""
+    inner = {
+        name: one
+        for name, one in values.items()
+        if name not in Circuit.model_fields and isinstance(one, Mapping | Contact)
+    }
+    own = {name: one for name, one in values.items() if name not in inner}
+    return {**own, "contacts": inner} if inner else own

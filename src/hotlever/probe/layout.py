@@ -15,6 +15,7 @@ import numpy as np
 
 from hotlever.errors import InputError
 from hotlever.materials import HIGH_DOPED, LOW_DOPED
+from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
 
@@ -237,6 +238,25 @@ class Layout:
         """Least and largest corner of the lever, shape (2, 2)."""
         boxes = np.array([region.box for region in self.regions])
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    @property
+    def terminal_names(self) -> tuple[str, ...]:
+        """The names of the terminals, each once."""
+        return tuple(dict.fromkeys(one.name for one in self.terminals))
+
+    @property
+    def usual_wiring(self) -> Wiring:
+        """Which terminals are what unless a circuit says something else."""
+        return Circuit().wiring(self.terminal_names)
+
+    def heaters(self, wiring: Wiring) -> tuple[Region, ...]:
+        """Return the regions that a current heats much: with other circuits not the heater only."""
+        beside = wiring.contacts or len(wiring.grounds) > 1
+        return tuple(
+            region
+            for region in self.regions
+            if region.part == "heater" or (beside and region.taper is not None)
+        )
 
     @property
     def corners(self) -> Array:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from skfem import MeshTet, MeshTri
 
 from hotlever.errors import ComputationError
+from hotlever.probe.circuit import Wiring
 from hotlever.probe.layout import Layout, Point, Region, Terminal
 from hotlever.types import Array, Index
 
@@ -84,8 +85,13 @@ class ProbeMesh:
     terminal_facets: Mapping[str, Index]
 
 
-def mesh_layout(layout: Layout, options: MeshOptions | None = None) -> ProbeMesh:
+def mesh_layout(
+    layout: Layout, options: MeshOptions | None = None, wiring: Wiring | None = None
+) -> ProbeMesh:
     """Triangulate a layout with Netgen.
+
+    Where current flows, and so where triangles are small, depends on the wiring, by default as in
+    the paper.
 
     Raises
     ------
@@ -93,7 +99,8 @@ def mesh_layout(layout: Layout, options: MeshOptions | None = None) -> ProbeMesh
         If Netgen cannot mesh it, or a terminal has no edge on the outline.
     """
     try:
-        mesh, region = _netgen(layout, options or MeshOptions())
+        heaters = layout.heaters(wiring or layout.usual_wiring)
+        mesh, region = _netgen(layout, heaters, options or MeshOptions())
     except RuntimeError as error:
         raise ComputationError(f"{_NOT_MESHED} ({error})") from error
     # where Netgen fails at a face it says so to the terminal only, and leaves a hole
@@ -109,7 +116,9 @@ def _area(corners: Array) -> float:
     return float(np.abs(ax * by - ay * bx).sum()) / 2
 
 
-def _netgen(layout: Layout, options: MeshOptions) -> tuple[MeshTri, Index]:
+def _netgen(
+    layout: Layout, heaters: tuple[Region, ...], options: MeshOptions
+) -> tuple[MeshTri, Index]:
     # imported here: OpenCASCADE takes a quarter of a second to load, and a saved sweep can be
     # read and drawn without it
     from netgen.occ import Glue, OCCGeometry, WorkPlane
@@ -120,7 +129,7 @@ def _netgen(layout: Layout, options: MeshOptions) -> tuple[MeshTri, Index]:
     for index, region in enumerate(layout.regions):
         face = face_of(region, WorkPlane())
         face.name = f"{index}"
-        if region.part == "heater":
+        if region in heaters:
             # of a film that heats all along, some hundred steps are enough
             step = max(region.narrow_um, math.sqrt(region.area / MOST_SQUARES))
             face.maxh = options.heater * step / options.refinement

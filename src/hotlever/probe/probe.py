@@ -16,7 +16,7 @@ from hotlever.files import write_text
 from hotlever.materials import HIGH_DOPED, LOW_DOPED, Kind, Material, full_name
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.materials.presets import materials_of
-from hotlever.probe.circuit import Circuit
+from hotlever.probe.circuit import Circuit, Contact, Wiring
 from hotlever.probe.layout import Layout
 from hotlever.probe.priors import PriorTexts, priors_of
 from hotlever.probe.sections import read_sections, section_lines, with_values
@@ -108,34 +108,12 @@ class Probe(Record):
         No drawing of the paper's lever is public. These dimensions and the series resistance
         are inferred: with the option-III parameters they give the published operating points.
         """
-        return cls(
-            shape=ThreeLeg(
-                length_um=54.4,
-                centre_leg_width_um=6.44,
-                outer_leg_width_um=3.46,
-                gap_um=3.2,
-                bridge_width_um=3.82,
-                heater_length_um=4.0,
-                heater_width_um=1.645,
-                thickness_um=0.4,
-                reader_length_um=4.0,
-            )
-        )
+        return cls(shape=ThreeLeg.reference())
 
     @classmethod
     def u_shape(cls) -> Probe:
         """Return a two-legged lever with a heater like the reference probe's."""
-        return cls(
-            shape=UShape(
-                length_um=60.0,
-                leg_width_um=6.0,
-                gap_um=6.0,
-                bridge_width_um=4.0,
-                heater_length_um=4.0,
-                heater_width_um=1.645,
-                thickness_um=0.4,
-            )
-        )
+        return cls(shape=UShape.reference())
 
     @classmethod
     def given(cls, probe: Probe | str | os.PathLike[str]) -> Probe:
@@ -193,6 +171,7 @@ class Probe(Record):
                 section = {**usual.get(name, {}), **values[name]}
                 parts[name] = part.of(section, f"{where}: [{name}]")
         probe = cls.of(parts, where)
+        probe.circuit.check(probe.layout().terminal_names, probe.surroundings.medium, where)
         if "material" in values and not probe.has_plain_silicon:
             raise InputError(f"{where}: [material]: no layer is made of it, expected none")
         priors_of(probe.stated_priors, probe, f"{where}: [prior]")
@@ -249,9 +228,15 @@ class Probe(Record):
         """
         section, dot, key = name.rpartition(".")
         named = {one: type(kind) for one, kind in self.materials.items()}
-        records: dict[str, type[Record]] = {"probe": type(self.shape), **named, **_PARTS}
+        wired = {f"circuit.{name}": Contact for name in self.layout().terminal_names}
+        records: dict[str, type[Record]] = {
+            "probe": type(self.shape),
+            **named,
+            **_PARTS,
+            **wired,
+        }
         if dot and section not in records:
-            raise unknown_name("section", section, [*SECTIONS, *named])
+            raise unknown_name("section", section, [*SECTIONS, *named, *wired])
         known = {part: _keys(record, part) for part, record in records.items()}
         own = [part for part in _PARTS if getattr(self, part)]
         # those of a named material have its name before them
@@ -259,7 +244,8 @@ class Probe(Record):
             if key in known[part] or (dot and records[part] is PriorTexts):
                 return part, key, records[part]
         # a prior has the name of what it is of
-        full = [f"{part}.{key}" if part in named else key for part in known for key in known[part]]
+        dotted = {*named, *wired}
+        full = [f"{part}.{key}" if part in dotted else key for part in known for key in known[part]]
         choices = known[section] if dot else full
         raise unknown_name("name", key, dict.fromkeys(choices))
 
@@ -277,8 +263,10 @@ class Probe(Record):
         sections = self.values()
         for name, value in changes.items():
             section, key, _ = self.field(name)
-            inside = sections[_MATERIALS] if section in self.materials else sections
-            inside.setdefault(section, {})[key] = value
+            inside, (*above, last) = sections, section.split(".")
+            for one in [_MATERIALS] if section in self.materials else above:
+                inside = inside.setdefault(one, {})
+            inside.setdefault(last, {})[key] = value
         sections = {name: with_values(section) for name, section in sections.items()}
         shape = PARAMETRIC.get(str(sections["probe"]["shape"]))
         if shape is not None and not isinstance(self.shape, shape):
@@ -351,6 +339,11 @@ class Probe(Record):
         """The low-doped silicon of the heater; None if it is of another material."""
         kind = self.kinds[self.layout().heater.stack[0].material]
         return kind if isinstance(kind, LowDopedSilicon) else None
+
+    @property
+    def wiring(self) -> Wiring:
+        """Which of its terminals are what."""
+        return self.circuit.wiring(self.layout().terminal_names)
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip."""

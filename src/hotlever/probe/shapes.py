@@ -146,6 +146,21 @@ class ThreeLeg(Parametric):
     def _reader_centre(self) -> float:
         return self.reader_centre_um or 2 / 3 * self.length_um
 
+    @classmethod
+    def reference(cls) -> ThreeLeg:
+        """Return the shape of the reference probe, see `hotlever.probe.Probe.reference`."""
+        return cls(
+            length_um=54.4,
+            centre_leg_width_um=6.44,
+            outer_leg_width_um=3.46,
+            gap_um=3.2,
+            bridge_width_um=3.82,
+            heater_length_um=4.0,
+            heater_width_um=1.645,
+            thickness_um=0.4,
+            reader_length_um=4.0,
+        )
+
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
         front = self.length_um - self.bridge_width_um
@@ -218,6 +233,19 @@ class UShape(Parametric):
             self.heater_length_um <= self.gap_um,
             f"heater_length_um = {self.heater_length_um:g} must not exceed "
             f"gap_um = {self.gap_um:g}",
+        )
+
+    @classmethod
+    def reference(cls) -> UShape:
+        """Return the shape of a lever with a heater like the reference probe's."""
+        return cls(
+            length_um=60.0,
+            leg_width_um=6.0,
+            gap_um=6.0,
+            bridge_width_um=4.0,
+            heater_length_um=4.0,
+            heater_width_um=1.645,
+            thickness_um=0.4,
         )
 
     def tied(self) -> tuple[str, ...]:

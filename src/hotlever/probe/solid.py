@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from skfem import MeshTet
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.probe.layout import Layout
+from hotlever.probe.circuit import Wiring
+from hotlever.probe.layout import Layout, Region
 from hotlever.probe.mesh import ON_LINE, MeshSizes, ProbeMesh, face_of, terminal_facets
 from hotlever.types import Array, Index
 
@@ -78,6 +79,7 @@ def mesh_solid(
     options: SolidMeshOptions | None = None,
     *,
     sphere_radius_um: float | None = None,
+    wiring: Wiring | None = None,
 ) -> SolidMesh:
     """Cut a lever of its true thickness into tetrahedra with Netgen.
 
@@ -87,6 +89,8 @@ def mesh_solid(
     options : SolidMeshOptions, optional
     sphere_radius_um : float, optional
         Mesh the air too, in a sphere of this radius around the middle of the lever.
+    wiring : Wiring, optional
+        Says where currents flow; by default as in the paper.
 
     Raises
     ------
@@ -102,7 +106,7 @@ def mesh_solid(
     options = options or SolidMeshOptions()
     middle, reach = middle_and_reach(layout)
     centre = (float(middle[0]), float(middle[1]), 0.0)
-    shape = _silicon(layout, options)
+    shape = _silicon(layout, layout.heaters(wiring or layout.usual_wiring), options)
     largest = options.lever * np.ptp(layout.box, axis=0).max() / options.refinement
     if sphere_radius_um is not None:
         if not sphere_radius_um > 1.1 * reach:
@@ -140,7 +144,7 @@ def _check_size(layout: Layout) -> None:
         )
 
 
-def _silicon(layout: Layout, options: SolidMeshOptions) -> Any:
+def _silicon(layout: Layout, heaters: tuple[Region, ...], options: SolidMeshOptions) -> Any:
     """The regions as solids, named by their number; the tip belongs to the heater."""
     from netgen.occ import Axes, Axis, Glue, Pnt, WorkPlane, X, Y, Z
 
@@ -152,7 +156,7 @@ def _silicon(layout: Layout, options: SolidMeshOptions) -> Any:
         face = face_of(region, WorkPlane(Axes((0, 0, bottom), Z, X)))
         solid = face.Extrude(layout.thickness_um)
         solid.mat(f"{index}")
-        solid.maxh = (options.heater * narrow) if region.part == "heater" else options.lever * whole
+        solid.maxh = (options.heater * narrow) if region in heaters else options.lever * whole
         solids.append(solid)
     if layout.cone is not None:
         cone = layout.cone

@@ -148,6 +148,7 @@ def vary(
     InputError
         If the name does not exist or a value is impossible.
     """
+    design.probe.circuit.need_cold_start("a study of a design")
     probes = [design.changed(name, float(value)) for value in values]
     rows = [quantities(probe, power_mW, air) for probe in each(probes, progress)]
     return labelled(

@@ -84,7 +84,7 @@ class MinimosLever(Lever):
         super()._prepare()
         kinds = self.probe.kinds
         kinds[LOW_DOPED] = MinimosSilicon.model_construct(**dict(kinds[LOW_DOPED]))
-        self.equations = LeverEquations(self.space, kinds, self.circuit.base_temperature_K)
+        self.equations = LeverEquations(self.space, kinds, self.circuit)
 
 
 def drawn(

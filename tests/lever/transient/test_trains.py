@@ -50,7 +50,7 @@ def test_laws_that_are_looked_up_are_the_laws(coarse):
     snapshots = []
     followed(coarse, step(8.0), 50.0, seen=lambda t, state: snapshots.append(state.x))
     reduced = reduced_in_time(coarse, np.hstack(snapshots))
-    exact = LeverEquations(reduced.space, coarse.probe.kinds, 293.0)
+    exact = LeverEquations(reduced.space, coarse.probe.kinds, coarse.circuit)
     T = np.random.default_rng(0).uniform(293.0, 1600.0, (reduced.space.weights.size, 3))
     looked_up, true = reduced.equations.conductivities(T), exact.conductivities(T)
     np.testing.assert_allclose(looked_up.kappa, true.kappa, rtol=2e-4)

@@ -96,5 +96,4 @@ class DrivenLever:
 
     def rates(self, x: Array) -> Array:
         """Return the power, and the heat that leaves as it does at rest (mW), (2,)."""
-        power = x[-1, 0] * self.equations.balance(x)[-1, 0]
-        return np.array([power, heat_left(self.equations, x)[0]])
+        return np.array([self.equations.power(x)[0], heat_left(self.equations, x)[0]])

@@ -112,8 +112,9 @@ def follow(
 ) -> Iterator[tuple[Piece, Step]]:
     """Give the steps of a lever under a wave form, each with the piece it belongs to."""
     x = _at_rest(lever, waveform.before_V) if start is None else start.x
-    rise = _SHARE_OF_RISE * _expected_rise(lever, waveform.highest_V)
-    tolerance_K = max(min(tolerance_K, rise), _LEAST_TOLERANCE)
+    if lever.circuit.starts_cold:
+        rise = _SHARE_OF_RISE * _expected_rise(lever, waveform.highest_V)
+        tolerance_K = max(min(tolerance_K, rise), _LEAST_TOLERANCE)
     length = None
     for piece in waveform.pieces(until):
         problem = DrivenLever(lever.equations, lever.circuit, piece.bias)
@@ -134,6 +135,9 @@ def _expected_rise(lever: Lever, bias: float) -> float:
 
 def _at_rest(lever: Lever, bias: float) -> Array:
     """Return the state at rest; the other polarity has the potentials reversed."""
+    if not lever.circuit.starts_cold and bias >= 0.0:
+        return lever.solve([bias])[0].x
+    lever.circuit.need_cold_start("a wave form that begins at a negative bias")
     if bias == 0.0:
         return np.zeros((lever.space.size + 1, 1))
     (state,) = lever.solve([abs(bias)])

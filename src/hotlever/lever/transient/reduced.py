@@ -14,6 +14,7 @@ from hotlever.lever.reduction import ReductionOptions, empirical_rule
 from hotlever.lever.space import Space
 from hotlever.lever.state import State
 from hotlever.materials import Kind
+from hotlever.probe import Circuit
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -52,8 +53,7 @@ def reduced_in_time(lever: Lever, snapshots: Array) -> Lever:
     other = copy(lever)
     space = every.at_points(points, few)
     other.space = cast("Any", space)
-    base = lever.circuit.base_temperature_K
-    other.equations = TabulatedEquations(space, lever.probe.kinds, base)
+    other.equations = TabulatedEquations(space, lever.probe.kinds, lever.circuit)
     return other
 
 
@@ -96,10 +96,8 @@ class TabulatedEquations(LeverEquations):
     they are cubics through values and slopes: within 1e-6, and 2e-4 at the step in the slope of κ.
     """
 
-    def __init__(
-        self, space: Space, materials: Mapping[str, Kind], base_temperature_K: float
-    ) -> None:
-        super().__init__(space, materials, base_temperature_K)
+    def __init__(self, space: Space, materials: Mapping[str, Kind], circuit: Circuit) -> None:
+        super().__init__(space, materials, circuit)
         self._found: tuple[Array, Array, Array] | None = None
         T = np.broadcast_to(_NODES, (space.weights.size, _NODES.size))
         laws, (heat, heat_by) = super().conductivities(T), super().heat_density(T)

@@ -87,10 +87,13 @@ def harmonics(
     frequency = checked_frequencies(frequency_Hz)
     if not 0.0 < amplitude_V < np.inf:
         raise InputError(f"found an amplitude of {amplitude_V:g} V, expected a positive one")
+    if not lever.circuit.is_plain:
+        raise InputError(
+            "[circuit]: harmonics are of levers with one supply, grounds and sense contacts"
+        )
     (rest,) = lever.solve([offset_V])
     space = space_of_modes(lever, _steps(lever, rest, amplitude_V), rest.x)
-    base = lever.circuit.base_temperature_K
-    equations = LeverEquations(space, lever.probe.kinds, base)
+    equations = LeverEquations(space, lever.probe.kinds, lever.circuit)
     start = space.coordinates(rest.x)
     balance = HarmonicBalance(equations, lever.circuit, start, offset_V, amplitude_V)
     found = []

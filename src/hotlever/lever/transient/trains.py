@@ -52,7 +52,9 @@ def followed_on_modes(
     end, period = waveform.usual_end if until is None else until, waveform.period
     if at is not None and until is None:
         end = float(checked_times(at)[-1])
-    if period is None or waveform.count < FEWEST or not FEWEST * period <= end < np.inf:
+    often = period is not None and waveform.count >= FEWEST and FEWEST * period <= end < np.inf
+    # modes are of levers that only the swept supply drives
+    if period is None or not often or lever.space.wired:
         return followed(lever, waveform, until, at, seen=seen, **given)
     try:
         return _Train(lever, waveform, period, end, given).followed(at, seen)
