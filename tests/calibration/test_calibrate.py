@@ -212,6 +212,18 @@ def test_routes_exclude_each_other(reference):
         calibrate(curve, law=EQ12, probe=Probe.reference())
     with pytest.raises(InputError, match="leave the medium out"):
         calibrate(curve, law=EQ12, medium="air")
+    with pytest.raises(InputError, match="the paper's rule has no posterior"):
+        calibrate(curve, law=EQ12, samples=10)
+
+
+@pytest.mark.slow
+def test_the_posterior_of_a_usual_lever_is_that_of_its_linearised_error(calibrated):
+    sampled = calibrate(calibrated.measurement, samples=2000)
+    assert any("posterior samples" in note for note in sampled.notes)
+    np.testing.assert_allclose(sampled.table.tip_K, calibrated.table.tip_K, atol=0.01)
+    for name in ("tip_low_K", "tip_high_K"):
+        found, usual = (one.table[name] - one.table.tip_K for one in (sampled, calibrated))
+        np.testing.assert_allclose(found, usual, rtol=0.3)
 
 
 def test_a_scaled_model_is_the_paper_s_rule(reference):

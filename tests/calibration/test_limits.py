@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hotlever.calibration.limits import BAND, profile_of_tip
+from hotlever.calibration.limits import BAND, posterior_of_tip, profile_of_tip
 
 TIPS, SLOPES = np.array([300.0, 500.0, 800.0]), np.array([1.0, 10.0, 20.0])
 
@@ -69,3 +69,15 @@ def test_other_errors_are_the_same_either_way():
     profile = profile_of_tip(OneUnknown(), prediction(0.0), [], np.eye(1))
     low, high = profile.limits(TIPS, np.zeros(3), np.full(3, 2.0))
     np.testing.assert_allclose([TIPS - low, high - TIPS], 2.0 * BAND)
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.12])
+def test_quantiles_of_the_posterior_are_those_of_what_is_unknown(bend):
+    """x is normal, so that the quantiles of the tip are the tips at 1.96 standard errors."""
+    found = posterior_of_tip(OneUnknown(), prediction(bend), [], np.eye(1), samples=4000)
+    assert found.rhat < 1.05
+    assert found.effective_samples > 500
+    low, high = found.profile.limits(TIPS[1:], SLOPES[1:], np.zeros(2))
+    x = BAND * np.array([[-1.0], [1.0]])
+    expected = TIPS[1:] + SLOPES[1:] * (x + bend * x**2)
+    np.testing.assert_allclose([low, high], expected, atol=0.12 * BAND * SLOPES[-1])

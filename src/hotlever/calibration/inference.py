@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.calibration.knee import Knee
-from hotlever.calibration.limits import BAND, profile_of_tip
+from hotlever.calibration.limits import BAND, posterior_of_tip, profile_of_tip
 from hotlever.calibration.plausibility import misfit
-from hotlever.errors import ComputationError
+from hotlever.errors import ComputationError, InputError
 from hotlever.fitting import Fit, FitOptions, Measurement
 from hotlever.fitting.estimation import Estimate, estimate
 from hotlever.fitting.least_squares import LeastSquares
@@ -149,6 +149,7 @@ def estimated(
     probe: Probe,
     fit: Fit | None = None,
     priors: Mapping[str, Prior | str] | None = None,
+    samples: int = 0,
     progress: Progress | None = None,
 ) -> Estimated:
     """Estimate a lever from its measurement.
@@ -162,6 +163,8 @@ def estimated(
         Of this lever to other data, or to the same. Its data count, not what it made of them.
     priors : mapping of str to Prior or str, optional
         In place of some of the usual ones; if empty there are none, and dimensions are held.
+    samples : int
+        Of the posterior, from which the limits are then taken; none by default.
     progress : callable, optional
 
     Raises
@@ -173,7 +176,7 @@ def estimated(
     if fit is None:
         options = FitOptions(priors=known, robust=_robust(measured))
         found = estimate(measured, probe, options, progress=progress)
-        return _put_together(found, measured, known)
+        return _put_together(found, measured, known, samples, progress)
     held = _before(fit, priors)
     options = FitOptions(
         observables=fit.observables,
@@ -183,7 +186,7 @@ def estimated(
     )
     found = estimate(fit.measurement, fit.probe, options, progress=progress)
     if _same_data(fit.measurement, measured):
-        return _put_together(found, measured, held)
+        return _put_together(found, measured, held, samples, progress)
     # what that leaves of the lever itself is known before the other data; circuit and gas are
     # those of each measurement
     own = [name for name in found.options.varied if name not in _CIRCUIT]
@@ -205,7 +208,7 @@ def estimated(
         raise ComputationError(
             f"no lever like the fitted one shows these data; is it another lever's fit? ({error})"
         ) from error
-    return _put_together(found, measured, {**held, **theirs})
+    return _put_together(found, measured, {**held, **theirs}, samples, progress)
 
 
 def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Prior]:
@@ -230,7 +233,13 @@ def _same_data(one: Measurement, other: Measurement) -> bool:
     return same and np.array_equal(one.current_mA, other.current_mA, equal_nan=True)
 
 
-def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Prior]) -> Estimated:
+def _put_together(
+    found: Estimate,
+    measured: Measurement,
+    known: Mapping[str, Prior],
+    samples: int,
+    progress: Progress | None,
+) -> Estimated:
     best, residuals = found.optimum.probe, found.problem.residuals
     present = measured.bias_V[np.isfinite(measured.current_mA) & (measured.bias_V > 0)]
     highest = float(residuals.bias.max())
@@ -244,7 +253,7 @@ def _put_together(found: Estimate, measured: Measurement, known: Mapping[str, Pr
     tip = predicted.values[2]
     of_model = error_of_model(best.surroundings.medium, bias, tip - best.circuit.base_temperature_K)
     stderr = np.sqrt(np.sum(list(parts.values()), axis=0))
-    (low, high), lopsided = _limits(found, tip, stderr, of_model)
+    (low, high), lopsided = _limits(found, tip, stderr, of_model, samples, progress)
     parts["model"] = of_model**2
     use = found.priors(known)
     return Estimated(
@@ -277,17 +286,28 @@ def _shares(found: Estimate) -> dict[str, Array]:
 
 
 def _limits(
-    found: Estimate, tip: Array, stderr: Array, of_model: Array
+    found: Estimate,
+    tip: Array,
+    stderr: Array,
+    of_model: Array,
+    samples: int,
+    progress: Progress | None,
 ) -> tuple[tuple[Array, Array], list[str]]:
-    """Return what 95 % of the tip temperatures lie between (K), and words if that is lopsided."""
+    """Return what 95 % of the tip temperatures lie between (K), and words on where that is from."""
     objective, at = found.problem.objective, found.optimum.prediction
+    away = BAND * np.hypot(stderr, of_model)
+    if samples and not objective.informed:
+        raise InputError("posterior: expected priors, without which it is not that of a fit")
     if not objective.informed:
-        away = BAND * np.hypot(stderr, of_model)
         return (tip - away, tip + away), []
-    profile = profile_of_tip(objective, at, found.problem.others(at), found.covariance)
-    low, high = profile.limits(tip, stderr, of_model)
+    near = (objective, at, found.problem.others(at), found.covariance)
+    if samples:
+        posterior = posterior_of_tip(*near, samples=samples, progress=progress)
+        return posterior.profile.limits(tip, stderr, of_model), [posterior.note]
+    profile = profile_of_tip(*near)
     if profile.linear:
-        return (low, high), []
+        return (tip - away, tip + away), []
+    low, high = profile.limits(tip, stderr, of_model)
     return (low, high), [
         "the tip temperature is not a linear function of what is unknown, so that its limits come "
         f"from estimates of hotter and colder levers: at {tip[-1]:.0f} K 95 % lie from "

@@ -3,19 +3,25 @@
 The profile: all parameters are estimated anew with the tip temperature at one bias pulled away, on
 either side. The sum of squares, of which each unit is a standard deviation squared, then rises by
 the square of how many standard errors away it is. A linearised error is that for small changes.
+
+The posterior: all parameters are sampled, and the limits are quantiles of their tip temperatures.
+Both take the levers near the optimum from those that were solved (`Vicinity`).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize
 
 from hotlever.errors import ComputationError
+from hotlever.fitting.diagnostics import effective_sample_size, split_rhat
+from hotlever.fitting.ensembles import Gaussian, sample
 from hotlever.fitting.models import Prediction
 from hotlever.fitting.objective import UNSOLVED, Objective, Vicinity, inside
-from hotlever.types import Array
+from hotlever.types import Array, Progress
 
 #: Standard errors that 95 % of a normal distribution lie within.
 BAND = 1.96
@@ -29,6 +35,8 @@ _FOUND = 1e-5
 _LEAST_RISE = 0.25
 #: A linearised error that is right within this factor holds.
 _ALIKE = 1.25
+#: Walkers of an ensemble, at least; and R̂ from which on samples are too few.
+_WALKERS, _SETTLED = 24, 1.05
 
 
 @dataclass(frozen=True)
@@ -56,10 +64,7 @@ class Profile:
 
         The profile is that of the linearised error `stderr_K`; an `other_K` is the same either way.
         """
-        if self.linear:
-            below = above = np.ones_like(tip_K)
-        else:
-            below, above = (np.interp(tip_K, self.tip_K, side) for side in (self.below, self.above))
+        below, above = (np.interp(tip_K, self.tip_K, side) for side in (self.below, self.above))
         low, high = (BAND * np.hypot(side * stderr_K, other_K) for side in (below, above))
         return tip_K - low, tip_K + high
 
@@ -103,6 +108,86 @@ def profile_of_tip(
             found.append(multiple)
     below, above = np.reshape(found, (-1, 2)).T
     return Profile(at.values[2, some], below, above)
+
+
+@dataclass(frozen=True)
+class TipPosterior:
+    """What posterior samples say of the tip temperature.
+
+    Attributes
+    ----------
+    profile : Profile
+        From the quantiles of 2.5 and 97.5 %.
+    effective_samples, rhat : float
+        Of the tip temperature where it is hottest.
+    """
+
+    profile: Profile
+    effective_samples: float
+    rhat: float
+
+    @property
+    def note(self) -> str:
+        """What the limits are from, and whether there are enough samples."""
+        text = (
+            "95 % of the tip temperatures lie between quantiles of posterior samples "
+            f"({self.effective_samples:.0f} effective ones, R̂ {self.rhat:.3f})"
+        )
+        return text + ("" if self.rhat < _SETTLED else "; these are too few, take more samples")
+
+
+def posterior_of_tip(
+    objective: Objective,
+    at: Prediction,
+    others: list[Prediction],
+    covariance: Array,
+    *,
+    samples: int,
+    progress: Progress | None = None,
+) -> TipPosterior:
+    """Sample the parameters of an estimate, and their tip temperatures.
+
+    Parameters are those of `profile_of_tip`, and those of `hotlever.fitting.ensembles.sample`. What
+    is sampled costs too little for processes of its own.
+    """
+    vicinity = Vicinity(objective, at, others)
+    scaled = covariance / np.outer(objective.scale, objective.scale)
+    chains = sample(
+        _Density(vicinity),
+        Gaussian(vicinity.origin, scaled),
+        samples=samples,
+        walkers=max(_WALKERS, 3 * vicinity.origin.size),
+        progress=progress,
+    )
+    ensembles, walkers, draws, size = chains.points.shape
+    every = chains.points.reshape(-1, size)
+    tips = np.array([vicinity.predict(point)[0][2] for point in every])
+    order = np.argsort(at.values[2])
+    some = order[np.linspace(order.size / 3, order.size - 1, _PLACES).astype(int)]
+    slopes = at.slopes[2][some][:, objective.columns]
+    stderr = np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes))
+    low, high = np.percentile(tips[:, some], (2.5, 97.5), axis=0)
+    middle = at.values[2, some]
+    hottest = tips[:, order[-1]].reshape(ensembles, walkers, draws)
+    apart = np.swapaxes(hottest, 1, 2).reshape(ensembles, -1)
+    return TipPosterior(
+        Profile(middle, (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)),
+        effective_sample_size(hottest.reshape(-1, draws)),
+        split_rhat(apart),
+    )
+
+
+@dataclass(frozen=True)
+class _Density:
+    """The logarithm of the posterior density of scaled parameters."""
+
+    vicinity: Vicinity
+
+    def __call__(self, scaled: Array) -> float:
+        low, high = self.vicinity.objective.bounds
+        if np.any(scaled <= low) or np.any(scaled >= high):
+            return -math.inf
+        return -0.5 * _squares(self.vicinity.residual(scaled))
 
 
 class _Pulled:

@@ -44,6 +44,7 @@ def calibrate(
     medium: str | None = None,
     priors: Mapping[str, Prior | str] | None = None,
     pulse: PulseTiming | None = None,
+    samples: int = 0,
     progress: Progress | None = None,
 ) -> Calibration:
     """Find the tip temperature of a lever from its I-V curve.
@@ -72,8 +73,12 @@ def calibrate(
         dimensions are held.
     pulse : PulseTiming, optional
         Of pulses whose tip temperature is wanted too (`hotlever.calibration.pulses`).
+    samples : int
+        Of the posterior, at least, from which the limits of the tip temperature are taken; by
+        default they follow from its linearised error, or estimates of hotter and colder levers.
     progress : callable, optional
-        Called with solved branches, then with followed pulses, and how many there usually are.
+        Called with solved branches, then with steps of the sampler and followed pulses, and how
+        many there usually are.
 
     Raises
     ------
@@ -99,6 +104,8 @@ def calibrate(
     known = measured if law is None else replace(measured, medium=None)
     probe, notes = with_measured_circuit(origin, known, medium if law is None else "vacuum")
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
+        if samples:
+            raise InputError("the paper's rule has no posterior; expected a probe or a fit")
         if pulse is not None:
             raise InputError(
                 "the paper's rule says nothing about a pulse; expected a probe or a fit, in the "
@@ -108,7 +115,7 @@ def calibrate(
     causes = Causes(measured, probe, priors)
     check_plausible(measured, probe, causes)
     try:
-        found = estimated(measured, probe, fit, priors, progress)
+        found = estimated(measured, probe, fit, priors, samples, progress)
     except ComputationError as error:
         raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
     if found.reason:

@@ -43,6 +43,10 @@ def calibrate_command(
     pulse: str | None = Option(
         None, metavar="TIME[,PERIOD]", help="Calibrate a pulse too, such as 5us or 5us,100us."
     ),
+    posterior: bool = Option(
+        False, "--posterior", help="Take the limits from samples of the posterior."
+    ),
+    samples: int = Option(4_000, metavar="N", min=1, help="Of the posterior, at least."),
     output: File = Option(None, "-o", "--output", help="Calibration file (JSON)."),
     table: File = Option(
         None, help="Write the table for an instrument, or for its pulses, to this CSV file."
@@ -83,6 +87,7 @@ def calibrate_command(
             medium=medium,
             priors=priors,
             pulse=timing,
+            samples=samples if posterior else 0,
             progress=update,
         )
     note(*result.notes)

@@ -108,8 +108,9 @@ def range_notes(probe: Probe, where: str, along: Array, max_K: Array) -> list[st
     beyond = along[max_K > limit]
     if not beyond.size:
         return []
+    least = where.format(f"{beyond.min().round(9):.4g}")
     return [
-        f"from {where.format(f'{beyond.min().round(9):.4g}')} part of the lever is above {limit:.0f} K, "
+        f"from {least} part of the lever is above {limit:.0f} K, "
         "where the material laws are extrapolated"
     ]
 
