@@ -9,16 +9,18 @@ from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import Circuit, MeshOptions, Probe, ThreeLeg, Tip, UShape, mesh_layout
+from hotlever.probe.circuit import Contact
 from hotlever.probe.solid import mesh_solid
 from hotlever.spieser2017 import PUBLISHED
 
-RECORDS = (ThreeLeg, UShape, Circuit, Material, Tip)
+RECORDS = (ThreeLeg, UShape, Circuit, Contact, Material, Tip)
+NUMBERS = (float, int, float | None)
 
 
 @pytest.mark.parametrize("record", RECORDS, ids=lambda record: record.__name__)
 def test_every_number_has_bounds_and_a_meaning(record):
     for name, field in record.model_fields.items():
-        if name != "shape":
+        if field.annotation in NUMBERS:
             bounds = {type(one).__name__ for one in field.metadata}
             assert {"Ge", "Le"} <= bounds, name
             assert record.description()[name]

@@ -18,6 +18,7 @@ from hotlever.drawing.sheet import Sheet, read_sheet
 from hotlever.errors import InputError
 from hotlever.probe.layout import Point, ring_area
 from hotlever.probe.probe import Probe
+from hotlever.probe.sections import commented
 from hotlever.text import aligned, as_toml
 
 #: Layers that are listed.
@@ -163,4 +164,4 @@ def _entry(key: str, value: Drawn | Point | None, reason: str | None, example: o
         return f"# {key} = {as_toml(example)}    # not found in the drawing"
     one_outline = isinstance(value, tuple) and len(value) == 1
     entry = f"{key} = {as_toml(value[0] if one_outline else value)}"
-    return f"{entry:<32}# {reason}" if reason else entry
+    return commented(entry, reason)

@@ -310,7 +310,8 @@ def _tip(best: _Silicon, sheet: Sheet, shapes: dict[str, BaseGeometry], found: P
     """Find the place of the tip."""
     for _, text, place in sheet.labels:
         if "tip" in text.lower() and best.shape.contains(shapely.Point(place)):
-            found.tip, found.reasons["tip"] = place, f"the text '{text.strip()[:20]}' stands there"
+            found.tip = (round(place[0], 6), round(place[1], 6))
+            found.reasons["tip"] = f"the text '{text.strip()[:20]}' stands there"
             return
     heater = found.layers.get(HEATER)
     if isinstance(heater, str):

@@ -19,9 +19,9 @@ from hotlever.records import Record
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.types import Array
 
-#: Resistance (kΩ) behind which a voltage is held where none is given: a micro-ohm, far less than
+#: Resistance (kΩ) behind which a voltage is held where none is given: ten nano-ohm, far less than
 #: any contact has.
-_NEARLY_NONE = 1e-9
+_NEARLY_NONE = 1e-11
 #: Largest voltage (V) and current (mA) of a held supply.
 _MOST = 1000.0
 

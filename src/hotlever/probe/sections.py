@@ -52,6 +52,11 @@ def with_values(section: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def commented(entry: str, text: str | None) -> str:
+    """Return a line of a probe file with a comment, if there is one."""
+    return f"{entry:<{_COMMENTS - 2}}  # {text}" if text else entry
+
+
 def section_lines(
     name: str,
     section: Mapping[str, Any],
@@ -72,7 +77,7 @@ def section_lines(
             continue
         written = f"{value:.12g}" if isinstance(value, float) else as_toml(value)
         entry = f"# {key} =" if value is None else f"{start}{key} = {written}"
-        lines.append(f"{entry:<{_COMMENTS}}# {meaning[key]}" if key in meaning else entry)
+        lines.append(commented(entry, meaning.get(key)))
     for key, values in inner.items():
         lines += section_lines(f"{name}.{key}", values, {})
     return lines
