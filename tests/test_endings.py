@@ -233,3 +233,14 @@ def test_what_a_stopped_import_says_is_not_an_internal_error(monkeypatch):
     assert "internal error" in running._ended(error, [])[1]
     monkeypatch.setattr(running, "_received", [signal.SIGINT])
     assert running._ended(error, []) == (1, "stopped by the user")
+
+
+def test_progress_is_told_in_lines_where_there_is_no_terminal(run, monkeypatch):
+    run()  # sets what these tests do without
+    monkeypatch.setattr("hotlever.cli.output.FIRST_LINE_S", 0.0)
+    monkeypatch.setattr("hotlever.cli.output.NEXT_LINE_S", 0.0)
+    status, out, err = run("sweep", "--bias", "1:2:2")
+    assert status == 0
+    assert out.startswith("bias_V,")
+    assert err.splitlines()[0].startswith("sweep: ")
+    assert " of " in err.splitlines()[0]

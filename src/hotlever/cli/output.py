@@ -6,6 +6,7 @@ Nothing heavy is imported above a bar of progress.
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, cast
@@ -14,6 +15,9 @@ from hotlever.errors import HotleverError
 
 if TYPE_CHECKING:
     from hotlever.types import Progress
+
+#: When progress is first told in a line, and how long after that again (s).
+FIRST_LINE_S, NEXT_LINE_S = 2.0, 10.0
 
 
 def give(result: str = "") -> None:
@@ -84,6 +88,19 @@ def fail(message: str) -> None:
         tell(f"hotlever: {message}")
 
 
+def _lines(label: str) -> Progress:
+    """Return what tells progress in lines, seldom, and not at all of what takes little time."""
+    due = time.monotonic() + FIRST_LINE_S
+
+    def update(done: int, total: int) -> None:
+        nonlocal due
+        if time.monotonic() >= due and done < total:
+            tell(f"{label}: {done} of {total}")
+            due = time.monotonic() + NEXT_LINE_S
+
+    return update
+
+
 @contextmanager
 def progress(label: str) -> Iterator[Progress]:
     """Show a progress bar on standard error while the block runs.
@@ -97,9 +114,9 @@ def progress(label: str) -> Iterator[Progress]:
 
 @contextmanager
 def progress_bars(*labels: str) -> Iterator[tuple[Progress, ...]]:
-    """Show several progress bars, each from its first call on."""
+    """Show several progress bars, each from its first call on; lines where there is no terminal."""
     if sys.stderr is None or not sys.stderr.isatty():
-        yield tuple(lambda done, total: None for _ in labels)
+        yield tuple(_lines(label) for label in labels)
         return
     from rich import progress as rich
     from rich.console import Console
