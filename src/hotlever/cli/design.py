@@ -14,7 +14,7 @@ from hotlever.cli.options import (
     load_probe,
     parse_vary,
 )
-from hotlever.cli.output import give, progress
+from hotlever.cli.output import give, note, progress
 from hotlever.errors import InputError
 from hotlever.files import Outputs, write_text
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
@@ -59,6 +59,7 @@ def design_command(
     start.value(name)
     with progress("design") as update:
         data = study.vary(start, name, values, power_mW=power, air=air, progress=update)
+    note(*study.knee_notes(data))
     with outputs.together():
         if output is not None:
             write_text(output, study.design_csv(data))

@@ -58,13 +58,18 @@ def data_and_model(
         Whether it had priors: its data scatter less, or are marked.
     """
     usual = usual_scatter(with_priors)
-    panels = (
+    every = (
         ("current", "heater current I$_h$ (mA)", "current_mA", "µA", 1000.0),
         ("reader", "reader voltage V$_r$ (V)", "reader_V", "mV", 1000.0),
         ("tip", "tip temperature (K)", "tip_K", "K", 1.0),
     )
-    bias = measured.bias.values
-    with figure(8.4, 4.6, 2, 3, sharex=True, height_ratios=(1.8, 1.0)) as (made, grid):
+    # a lever without a reader shows no voltage of it
+    panels = [panel for panel in every if model[panel[2]].notnull().any()]
+    bias, shape = measured.bias.values, (2, len(panels))
+    with figure(2.8 * len(panels), 4.6, *shape, sharex=True, height_ratios=(1.8, 1.0)) as (
+        made,
+        grid,
+    ):
         for (upper, lower), (name, label, column, unit, factor) in zip(grid.T, panels, strict=True):
             data, values = measured[column].values, model[column].values
             upper.plot(bias, values, "-", color=BLUE, label="model")

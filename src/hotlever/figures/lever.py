@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import groupby
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,12 +30,16 @@ from hotlever.figures.style import (
 )
 from hotlever.materials import HIGH_DOPED
 from hotlever.probe import Layout, Region
-from hotlever.spieser2017 import BASE_TEMPERATURE_K, POWER_LAW_SPREAD_K
+from hotlever.spieser2017 import BASE_TEMPERATURE_K, POWER_LAW_SPREAD_K, PublishedPoint
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from hotlever.lever.fields import FieldMap
+
+
+#: Characters of a title that have room above a drawing.
+_TITLE = 90
 
 
 def _marker(sweep: xr.Dataset, marker: str = "o") -> str:
@@ -87,7 +92,10 @@ def probe_drawing(layout: Layout, title: str = "") -> Figure:
             bottom - wider[(1, True) in labelled] * margin,
             high + wider[(1, False) in labelled] * margin,
         )
-        axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)", title=title)
+        axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)")
+        if title:
+            lines = "\n".join(wrap(title, _TITLE))
+            made.suptitle(lines, x=0.01, ha="left", fontsize=9, parse_math=False)
         made.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
     return made
 
@@ -177,6 +185,7 @@ def iv_curves(
     sweeps: Mapping[str, xr.Dataset],
     knees: Mapping[str, xr.Dataset] | None = None,
     measured: xr.Dataset | None = None,
+    published: Sequence[PublishedPoint] = (),
 ) -> Figure:
     """Draw heater current against lever voltage (paper's Figs. 6a and 10a), with the knees.
 
@@ -188,6 +197,7 @@ def iv_curves(
         By label of a sweep and in their order, the one state returned by `Lever.knee`.
     measured : xarray.Dataset, optional
         From `Measurement.dataset`.
+    published : sequence of `hotlever.spieser2017` operating points, optional
     """
     with figure(4.8, 3.6) as (made, axes):
         for (name, sweep), colour in zip(sweeps.items(), COLOURS, strict=False):
@@ -199,6 +209,12 @@ def iv_curves(
             seen = f"knee{'' if len(sweeps) < 2 else f' in {name}'}: {knee.tip_K.item():.0f} K"
             seen += f", {knee.lever_V.item():.2f} V, {knee.current_mA.item():.2f} mA"
             axes.plot(knee.lever_V, knee.current_mA, "D", ms=6, color=colour, label=seen)
+        for place, point in enumerate(published):
+            label = None if place else "published operating points"
+            ring: Any = {"mfc": "none", "mec": VERMILION, "ms": 9, "ls": "none", "label": label}
+            axes.plot(point.lever_V, point.current_mA, "o", **ring)
+            at: Any = {"xytext": (-4, -13), "textcoords": "offset points", "ha": "right"}
+            axes.annotate(point.name, (point.lever_V, point.current_mA), fontsize=8, **at)
         axes.set(xlabel="lever voltage V$_l$ (V)", ylabel="heater current I$_h$ (mA)")
         axes.set(xlim=(0, None), ylim=(0, None))
         axes.legend(loc="upper left")

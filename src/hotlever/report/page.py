@@ -5,17 +5,46 @@ from __future__ import annotations
 import base64
 import io
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import jinja2
+from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from hotlever import __version__
 from hotlever.figures import save_figure
 from hotlever.files import output_folder, write_text
+
+#: Sections from which on a page has a list of them.
+_CONTENTS_FROM = 5
+_DOI = re.compile(r"doi:(10\.\d{4,9}/[^\s,;]*[^\s,;.])")
+
+
+class Linked(str):
+    """A cell of a table that leads to a section of the page, by its `anchor`."""
+
+    anchor: str
+
+    def __new__(cls, text: str, anchor: str) -> Linked:
+        """Make a cell of a text and what it leads to."""
+        made = super().__new__(cls, text)
+        made.anchor = anchor
+        return made
+
+
+def _anchor(text: str) -> str:
+    """Return what a link to a section of this heading ends in."""
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+
+
+def _with_links(text: str) -> Markup:
+    """Return a text whose DOIs are links."""
+    link = r'<a href="https://doi.org/\1">doi:\1</a>'
+    return Markup(_DOI.sub(link, str(escape(text))))
 
 
 @dataclass
@@ -28,7 +57,13 @@ class Page:
 
     def heading(self, text: str) -> None:
         """Start a section."""
-        self.blocks.append({"kind": "heading", "text": text})
+        self.blocks.append({"kind": "heading", "text": text, "anchor": _anchor(text)})
+
+    @property
+    def anchor(self) -> str:
+        """That of the section being filled; nothing before the first."""
+        found = [block["anchor"] for block in self.blocks if block["kind"] == "heading"]
+        return found[-1] if found else ""
 
     def text(self, text: str) -> None:
         """Add a paragraph."""
@@ -72,8 +107,13 @@ class Page:
         environment = jinja2.Environment(
             loader=jinja2.PackageLoader("hotlever", "report"), **options
         )
+        environment.filters["with_links"] = _with_links
         html = environment.get_template("page.html.j2").render(
-            title=self.title, summary=self.summary, blocks=blocks, version=__version__
+            title=self.title,
+            summary=self.summary,
+            blocks=blocks,
+            version=__version__,
+            contents_from=_CONTENTS_FROM,
         )
         write_text(target / "index.html", html)
         return target / "index.html"

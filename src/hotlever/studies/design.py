@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from hotlever.datasets import labelled
-from hotlever.errors import ComputationError, unknown_name
+from hotlever.errors import unknown_name
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
 from hotlever.materials.doping import diffusion_length
@@ -185,7 +185,7 @@ def sensitivities(
     """
     base = quantities(design.probe, power_mW, air)
     if np.isnan(base["knee_K"]):
-        raise ComputationError("the design has no knee below the highest temperature of the laws")
+        Lever(design.probe.in_medium("vacuum"), DESIGN_MESH).knee()  # says why
     columns: dict[str, list[float]] = {f"by_{key}": [] for key in QUANTITIES}
     value = [design.value(name) for name in names]
     for name, here in each(list(zip(names, value, strict=True)), progress):
@@ -202,6 +202,16 @@ def sensitivities(
     return labelled(
         {**alone, **columns, "value": value}, "name", {"name": list(names)}, power_mW=power_mW
     )
+
+
+def knee_notes(data: xr.Dataset) -> list[str]:
+    """Say for which values of a sweep of a design there is no knee, and why."""
+    (name,) = data.dims
+    without = data[name].values[np.isnan(data.knee_K.values)]
+    if not without.size:
+        return []
+    values = ", ".join(f"{value:g}" for value in without)
+    return [f"no knee with {name} = {values}: the lever voltage rises until something melts"]
 
 
 def sensitivity_text(data: xr.Dataset) -> str:

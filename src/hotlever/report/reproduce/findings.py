@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from hotlever.lever import Lever
-from hotlever.report.page import Page
+from hotlever.report.page import Linked, Page
 from hotlever.spieser2017 import DOI, RAMP
 from hotlever.types import Progress
 
@@ -51,14 +51,14 @@ class Findings(Page):
         found: str,
         *,
         holds: bool,
-        within: str = "",
+        as_found: str = "",
         because: str = "",
     ) -> None:
-        """Add a claim of the paper: how closely it holds in this run, or why it does not."""
-        verdict = f"holds within {within}" if within else "holds"
+        """Add a claim of the paper: how it holds in this run (`as_found`), or why it does not."""
+        verdict = f"holds{as_found}"
         if not holds:
             verdict = f"does not hold here, because {because}"
-        self.claims.append((where, statement, verdict, found))
+        self.claims.append((Linked(where, self.anchor), statement, verdict, found))
 
     def columns(self, columns: Mapping[str, tuple[xr.DataArray, str]], caption: str) -> None:
         """Add a table of some values and their format by heading."""

@@ -117,7 +117,7 @@ def _option_claims(page: Findings, name: str, fits: dict[str, Fit]) -> None:
         f"strongest correlation between groups {third:.2f} with one noise for all "
         f"observables, as the paper has it; {own:.2f} when each has its own",
         holds=third < 0.6,
-        within=f"a correlation of {third:.2f} between groups",
+        as_found=f": between groups {third:.2f} is the strongest correlation",
         because=f"a correlation of {third:.2f} is left between groups",
     )
     first, third = (_hot_error(fits[option]) for option in ("I", "III"))
