@@ -48,6 +48,7 @@ DEPARTURES = {
     "mobility": "carriers as in MINIMOS, scattered less by impurities when hot, instead of Eq. 8",
     "drift": "a gain that drifts by 0.05 % over the ramp",
     "outliers": "in a third of the twins, one or two currents off by 10 to 50 times the noise",
+    "thermometer": "Raman temperatures off together, by 2 % of the rise",
 }
 ALL = tuple(DEPARTURES)
 KINDS = ("iv", "reader", "raman")
@@ -150,9 +151,11 @@ def measured(
         at = np.linspace(HOT, 0.98 * tip.max(), RAMAN_POINTS)
         some = np.searchsorted(tip, at).clip(0, POINTS - 1)
         (alone, common), base = RAMAN, true.circuit.base_temperature_K
-        scale = 1.0 + common * rng.standard_normal()
+        together_off = rng.standard_normal() * ("thermometer" in departures)
+        scale = 1.0 + common * together_off
         rise = (tip - base)[some] * scale * (1.0 + alone * rng.standard_normal(some.size))
-        tips[some], errors[some] = base + rise, np.hypot(alone, common) * (tip[some] - base)
+        stated = np.hypot(alone, common) if "thermometer" in departures else alone
+        tips[some], errors[some] = base + rise, stated * (tip[some] - base)
     current = noisy(sweep.current_mA.values)
     if "outliers" in departures and rng.random() < _SOME:
         places = rng.choice(POINTS, rng.integers(1, 3), replace=False)
