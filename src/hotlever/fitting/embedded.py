@@ -1,4 +1,4 @@
-"""What fit and calibration files have in common: JSON without NaN, and the measurement inside."""
+"""What fit and calibration files have in common: their sections, and the measurement inside."""
 
 from __future__ import annotations
 
@@ -101,12 +101,3 @@ def array(values: Sequence[Any], shape: tuple[int, ...], where: str) -> Array:
         raise InputError(
             f"{where}: expected numbers in {' × '.join(map(str, shape))} places"
         ) from None
-
-
-def without_nan(value: Any) -> Any:
-    """Replace NaN by None in plain values: JSON has no NaN."""
-    if isinstance(value, dict):
-        return {key: without_nan(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [without_nan(entry) for entry in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -158,10 +158,10 @@ def estimate(
     weights = "errors" if known else options.weights
     common = errors_of_scales(measurement, observables, priors) if known else []
     residuals = Residuals(measurement, observables, weights, options.drift, common=common)
-    if not known and residuals.size < len(options.varied):
+    if not known and residuals.different < len(options.varied):
         raise InputError(
-            f"{measurement.path or 'measurement'}: {residuals.size} data for "
-            f"{len(options.varied)} parameters; fix some or measure more"
+            f"{measurement.path or 'measurement'}: {residuals.different} different data for "
+            f"{len(options.varied)} parameters; fix some or measure at more biases"
         )
     names = tuple(dict.fromkeys([*options.usual, *options.varied]))
     make = model or partial(forward_model, names=names)

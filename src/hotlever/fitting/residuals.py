@@ -19,6 +19,8 @@ from hotlever.types import Array
 _HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
 #: A point is named as suspicious beyond this many standard deviations.
 _SUSPICIOUS = 8.0
+#: So many of them are named, those furthest off.
+_NAMED = 10
 
 
 class Residuals:
@@ -111,6 +113,11 @@ class Residuals:
     def size(self) -> int:
         """How many data count."""
         return int(self.present.sum())
+
+    @property
+    def different(self) -> int:
+        """How many of them are at different biases: the same again tells of noise only."""
+        return sum(np.unique(self.bias[row]).size for row in self.present)
 
     @property
     def by(self) -> Array:
@@ -246,13 +253,16 @@ class Residuals:
     def suspicious(self, values: Array, robust: bool) -> list[str]:
         """Name the points that lie far outside the scatter of the others."""
         advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
-        return [
-            f"{name} at {bias:g} V is {abs(deviation):.0f} standard deviations from the fit; "
-            f"{advice}"
-            for name, row in zip(self.observables, self.deviations(values), strict=True)
-            for bias, deviation in zip(self.bias, row, strict=True)
-            if abs(deviation) > _SUSPICIOUS
+        size = np.abs(self.deviations(values))
+        odd = np.argwhere(size > _SUSPICIOUS)
+        worst = np.sort(np.argsort(-size[tuple(odd.T)], kind="stable")[:_NAMED])
+        found = [
+            f"{self.observables[row]} at {self.bias[place]:g} V is {size[row, place]:.0f} standard "
+            f"deviations from the fit; {advice}"
+            for row, place in odd[worst].tolist()
         ]
+        more = len(odd) - len(found)
+        return [*found, f"{more} more data are as far from the fit"] if more else found
 
     def zeros(self, values: Array, slopes: Array) -> list[str]:
         """Say how the zeros drift, or that they seem to."""
