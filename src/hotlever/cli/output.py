@@ -10,10 +10,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, cast
 
-from hotlever.errors import HotleverError
+from hotlever.errors import HotleverError, shown
 
 if TYPE_CHECKING:
     from hotlever.types import Progress
+
+#: Characters of a line that says what went wrong.
+_LONGEST = 1200
 
 
 def give(result: str = "") -> None:
@@ -79,9 +82,9 @@ def note(*texts: str) -> None:
 
 
 def fail(message: str) -> None:
-    """Say what went wrong."""
+    """Say what went wrong, in a line that can be read whatever it quotes."""
     if message:
-        tell(f"hotlever: {message}")
+        tell(f"hotlever: {shown(message, _LONGEST)}")
 
 
 @contextmanager

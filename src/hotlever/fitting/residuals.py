@@ -82,7 +82,10 @@ class Residuals:
                 raise InputError(f"{self._where}: all values of {name} are 0")
         self.without_errors = np.zeros(len(self.rows), dtype=bool)
         self.errors_known = weights == "errors" and data_weights is None
-        self._scale = np.broadcast_to(self.largest, self.data.shape).copy()
+        rows = measurement.rows
+        #: Of how many rows each is the mean, as a root: by it errors are smaller.
+        self._root = np.ones(self.bias.size) if rows is None else np.sqrt(rows[self._used])
+        self._scale = self.largest / self._root
         self.down = np.ones(self.data.shape)
         if self.errors_known:
             self._scale = self._measured_errors()
@@ -106,7 +109,7 @@ class Residuals:
                     "one for each of its values or none at all"
                 )
         self.without_errors = np.all(np.isnan(errors), axis=1)
-        guessed = np.broadcast_to(0.01 * self.largest, errors.shape)
+        guessed = 0.01 * self.largest / self._root
         return np.where(np.isfinite(errors), errors, guessed)
 
     @property
@@ -195,12 +198,12 @@ class Residuals:
 
         Data may be off by their own errors, if they have some.
         """
-        difference = self.difference(values)
+        difference = self.difference(values) * self._root
         scatter = 1.4826 * np.nanmedian(np.abs(difference), axis=1, keepdims=True)
         # data without noise have no scatter to measure against
         least = np.broadcast_to(1e-4 * self.largest, difference.shape)
         if self.errors_known:
-            least = np.where(self.without_errors[:, None], least, self._scale)
+            least = np.where(self.without_errors[:, None], least, self._scale * self._root)
         return np.nan_to_num(difference / np.maximum(scatter, least))
 
     def lessen(self, values: Array, gently: bool) -> None:
@@ -221,13 +224,14 @@ class Residuals:
         datum more: a few data say little of their own.
         """
         weight = np.where(self.present, self.down**2, 0.0)
-        squares = np.nansum(weight * self.difference(values) ** 2, axis=1, keepdims=True)
+        difference = self.difference(values) * self._root
+        squares = np.nansum(weight * difference**2, axis=1, keepdims=True)
         count = weight.sum(axis=1, keepdims=True)
         if usual:
             squares, count = squares + (usual * self.largest) ** 2, count + 1.0
         rms = np.sqrt(squares / np.maximum(count - used_up, 1.0))
         scatter = np.maximum(rms, 1e-6 * self.largest)
-        self._scale = np.where(self.without_errors[:, None], scatter, self._scale)
+        self._scale = np.where(self.without_errors[:, None], scatter / self._root, self._scale)
 
     def rms(self, values: Array) -> dict[str, float]:
         """Return the rms of data minus prediction by column, for every observable with data."""
