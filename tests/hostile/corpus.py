@@ -244,7 +244,7 @@ _TEXT = [
 def _another_value(raw: bytes, rng: np.random.Generator) -> bytes:
     try:
         content = json.loads(raw)
-    except ValueError:
+    except (ValueError, RecursionError):
         return _flipped(raw, rng)
     inside = content
     for _ in range(rng.integers(6)):
