@@ -30,7 +30,7 @@ docs: env
 
 lock: env
 	$(BIN)/pip install "pip-tools>=7.4"
-	$(BIN)/pip-compile --quiet --strip-extras --no-emit-index-url --no-emit-find-links \
+	$(BIN)/pip-compile --quiet --strip-extras --generate-hashes --no-emit-index-url --no-emit-find-links \
 	    --no-header --all-extras --output-file requirements.lock pyproject.toml
 
 clean:

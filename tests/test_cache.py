@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
+import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -75,10 +79,65 @@ def test_a_cache_that_cannot_be_used_is_no_reason_to_stop(tmp_path, monkeypatch,
 def test_keys_follow_the_code(folder, monkeypatch):
     before = cache_file("kind", {"number": 1})
     assert cache_file("kind", {"number": 1}) == before
-    cache._code.cache_clear()
-    monkeypatch.setattr(cache, "_MAKERS", ("materials",))
+    monkeypatch.setattr(cache, "_code", lambda: b"another law")
     assert cache_file("kind", {"number": 1}) != before
-    cache._code.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("changed", "matters"),
+    [
+        ("materials/silicon.py", True),
+        ("lever/transient/modes.py", True),
+        ("spieser2017.py", True),
+        ("cli/sweep.py", False),
+        ("figures/air.py", False),
+    ],
+)
+def test_a_changed_law_meets_no_old_state(tmp_path, changed, matters):
+    package = Path(cache.__file__).parent
+    copy = tmp_path / "hotlever"
+    shutil.copytree(package, copy, ignore=shutil.ignore_patterns("__pycache__", "examples"))
+    before = cache.code_digest(copy)
+    assert before == cache.code_digest(package)
+    with (copy / changed).open("a") as file:
+        file.write("# changed\n")
+    assert (cache.code_digest(copy) != before) is matters
+
+
+def test_all_that_the_makers_import_is_in_the_digest():
+    """A package that they begin to import has to be named as one of them."""
+    names = [f"hotlever.{name}" for name in cache._MAKERS]
+    script = (
+        "import importlib, pkgutil, sys\n"
+        f"for package in map(importlib.import_module, {names}):\n"
+        "    for one in pkgutil.walk_packages(package.__path__, package.__name__ + '.'):\n"
+        "        importlib.import_module(one.name)\n"
+        "print(*{name.split('.')[1] for name in sys.modules if name.startswith('hotlever.')})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    package = Path(cache.__file__).parent
+    beside = {file.stem for file in package.glob("*.py")}
+    assert set(done.stdout.split()) <= {*cache._MAKERS, *beside}
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="needs to become another user")
+def test_a_cache_that_may_not_be_read_or_written_only_costs_time(folder):
+    path = kept()
+    for mode in (0o000, 0o500):
+        child = os.fork()
+        if child == 0:  # permissions do not hold for root
+            os.chmod(folder, mode)
+            os.setuid(65534)
+            ended = 1
+            with suppress(BaseException):
+                store_arrays(path, ARRAYS)
+                ended = int(stored(path, dict) is not None)
+            os._exit(ended)
+        assert os.waitpid(child, 0)[1] == 0
+    os.chmod(folder, 0o700)
+    assert stored(path, dict) is not None
 
 
 def test_what_was_not_used_for_longest_goes_first(folder, monkeypatch):

@@ -13,10 +13,12 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+import dask
 import psutil
 import pytest
+from distributed import LocalCluster, Security
 
-from hotlever.cluster import local_client, run_all
+from hotlever.cluster import local_client, remote_client, run_all
 from hotlever.errors import ComputationError, InputError
 
 # --- tasks --------------------------------------------------------------------------------------
@@ -136,7 +138,7 @@ def test_nobody_without_credentials_is_answered(client):
 
 SCRIPT = """
 import os, sys
-from hotlever.cluster import local_client, run_all
+from hotlever.cluster import local_client, remote_client, run_all
 sys.path.insert(0, {folder!r})
 from test_cluster import slow, workers
 if __name__ == "__main__":
@@ -185,3 +187,39 @@ def test_workers_that_do_not_start_are_said(tmp_path):
         [sys.executable, str(tmp_path / "script.py")], capture_output=True, text=True, check=False
     )
     assert "ComputationError: the worker processes could not be started" in ended.stderr
+
+
+@pytest.fixture
+def credentials(tmp_path, monkeypatch):
+    """Files of credentials, as the settings name them that the environment makes."""
+    made = Security.temporary()
+    files = {
+        "ca-file": "tls_ca_file",
+        "client.cert": "tls_client_cert",
+        "client.key": "tls_client_key",
+    }
+    for attribute in files.values():
+        (tmp_path / attribute).write_text(getattr(made, attribute))
+    settings = {f"distributed.comm.tls.{key}": str(tmp_path / name) for key, name in files.items()}
+    with dask.config.set(settings):
+        yield made
+
+
+def test_a_scheduler_with_tls_is_found_by_dask_s_settings(credentials):
+    options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "protocol": "tls"}
+    with (
+        LocalCluster(security=credentials, dashboard_address="127.0.0.1:0", **options) as cluster,
+        remote_client(cluster.scheduler_address) as client,
+    ):
+        assert cluster.scheduler_address.startswith("tls://")
+        assert dict(run_all(client, square, [(3,)])) == {0: 9}
+
+
+@pytest.mark.parametrize(
+    ("missing", "words"),
+    [(None, "no credentials for TLS, expected .*CA_FILE is not set"), ("none.pem", "no such file")],
+)
+def test_tls_without_credentials_is_one_line(missing, words):
+    settings = {"distributed.comm.tls.ca-file": missing}
+    with dask.config.set(settings), pytest.raises(InputError, match=words):
+        remote_client("tls://127.0.0.1:1").__enter__()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import resource
 import socket
@@ -16,6 +17,7 @@ from hotlever import files
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import (
     Outputs,
+    json_text,
     output_folder,
     read_bytes,
     read_json,
@@ -134,6 +136,11 @@ def test_json_numbers_keep_their_kind(tmp_path):
     values = read_json(tmp_path / "x")
     assert [type(value) for value in values.values()] == [int, float, int]
     assert values["c"] == 220000000000000000000
+
+
+def test_what_is_no_finite_number_is_null_in_json():
+    text = json_text({"a": float("nan"), "b": [1.0, float("inf"), {"c": -float("inf")}], "d": "κ"})
+    assert json.loads(text) == {"a": None, "b": [1.0, None, {"c": None}], "d": "κ"}
 
 
 # --- writing ------------------------------------------------------------------------------------

@@ -66,10 +66,19 @@ def cache_file(kind: str, facts: Mapping[str, Any]) -> Path | None:
 @functools.cache
 def _code() -> bytes:
     """Return a digest of the code that makes what is kept."""
+    return code_digest(Path(__file__).parent)
+
+
+def code_digest(package: Path) -> bytes:
+    """Return a digest of the packages that make what is kept, and of the modules beside them.
+
+    All that these import of the rest is among the modules.
+    """
     content = hashlib.sha256(__version__.encode())
-    for name in _MAKERS:
-        for file in sorted(Path(__file__).with_name(name).glob("*.py")):
-            content.update(file.read_bytes())
+    inside = (file for name in _MAKERS for file in (package / name).rglob("*.py"))
+    for file in sorted([*package.glob("*.py"), *inside]):
+        content.update(f"{file.relative_to(package)}\n".encode())
+        content.update(file.read_bytes())
     return content.digest()
 
 

@@ -23,6 +23,7 @@ from distributed.diagnostics.plugin import WorkerPlugin
 from hotlever import __version__
 from hotlever.cache import CACHE_VARIABLE, cache_folder
 from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.files import read_text
 from hotlever.types import Progress
 
 T = TypeVar("T")
@@ -49,6 +50,12 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: Those that Dask gives levels of their own.
 _LOGGERS = ("distributed", "distributed.client")
 _KILLED = ComputationError("every process that tried it died; too little memory?")
+#: Dask's settings of TLS, and the variables of the environment that set them.
+_CREDENTIALS = {
+    "ca-file": "DASK_DISTRIBUTED__COMM__TLS__CA_FILE",
+    "client.cert": "DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT",
+    "client.key": "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY",
+}
 _LOST = "the scheduler is lost; what was done until then is written"
 
 
@@ -292,13 +299,46 @@ def remote_client(address: str) -> Iterator[Client]:
             logging.getLogger(name).setLevel(level)
 
 
+def is_open(address: str) -> bool:
+    """Whether anybody on the network who finds a scheduler may use it, and its workers.
+
+    Examples
+    --------
+    >>> [is_open(one) for one in ("tcp://node7:8786", "tls://node7:8786", "tcp://127.0.0.1:8786")]
+    [True, False, False]
+    """
+    scheme, _, rest = address.rpartition("://")
+    host = rest.rpartition(":")[0].strip("[]")
+    return scheme != "tls" and not (host in ("localhost", "::1") or host.startswith("127."))
+
+
+def _check_credentials(where: str) -> None:
+    """Check that Dask's settings name the files with which TLS is spoken.
+
+    Raises
+    ------
+    InputError
+        If they name none, or one that cannot be read.
+    """
+    for setting, variable in _CREDENTIALS.items():
+        path = dask.config.get(f"distributed.comm.tls.{setting}", None)
+        if not path:
+            raise InputError(
+                f"{where}: no credentials for TLS, expected the names of their files in "
+                f"{', '.join(_CREDENTIALS.values())}; {variable} is not set"
+            )
+        read_text(path)
+
+
 @contextmanager
 def _connected(address: str, where: str) -> Iterator[Client]:
+    if address.startswith("tls://"):
+        _check_credentials(where)
     try:
         client = Client(address, timeout=_PATIENCE_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(
-            f"{where}: no scheduler answers there, expected one like tcp://HOST:8786"
+            f"{where}: no scheduler answers there, expected one like tls://HOST:8786"
         ) from error
     with client:
         try:

@@ -183,10 +183,19 @@ def labelled(
 def csv_text(data: xr.Dataset, columns: Sequence[str]) -> str:
     """Return columns of a dataset as CSV text; empty where a value does not exist."""
     rows = (
-        ",".join("" if math.isnan(value) else f"{value:.10g}" for value in row)
+        ",".join(f"{value:.10g}" if math.isfinite(value) else "" for value in row)
         for row in zip(*(data[name].values for name in columns), strict=True)
     )
     return "\n".join([",".join(columns), *rows]) + "\n"
+
+
+def frame_text(frame: Any, **options: Any) -> str:
+    """Return a `pandas.DataFrame` as CSV text; empty where there is no finite number.
+
+    The options are those of `pandas.DataFrame.to_csv`.
+    """
+    finite = frame.replace([math.inf, -math.inf], math.nan)
+    return str(finite.to_csv(lineterminator="\n", **options))
 
 
 def write_dataset(data: xr.Dataset, path: str | os.PathLike[str], columns: Sequence[str]) -> None:

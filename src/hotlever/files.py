@@ -112,7 +112,17 @@ def read_json(path: Name) -> dict[str, Any]:
 
 def json_text(content: dict[str, Any]) -> str:
     """Return the text of a JSON file that people may read."""
-    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+    plain = without_nan(content)
+    return json.dumps(plain, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def without_nan(value: Any) -> Any:
+    """Replace what is no finite number by None in plain values: JSON has no other word for it."""
+    if isinstance(value, dict):
+        return {key: without_nan(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [without_nan(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 # --- writing ------------------------------------------------------------------------------------

@@ -33,6 +33,13 @@ def shown(curve: IVCurve, rows: slice = slice(None), **changed: np.ndarray) -> M
     return replace(data, **some)
 
 
+def test_equal_rows_are_no_curve(curve):
+    equal = {name: np.full(30, getattr(curve, name)[5]) for name in ("bias_V", "current_mA")}
+    nothing = dict.fromkeys(("reader_V", "tip_K", "tip_error_K"), np.full(30, np.nan))
+    with pytest.raises(InputError, match="at 1 different biases above 0, expected 3 or more"):
+        calibrate(Measurement(**equal, **nothing))
+
+
 @pytest.mark.parametrize(
     ("bias", "current", "probe", "message"),
     [

@@ -13,6 +13,7 @@ from hotlever.errors import BranchEndError, ComputationError, InputError
 from hotlever.fitting import Measurement, fit, read_measurement
 from hotlever.fitting.measurement import with_measured_circuit
 from hotlever.fitting.models import full_model, reduced_model
+from hotlever.fitting.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced import ReducedLever
@@ -125,6 +126,17 @@ def test_wrong_points_are_named_and_a_robust_fit_sets_them_aside(coarse, coarse_
     assert plain.parameters["c_kappa"].stderr > 10 * robust.parameters["c_kappa"].stderr
 
 
+def test_of_many_wrong_points_the_worst_are_named(coarse):
+    data = Measurement.of_sweep(coarse.sweep(np.linspace(1.0, 9.0, 200)))
+    values = np.stack([data.current_mA, data.reader_V, data.tip_K])
+    data.current_mA[::3] *= 1.1
+    data.current_mA[30] *= 2.0
+    *named, last = Residuals(data, ["current", "tip"]).suspicious(values, robust=False)
+    assert len(named) == 10
+    assert any(f"at {data.bias_V[30]:g} V" in text for text in named)
+    assert last == f"{67 - 10} more data are as far from the fit"
+
+
 def test_good_data_raise_no_suspicion(coarse, coarse_model):
     notes = fit(twin(coarse, noise=2e-3), model=coarse_model).notes
     assert not any("standard deviations" in note for note in notes)
@@ -201,8 +213,14 @@ def test_an_observable_without_data_is_refused(coarse):
 
 def test_too_few_data_are_refused(coarse):
     one = Measurement(*(np.array([value]) for value in (5.0, 0.7, 0.3, 380.0, 5.0)))
-    with pytest.raises(InputError, match="3 data for 6 parameters"):
+    with pytest.raises(InputError, match="3 different data for 6 parameters"):
         fit(one)
+
+
+def test_the_same_row_again_is_no_further_datum(coarse):
+    equal = Measurement(*(np.full(30, value) for value in (5.0, 0.7, 0.3, 380.0, 5.0)))
+    with pytest.raises(InputError, match=r"3 different data for 6 parameters; .* more biases"):
+        fit(equal)
 
 
 def test_an_unsolvable_start_is_reported(coarse, coarse_model):

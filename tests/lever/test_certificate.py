@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hotlever.errors import ComputationError
 from hotlever.lever.atlas import BOX, material_in_box
 from hotlever.lever.branch import Reach
-from hotlever.lever.certificate import estimated_error
+from hotlever.lever.certificate import certified_branch, estimated_error
 from hotlever.lever.reduction import ReductionOptions, reduce
 from hotlever.lever.sensitivities import at_fixed_bias
+from hotlever.materials.parameters import OF_SILICON
 
 
 @pytest.fixture(scope="module")
@@ -33,3 +35,25 @@ def test_the_estimate_bounds_the_true_error_without_exaggeration(coarse, poor, s
     assert np.all(true <= estimate)
     largest = np.argmax(true, axis=1)
     assert np.all(estimate[range(3), largest] < 10.0 * true[range(3), largest])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_reduced_lever_by_itself_is_accurate_or_refused(coarse, reduced, seed):
+    """Materials over the full bounds of a fit, and every second time those it was made for."""
+    rng = np.random.default_rng(seed)
+    if seed % 2:
+        material = material_in_box(coarse.probe.material, rng.uniform(0.0, 1.0, len(BOX)))
+    else:
+        known = {name: OF_SILICON[name] for name in BOX}
+        material = coarse.probe.material.with_(
+            **{name: rng.uniform(one.lower, one.upper) for name, one in known.items()}
+        )
+    lever = coarse.with_material(material)
+    try:
+        branch = certified_branch(lever, reduced, 6.0)
+    except ComputationError:
+        assert not seed % 2
+        return
+    bias = np.linspace(0.5, 6.0, 12)
+    full = lever.branch_to(6.0).read(lever.circuit, bias).u
+    assert np.abs(branch.read(lever.circuit, bias).u ** 2 - full**2).max() < 0.1

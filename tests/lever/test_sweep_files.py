@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from hotlever.datasets import csv_text, frame_text, labelled
 from hotlever.errors import InputError
 from hotlever.lever import probe_of, read_sweep, write_sweep
 from hotlever.lever.fields import FieldMapper, heater_profile, write_vtu
@@ -42,6 +43,14 @@ def test_netcdf_round_trip_keeps_units_and_the_probe(sweep, coarse, tmp_path):
         assert {"units", "long_name"} <= set(back[name].attrs)
     assert json.loads(back.attrs["material"])["c_kappa"] == 0.686
     assert back.attrs["software"].startswith("hotlever ")
+
+
+def test_what_is_no_finite_number_is_an_empty_cell():
+    columns = {"bias_V": [1.0, np.nan], "tip_K": [np.inf, 300.0]}
+    assert csv_text(labelled(columns), list(columns)) == "bias_V,tip_K\n1,\n,300\n"
+    assert frame_text(labelled(columns).to_dataframe(), index=False) == (
+        "bias_V,tip_K\n1.0,\n,300.0\n"
+    )
 
 
 def test_other_file_types_are_refused(sweep, tmp_path):

@@ -97,6 +97,7 @@ def test_left_out_sections_take_the_reference_values(tmp_path):
         ),
         ("= 3.2", "= = 3.2", r"probe.toml: not valid TOML: .*line 7"),
         ("n_d = 5.75e17", "n_d = nan", r"n_d = nan: input should be a finite number"),
+        ("gap_um = 3.2", "gap_um = true", r"gap_um = True: input should be a valid number"),
     ],
 )
 def test_errors_name_the_place_and_what_is_expected(tmp_path, old, new, message):
@@ -108,6 +109,13 @@ def test_errors_name_the_place_and_what_is_expected(tmp_path, old, new, message)
 def test_missing_file_is_one_line(tmp_path):
     with pytest.raises(InputError, match=r"nothing.toml: no such file"):
         Probe.from_file(tmp_path / "nothing.toml")
+
+
+def test_a_resistivity_stays_above_zero_down_to_the_base():
+    metallic = {"a0": 1e-4, "a1": 1e-5}
+    assert Probe.reference().with_(**metallic, base_temperature_K=300).material.a1 == 1e-5
+    with pytest.raises(InputError, match=r"resistivity of -0.0004 Ω cm at 250 K, expected more"):
+        Probe.reference().with_(**metallic, base_temperature_K=250)
 
 
 def test_with_values_reaches_every_section_and_answers_a_typo():

@@ -15,16 +15,15 @@ from hotlever.calibration.knee import Knee
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseCalibration, PulseSection
 from hotlever.calibration.words import calibration_text
-from hotlever.datasets import labelled
+from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
-from hotlever.files import json_text, write_text
+from hotlever.files import json_text, without_nan, write_text
 from hotlever.fitting.embedded import (
     EmbeddedMeasurement,
     Number,
     Section,
     array,
     embed,
-    without_nan,
 )
 from hotlever.fitting.measurement import Measurement
 from hotlever.probe import Circuit, Probe
@@ -190,7 +189,7 @@ class Calibration:
         if self.pulse is not None:
             return self.pulse.table_csv()
         frame = self.table[list(TABLE_COLUMNS)].to_dataframe()
-        return str(frame.to_csv(index=False, float_format="%.6g", na_rep="nan"))
+        return frame_text(frame, index=False, float_format="%.6g")
 
 
 def table_of(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:

@@ -42,10 +42,11 @@ def check_plausible(measured: Measurement, probe: Probe, causes: Causes) -> None
     """
     where = measured.path or "measurement"
     here = np.isfinite(measured.current_mA) & (measured.bias_V > 0) & (measured.current_mA > 0)
-    if here.sum() < _FEWEST:
+    different = np.unique(measured.bias_V[here]).size
+    if different < _FEWEST:
         raise InputError(
-            f"{where}: {here.sum()} rows with a bias and a current above 0, expected {_FEWEST} or "
-            "more"
+            f"{where}: currents above 0 at {different} different biases above 0, expected "
+            f"{_FEWEST} or more"
         )
     _check_temperatures(measured, probe, where)
     bias, current = measured.bias_V[here], measured.current_mA[here]

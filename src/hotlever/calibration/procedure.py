@@ -23,6 +23,7 @@ from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import ComputationError, InputError
 from hotlever.fitting import Fit, Measurement, read_fit
 from hotlever.fitting.measurement import with_measured_circuit
+from hotlever.fitting.measurement.averages import averaged, note_on_averages
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Circuit, Probe
@@ -93,7 +94,7 @@ def calibrate(
         raise InputError("a power law holds in vacuum; with one, leave the medium out")
     if law is not None and priors is not None:
         raise InputError("a power law takes no priors; a probe or a fit does")
-    measured = Measurement.given(measurement)
+    measured = averaged(whole := Measurement.given(measurement), robust=True)
     if fit is not None:
         fit = fit if isinstance(fit, Fit) else read_fit(fit)
         route, origin = f"fit in {fit.medium}", fit.probe
@@ -103,6 +104,7 @@ def calibrate(
     # a power law holds for vacuum, whatever the lever is in
     known = measured if law is None else replace(measured, medium=None)
     probe, notes = with_measured_circuit(origin, known, medium if law is None else "vacuum")
+    notes += note_on_averages(whole, measured)
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
         if samples:
             raise InputError("the paper's rule has no posterior; expected a probe or a fit")

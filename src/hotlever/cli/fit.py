@@ -74,7 +74,7 @@ def fit_command(
         None, metavar="N", help="Local processes; one for each processor if left out."
     ),
     scheduler: str | None = Option(
-        None, metavar="ADDRESS", help="Dask scheduler for several data files, as tcp://HOST:8786."
+        None, metavar="ADDRESS", help="Dask scheduler for several data files, as tls://HOST:8786."
     ),
 ) -> None:
     """Find the material parameters that make the model match a measurement.
@@ -175,11 +175,18 @@ def _fit_one(
 def _fit_several(
     data: list[Path], probe: Probe, options: FitOptions, where: dict[str, Any], to: Destination
 ) -> None:
+    from hotlever.cluster import is_open
     from hotlever.fitting.batch import fit_many
     from hotlever.fitting.levers import compare_levers, levers_csv
     from hotlever.fitting.words import levers_text
 
     outputs, output, report = to
+    scheduler = where["scheduler"]
+    if scheduler is not None and is_open(scheduler):
+        note(
+            f"--scheduler {scheduler}: without TLS whoever reaches this address can have its "
+            "workers run any code"
+        )
     if output is None and report is None:
         raise InputError(
             f"{len(data)} data files: expected -o FOLDER or --report DIR to write their fits to"

@@ -255,7 +255,9 @@ def parse_settings(settings: list[str] | None, probe: Probe) -> dict[str, Any]:
 def check_number(option: str, value: float | None, least: float, most: float) -> None:
     """Refuse a number out of bounds."""
     if value is not None and not least <= value <= most:
-        raise InputError(f"{option} {value:g}: expected a number from {least:g} to {most:g}")
+        # what is too long for a float is quoted as it stands
+        found = f"{value:g}" if abs(value) < 1e300 else quoted(value)
+        raise InputError(f"{option} {found}: expected a number from {least:g} to {most:g}")
 
 
 def parse_values(

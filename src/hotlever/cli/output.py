@@ -11,13 +11,15 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, cast
 
-from hotlever.errors import HotleverError
+from hotlever.errors import HotleverError, shown
 
 if TYPE_CHECKING:
     from hotlever.types import Progress
 
 #: When progress is first told in a line, and how long after that again (s).
 FIRST_LINE_S, NEXT_LINE_S = 2.0, 10.0
+#: Characters of a line that says what went wrong.
+_LONGEST = 1200
 
 
 def give(result: str = "") -> None:
@@ -83,9 +85,9 @@ def note(*texts: str) -> None:
 
 
 def fail(message: str) -> None:
-    """Say what went wrong."""
+    """Say what went wrong, in a line that can be read whatever it quotes."""
     if message:
-        tell(f"hotlever: {message}")
+        tell(f"hotlever: {shown(message, _LONGEST)}")
 
 
 def _lines(label: str) -> Progress:

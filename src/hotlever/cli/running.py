@@ -12,6 +12,7 @@ import signal
 import sys
 import tempfile
 import traceback
+import warnings
 from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
@@ -55,7 +56,9 @@ def _stop(number: int, _: FrameType | None) -> NoReturn:
 
 
 def _keep_to_ourselves() -> None:
-    """Keep what compiled libraries print, such as Netgen's warnings, out of the results."""
+    """Keep what libraries print out of the results, and their warnings to those who develop."""
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
     with suppress(OSError, AttributeError):
         results = os.dup(1)
         with open(os.devnull, "wb") as nowhere:

@@ -1,4 +1,4 @@
-"""What fit and calibration files have in common: JSON without NaN, and the measurement inside."""
+"""What fit and calibration files have in common: their sections, and the measurement inside."""
 
 from __future__ import annotations
 
@@ -58,6 +58,7 @@ class EmbeddedMeasurement(Section):
     gas_conductivity: float | None = None
     pressure_mbar: float | None = None
     columns: dict[str, list[Number]]
+    rows: list[Annotated[int, Field(ge=1)]] | None = None
 
     def measurement(self, where: str) -> Measurement:
         """Return the measurement; `where` names the file in an error.
@@ -77,6 +78,8 @@ class EmbeddedMeasurement(Section):
         }
         if not np.all(columns["bias_V"] >= 0):
             raise InputError(f"{where}: V_b: expected biases of 0 or more")
+        if self.rows is not None:
+            columns["rows"] = array(self.rows, (rows,), f"{where}: rows")
         return Measurement(**columns, **{name: getattr(self, name) for name in _NAMED})
 
 
@@ -84,7 +87,9 @@ def embed(measurement: Measurement) -> dict[str, Any]:
     """Return the content of an `EmbeddedMeasurement`."""
     columns = {name: getattr(measurement, attribute) for name, (attribute, _) in COLUMNS.items()}
     present = {name: values.tolist() for name, values in columns.items() if values is not None}
-    return {**{name: getattr(measurement, name) for name in _NAMED}, "columns": present}
+    averaged = {} if measurement.rows is None else {"rows": measurement.rows.astype(int).tolist()}
+    named = {name: getattr(measurement, name) for name in _NAMED}
+    return {**named, "columns": present, **averaged}
 
 
 def array(values: Sequence[Any], shape: tuple[int, ...], where: str) -> Array:
@@ -101,12 +106,3 @@ def array(values: Sequence[Any], shape: tuple[int, ...], where: str) -> Array:
         raise InputError(
             f"{where}: expected numbers in {' × '.join(map(str, shape))} places"
         ) from None
-
-
-def without_nan(value: Any) -> Any:
-    """Replace NaN by None in plain values: JSON has no NaN."""
-    if isinstance(value, dict):
-        return {key: without_nan(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [without_nan(entry) for entry in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

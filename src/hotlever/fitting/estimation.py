@@ -16,6 +16,7 @@ from hotlever.errors import BranchEndError, ComputationError, InputError, unknow
 from hotlever.fitting.common_errors import errors_of_scales
 from hotlever.fitting.least_squares import LeastSquares, Optimum
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement, with_measured_circuit
+from hotlever.fitting.measurement.averages import averaged, note_on_averages
 from hotlever.fitting.misfit import undescribed
 from hotlever.fitting.models import ForwardModel, Prediction, forward_model
 from hotlever.fitting.options import FitOptions
@@ -146,9 +147,10 @@ def estimate(
     began = time.perf_counter()
     # what an earlier one used
     memory.give_back()
-    measurement = Measurement.given(measurement)
+    measurement = averaged(whole := Measurement.given(measurement), options.robust)
     given = Probe.reference() if probe is None else Probe.given(probe)
     probe, notes = with_measured_circuit(given, measurement, options.medium)
+    notes += note_on_averages(whole, measurement)
     options = options.of(probe)
     priors = priors_of(options.priors, probe, "priors")
     options = replace(options, priors=priors)
@@ -158,10 +160,10 @@ def estimate(
     weights = "errors" if known else options.weights
     common = errors_of_scales(measurement, observables, priors) if known else []
     residuals = Residuals(measurement, observables, weights, options.drift, common=common)
-    if not known and residuals.size < len(options.varied):
+    if not known and residuals.different < len(options.varied):
         raise InputError(
-            f"{measurement.path or 'measurement'}: {residuals.size} data for "
-            f"{len(options.varied)} parameters; fix some or measure more"
+            f"{measurement.path or 'measurement'}: {residuals.different} different data for "
+            f"{len(options.varied)} parameters; fix some or measure at more biases"
         )
     names = tuple(dict.fromkeys([*options.usual, *options.varied]))
     make = model or partial(forward_model, names=names)

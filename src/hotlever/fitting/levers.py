@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from scipy.special import chdtri
 
-from hotlever.datasets import labelled
+from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
 from hotlever.materials import PARAMETERS
 from hotlever.text import INVERSION, parameter_named
@@ -157,4 +157,4 @@ def levers_csv(data: xr.Dataset) -> str:
         for kind, of in (("", data.value), ("_stderr", data.stderr))
     }
     table = xr.Dataset(columns, {"lever": data.lever.data})
-    return str(table.to_dataframe().to_csv(float_format="%.8g"))
+    return frame_text(table.to_dataframe(), float_format="%.8g")

@@ -19,6 +19,8 @@ from hotlever.types import Array
 _HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
 #: A point is named as suspicious beyond this many standard deviations.
 _SUSPICIOUS = 8.0
+#: So many of them are named, those furthest off.
+_NAMED = 10
 
 
 class Residuals:
@@ -80,7 +82,10 @@ class Residuals:
                 raise InputError(f"{self._where}: all values of {name} are 0")
         self.without_errors = np.zeros(len(self.rows), dtype=bool)
         self.errors_known = weights == "errors" and data_weights is None
-        self._scale = np.broadcast_to(self.largest, self.data.shape).copy()
+        rows = measurement.rows
+        #: Of how many rows each is the mean, as a root: by it errors are smaller.
+        self._root = np.ones(self.bias.size) if rows is None else np.sqrt(rows[self._used])
+        self._scale = self.largest / self._root
         self.down = np.ones(self.data.shape)
         if self.errors_known:
             self._scale = self._measured_errors()
@@ -104,13 +109,18 @@ class Residuals:
                     "one for each of its values or none at all"
                 )
         self.without_errors = np.all(np.isnan(errors), axis=1)
-        guessed = np.broadcast_to(0.01 * self.largest, errors.shape)
+        guessed = 0.01 * self.largest / self._root
         return np.where(np.isfinite(errors), errors, guessed)
 
     @property
     def size(self) -> int:
         """How many data count."""
         return int(self.present.sum())
+
+    @property
+    def different(self) -> int:
+        """How many of them are at different biases: the same again tells of noise only."""
+        return sum(np.unique(self.bias[row]).size for row in self.present)
 
     @property
     def by(self) -> Array:
@@ -188,12 +198,12 @@ class Residuals:
 
         Data may be off by their own errors, if they have some.
         """
-        difference = self.difference(values)
+        difference = self.difference(values) * self._root
         scatter = 1.4826 * np.nanmedian(np.abs(difference), axis=1, keepdims=True)
         # data without noise have no scatter to measure against
         least = np.broadcast_to(1e-4 * self.largest, difference.shape)
         if self.errors_known:
-            least = np.where(self.without_errors[:, None], least, self._scale)
+            least = np.where(self.without_errors[:, None], least, self._scale * self._root)
         return np.nan_to_num(difference / np.maximum(scatter, least))
 
     def lessen(self, values: Array, gently: bool) -> None:
@@ -214,13 +224,14 @@ class Residuals:
         datum more: a few data say little of their own.
         """
         weight = np.where(self.present, self.down**2, 0.0)
-        squares = np.nansum(weight * self.difference(values) ** 2, axis=1, keepdims=True)
+        difference = self.difference(values) * self._root
+        squares = np.nansum(weight * difference**2, axis=1, keepdims=True)
         count = weight.sum(axis=1, keepdims=True)
         if usual:
             squares, count = squares + (usual * self.largest) ** 2, count + 1.0
         rms = np.sqrt(squares / np.maximum(count - used_up, 1.0))
         scatter = np.maximum(rms, 1e-6 * self.largest)
-        self._scale = np.where(self.without_errors[:, None], scatter, self._scale)
+        self._scale = np.where(self.without_errors[:, None], scatter / self._root, self._scale)
 
     def rms(self, values: Array) -> dict[str, float]:
         """Return the rms of data minus prediction by column, for every observable with data."""
@@ -246,13 +257,16 @@ class Residuals:
     def suspicious(self, values: Array, robust: bool) -> list[str]:
         """Name the points that lie far outside the scatter of the others."""
         advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
-        return [
-            f"{name} at {bias:g} V is {abs(deviation):.0f} standard deviations from the fit; "
-            f"{advice}"
-            for name, row in zip(self.observables, self.deviations(values), strict=True)
-            for bias, deviation in zip(self.bias, row, strict=True)
-            if abs(deviation) > _SUSPICIOUS
+        size = np.abs(self.deviations(values))
+        odd = np.argwhere(size > _SUSPICIOUS)
+        worst = np.sort(np.argsort(-size[tuple(odd.T)], kind="stable")[:_NAMED])
+        found = [
+            f"{self.observables[row]} at {self.bias[place]:g} V is {size[row, place]:.0f} standard "
+            f"deviations from the fit; {advice}"
+            for row, place in odd[worst].tolist()
         ]
+        more = len(odd) - len(found)
+        return [*found, f"{more} more data are as far from the fit"] if more else found
 
     def zeros(self, values: Array, slopes: Array) -> list[str]:
         """Say how the zeros drift, or that they seem to."""

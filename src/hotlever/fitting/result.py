@@ -15,7 +15,7 @@ from pydantic import Field
 from hotlever import __version__
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
-from hotlever.files import json_text, write_text
+from hotlever.files import json_text, without_nan, write_text
 from hotlever.fitting.common_errors import errors_of_scales
 from hotlever.fitting.embedded import (
     EmbeddedMeasurement,
@@ -24,7 +24,6 @@ from hotlever.fitting.embedded import (
     Spread,
     array,
     embed,
-    without_nan,
 )
 from hotlever.fitting.measurement import Measurement
 from hotlever.fitting.options import FitOptions

@@ -14,7 +14,6 @@ from dask.system import CPU_COUNT
 
 from hotlever.cluster import local_processes
 from hotlever.files import json_text
-from hotlever.fitting.embedded import without_nan
 from hotlever.fitting.posterior import BAND_QUANTILES, predictive_band, sample_posterior
 from hotlever.fitting.profile import profile_likelihood
 from hotlever.fitting.result import Fit
@@ -93,7 +92,7 @@ class Uncertainty:
                 name: _profile_content(profile) for name, profile in self.profiles.items()
             }
         content["uncertainty_notes"] = self.statements()
-        return json_text(without_nan(content))
+        return json_text(content)
 
 
 def examine(

@@ -23,6 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
+from hotlever.errors import ComputationError
 from hotlever.lever.motion import Motion
 from hotlever.lever.space import LEVER, TIP, Factors, Fields, Fluxes, Pin, Space, Tangent
 from hotlever.lever.stack import GAS, PER_CM_TO_MILLI_PER_UM, Conductivities, Stacks
@@ -54,6 +55,11 @@ class LeverEquations:
     motions : mapping of str to Motion, optional
         Of the dimensions by which derivatives may be asked for.
 
+    Raises
+    ------
+    ComputationError
+        If a law makes no sense at the base temperature: a fit may have moved it there.
+
     Attributes
     ----------
     scale, step_limit : ndarray, shape (size + 1, 1)
@@ -72,6 +78,9 @@ class LeverEquations:
         self.circuit, self.base_temperature_K = circuit, circuit.base_temperature_K
         self.conductance, self.source_mA = circuit.norton(space.wired)
         self.end_rises = circuit.end_rises()
+        for name, kind in self.made_of.items():
+            if reason := kind.impossible(self.base_temperature_K):
+                raise ComputationError(f"{name}: {reason}")
         self._stacks = Stacks(space, materials, self.motions)
         self._latest: tuple[Array, tuple[Fields, Conductivities]] | None = None
         self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]

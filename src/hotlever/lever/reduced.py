@@ -207,6 +207,8 @@ class ReducedAir:
 class ReducedLever:
     """The reduced lever of a geometry, medium and base temperature.
 
+    How wrong it is depends on the material: `hotlever.lever.certificate.certified_branch`.
+
     Attributes
     ----------
     all_points, few_points : ReducedSpace

@@ -41,6 +41,8 @@ from hotlever.types import Array
 BY_THICKNESS = "thickness"
 #: Temperature coefficients (K⁻¹) of metal films; with any of them the resistivity stays positive.
 _LEAST_TCR, _MOST_TCR = -5e-4, 5e-3
+#: Share of its resistivity at 300 K that high-doped silicon has when it is colder.
+_LEAST_LEFT = 0.1
 #: Heat a metal carries over what its electrons do.
 _LEAST_LORENZ, _MOST_LORENZ = 0.2, 5.0
 
@@ -102,6 +104,10 @@ class Kind(Record):
     def end(self, name: str) -> str:
         """Say what happens to a material of this name above its highest temperature."""
         return f"the laws of '{name}' end"
+
+    def impossible(self, coldest_K: float) -> str:
+        """Say why its laws make no sense from a temperature (K) on; empty if they do."""
+        return ""
 
     @abstractmethod
     def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
@@ -236,6 +242,16 @@ class HighDopedSilicon(Silicon):
     a0: float = bounded(OF_SILICON["a0"])
     a1: float = bounded(OF_SILICON["a1"])
     n_hd: float = high_doping()
+
+    def impossible(self, coldest_K: float) -> str:
+        """Say that the straight line of Eq. 11 falls to nothing below 300 K, if it does."""
+        resistivity = self.a0 + self.a1 * (coldest_K - 300.0)
+        if resistivity >= _LEAST_LEFT * self.a0:
+            return ""
+        return (
+            f"a0 = {self.a0:g} and a1 = {self.a1:g} give a resistivity of {resistivity:.3g} Ω cm "
+            f"at {coldest_K:g} K, expected more than {_LEAST_LEFT:g} of a0"
+        )
 
     @property
     def laws(self) -> tuple[Law, ...]:

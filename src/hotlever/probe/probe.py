@@ -97,6 +97,13 @@ class Probe(Record):
                 )
         return self
 
+    @model_validator(mode="after")
+    def _laws_make_sense_at_the_base(self) -> Probe:
+        for kind in self.made_of.values():
+            if reason := kind.impossible(self.circuit.base_temperature_K):
+                raise ValueError(reason)
+        return self
+
     def __hash__(self) -> int:
         parts = tuple(getattr(self, name) for name in _PARTS)
         return hash((self.shape, tuple(self.materials.items()), *parts))
@@ -237,7 +244,9 @@ class Probe(Record):
         }
         if dot and section not in records:
             raise unknown_name("section", section, [*SECTIONS, *named, *wired])
-        known = {part: _keys(record, part) for part, record in records.items()}
+        known = {part: [*record.model_fields] for part, record in records.items()}
+        # in [probe] those of all shapes, its own first
+        known["probe"] += [key for one in PARAMETRIC.values() for key in one.model_fields]
         own = [part for part in _PARTS if getattr(self, part)]
         # those of a named material have its name before them
         for part in [section] if dot else ["probe", *own, *_PARTS]:
@@ -285,14 +294,18 @@ class Probe(Record):
         if dot:
             return getattr(self.materials[material], own)
         parts = (self.shape, *(getattr(self, part) for part in _PARTS))
-        return next(getattr(part, name) for part in parts if part and name in _fields(part))
+        return next(
+            getattr(part, name) for part in parts if part and name in type(part).model_fields
+        )
 
     def moved(self, values: Mapping[str, float]) -> Probe:
         """Return a copy with some values changed, as `with_` does but unchecked and fast."""
         parts: dict[str, Any] = {}
         for field in ("shape", *_PARTS):
             part = getattr(self, field)
-            own = {name: values[name] for name in values if part and name in _fields(part)}
+            own = {
+                name: values[name] for name in values if part and name in type(part).model_fields
+            }
             parts[field] = part.model_copy(update=own) if own else part
         kinds = dict(self.materials)
         for full, value in values.items():
@@ -377,13 +390,3 @@ class Probe(Record):
     def to_file(self, path: str | os.PathLike[str]) -> None:
         """Write the probe as a commented probe file, whole or not at all."""
         write_text(path, self.to_toml())
-
-
-def _fields(part: Record) -> Any:
-    return type(part).model_fields
-
-
-def _keys(record: type[Record], section: str) -> list[str]:
-    """Return the keys of a section; in ``[probe]`` those of all shapes, its own first."""
-    shapes = PARAMETRIC.values() if section == "probe" else ()
-    return [key for one in (record, *shapes) for key in one.model_fields]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hotlever.datasets import labelled
+from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.raman.calibration import Point, RamanCalibration, calibrate_raman
 from hotlever.raman.fit import fit_peak
@@ -103,7 +103,7 @@ def to_csv(table: xr.Dataset) -> str:
     frame = table.to_dataframe()
     for name, digits in DIGITS.items():
         frame[name] = frame[name].map(f"{{:.{digits}f}}".format, na_action="ignore")
-    return str(frame.to_csv(index=False, header=COLUMNS, lineterminator="\n"))
+    return frame_text(frame, index=False, header=COLUMNS)
 
 
 def calibrate_from(

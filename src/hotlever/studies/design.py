@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from hotlever.datasets import labelled
+from hotlever.datasets import frame_text, labelled
 from hotlever.errors import unknown_name
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
@@ -238,7 +238,7 @@ def sensitivity_text(data: xr.Dataset) -> str:
 
 def design_csv(data: xr.Dataset) -> str:
     """Return a sweep of a design as CSV, one row per value; empty where nothing is known."""
-    return data[list(QUANTITIES)].to_dataframe().to_csv(float_format="%.6g")
+    return frame_text(data[list(QUANTITIES)].to_dataframe(), float_format="%.6g")
 
 
 def label_of(name: str) -> str:

@@ -52,6 +52,8 @@ class Measurement:
         What of the file was not used or not understood, and what looks wrong in it.
     understood : tuple of tuple of str
         What each column and setting of the file was taken for, as rows of a table.
+    rows : ndarray, shape (n,), or None
+        Of how many rows of the file each is the mean, if they were averaged.
     """
 
     bias_V: Array
@@ -70,6 +72,7 @@ class Measurement:
     gas_conductivity: float | None = None
     pressure_mbar: float | None = None
     understood: tuple[tuple[str, ...], ...] = ()
+    rows: Array | None = None
 
     @classmethod
     def given(cls, measurement: Measurement | str | os.PathLike[str]) -> Measurement:
