@@ -22,6 +22,7 @@ from hotlever.lever.dataset import at_bias, checked_bias, sweep_dataset
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.following import Follower
 from hotlever.lever.full_space import FullSpace
+from hotlever.lever.heat_in_air import AroundLever
 from hotlever.lever.pinned import state_at_bias
 from hotlever.lever.sensitivities import sensitivities_of
 from hotlever.lever.state import State
@@ -92,7 +93,8 @@ class Lever:
             return space.in_air(None)
         base = self.circuit.base_temperature_K
         air = air_operator(self._plate, self.probe.surroundings, base, self.panels, progress)
-        return space.in_air(air).in_gas(self.probe.surroundings.gas_conductivity)
+        around = AroundLever(space, self._plate, self.probe.surroundings, base)
+        return space.in_air(air, around).in_gas(self.probe.surroundings.gas_conductivity)
 
     def air_by_inverse_gap(self) -> Array:
         """Return how the operator of the air changes with the inverse of the gap, in µm²."""
