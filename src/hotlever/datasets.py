@@ -46,6 +46,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "time_us": ("µs", "time"),
     "supplied_nJ": ("nJ", "electrical energy taken up since the start"),
     "stored_nJ": ("nJ", "heat in the lever above that at the base temperature"),
+    "air_stored_nJ": ("nJ", "heat that the air has taken up"),
     "lost_nJ": ("nJ", "heat lost through the leg ends and into the air since the start"),
     "time_constant_us": ("µs", "time constant, negative for what grows"),
     "heating_us": ("µs", "time from 10 to 90 % of the tip's rise"),

@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from hotlever.air.chip import BaseLine, chip_panels
 from hotlever.air.panels import Mirror, Panels, mirror_group
+from hotlever.air.screened_layer import Numbers, screened_layers
 from hotlever.air.single_layer import layer_potential, single_layer_matrix
 from hotlever.air.surface import PanelOptions, lever_surface
 from hotlever.cache import cache_file, store_arrays, stored
@@ -123,7 +125,7 @@ def change_with_gap(
 
 
 class PanelledAir:
-    """Panels on a lever and its surroundings, with their single layer factorised.
+    """Panels on a lever and its surroundings, with their single layer.
 
     Parameters and errors are those of `air_operator`.
 
@@ -158,18 +160,22 @@ class PanelledAir:
         mid_plane = [Mirror.in_plane((0, 0, 0), (0, 0, 1), +1.0)] if surroundings.symmetric else []
         self._halves = 1.0 + len(mid_plane)
         self.mirrors = mirror_group([*mid_plane, *below])
-        layer = single_layer_matrix(self.panels, self.mirrors, progress)
+        self._layer = single_layer_matrix(self.panels, self.mirrors, progress)
         own = np.arange(len(self.surface.panels))
         jump = np.full(len(self.panels), surroundings.jump_length_um(base_temperature_K))
         jump[own] = surroundings.jump_length_um(surroundings.jump_temperature_K)
         self._resistances = jump * self.panels.areas
-        layer[np.diag_indices_from(layer)] += self._resistances
+        self._layer[np.diag_indices_from(self._layer)] += self._resistances
         self._moments = np.zeros((len(self.panels), len(self.surface.sites)))
         self._moments[own, self.surface.site] = self.surface.panels.areas
+
+    @cached_property
+    def _factors(self) -> tuple[Array, bool]:
         try:
-            self._factors = cho_factor(layer, overwrite_a=True)
+            factors: tuple[Array, bool] = cho_factor(self._layer)
         except LinAlgError as error:
             raise ComputationError("the air operator of this geometry is not positive") from error
+        return factors
 
     def densities(self, theta: Array) -> Array:
         """Return the heat flux (mW/µm²) into air from every panel, for θ (mW/µm) at the sites."""
@@ -185,6 +191,29 @@ class PanelledAir:
         own = len(self.surface.panels)
         jumped = self._resistances[:own] @ flux[:own].sum(axis=1) / self.panels.areas[:own].sum()
         return AirOperator(self.surface.sites, 0.5 * (heat + heat.T), float((1.0 - jumped) ** 2))
+
+    def admittances(self, q: Numbers, shapes: Array) -> Numbers:
+        """Return the heat lost (mW) where θ changes in time, as it is tested with some shapes.
+
+        Parameters
+        ----------
+        q : ndarray, shape (k,)
+            √(rate / diffusivity) (1/µm), see `hotlever.air.screened_layer`.
+        shapes : ndarray, shape (sites, m)
+            Of θ (mW/µm), by their values at the sites.
+
+        Returns
+        -------
+        ndarray, shape (k, m, m)
+            µm, symmetric; with what the air would take up that fills the plate.
+        """
+        moments = self._moments @ shapes
+        heat = []
+        for screened in screened_layers(self.panels, q, self.mirrors):
+            flux = np.linalg.solve(self._layer + screened, moments.astype(screened.dtype))
+            heat.append(self._halves * (moments.T @ flux))
+        found = np.array(heat)
+        return np.asarray(0.5 * (found + found.swapaxes(1, 2)))
 
     def theta(self, points: Array, flux: Array) -> Array:
         """Return θ (mW/µm) of the air at some points (n, 3), for the flux from every panel."""

@@ -126,7 +126,7 @@ def calibrate(
     if pulse is None:
         return result
     pulsed = pulse_calibration(found, pulse, progress)
-    return replace(result, pulse=pulsed, notes=[*result.notes, *pulsed.notes])
+    return replace(result, pulse=pulsed)
 
 
 def _by_estimate(

@@ -37,8 +37,11 @@ def history_overview(history: xr.Dataset) -> Figure:
         for name, label, colour in (
             ("supplied_nJ", "supplied", PURPLE),
             ("stored_nJ", "stored", VERMILION),
+            ("air_stored_nJ", "in the air", BLUE),
             ("lost_nJ", "lost", ORANGE),
         ):
+            if name == "air_stored_nJ" and not data[name].any():
+                continue  # in vacuum
             heat.plot(data.time, data[name], color=colour, label=label, **style)
         heat.set(ylabel="energy (nJ)")
         for axes in (voltage, heat):

@@ -18,6 +18,7 @@ from scipy.sparse.linalg import SuperLU
 
 from hotlever.errors import ComputationError
 from hotlever.lever.elements import sums_by_index
+from hotlever.lever.heat_in_air import AroundLever, HeatInAir
 from hotlever.types import Array, Index
 
 #: Krylov's method stops at this residual, relative to the right-hand side; what is left is small
@@ -48,6 +49,8 @@ class AirLoss:
     ----------
     gas_conductivity : float
         Of the gas, over that of air.
+    around : AroundLever or None
+        Makes what the air takes up in time, once it is asked for.
     gap_um : float
         To a surface below; NaN without one.
     by_inverse_gap : ndarray, shape (sites, sites)
@@ -55,6 +58,7 @@ class AirLoss:
     """
 
     gas_conductivity, gap_um = 1.0, float("nan")
+    around: AroundLever | None = None
     by_inverse_gap = np.empty((0, 0))
 
     def __init__(
@@ -75,6 +79,11 @@ class AirLoss:
         self.operator, self.filling = operator, operator.filling
         self._local = operator.matrix @ np.ones(len(operator.sites))
         self.rest = operator.less(self._local)
+
+    @property
+    def stores(self) -> HeatInAir | None:
+        """What the air takes up itself; None where that is not known."""
+        return None if self.around is None else self.around.stores(self.gas_conductivity)
 
     def in_gas(self, conductivity: float) -> AirLoss:
         """Return the loss to a gas that conducts so many times as well as air."""
@@ -122,19 +131,32 @@ class AirSolver:
 
     With t = E x this is (1 + E M⁻¹ Eᵀ R κ) t = E M⁻¹ b between the sites, solved by generalised
     conjugate residuals. Search directions are kept for the next right-hand side. Transposed, M⁻¹
-    is so too, and R κ becomes κ R.
+    is so too, and R κ becomes κ R. In time E has more rows, the shares of the modes that air takes
+    up heat for, and there R κ is what it takes up.
     """
 
-    def __init__(self, factors: SuperLU, air: AirLoss, kappa: Array) -> None:
-        def lost(theta: Array) -> Array:
-            return np.asarray(air.spreading @ (air.rest @ (kappa * theta)))
+    def __init__(
+        self, factors: SuperLU, air: AirLoss, kappa: Array, taken_up: Array | None = None
+    ) -> None:
+        sites, modes, more = len(kappa), np.empty((0, air.sampling.shape[1])), np.empty((0, 0))
+        if taken_up is not None and air.stores is not None:
+            modes, more = air.stores.coordinates, taken_up
 
-        def lost_transposed(theta: Array) -> Array:
-            return np.asarray(air.spreading @ (kappa * (air.rest @ theta)))
+        def sampled(x: Array) -> Array:
+            return np.append(air.sampling @ x, modes @ x)
+
+        def spread(lost: Array, t: Array) -> Array:
+            return np.asarray(air.spreading @ lost + (more @ t[sites:]) @ modes)
+
+        def lost(t: Array) -> Array:
+            return spread(air.rest @ (kappa * t[:sites]), t)
+
+        def lost_transposed(t: Array) -> Array:
+            return spread(kappa * (air.rest @ t[:sites]), t)
 
         self._ways = {
-            "N": _Directions(lambda b: factors.solve(b), lost, air.sampling),
-            "T": _Directions(lambda b: factors.solve(b, "T"), lost_transposed, air.sampling),
+            "N": _Directions(lambda b: factors.solve(b), lost, sampled),
+            "T": _Directions(lambda b: factors.solve(b, "T"), lost_transposed, sampled),
         }
 
     def solve(self, right_hand_side: Array, how: str = "N") -> Array:
@@ -158,26 +180,26 @@ class _Directions:
         self,
         near: Callable[[Array], Array],
         lost: Callable[[Array], Array],
-        sampling: csr_matrix,
+        sampled: Callable[[Array], Array],
     ) -> None:
-        self._near, self._lost, self._sampling = near, lost, sampling
+        self._near, self._lost, self._sampled = near, lost, sampled
         # per direction: its image between the sites (orthonormal), and the change of x
-        sites, size = sampling.shape
-        self._images, self._changes = np.empty((0, sites)), np.empty((0, size))
+        self._images = self._changes = np.empty((0, 0))
         self._known = 0
 
     def solve(self, right_hand_side: Array) -> Array:
         """Solve for one right-hand side."""
         x = self._near(right_hand_side)
-        residual = self._sampling @ x
+        residual = self._sampled(x)
         goal = _TOLERANCE * np.linalg.norm(residual)
         used = restarts = 0
         while True:
-            images = self._images[used : self._known]
-            shares = images @ residual
-            x += shares @ self._changes[used : self._known]
-            residual = residual - shares @ images
-            used = self._known
+            if self._known:
+                images = self._images[used : self._known]
+                shares = images @ residual
+                x += shares @ self._changes[used : self._known]
+                residual = residual - shares @ images
+                used = self._known
             if not np.linalg.norm(residual) > goal:
                 return x
             if used == _MOST_DIRECTIONS:
@@ -192,13 +214,12 @@ class _Directions:
 
     def _add(self, direction: Array) -> None:
         known = self._known
+        change = -self._near(self._lost(direction))
+        image = direction - self._sampled(change)
         if not self._images.size:
             # only one of the two systems may ever be asked for
-            sites, size = self._sampling.shape
-            self._images = np.empty((_MOST_DIRECTIONS, sites))
-            self._changes = np.empty((_MOST_DIRECTIONS, size))
-        change = -self._near(self._lost(direction))
-        image = direction - self._sampling @ change
+            self._images = np.empty((_MOST_DIRECTIONS, image.size))
+            self._changes = np.empty((_MOST_DIRECTIONS, change.size))
         shares = self._images[:known] @ image
         image = image - shares @ self._images[:known]
         change = change - shares @ self._changes[:known]

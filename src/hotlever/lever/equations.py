@@ -24,9 +24,21 @@ from functools import cached_property
 import numpy as np
 
 from hotlever.errors import ComputationError
+from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.motion import Motion
-from hotlever.lever.space import LEVER, TIP, Factors, Fields, Fluxes, Pin, Space, Tangent
-from hotlever.lever.stack import GAS, PER_CM_TO_MILLI_PER_UM, Conductivities, Stacks
+from hotlever.lever.space import (
+    LEVER,
+    PER_CM_TO_MILLI_PER_UM,
+    TIP,
+    AirTangent,
+    Factors,
+    Fields,
+    Fluxes,
+    Pin,
+    Space,
+    Tangent,
+)
+from hotlever.lever.stack import GAS, Conductivities, Stacks
 from hotlever.materials import Kind
 from hotlever.materials.air import kirchhoff_variable
 from hotlever.probe.circuit import Circuit
@@ -162,6 +174,11 @@ class LeverEquations:
         held, by = self._stacks.heat(T)
         return held - self._cold_heat, by
 
+    @property
+    def heat_in_air(self) -> HeatInAir | None:
+        """Heat that the air takes up itself; None in vacuum, or where that is not known."""
+        return None if self.space.air is None else self.space.air.stores
+
     @cached_property
     def _cold_heat(self) -> Array:
         """The enthalpy at the base temperature (nJ/µm²), (points, 1)."""
@@ -179,7 +196,8 @@ class LeverEquations:
     def factorised(self, x: Array, pin: Pin = TIP, per_us: float = 0.0) -> Factors:
         """Return the factorised Jacobians of states, with the row of a pin last.
 
-        They are those of `balance` and so many times (1/µs) that of `stored`.
+        They are those of `balance` and so many times (1/µs) that of `stored`, with what the air
+        takes up where things change so fast.
         """
         fields, laws = self.at(x)
         heat_source_T = -laws.sigma_by["T"] * square(fields.grad_V)
@@ -193,8 +211,12 @@ class LeverEquations:
             charge_flux_T=laws.sigma_by["T"] * fields.grad_V,
             sigma=laws.sigma,
         )
-        kappa_air = None if self.space.air is None else self.kirchhoff(x)[1]
-        return self.space.factorised(tangent, kappa_air, pin, self.conductance)
+        air = None
+        if self.space.air is not None:
+            own = self.heat_in_air if per_us else None
+            taken_up = None if own is None else own.taken_up(per_us)
+            air = AirTangent(self.kirchhoff(x)[1], taken_up)
+        return self.space.factorised(tangent, air, pin, self.conductance)
 
     # --- derivatives --------------------------------------------------------------------------
 

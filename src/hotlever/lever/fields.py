@@ -19,7 +19,7 @@ from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever
-from hotlever.lever.stack import PER_CM_TO_MILLI_PER_UM
+from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
 from hotlever.lever.state import State
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.kinds import HighDopedSilicon

@@ -18,7 +18,17 @@ from scipy.sparse.linalg import SuperLU, splu
 from hotlever.air.operator import AirOperator
 from hotlever.lever.air_loss import AirLoss, AirSolver
 from hotlever.lever.elements import FiniteElements, sums_by_index
-from hotlever.lever.space import FAR, LinearMap, Pin, PlacedFilm, Space, Tangent, at_some
+from hotlever.lever.heat_in_air import AroundLever
+from hotlever.lever.space import (
+    FAR,
+    AirTangent,
+    LinearMap,
+    Pin,
+    PlacedFilm,
+    Space,
+    Tangent,
+    at_some,
+)
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Film, Layout, Part
 from hotlever.probe.mesh import ProbeMesh
@@ -222,9 +232,16 @@ class FullSpace(Space):
         """Return the nodal rises of the temperature (K), (places, n), of states."""
         return x[self.is_temperature]
 
+    def rise_at(self, places: Array, x: Array) -> Array:
+        """Return the rise of the temperature (K) at places (k, 2) in states, (k, n)."""
+        element, shares, _ = self.elements.at_points(places)
+        unknowns = self._T[self.elements.dofs[element]]
+        nodal = np.where((unknowns >= 0)[..., None], x[unknowns], 0.0)
+        return np.asarray(np.einsum("ks,ksn->kn", shares, nodal))
+
     # --- the air ----------------------------------------------------------------------------------
 
-    def in_air(self, air: AirOperator | None) -> FullSpace:
+    def in_air(self, air: AirOperator | None, around: AroundLever | None = None) -> FullSpace:
         """Return the same space with this air around it, or in vacuum; everything is shared."""
         space = copy(self)
         space.air = None
@@ -234,6 +251,7 @@ class FullSpace(Space):
             slots = self._slots[element, :nodes, :nodes]
             unknowns = self._T[self.elements.dofs[element]]
             space.air = AirLoss(air, unknowns, shares, slots, self.size + 1)
+            space.air.around = around
         return space
 
     def in_gas(self, conductivity: float) -> FullSpace:
@@ -283,19 +301,19 @@ class FullSpace(Space):
         self._starts = np.searchsorted(unique // count, np.arange(count + 1)).astype(np.int32)
 
     def factorised(
-        self, tangent: Tangent, kappa_air: Array | None, pin: Pin, conductance: Array
+        self, tangent: Tangent, air: AirTangent | None, pin: Pin, conductance: Array
     ) -> SparseFactors:
         """Put the Jacobians of all states together, the row of the pin last, and factorise."""
         solvers = []
         for state in range(tangent.sigma.shape[-1]):
             entries = self._assembled(tangent.of(state))
             entries[self._contact_slots] += conductance
-            if self.air is None or kappa_air is None:
+            if self.air is None or air is None:
                 solvers.append(self._lu(entries, pin))
                 continue
-            kappa = kappa_air[:, state]
+            kappa = air.kappa[:, state]
             local = entries + self.air.local_entries(kappa, self._entries)
-            solvers.append(AirSolver(self._lu(local, pin), self.air, kappa))
+            solvers.append(AirSolver(self._lu(local, pin), self.air, kappa, air.taken_up))
         return SparseFactors(solvers)
 
     def _assembled(self, tangent: Tangent) -> Array:

@@ -22,14 +22,14 @@ from hotlever.lever.dataset import at_bias, checked_bias, sweep_dataset
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.following import Follower
 from hotlever.lever.full_space import FullSpace
+from hotlever.lever.heat_in_air import AroundLever
 from hotlever.lever.held import HeldFollower, pin_along
 from hotlever.lever.pinned import state_at_bias
 from hotlever.lever.sensitivities import sensitivities_of
 from hotlever.lever.space import TIP, Pin
 from hotlever.lever.state import State
 from hotlever.materials import Material
-from hotlever.probe import Circuit, Layout, MeshOptions, Probe, mesh_layout
-from hotlever.probe.circuit import Wiring
+from hotlever.probe import Circuit, Layout, MeshOptions, Probe, Wiring, mesh_layout
 from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
@@ -91,14 +91,15 @@ class Lever:
         """Return a space in the probe's surroundings."""
         if self.medium == "vacuum":
             return space.in_air(None)
-        base = self.circuit.base_temperature_K
-        air = air_operator(self._plate, self.probe.surroundings, base, self.panels, progress)
-        return space.in_air(air).in_gas(self.probe.surroundings.gas_conductivity)
+        base, around = self.circuit.base_temperature_K, self.probe.surroundings
+        air = air_operator(self._plate, around, base, self.panels, progress)
+        lever = AroundLever(space, self._plate, around, base)
+        return space.in_air(air, lever).in_gas(around.gas_conductivity)
 
     def air_by_inverse_gap(self) -> Array:
         """Return how the operator of the air changes with the inverse of the gap, in µm²."""
-        base, operator = self.circuit.base_temperature_K, self.space.air.operator
-        return change_with_gap(operator, self._plate, self.probe.surroundings, base, self.panels)
+        place = self._plate, self.probe.surroundings, self.circuit.base_temperature_K
+        return change_with_gap(self.space.air.operator, *place, self.panels)
 
     @property
     def _plate(self) -> Layout:
@@ -162,9 +163,7 @@ class Lever:
         ComputationError
             If a state was not found.
         """
-        return self._followed(
-            lambda branch: bool(branch.tip_K(branch.u[-1]) >= hottest_K), progress
-        )
+        return self._followed(lambda one: bool(one.tip_K(one.u[-1]) >= hottest_K), progress)
 
     def _followed(
         self, enough: Callable[[Branch], bool], progress: Progress | None = None
@@ -292,11 +291,12 @@ class Lever:
         Notes
         -----
         Between the states of the branch the curves are within 2e-5 in V_l and I_h and 0.02 K of
-        states solved by themselves (`solve`), a third of what the mesh is off by; within 5e-5 and
-        0.05 K where a leg gets hot faster than the tip. Of a lever with held supplies each state is
-        solved by itself.
+        states solved by themselves (`solve`), a third of what the mesh is off by; 5e-5 and 0.05 K
+        where a leg gets hot faster than the tip. With held supplies each is solved by itself.
         """
         values = checked_bias(bias)
+        if sensitivities:
+            self.circuit.need_cold_start("a sweep with sensitivities")
         branch, reading, failure = self._read(values, progress)
         here = np.flatnonzero(np.isfinite(reading.u))
         notes = reading.notes(values[here])
@@ -306,10 +306,10 @@ class Lever:
             places = zip(reading.u[here], values[here].tolist(), strict=True)
             data = self.dataset([self._state_at(branch, u, bias) for u, bias in places], notes)
         data = at_bias(data, values[here])
-        if failure is None:
-            return data
-        failure.partial = data
-        raise failure
+        if failure is not None:
+            failure.partial = data
+            raise failure
+        return data
 
     @one_blas_thread
     def dataset(self, states: Sequence[State], notes: Sequence[str] = ()) -> xr.Dataset:
@@ -370,10 +370,8 @@ class Lever:
         branch = self.branch_past_knee()
         knee = branch.knee
         if knee is None:
-            raise ComputationError(
-                f"V_l rises until {self.equations.limit[1]}, with the tip at "
-                f"{branch.hottest_K:.0f} K: there is no knee"
-            )
+            end = f"{self.equations.limit[1]}, with the tip at {branch.hottest_K:.0f} K"
+            raise ComputationError(f"V_l rises until {end}: there is no knee")
         return self._dataset(branch, branch.u_at([knee.tip_K]), [])
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,10 +24,11 @@ from hotlever.lever.branch import Reach
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.following import branch_of
 from hotlever.lever.full_space import FullSpace
+from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
 from hotlever.lever.pinned import Pinned
 from hotlever.lever.sensitivities import Linearised
-from hotlever.lever.space import LinearMap, Pin, Space, Tangent, at_some
+from hotlever.lever.space import AirTangent, LinearMap, Pin, Space, Tangent, at_some
 from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import Circuit, Probe
 from hotlever.threads import one_blas_thread
@@ -122,15 +124,16 @@ class ReducedSpace(Space):
         return np.concatenate([np.tensordot(orthonormal, free, axes=1), x[-1:]])
 
     def factorised(
-        self, tangent: Tangent, kappa_air: Array | None, pin: Pin, conductance: Array
+        self, tangent: Tangent, air: AirTangent | None, pin: Pin, conductance: Array
     ) -> DenseFactors:
         """Put the Jacobians of all states together, the row of the pin last, and invert them."""
         states = tangent.sigma.shape[-1]
         matrices = np.zeros((states, self.size + 1, self.size + 1))
         for state in range(states):
             self._assemble(tangent.of(state), matrices[state])
-            if self.air is not None and kappa_air is not None:
-                matrices[state, : self.count, : self.count] += self.air.matrix(kappa_air[:, state])
+            if self.air is not None and air is not None:
+                of_air = self.air.matrix(air.kappa[:, state], air.taken_up)
+                matrices[state, : self.count, : self.count] += of_air
         matrices[:, -1] = 0.0
         matrices[:, -1, : self.count] = pin.tip * self.tip[1]
         matrices[:, -1, -1] = pin.lever
@@ -187,6 +190,25 @@ class ReducedAir:
         self._size, self._count, self.heat = size, len(modes), full.heat
         self._samples = full.sampling[:, : modes.shape[1]] @ modes.T
         self._spread = self._samples.T @ full.operator.matrix
+        self._full = full
+        self._changes = np.zeros((modes.shape[1] + 1, size + 1))
+        self._changes[:-1, : self._count] = modes.T
+
+    @cached_property
+    def _stores(self) -> tuple[HeatInAir | None, Array]:
+        full = self._full.stores
+        return (None, np.empty((0, 0))) if full is None else full.between(self._changes)
+
+    @property
+    def stores(self) -> HeatInAir | None:
+        """Heat that the air takes up itself; see `AirLoss`."""
+        return self._stores[0]
+
+    def expanded(self, in_air: Array) -> Array:
+        """Return the temperatures in the air around the full lever."""
+        shares = self._stores[1]
+        many = in_air.reshape(-1, shares.shape[1], in_air.shape[1])
+        return np.einsum("mk,skn->smn", shares, many).reshape(-1, in_air.shape[1])
 
     def rise(self, x: Array) -> Array:
         """Return the rise of the temperature (K) at the sites, (sites, ...)."""
@@ -198,9 +220,13 @@ class ReducedAir:
         weak[: self._count] = np.tensordot(self._spread, theta, axes=1)
         return weak
 
-    def matrix(self, kappa: Array) -> Array:
+    def matrix(self, kappa: Array, taken_up: Array | None) -> Array:
         """Return what the air adds to the Jacobian of one state, (modes, modes)."""
-        return np.asarray(self._spread @ (kappa[:, None] * self._samples))
+        added = self._spread @ (kappa[:, None] * self._samples)
+        if taken_up is not None and self.stores is not None:
+            own = self.stores.coordinates[:, : self._count]
+            added = added + own.T @ taken_up @ own
+        return np.asarray(added)
 
 
 @dataclass(frozen=True)

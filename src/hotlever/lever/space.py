@@ -19,6 +19,10 @@ from numpy.typing import NDArray
 
 from hotlever.types import Array, Index
 
+#: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
+PER_CM_TO_MILLI_PER_UM = 0.1
+#: J/cm³ to nJ/µm³; with times in µs, nJ are mW µs.
+PER_CM3_TO_NANO_PER_UM3 = 1e-3
 #: As good as infinitely far from a border (µm).
 FAR = 1e6
 
@@ -171,6 +175,22 @@ class Tangent:
 
 
 @dataclass(frozen=True)
+class AirTangent:
+    """How the heat that leaves into the air changes with the temperatures.
+
+    Attributes
+    ----------
+    kappa : ndarray, shape (sites, n)
+        κ of the air at the sites (mW/(K µm)).
+    taken_up : ndarray, shape (m, m), or None
+        What the air takes up itself, see `hotlever.lever.heat_in_air`; None at rest.
+    """
+
+    kappa: Array
+    taken_up: Array | None = None
+
+
+@dataclass(frozen=True)
 class Pin:
     """The condition that selects a state: ``tip × rise of the tip + lever × V_l = value``."""
 
@@ -275,12 +295,11 @@ class Space(ABC):
 
     @abstractmethod
     def factorised(
-        self, tangent: Tangent, kappa_air: Array | None, pin: Pin, conductance: Array
+        self, tangent: Tangent, air: AirTangent | None, pin: Pin, conductance: Array
     ) -> Factors:
         """Put the Jacobians of all states together, the row of the pin last, and factorise.
 
-        Where there is air, its κ is given at the sites (mW/(K µm)), (sites, n). Behind each of the
-        contacts is a conductance (mA/V).
+        Behind each of the contacts is a conductance (mA/V).
         """
 
 

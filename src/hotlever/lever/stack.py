@@ -13,17 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.lever.motion import Motion
-from hotlever.lever.space import PlacedFilm, Space
+from hotlever.lever.space import (
+    PER_CM3_TO_NANO_PER_UM3,
+    PER_CM_TO_MILLI_PER_UM,
+    PlacedFilm,
+    Space,
+)
 from hotlever.materials import Kind, full_name
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.types import Array
 
-#: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
-PER_CM_TO_MILLI_PER_UM = 0.1
-#: J/cm³ to nJ/µm³; with times in µs, nJ are mW µs.
-PER_CM3_TO_NANO_PER_UM3 = 1e-3
 #: How many times as well as air the gas conducts, a parameter of no material.
 GAS = "gas_conductivity"
 

@@ -21,10 +21,13 @@ class State:
     lever : Lever
     x : ndarray, shape (size + 1, 1)
         Unknowns, see `hotlever.lever.space`.
+    in_air : ndarray, shape (stores, 1), or None
+        Temperatures in the air in time, see `hotlever.lever.heat_in_air`; None at rest.
     """
 
     lever: Lever
     x: Array
+    in_air: Array | None = None
 
     @cached_property
     def _shown(self) -> list[float]:

@@ -12,7 +12,7 @@ from hotlever.air.chip import lever_axes
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file
-from hotlever.lever.equations import PER_CM_TO_MILLI_PER_UM
+from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
 from hotlever.lever.state import State
 from hotlever.lever3d.lever import SolidLever, surface_nodes
 from hotlever.lever3d.still_air import ngsolve

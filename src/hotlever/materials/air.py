@@ -95,6 +95,28 @@ def temperature_jump_length(T: ArrayLike, pressure_mbar: float, accommodation: f
     return per_kappa * kappa, {"T": per_kappa * (slope + 0.5 * kappa / T)}
 
 
+@law(
+    meant_for=(290.0, 1300.0),
+    source="ideal gas; E. H. Kennard, Kinetic Theory of Gases (McGraw-Hill, 1938)",
+)
+def heat_capacity_of_air(T: ArrayLike, pressure_mbar: float = ATMOSPHERE) -> Evaluated:
+    """Heat capacity of air at constant pressure, ρ c_p = γ/(γ − 1) p/T, in J cm⁻³ K⁻¹.
+
+    With κ_air it makes the diffusivity κ_air/(ρ c_p), 0.222 cm²/s at 300 K and 1 atm. The partial
+    derivative is by ``T``.
+
+    Examples
+    --------
+    >>> capacity, _ = heat_capacity_of_air([293.0, 300.0])
+    >>> (1e6 * capacity).round().tolist()  # J/(m³ K)
+    [1210.0, 1182.0]
+    """
+    T = np.asarray(T, dtype=float)
+    # mbar to J/cm³
+    capacity = 1e-4 * pressure_mbar * HEAT_RATIO / ((HEAT_RATIO - 1.0) * T)
+    return capacity, {"T": -capacity / T}
+
+
 def kirchhoff_variable(T: ArrayLike, base_temperature_K: float) -> Evaluated:
     """Kirchhoff variable of air, θ = ∫κ_air dT from the base temperature.
 

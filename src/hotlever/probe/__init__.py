@@ -1,6 +1,6 @@
 """Probes: shapes, layouts, meshes and the probe file."""
 
-from hotlever.probe.circuit import Circuit
+from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Layout, Region, Taper, Terminal
 from hotlever.probe.mesh import MeshOptions, ProbeMesh, mesh_layout
 from hotlever.probe.probe import Probe
@@ -19,5 +19,6 @@ __all__ = [
     "ThreeLeg",
     "Tip",
     "UShape",
+    "Wiring",
     "mesh_layout",
 ]

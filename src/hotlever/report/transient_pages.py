@@ -89,7 +89,7 @@ def _train(page: Page, lever: Lever, biases: list[float]) -> None:
     wave = pulse(biases[-1], _LENGTH, _PERIOD, _COUNT)
     history = lever.pulse(wave, per_step=_PER_STEP)
     page.figure("train", figures.history_overview(history), f"{sentence(wave.text)}")
-    kept = history.stored_nJ + history.lost_nJ
+    kept = history.stored_nJ + history.air_stored_nJ + history.lost_nJ
     off = float(np.abs(history.supplied_nJ - kept).max() / history.supplied_nJ.max())
     page.text(f"Of the heat supplied all but {off:.0e} is stored or lost.")
 

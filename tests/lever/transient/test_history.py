@@ -17,7 +17,8 @@ from of_materials import metal_film_probe, metal_film_sections
 
 def imbalance(data: xr.Dataset) -> float:
     """Heat that is neither stored nor lost, over all that was supplied."""
-    kept = data.stored_nJ - float(data.stored_nJ[0]) + data.lost_nJ
+    stored = data.stored_nJ + data.air_stored_nJ
+    kept = stored - float(stored[0]) + data.lost_nJ
     return float(np.abs(data.supplied_nJ - kept).max() / np.abs(data.supplied_nJ).max())
 
 
@@ -92,12 +93,14 @@ def other(request, in_air):
 
 
 def test_every_lever_can_be_followed(other):
-    data = other.pulse(step(3.0), 3000.0)
+    # the air far away takes a tenth of a second to get warm
+    data = other.pulse(step(3.0), 3000.0 if other.medium == "vacuum" else 3e5)
     (rest,) = other.solve([3.0])
     assert data.tip_K.values[-1] == pytest.approx(rest.tip_K, abs=1e-3)
     assert imbalance(data) < 1e-6
-    assert (np.diff(data.tip_K) > 0).all()
-    assert bool(data.notes) == (other.medium == "air")
+    assert (np.diff(data.tip_K) > -1e-6).all()
+    assert bool((data.air_stored_nJ > 0).any()) == (other.medium == "air")
+    assert not data.notes
 
 
 def test_air_slows_nothing_down_but_cools(coarse, in_air):

@@ -5,7 +5,8 @@ rise of the enthalpy in the heat balance and, in place of the pin, the circuit::
 
     V_l + R_s I_h = V_b(t)
 
-Air is taken at rest: its operator answers at once (see `hotlever.lever.air_loss`).
+Air lets heat through as it does at rest, and holds some itself: the temperatures of its stores
+(`hotlever.lever.heat_in_air`) follow the unknowns of the lever, each at its own rate.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ import numpy as np
 
 from hotlever.lever.balances import heat_left
 from hotlever.lever.equations import LeverEquations
+from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.space import LEVER, Factors
+from hotlever.lever.state import State
 from hotlever.probe import Circuit
 from hotlever.types import Array, Index
 
@@ -60,6 +63,9 @@ class InCircuit:
 class DrivenLever:
     """See the module's text and `hotlever.lever.transient.runge_kutta.Problem`.
 
+    Where air takes up heat the unknowns are those of the lever (size + 1) and below them the
+    temperatures of the stores in the air.
+
     Parameters
     ----------
     equations : LeverEquations
@@ -72,28 +78,81 @@ class DrivenLever:
         self, equations: LeverEquations, circuit: Circuit, bias: Callable[[float], float]
     ) -> None:
         self.equations, self._circuit, self._bias = equations, circuit, bias
+        self._air, self._own = equations.heat_in_air, len(equations.scale)
         self.scale, self.step_limit = equations.scale, equations.step_limit
+        if self._air is not None:
+            free = np.ones((self._air.size, 1))
+            self.scale = np.vstack([self.scale, free])
+            self.step_limit = np.vstack([self.step_limit, np.inf * free])
+
+    def parts(self, x: Array) -> tuple[Array, Array]:
+        """Return the unknowns of the lever, and the temperatures in the air."""
+        return x[: self._own], x[self._own :]
+
+    def start(self, state: State) -> Array:
+        """Return the unknowns at a state; the air is at rest if the state does not say."""
+        if self._air is None:
+            return state.x
+        in_air = self._air.follows(state.x) if state.in_air is None else state.in_air
+        return np.vstack([state.x, in_air])
 
     def stored(self, x: Array) -> Array:
-        """Return the heat stored (nJ), (size + 1, 1)."""
-        return self.equations.stored(x)
+        """Return the heat stored (nJ), and the temperatures in the air (K)."""
+        lever, in_air = self.parts(x)
+        stored = self.equations.stored(lever)
+        if self._air is None:
+            return stored
+        stored = stored + self._air.tested(self._air.held(lever, in_air))
+        return np.vstack([stored, in_air])
 
     def rest(self, t: float, x: Array) -> Array:
-        """Return the residuals of heat, charge and circuit, (size + 1, 1)."""
-        rest = self.equations.balance(x)
-        rest[-1] = self._circuit.bias(x[-1], rest[-1]) - self._bias(t)
-        return rest
+        """Return the residuals of heat, charge and circuit, and of the stores in the air."""
+        lever, in_air = self.parts(x)
+        rest = self.equations.balance(lever)
+        rest[-1] = self._circuit.bias(lever[-1], rest[-1]) - self._bias(t)
+        if self._air is None:
+            return rest
+        return np.vstack([rest, self._air.rates * (in_air - self._air.follows(lever))])
 
-    def factorised(self, x: Array, rate: float) -> InCircuit:
+    def factorised(self, x: Array, rate: float) -> Factors:
         """Return the factorised Jacobian of ``rate × stored + rest``."""
-        factors = self.equations.factorised(x, LEVER, rate)
-        gradient = self.equations.observed_gradient(x)
-        return InCircuit(factors, self._circuit.bias(gradient[..., 0], gradient[..., 1]))
+        lever, _ = self.parts(x)
+        factors = self.equations.factorised(lever, LEVER, rate)
+        gradient = self.equations.observed_gradient(lever)
+        driven = InCircuit(factors, self._circuit.bias(gradient[..., 0], gradient[..., 1]))
+        return driven if self._air is None else InAir(driven, self._air, rate)
 
     def size_of(self, change: Array) -> float:
         """Return the largest change of the temperature (K)."""
-        return float(np.abs(self.equations.space.rises(change)).max())
+        return float(np.abs(self.equations.space.rises(change[: self._own])).max())
 
     def rates(self, x: Array) -> Array:
         """Return the power, and the heat that leaves as it does at rest (mW), (2,)."""
-        return np.array([self.equations.power(x)[0], heat_left(self.equations, x)[0]])
+        lever, _ = self.parts(x)
+        return np.array([self.equations.power(lever)[0], heat_left(self.equations, lever)[0]])
+
+
+class InAir:
+    """A factorised Jacobian with the rows of the stores in the air below it.
+
+    These are eliminated: what they take up at the rate of the Jacobian is part of the factors.
+    """
+
+    def __init__(self, factors: InCircuit, air: HeatInAir, rate: float) -> None:
+        self._factors, self._air, self._rate = factors, air, rate
+
+    def solve(self, right_hand_side: Array, states: Index, *, transposed: bool = False) -> Array:
+        """Solve for right-hand sides (rows, 1) or (rows, 1, k)."""
+        if transposed:
+            raise NotImplementedError("the air's stores are solved for forward only")
+        air, rate = self._air, self._rate
+        flat = right_hand_side.reshape(len(right_hand_side), -1)
+        above, below = flat[: -air.size], flat[-air.size :]
+        above = above - rate * air.tested(air.lagging(below, rate))
+        lever = self._factors.solve(above[:, None], states)[:, 0]
+        in_air = (below + air.rates * air.follows(lever)) / (rate + air.rates)
+        return np.vstack([lever, in_air]).reshape(right_hand_side.shape)
+
+    def replaced(self, states: Index, other: InAir) -> InAir:
+        """Return the other factors: there is one state."""
+        return other

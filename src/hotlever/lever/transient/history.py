@@ -31,7 +31,7 @@ TIME_COLUMNS = (
 #: What is followed between the ends of each step, in this order.
 _FOLLOWED = (
     *("lever_V", "current_mA", "reader_V", "tip_K", "max_K"),
-    *("supplied_nJ", "stored_nJ", "lost_nJ"),
+    *("supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ"),
 )
 #: Errors are at most this share of the rise that a lever would end with, so that a response is
 #: resolved however weak it is; but never less than this (K), which is near rounding errors.
@@ -39,8 +39,8 @@ _SHARE_OF_RISE, _LEAST_TOLERANCE = 2e-3, 1e-6
 #: Parts of the time that progress is told in.
 _PARTS = 1000
 _AIR_NOTE = (
-    "the air answers at once, as if it were at rest at every moment: what it takes up itself is "
-    "left out (heat goes 15 µm into air in 10 µs)"
+    "the air of this lever answers at once, as if it were at rest at every moment: what it takes "
+    "up itself is left out (heat goes 15 µm into air in 10 µs)"
 )
 
 # Told a time (µs) and the state there.
@@ -70,7 +70,7 @@ class _Observer:
         self._end: tuple[Array, Array, Array] | None = None
 
     def read(self, step: Step) -> tuple[Array, Array]:
-        """Return values and slopes (per µs) at both ends of the next step, each (8, 2)."""
+        """Return values and slopes (per µs) at both ends of the next step, each (9, 2)."""
         start = self._end
         # after a jump of the bias the potentials are others
         if start is None or not np.array_equal(start[0], step.x[:, 0]):
@@ -82,11 +82,18 @@ class _Observer:
     def _read(self, step: Step, end: int) -> tuple[Array, Array, Array]:
         """Return the unknowns at one end of a step, and values and slopes there."""
         equations, space = self._equations, self._space
-        x, moving, rates = step.x[:, [end]], step.slopes[:, [end]], step.rates[:, end]
+        whole, rates, own = step.x[:, [end]], step.rates[:, end], space.size + 1
+        x, moving = whole[:own], step.slopes[:own, [end]]
         density, by_T = equations.heat_density(equations.at(x)[0].T)
         stored, at_ends = (self._held @ density)[:, 0]
         rise = space.temperature.at_points(moving)[0]
         stored_by, at_ends_by = (self._held @ (by_T * rise))[:, 0]
+        in_air = in_air_by = 0.0
+        if (air := equations.heat_in_air) is not None:
+            in_air, held = (float(one[0]) for one in air.heat(air.held(x, whole[own:])))
+            by_mode = air.held(moving, step.slopes[own:, [end]])
+            in_air_by, held_by = (float(one[0]) for one in air.heat(by_mode))
+            at_ends, at_ends_by = at_ends + held, at_ends_by + held_by
         if self._at_ends is None:
             self._at_ends = float(at_ends)
         rises, base = space.rises(x)[:, 0], equations.base_temperature_K
@@ -98,9 +105,9 @@ class _Observer:
             space.tip_rise(moving)[0],
             space.rises(moving)[hottest, 0],
         ]
-        values += [supplied, stored, left - (at_ends - self._at_ends)]
-        slopes += [rates[0], stored_by, rates[1] - at_ends_by]
-        return x[:, 0], np.array(values), np.array(slopes)
+        values += [supplied, stored, in_air, left - (at_ends - self._at_ends)]
+        slopes += [rates[0], stored_by, in_air_by, rates[1] - at_ends_by]
+        return whole[:, 0], np.array(values), np.array(slopes)
 
 
 def follow(
@@ -111,13 +118,15 @@ def follow(
     start: State | None = None,
 ) -> Iterator[tuple[Piece, Step]]:
     """Give the steps of a lever under a wave form, each with the piece it belongs to."""
-    x = _at_rest(lever, waveform.before_V) if start is None else start.x
+    begin = State(lever, _at_rest(lever, waveform.before_V)) if start is None else start
     if lever.circuit.starts_cold:
         rise = _SHARE_OF_RISE * _expected_rise(lever, waveform.highest_V)
         tolerance_K = max(min(tolerance_K, rise), _LEAST_TOLERANCE)
-    length = None
+    length: float | None = None
+    x: Array | None = None
     for piece in waveform.pieces(until):
         problem = DrivenLever(lever.equations, lever.circuit, piece.bias)
+        x = problem.start(begin) if x is None else x
         stepper = Stepper(problem, tolerance_K)
         first = None if piece.jumps else length
         for step in stepper.steps(piece.start, piece.end, x, piece.longest, first):
@@ -253,7 +262,9 @@ class _Rows:
         self.bias.append(piece.bias(t))
         self.followed.append(hermite(step.start, step.end, values, slopes, t))
         if self._seen is not None:
-            self._seen(t, State(self._lever, step.between(t)))
+            whole, own = step.between(t), self._lever.space.size + 1
+            in_air = whole[own:] if len(whole) > own else None
+            self._seen(t, State(self._lever, whole[:own], in_air))
 
 
 def _melts(step: Step, values: Array, slopes: Array, limit_K: float) -> float | None:
@@ -292,9 +303,10 @@ def _dataset(lever: Lever, waveform: Waveform, rows: _Rows) -> xr.Dataset:
     columns["power_mW"] = columns["lever_V"] * columns["current_mA"]
     # the reader, where there is none, is NaN throughout
     variables = {"time_us": time, "bias_V": bias}
-    more = ("max_K", "supplied_nJ", "stored_nJ", "lost_nJ")
+    more = ("max_K", "supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ")
     variables |= {name: columns[name] for name in (*TIME_COLUMNS[2:], *more)}
-    notes = [] if lever.space.air is None else [_AIR_NOTE]
+    at_rest = lever.space.air is not None and lever.equations.heat_in_air is None
+    notes = [_AIR_NOTE] if at_rest else []
     notes += range_notes(lever.probe, "{} µs on", time, columns["max_K"])
     return labelled(
         variables,

@@ -4,6 +4,11 @@ A small change of a state obeys M dx/dt + J x = 0, with M and J the derivatives 
 and of the rest, the circuit's row among them. It is a sum of modes; each decays with a time
 constant τ, J⁻¹ M x = τ x. Heating changes the resistance that heats, so that the time constants
 depend on what the source holds. A negative one is the runaway beyond a fold.
+
+Air without an end has no modes of its own: its answer has a cut where the modes of the lever lie.
+A time constant in air is where the lever would resonate, with the heat capacity of the air that
+goes along, to second order in what leaks into the cut; the last per cent of a lever's rise follow
+no exponential.
 """
 
 from __future__ import annotations
@@ -32,6 +37,8 @@ if TYPE_CHECKING:
 Source = Literal["bias", "voltage", "current", "power"]
 #: Time constants are found to this relative accuracy.
 _ACCURATE = 1e-9
+#: In air they are found again with what goes along, until they change by less; rounds at most.
+_STEADY, _MOST_ROUNDS = 1e-4, 6
 #: Points of a history for each step of the solver.
 _PER_STEP = 8
 
@@ -83,9 +90,35 @@ def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tupl
     if not np.any(row):
         raise ComputationError("without power nothing is held where the source holds the power")
     factors = InCircuit(equations.factorised(x, LEVER), row)
+    constants, changes = _modes(equations, x, factors, count)
+    if (air := equations.heat_in_air) is None:
+        return constants, changes
+    for place in range(count):
+        # what goes along with the lever depends on how fast it goes
+        for _ in range(_MOST_ROUNDS):
+            rate, last = 1.0 / abs(constants[place]), constants[place]
+            bound = air.bound(rate) if last > 0.0 else air.taken_up(rate) / rate
+            found, moved = _modes(equations, x, factors, count, air.coordinates, bound)
+            constants[place], changes[:, place] = found[place], moved[:, place]
+            if abs(constants[place] / last - 1.0) < _STEADY:
+                break
+    return constants, changes
+
+
+def _modes(
+    equations: LeverEquations,
+    x: Array,
+    factors: InCircuit,
+    count: int,
+    coordinates: Array | None = None,
+    bound: Array | None = None,
+) -> tuple[Array, Array]:
+    """Return the slowest modes of a lever with a heat capacity (nJ/K) that goes along."""
 
     def relaxed(change: Array) -> Array:
         stored = stored_change(equations, x, change.reshape(-1, 1))
+        if coordinates is not None and bound is not None:
+            stored[:, 0] += coordinates.T @ (bound @ (coordinates @ change.ravel()))
         return factors.solve(stored, np.arange(1))[:, 0]
 
     size = len(x)

@@ -11,7 +11,6 @@ from hotlever.errors import ComputationError
 from hotlever.lever.state import State
 from hotlever.lever.transient.history import followed, kept_in
 from hotlever.lever.transient.waveform import Waveform
-from hotlever.types import Array
 
 if TYPE_CHECKING:
     from hotlever.lever.lever import Lever
@@ -79,23 +78,41 @@ def settled(
         size = float(np.abs(rises(change)).max())
         # all that is still to come, a geometric series
         left = size**2 / (last - size) if size < last else np.inf
-        if size < 0.1 * tolerance_K or left < tolerance_K:
+        if size < 0.1 * tolerance_K or left < 0.3 * tolerance_K:
             return history, before or State(lever, np.zeros_like(change))
-        begins.append(last_state)
+        begins.append(_air_settled(before, last_state, period))
         last = size
         if len(begins) > _KNOWN:
-            columns = [one.x for one in begins if one is not None]
-            begins, last = [State(lever, _limit(np.hstack(columns), lever))], 0.0
+            known = [one for one in begins if one is not None]
+            begins, last = [_limit(known, lever)], 0.0
     raise ComputationError(
         f"after {_MOST} periods of {period:g} µs one is still not like the last: the tip's state "
         f"at the beginning changes by {size:.2g} K"
     )
 
 
-def _limit(columns: Array, lever: Lever) -> Array:
-    """Extrapolate states at the beginning of successive periods (size + 1, n) to the limit."""
-    changes = np.diff(lever.space.rises(columns), axis=1)
+def _air_settled(before: State | None, after: State, period: float) -> State:
+    """Return a state after a period, with the air as it is after many such.
+
+    Air far away takes milliseconds to get warm, but hardly matters to the lever.
+    """
+    air = after.lever.equations.heat_in_air
+    if air is None or after.in_air is None:
+        return after
+    begin = np.zeros_like(after.in_air)
+    if before is not None:
+        begin = air.follows(before.x) if before.in_air is None else before.in_air
+    return State(after.lever, after.x, air.settled(begin, after.in_air, period))
+
+
+def _limit(begins: list[State], lever: Lever) -> State:
+    """Extrapolate states at the beginning of successive periods to the limit."""
+    own = lever.space.size + 1
+    columns = np.hstack(
+        [one.x if one.in_air is None else np.vstack([one.x, one.in_air]) for one in begins]
+    )
+    changes = np.diff(lever.space.rises(columns[:own]), axis=1)
     bends = np.diff(changes, axis=1)
     shares, *_ = np.linalg.lstsq(bends, -changes[:, 0], rcond=1e-8)
-    moved: Array = columns[:, :1] + np.diff(columns, axis=1)[:, : shares.size] @ shares[:, None]
-    return moved
+    moved = columns[:, :1] + np.diff(columns, axis=1)[:, : shares.size] @ shares[:, None]
+    return State(lever, moved[:own], moved[own:] if len(moved) > own else None)

@@ -148,13 +148,15 @@ class HarmonicBalance:
         turns = 1j * per_us * np.arange(_TIMES // 2 + 1)
         turns[-1] = 0.0
         x = np.repeat(self._start, _TIMES, axis=1)
+        of_air = self._taken_up(turns)
         inverses = None
         for done in range(_MOST):
             if inverses is None or done in (2, 8):
-                inverses = self._inverses(x.mean(axis=1, keepdims=True), turns)
+                inverses = self._inverses(x.mean(axis=1, keepdims=True), turns, of_air)
             stored, rest = self._equations.stored(x), self._equations.balance(x)
             rest[-1] = self._circuit.bias(x[-1], rest[-1]) - self._bias
             residual = np.fft.rfft(rest, axis=1) + turns * np.fft.rfft(stored, axis=1)
+            residual += np.einsum("kij,jk->ik", of_air, np.fft.rfft(x, axis=1))
             change = -np.einsum("kij,jk->ik", inverses, residual)
             x = x + np.fft.irfft(change, _TIMES, axis=1)
             if not np.isfinite(x).all():
@@ -176,14 +178,22 @@ class HarmonicBalance:
                 return False
         return True
 
-    def _inverses(self, x: Array, turns: Complex) -> Complex:
+    def _taken_up(self, turns: Complex) -> Complex:
+        """Return what the air takes up of each harmonic, (harmonics, size + 1, size + 1)."""
+        size, air = len(self._start), self._equations.heat_in_air
+        if air is None:
+            return np.zeros((turns.size, size, size), dtype=complex)
+        own = air.coordinates
+        return np.array([own.T @ air.taken_up(turn) @ own for turn in turns])
+
+    def _inverses(self, x: Array, turns: Complex, of_air: Complex) -> Complex:
         """Return the inverses of the equations linearised about a state, for each harmonic."""
         unit = np.eye(len(x))
         many = np.repeat(x, len(x), axis=1)
         rest = self._equations.balance_change(many, unit)
         rest[-1] = self._circuit.bias(unit[-1], rest[-1])
         moving = stored_change(self._equations, many, unit)
-        return np.linalg.inv(turns[:, None, None] * moving + rest)
+        return np.linalg.inv(turns[:, None, None] * moving + rest + of_air)
 
 
 def _steps(lever: Lever, rest: State, amplitude: float) -> Array:
