@@ -8,12 +8,37 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, cast
+from contextvars import ContextVar
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from hotlever.errors import HotleverError
 
 if TYPE_CHECKING:
     from hotlever.types import Progress
+
+
+class Listener(Protocol):
+    """Who hears what a command says beside its result, in place of standard error."""
+
+    def told(self, line: str) -> None:
+        """Hear a line."""
+
+    def progressed(self, label: str, done: int, total: int) -> None:
+        """Hear how many steps of some work are done."""
+
+
+_listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
+
+
+@contextmanager
+def heard_by(listener: Listener) -> Iterator[None]:
+    """Let somebody hear what commands say inside the block."""
+    before = _listener.set(listener)
+    try:
+        yield
+    finally:
+        _listener.reset(before)
 
 
 def give(result: str = "") -> None:
@@ -56,7 +81,7 @@ _stderr = _StandardError()
 
 def tell(text: str) -> None:
     """Say something in one line on standard error."""
-    print(" ".join(_printable(text).split()), file=cast(Any, _stderr), flush=True)
+    _say(" ".join(_printable(text).split()))
 
 
 def tell_table(rows: Sequence[Sequence[str]]) -> None:
@@ -64,7 +89,15 @@ def tell_table(rows: Sequence[Sequence[str]]) -> None:
     from hotlever.text import aligned
 
     for line in aligned([[_printable(cell) for cell in row] for row in rows]):
+        _say(line)
+
+
+def _say(line: str) -> None:
+    listener = _listener.get()
+    if listener is None:
         print(line, file=cast(Any, _stderr), flush=True)
+    else:
+        listener.told(line)
 
 
 def _printable(text: str) -> str:
@@ -98,6 +131,10 @@ def progress(label: str) -> Iterator[Progress]:
 @contextmanager
 def progress_bars(*labels: str) -> Iterator[tuple[Progress, ...]]:
     """Show several progress bars, each from its first call on."""
+    listener = _listener.get()
+    if listener is not None:
+        yield tuple(partial(listener.progressed, label) for label in labels)
+        return
     if sys.stderr is None or not sys.stderr.isatty():
         yield tuple(lambda done, total: None for _ in labels)
         return
