@@ -40,6 +40,10 @@ class Report:
         """Tell a line."""
         self._connection.send(("said", line))
 
+    def send(self, kind: str, content: Any) -> None:
+        """Send something of what is worked on, ahead of the answer."""
+        self._connection.send((kind, content))
+
     def progressed(self, label: str, done: int, total: int) -> None:
         """Tell how many steps are done."""
         self._connection.send(("progress", label, int(done), int(total)))

@@ -36,8 +36,11 @@ _STYLE = """
 .complaint { background: #fdecea; color: #7a1712; border-left: 4px solid #D55E00;
   padding: .5rem .75rem; border-radius: 4px; white-space: pre-wrap; overflow-wrap: anywhere; }
 .remark { overflow-wrap: anywhere; }
-.paper { background: white; border-radius: 6px; padding: .5rem; }
-.paper img { width: 100%; height: auto; }
+.paper { background: white; border-radius: 6px; padding: .5rem; max-width: 100%; }
+.paper img { max-width: 100%; height: auto; }
+.paper.wide img { width: 100%; }
+.caption { contain: inline-size; min-width: 12rem; }
+.lines { white-space: pre-wrap; font-family: monospace; font-size: .8rem; overflow-x: auto; }
 .number { font-size: 1.5rem; line-height: 1.2; font-variant-numeric: tabular-nums; }
 .controls { width: 21rem; min-width: 19rem; flex: 0 0 auto; }
 .results { flex: 1 1 30rem; min-width: 0; }
@@ -149,9 +152,18 @@ class Work:
     room : str
     then : callable
         Called with the job when it has ended while the page is open.
+    notes : bool
+        Whether what the command notes is shown here, and not with its result.
     """
 
-    def __init__(self, session: Session, room: str, then: Callable[[Job], Awaitable[None]]) -> None:
+    def __init__(
+        self,
+        session: Session,
+        room: str,
+        then: Callable[[Job], Awaitable[None]],
+        *,
+        notes: bool = True,
+    ) -> None:
         self._session, self._room, self._then = session, room, then
         self._seen: tuple[int, int] = (0, -1)
         with ui.column().classes("w-full gap-1") as self._all:
@@ -161,6 +173,7 @@ class Work:
                 ui.button("Cancel", on_click=self._cancel).props("dense outline color=negative")
             self._message = ui.label().classes("complaint w-full").props("role=alert")
             self._notes = ui.column().classes("w-full gap-0 text-sm remark")
+            self._notes.set_visibility(notes)
         ended = self._job is not None and self._job.standing != "running"
         self._told = id(self._job) if ended else 0
         self._look()
@@ -220,10 +233,10 @@ def command_shown(arguments: list[str], folder: str) -> None:
     ui.label(f"The same on the command line, in {folder}").classes("text-xs opacity-70")
 
 
-def figure(content: str, alt: str) -> None:
+def figure(content: str, alt: str, *, wide: bool = False) -> None:
     """Show an SVG figure: as an image it may hold texts from files, but no script of them runs."""
     source = f"data:image/svg+xml;base64,{b64encode(content.encode()).decode('ascii')}"
-    with ui.element("div").classes("paper w-full"):
+    with ui.element("div").classes("paper wide w-full" if wide else "paper"):
         image = ui.element("img")
         image.props["src"], image.props["alt"] = source, alt
 

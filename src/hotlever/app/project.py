@@ -23,6 +23,8 @@ DATA = (".csv", ".txt", ".tsv", ".dat", ".lvm", ".asc")
 DRAWINGS = (".gds", ".gds2", ".gdsii", ".oas", ".oasis", ".dxf")
 #: What the app writes beside a measurement begins with its name and ends so.
 FIT, CALIBRATION, TABLE = ".fit.json", ".calibration.json", ".table.csv"
+#: Folder of the fits of many levers.
+FITS = "fits"
 #: Endings of tables that commands write: no measurements.
 _WRITTEN = (TABLE, ".sweep.csv", ".raman.csv")
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -109,7 +111,9 @@ class Project:
     @property
     def fits(self) -> list[str]:
         """Fit files."""
-        return [name for name in self.names(".json") if "correlation" in self._keys(name)]
+        alone = [name for name in self.names(".json") if "correlation" in self._keys(name)]
+        among = (f"{FITS}/{path.name}" for path in sorted(self.path(FITS).glob("*.json")))
+        return [*alone, *list(among)[:_MOST]]
 
     @property
     def calibrations(self) -> list[str]:

@@ -41,8 +41,9 @@ def understood(
     measurement = _measurement(folder, name, columns, probe)
     seen = measurement.dataset(_probe(folder, probe).circuit)
     made = figures.iv_curves({}, measured=seen)
+    head, *rows = measurement.understood
     return {
-        "rows": measurement.understood,
+        "rows": [(name, *head[1:]), *rows],
         "notes": list(measurement.notes),
         "observables": list(measurement.observables),
         "medium": measurement.medium,
@@ -50,14 +51,12 @@ def understood(
     }
 
 
-def page(report: Report, folder: Path, kind: str, name: str) -> list[dict[str, Any]]:
-    """Return the blocks of the page of a result: a fit or a calibration."""
+def page(report: Report, folder: Path, kind: str, name: str) -> None:
+    """Send the blocks of the page of a result, a fit or a calibration, as they are drawn."""
     path = folder / name
-    made = _page(kind, path, _stamp(path))
-    return [
-        {**block, "figure": _svg(block["figure"])} if block["kind"] == "figure" else block
-        for block in made.blocks
-    ]
+    for block in _page(kind, path, _stamp(path)).blocks:
+        drawing = {"figure": _svg(block["figure"])} if block["kind"] == "figure" else {}
+        report.send("block", {**block, **drawing})
 
 
 def drawn(report: Report, folder: Path, kind: str, name: str, figure: str, suffix: str) -> bytes:
@@ -212,8 +211,7 @@ def _calibration(path: Path, stamp: float) -> Calibration:
 
 def _calibration_page(calibration: Calibration) -> Page:
     made = Page(f"Calibration of {calibration.measurement.path}")
-    for line in calibration.text().splitlines():
-        made.text(line)
+    made.text(calibration.text())
     for note in calibration.notes:
         made.text(sentence(note))
     made.figure(

@@ -45,7 +45,7 @@ class _Room:
                 self._button = ui.button("Calibrate", icon="straighten", on_click=self._start)
                 self._button.classes("w-full").props("no-caps")
             with right:
-                self._work = Work(session, "calibrate", self._calibrated)
+                self._work = Work(session, "calibrate", self._calibrated, notes=False)
                 self._result = ui.column().classes("w-full gap-2")
                 self.measured.shown()
                 self._command = ui.column().classes("w-full gap-0")

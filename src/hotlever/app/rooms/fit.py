@@ -9,7 +9,7 @@ from nicegui import ui
 
 from hotlever.app.jobs import Job, named
 from hotlever.app.page import Complaint, Work, command_shown, framed, two_columns
-from hotlever.app.project import FIT
+from hotlever.app.project import FIT, FITS
 from hotlever.app.rooms.measured import Measured
 from hotlever.app.rooms.results import download_button, show_result
 from hotlever.app.session import Session
@@ -45,7 +45,7 @@ class _Room:
                 self._button = ui.button("Fit", icon="query_stats", on_click=self._start)
                 self._button.classes("w-full").props("no-caps")
             with right:
-                self._work = Work(session, "fit", self._fitted)
+                self._work = Work(session, "fit", self._fitted, notes=False)
                 self._result = ui.column().classes("w-full gap-2")
                 self.measured.shown()
                 self._command = ui.column().classes("w-full gap-0")
@@ -149,14 +149,19 @@ class _Room:
         self._result.clear()
         if not self._chosen.get("data") or self._session.jobs.running("fit"):
             return
-        name = self._output
-        if not self._session.project.stamp(name):
+        # a fit of this measurement alone goes before one among many levers
+        stem, project = Path(self._chosen["data"]).stem, self._session.project
+        names = [name for name in (self._output, f"{FITS}/{stem}.json") if project.stamp(name)]
+        if not names:
             return
+        name = names[0]
         with self._result:
             with ui.row().classes("items-center"):
                 ui.label(name).classes("text-lg text-bold")
                 ui.button(
-                    "Calibrate with this fit", icon="straighten", on_click=self._calibrate
+                    "Calibrate with this fit",
+                    icon="straighten",
+                    on_click=lambda: self._calibrate(name),
                 ).props("no-caps dense").classes("q-px-sm")
                 download_button(self._session, name, "Fit (JSON)")
                 page = f"{self._report}/index.html"
@@ -164,8 +169,7 @@ class _Room:
                     download_button(self._session, page, "Page (HTML)")
             await show_result(self._session, self._complaint, "fit", name)
 
-    def _calibrate(self) -> None:
-        data = self._chosen["data"]
-        rest = {"data": data, "rests": f"fit:{self._output}", "run": True}
+    def _calibrate(self, name: str) -> None:
+        rest = {"data": self._chosen["data"], "rests": f"fit:{name}", "run": True}
         self._session.chosen.setdefault("calibrate", {}).update(rest)
         ui.navigate.to("/calibrate")

@@ -93,7 +93,7 @@ class _Room:
         if drawing is not None:
             self._import(drawing)
         elif self._chosen["text"] is not None:
-            self._text.set_value(self._chosen["text"])
+            self._quietly(self._chosen["text"])
             await self._show_text()
         else:
             await self._show_values()
@@ -101,7 +101,10 @@ class _Room:
     # --- parametric -------------------------------------------------------------------------------
 
     async def _take_shape(self, event: Any) -> None:
+        if event.value is None:  # a file is open
+            return
         self._chosen |= {"shape": event.value, "changes": {}, "text": None}
+        self._pick.set_value(None)
         await self._show_values()
 
     async def _change(self, name: str, value: float | None) -> None:
@@ -158,8 +161,8 @@ class _Room:
             self._name.set_value(path.name)
             self._fields.clear()
             self._show(found)
-            self._quietly(found["text"])
             self._chosen["text"] = found["text"]
+            self._quietly(found["text"])
 
     def _import(self, drawing: str) -> None:
         """Have a probe file proposed for a drawing."""
@@ -181,13 +184,15 @@ class _Room:
         self._quietly(self._chosen["text"])
         await self._show_text()
         with self._picture, ui.expansion("What the drawing holds").classes("w-full"):
-            ui.label(job.result).classes("whitespace-pre font-mono text-xs overflow-auto")
+            ui.label(job.result).classes("lines")
             picture = self._session.project.path(f"{path.stem}.svg")
             figure(picture.read_text(encoding="utf-8"), "All outlines of the drawing, by layer")
 
     async def _edited(self, event: Any) -> None:
         if event.value != self._shown_text:
             self._chosen["text"] = self._shown_text = event.value
+            self._fields.clear()
+            self._shape.set_value(None)
             await self._show_text()
 
     async def _show_text(self) -> None:
@@ -201,13 +206,15 @@ class _Room:
         """Show a probe file that nobody typed."""
         self._shown_text = text
         self._text.set_value(text)
+        if self._chosen["text"] is not None:
+            self._shape.set_value(None)
 
     # --- what is shown and written ----------------------------------------------------------------
 
     def _show(self, found: dict[str, Any]) -> None:
         self._picture.clear()
         with self._picture:
-            figure(found["figure"], "The lever from above: regions, terminals and tip")
+            figure(found["figure"], "The lever from above: regions, terminals and tip", wide=True)
             if found["fault"]:
                 self._complaint.say(found["fault"])
             else:

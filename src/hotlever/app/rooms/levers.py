@@ -17,13 +17,14 @@ from hotlever.app.page import (
     table,
     two_columns,
 )
+from hotlever.app.project import FITS
 from hotlever.app.rooms.measured import REFERENCE
 from hotlever.app.rooms.results import SHOWING, download_button
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 
-#: Folders of the fits and of their page.
-_FITS, _REPORT = "fits", "levers"
+#: Folder of the page of the fits.
+_REPORT = "levers"
 _LOOK_S = 1.0
 
 
@@ -105,7 +106,7 @@ class _Room:
         arguments = ["fit", *(named(name) for name in self._files.value)]
         if self._probe.value:
             arguments += ["--probe", named(self._probe.value)]
-        return [*arguments, "-o", _FITS, "--report", _REPORT]
+        return [*arguments, "-o", FITS, "--report", _REPORT]
 
     def _show_command(self) -> None:
         self._command.clear()
@@ -123,14 +124,15 @@ class _Room:
 
     async def look(self) -> None:
         """Show the fits that are there, when there is a new one."""
-        folder = self._session.project.path(_FITS)
+        folder = self._session.project.path(FITS)
         there = sorted(folder.glob("*.json")) if folder.is_dir() else []
-        seen = [(path.name, path.stat().st_mtime) for path in there]
+        pages = [folder / "levers.csv", self._session.project.path(f"{_REPORT}/index.html")]
+        seen = [(path.name, path.stat().st_mtime) for path in (*there, *pages) if path.is_file()]
         if seen == self._seen:
             return
         self._seen = seen
         call = f"{SHOWING}:levers"
-        names = [f"{_FITS}/{path.name}" for path in there]
+        names = [f"{FITS}/{path.name}" for path in there]
         with self._complaint.caught():
             found = await self._session.full.call(call, self._session.project.folder, names)
             self._show(names, found)
@@ -142,7 +144,7 @@ class _Room:
         with self._result:
             with ui.row().classes("items-center"):
                 for name, label in (
-                    (f"{_FITS}/levers.csv", "Table (CSV)"),
+                    (f"{FITS}/levers.csv", "Table (CSV)"),
                     (f"{_REPORT}/index.html", "Page (HTML)"),
                 ):
                     if self._session.project.stamp(name):

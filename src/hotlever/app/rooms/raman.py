@@ -153,5 +153,7 @@ class _Room:
                     )
             if project.stamp(f"{_FIGURE}.svg"):
                 drawn = project.path(f"{_FIGURE}.svg").read_text(encoding="utf-8")
-                figure(drawn, "Spectra by temperature, the calibration and its residuals")
+                figure(
+                    drawn, "Spectra by temperature, the calibration and its residuals", wide=True
+                )
             table(head, rows, pagination=20)

@@ -15,33 +15,39 @@ FIGURE_FILES = (".svg", ".png", ".pdf")
 
 
 async def show_result(session: Session, complaint: Complaint, kind: str, name: str) -> None:
-    """Show the page of a fit or a calibration, in the element that is open."""
-    with ui.column().classes("w-full gap-2") as shown:
-        waiting = ui.spinner(size="lg")
+    """Show the page of a fit or a calibration in the element that is open, as it is drawn."""
+    shown = ui.row().classes("w-full gap-3 items-start")
+    waiting = ui.spinner(size="lg")
+
+    def hear(message: tuple[str, Any]) -> None:
+        if message[0] == "block" and not shown.is_deleted:
+            with shown:
+                _show(session, complaint, kind, name, message[1])
+
     with complaint.caught():
         call = f"{SHOWING}:page"
-        blocks = await session.full.call(call, session.project.folder, kind, name)
-        with shown:
-            for block in blocks:
-                _show(session, complaint, kind, name, block)
-    waiting.delete()
+        await session.full.call(call, session.project.folder, kind, name, heard=hear)
+    if not waiting.is_deleted:
+        waiting.delete()
 
 
 def _show(
     session: Session, complaint: Complaint, kind: str, name: str, block: dict[str, Any]
 ) -> None:
     if block["kind"] == "heading":
-        ui.label(block["text"]).classes("text-lg text-bold")
+        ui.label(block["text"]).classes("w-full text-lg text-bold")
     elif block["kind"] == "text":
-        ui.label(block["text"]).classes("remark")
+        lines = "\n" in block["text"]
+        ui.label(block["text"]).classes("w-full lines" if lines else "w-full remark")
     elif block["kind"] == "table":
         table(block["columns"], block["rows"])
-        ui.label(block["caption"]).classes("text-xs opacity-70")
+        ui.label(block["caption"]).classes("w-full text-xs opacity-70")
     else:
-        figure(block["figure"], block["caption"])
-        with ui.row().classes("items-center w-full no-wrap"):
-            ui.label(block["caption"]).classes("text-xs opacity-70 remark col")
-            figure_files(session, complaint, kind, name, block["name"])
+        with ui.column().classes("gap-0"):
+            figure(block["figure"], block["caption"])
+            with ui.row().classes("items-center w-full no-wrap"):
+                ui.label(block["caption"]).classes("text-xs opacity-70 remark caption col")
+                figure_files(session, complaint, kind, name, block["name"])
 
 
 def figure_files(session: Session, complaint: Complaint, kind: str, name: str, shown: str) -> None:
