@@ -36,14 +36,18 @@ class App:
 
     def __init__(self, folder: Path, *options: str) -> None:
         command = [sys.executable, "-m", "hotlever", "app", str(folder), "--no-browser", *options]
-        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        # NiceGUI behaves otherwise where it believes to be tested by its own fixtures
+        own = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
+        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=own)
         self.lines: list[str] = []
         self._said = threading.Event()
         threading.Thread(target=self._read, daemon=True).start()
-        if not self._said.wait(_START_S):
+        self._said.wait(_START_S)
+        words = [word for line in self.lines for word in line.split()]
+        self.address = next((word for word in words if word.startswith("http:")), "")
+        if not self.address:
             self.end()
             raise RuntimeError(f"the app did not start: {self.lines}")
-        self.address = next(word for word in self.lines[-1].split() if word.startswith("http"))
 
     @property
     def base(self) -> str:
@@ -52,10 +56,13 @@ class App:
 
     def _read(self) -> None:
         assert self.process.stderr is not None
-        for line in self.process.stderr:
-            self.lines.append(line.rstrip())
-            if "http://" in line:
-                self._said.set()
+        with self.process.stderr as lines:
+            for line in lines:
+                self.lines.append(line.rstrip())
+                if "http://" in line:
+                    self._said.set()
+        # nothing more will be said
+        self._said.set()
 
     def end(self) -> None:
         """Stop it as Ctrl-C does."""
