@@ -1,20 +1,23 @@
-"""The app in a real browser: how soon it answers, and what it asks of other hosts.
+"""The app in a real browser: how soon it answers, what it asks of other hosts, what it withstands.
 
-python benchmarks/app.py [MOVES]     (needs Chromium, and the extra test-app)
+python benchmarks/app.py [speed|files|memory] [COUNT]   (needs Chromium, and the extra test-app)
 
-Times are of the wall, as a user has them, from the key press to the last figure drawn.
+Times are of the wall, as a user has them, from the key press to the last figure drawn; the
+processor's, of the app and the browser together, tell what a machine without other work would need.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 import time
 from pathlib import Path
-from statistics import median
 
 import numpy as np
+import psutil
 from app_in_browser import EXAMPLES, browsing, running
+from bad_files import bad_files
 
 from problems import table
 
@@ -72,7 +75,9 @@ def sliders(page, app, count):
     page.get_by_text("full lever:").wait_for(timeout=60_000)
     page.wait_for_timeout(1000)
     page.evaluate(_COUNT)
+    before = _spent(app)
     bias = moves(page, "Bias", count)
+    by_bias = 1000 * (_spent(app) - before) / count
     # the reduced lever is made in the background
     deadline, model = time.monotonic() + 240, ""
     while "reduced" not in model and time.monotonic() < deadline:
@@ -80,8 +85,10 @@ def sliders(page, app, count):
         model = page.locator("[aria-live=polite]").first.inner_text()
         if "reduced" not in model:
             page.wait_for_timeout(1000)
+    before = _spent(app)
     material = moves(page, MATERIAL, count // 2)
-    return bias, material, model
+    by_material = 1000 * (_spent(app) - before) / (count // 2)
+    return bias, material, model, (by_bias, by_material)
 
 
 def fit(page, app):
@@ -103,13 +110,12 @@ def fit(page, app):
     return parameters, time.perf_counter() - begin
 
 
-def main():
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 60
+def speed(count):
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         said, answered = start_to_page(folder)
         with running(folder) as app, browsing(app) as (page, seen):
-            bias, material, model = sliders(page, app, count)
+            bias, material, model, shares = sliders(page, app, count)
             fit(page, app)
             (folder / "lever-b.fit.json").unlink()
             (folder / "lever-b.csv").unlink()
@@ -117,17 +123,106 @@ def main():
             rows = [
                 ("address printed", f"{said:.2f} s", ""),
                 ("start to a page that answers", f"{answered:.2f} s", "3 s"),
-                ("bias slider, median", f"{median(bias):.0f} ms", "100 ms"),
-                ("bias slider, 95 %", f"{np.percentile(bias, 95):.0f} ms", "250 ms"),
-                (f"material slider, median ({model})", f"{np.median(material):.0f} ms", "200 ms"),
+                ("bias slider, median", f"{np.nanmedian(bias):.0f} ms", "100 ms"),
+                ("bias slider, 95 %", f"{np.nanpercentile(bias, 95):.0f} ms", "250 ms"),
+                ("bias slider, processor", f"{shares[0]:.0f} ms", ""),
+                (
+                    f"material slider, median ({model})",
+                    f"{np.nanmedian(material):.0f} ms",
+                    "200 ms",
+                ),
+                ("material slider, processor", f"{shares[1]:.0f} ms", ""),
                 ("fit, drop to parameters, warm", f"{parameters:.1f} s", ""),
                 ("fit, drop to drawn, warm", f"{drawn:.1f} s", "3 s"),
                 ("requests to other hosts", f"{len(seen.elsewhere)} of {seen.requests}", "0"),
                 ("errors in the browser", f"{len(seen.errors)}", "0"),
+                ("load of the machine", f"{os.getloadavg()[0]:.1f} on {os.cpu_count()}", ""),
             ]
             table(("quantity", "measured", "target"), rows)
             for line in (*seen.errors[:5], *seen.elsewhere[:5]):
                 print(line)
+
+
+def files(count):
+    """Drop bad files in every room; say in which the app said nothing, or stopped."""
+    rows = []
+    with (
+        tempfile.TemporaryDirectory() as name,
+        running(Path(name)) as app,
+        browsing(app) as (page, seen),
+    ):
+        for room in ("", "lever", "simulate", "raman", "fit", "calibrate", "levers"):
+            rows.append((room or "start", *_files_in(page, app, room, count)))
+        said = [line for line in app.lines if "internal error" in line]
+        table(("room", "files", "a line", "moved on or taken", "dead pages"), rows)
+        print(f"internal errors: {len(said)}; errors in the browser: {len(seen.errors)}")
+        for line in (*said[:5], *seen.errors[:5]):
+            print(line)
+
+
+def _files_in(page, app, room, count):
+    told = taken = dead = 0
+    bad = [file for file in bad_files() if "/" not in file[0] and len(file[0]) < 200][:count]
+    page.goto(f"{app.base}/{room}")
+    page.wait_for_load_state("networkidle")
+    zone = page.locator("input[type=file]").first
+    if not zone.count():
+        return 0, 0, 0, 0
+    for name, content in bad:
+        zone.set_input_files({"name": name, "mimeType": "", "buffer": content})
+        page.wait_for_timeout(400)
+        alert = " ".join(page.locator("[role=alert]").all_inner_texts()).strip()
+        told, taken = told + bool(alert), taken + (not alert)
+        if not page.url.endswith(f"/{room}"):
+            page.goto(f"{app.base}/{room}")
+        dead += not page.get_by_role("button", name="Simulate").first.is_enabled()
+    return len(bad), told, taken, dead
+
+
+def memory(count):
+    """Move sliders at random; say how the memory of the app grows."""
+    rng, rows = np.random.default_rng(1), []
+    with (
+        tempfile.TemporaryDirectory() as name,
+        running(Path(name)) as app,
+        browsing(app) as (page, seen),
+    ):
+        page.goto(f"{app.base}/simulate")
+        page.get_by_text("full lever:").wait_for(timeout=180_000)
+        names = [MATERIAL, "Bias", "scale of the thermal conductivity", "Bias"]
+        for number in range(count + 1):
+            if number % max(1, count // 5) == 0:
+                page.wait_for_timeout(3000)
+                rows.append((str(number), f"{_memory(app) / 2**20:.0f} MB"))
+            one = names[number % 4]
+            slider = page.get_by_role("slider", name=one, exact=True).locator("[tabindex]")
+            slider.press(str(rng.choice(["ArrowRight", "ArrowLeft"])))
+        table(("moves", "memory of the app and its processes"), rows)
+        print(f"errors in the browser: {len(seen.errors)}")
+
+
+def _processes(app):
+    own = psutil.Process(app.process.pid)
+    return [own, *own.children(recursive=True)]
+
+
+def _memory(app):
+    return sum(one.memory_info().rss for one in _processes(app))
+
+
+def _spent(app):
+    """Return processor seconds of the app and of the browsers."""
+    known = [*_processes(app), *psutil.Process().children(recursive=True)]
+    times = {one.pid: one.cpu_times() for one in known}
+    return sum(time.user + time.system for time in times.values())
+
+
+def main():
+    what = sys.argv[1] if len(sys.argv) > 1 else "speed"
+    count = (
+        int(sys.argv[2]) if len(sys.argv) > 2 else {"speed": 60, "files": 50, "memory": 1000}[what]
+    )
+    {"speed": speed, "files": files, "memory": memory}[what](count)
 
 
 if __name__ == "__main__":

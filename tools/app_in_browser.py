@@ -116,7 +116,7 @@ def browsing(app: App, width: int = 1280, height: int = 800) -> Iterator[tuple[P
     arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=chromium_path(), args=arguments)
-        page = browser.new_page(viewport={"width": width, "height": height})
+        page = browser.new_context(viewport={"width": width, "height": height}).new_page()
         seen = Seen(page, app.base)
         page.goto(app.address)
         page.wait_for_load_state("networkidle")

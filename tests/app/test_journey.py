@@ -7,6 +7,7 @@ import json
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,6 +28,7 @@ pytestmark = [
 SCREENSHOTS = Path(__file__).with_name("screenshots")
 #: Milliseconds that work may take on a busy machine, and what a cancelled command may.
 _WORK, _CANCEL = 180_000, 1500
+expect.set_options(timeout=60_000)
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +69,7 @@ def drop(page: Page, *paths: Any, zone: int = 0) -> None:
 
 def picture(page: Page, name: str) -> None:
     SCREENSHOTS.mkdir(exist_ok=True)
+    page.evaluate("window.scrollTo(0, 0)")
     page.wait_for_timeout(500)
     page.screenshot(path=SCREENSHOTS / f"{name}.png", full_page=True)
 
@@ -108,7 +111,8 @@ def test_from_the_shipped_measurement_to_a_table_in_five_clicks(
 
 
 def test_the_files_are_those_of_the_command_line(folder: Path, tmp_path: Path) -> None:
-    command = ["hotlever", "fit", "lever-a.csv", "-o", str(tmp_path / "fit.json")]
+    command = ["fit", "lever-a.csv", "-o", str(tmp_path / "fit.json")]
+    command = [sys.executable, "-m", "hotlever", *command]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     ours = json.loads((folder / "lever-a.fit.json").read_text())
     theirs = json.loads((tmp_path / "fit.json").read_text())

@@ -32,7 +32,7 @@ from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
 #: Biases of a curve, and cells of the temperature map along its longer side.
-_POINTS, _CELLS = 61, 150
+_POINTS, _CELLS = 121, 150
 #: How much making reduced levers steps back behind other work.
 _NICE = 10
 #: Levers kept for sliders that go back and forth.

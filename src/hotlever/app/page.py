@@ -76,14 +76,17 @@ def framed(session: Session, address: str) -> Iterator[Complaint]:
         ui.button(icon="contrast", on_click=switch).props(
             'flat dense color=white aria-label="Light or dark"'
         )
-    complaint = Complaint()
-    yield complaint
+    yield Complaint(str(session.project.folder))
 
 
 class Complaint:
-    """The line in which a room says what is wrong; empty and hidden while nothing is."""
+    """The line in which a room says what is wrong; empty and hidden while nothing is.
 
-    def __init__(self) -> None:
+    Files of the project's folder are named without it.
+    """
+
+    def __init__(self, folder: str) -> None:
+        self._folder = folder
         self._label = ui.label().classes("complaint w-full").props("role=alert")
         self.clear()
 
@@ -93,7 +96,7 @@ class Complaint:
 
     def say(self, text: str) -> None:
         """Say what is wrong."""
-        self._label.set_text(text)
+        self._label.set_text(text.replace(f"{self._folder}/", ""))
         self._label.set_visibility(bool(text))
 
     @contextmanager

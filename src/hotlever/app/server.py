@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import secrets
 import socket
 from collections.abc import Awaitable, Callable
@@ -52,8 +53,16 @@ class Served:
     password: str | None = None
 
 
-def serve(project: Project, served: Served, browser: bool, say: Callable[[str], None]) -> None:
+def serve(
+    project: Project,
+    served: Served,
+    browser: bool,
+    say: Callable[[str], None],
+    failed: Callable[[BaseException], None],
+) -> None:
     """Serve a project until Ctrl-C.
+
+    `say` is told the address, `failed` what nobody foresaw.
 
     Raises
     ------
@@ -73,6 +82,9 @@ def serve(project: Project, served: Served, browser: bool, say: Callable[[str], 
     session = Session(project)
     app.on_startup(session.start)
     app.on_startup(lambda: say(address))
+    # told in one line, and kept in a file, as by any command
+    logging.getLogger("nicegui").setLevel(logging.CRITICAL + 1)
+    app.on_exception(failed)
     add_pages(session)
     limits: Any = {"password": served.password, "largest": LARGEST_FILE}
     app.add_middleware(Guard, token=token, hosts=hosts, **limits)

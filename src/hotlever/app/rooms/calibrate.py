@@ -44,6 +44,7 @@ class _Room:
                 self._options()
                 self._button = ui.button("Calibrate", icon="straighten", on_click=self._start)
                 self._button.classes("w-full").props("no-caps")
+                self._button.disable()  # until there is something understood
             with right:
                 self._work = Work(session, "calibrate", self._calibrated, notes=False)
                 self._result = ui.column().classes("w-full gap-2")

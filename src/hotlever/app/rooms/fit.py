@@ -36,6 +36,7 @@ class _Room:
     def __init__(self, session: Session, complaint: Complaint) -> None:
         self._session, self._complaint = session, complaint
         self._chosen = session.chosen.setdefault("fit", {})
+        self._has: list[str] = []
         self.measured = Measured(session, complaint, self._chosen, self._understood)
         with two_columns() as (left, right):
             with left:
@@ -44,6 +45,7 @@ class _Room:
                 self._options()
                 self._button = ui.button("Fit", icon="query_stats", on_click=self._start)
                 self._button.classes("w-full").props("no-caps")
+                self._button.disable()  # until there is something understood
             with right:
                 self._work = Work(session, "fit", self._fitted, notes=False)
                 self._result = ui.column().classes("w-full gap-2")
@@ -93,10 +95,9 @@ class _Room:
     async def _understood(self, found: dict[str, Any] | None) -> None:
         """Show what can be fitted, and the fit of this measurement if there is one."""
         self._button.set_enabled(found is not None)
-        has = [] if found is None else found["observables"]
+        self._has = [] if found is None else found["observables"]
         for name, box in self._observables.items():
-            box.set_visibility(name in has)
-        self._has = has
+            box.set_visibility(name in self._has)
         self._show_command()
         await self._show_fit()
 

@@ -111,7 +111,7 @@ class Measured:
             try:
                 found = await self._session.full.call(call, folder, name, columns, probe)
             except HotleverError as error:
-                self._complaint.say(str(error).replace(f"{folder}/", ""))
+                self._complaint.say(str(error))
         if found is not None:
             with self._table:
                 self._show(found)

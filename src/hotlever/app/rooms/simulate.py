@@ -79,11 +79,11 @@ class _Room:
                 on_change=lambda event: self._change("medium", event.value),
             ).props("no-caps dense unelevated")
             self._gap = ui.number(
-                "surface at (µm)",
+                "surface (µm)",
                 min=0.01,
                 max=1e4,
                 on_change=lambda event: self._change("surface_gap_um", event.value),
-            ).props("dense outlined clearable hint='empty: none'")
+            ).props("dense outlined clearable placeholder=none stack-label")
             self._gap.bind_visibility_from(self._medium, "value", value="air")
         with ui.column().classes("w-full gap-0"):
             with ui.row().classes("w-full items-center no-wrap justify-between"):
@@ -168,7 +168,7 @@ class _Room:
         with ui.column().classes("w-full gap-0"):
             with ui.row().classes("w-full items-center no-wrap justify-between"):
                 ui.label(name).classes("text-sm").tooltip(meaning)
-                number = ui.number(format="%.5g").classes("w-32")
+                number = ui.number(format="%.4g").classes("w-36")
                 number.props(f'dense borderless suffix="{unit}" input-class=text-right')
                 number.props(f'aria-label="{name}, {meaning}"')
             slider = ui.slider(min=low, max=high, step=(high - low) / 400, value=now)
@@ -213,7 +213,7 @@ class _Room:
 
     async def _follow(self) -> None:
         try:
-            while self._wanted is not None:
+            while self._wanted is not None and not self._bias.is_deleted:
                 wanted, self._wanted = self._wanted, None
                 parameters = (wanted["probe"], wanted["changes"])
                 await self._show(wanted, quick=parameters != self._settled)
@@ -233,7 +233,10 @@ class _Room:
         try:
             answer = await desk.call(f"{_LIVE}:answer", folder, wanted["probe"], changes, ask)
         except HotleverError as error:
-            self._complaint.say(str(error))
+            if not self._bias.is_deleted:
+                self._complaint.say(str(error))
+            return False
+        if self._bias.is_deleted:  # the tab was closed meanwhile
             return False
         if self._wanted is not None and not quick and wanted["changes"] != self._chosen["changes"]:
             return False  # parameters have moved on while the full lever was solved

@@ -99,6 +99,7 @@ async def _sort(session: Session, complaint: Complaint, names: list[str]) -> Non
     if name.lower().endswith(DRAWINGS):
         _open(session, "/lever", "lever", "drawing", name)
     elif name.lower().endswith(".toml"):
+        await session.quick.call(f"{SHOWING}:probe_page", session.project.folder, name)
         _open(session, "/simulate", "simulate", "probe", name)
     elif name.lower().endswith(".json"):
         complaint.say(f"{name}: kept in the folder; the rooms Fit and Calibrate find it there")
@@ -109,7 +110,7 @@ async def _sort(session: Session, complaint: Complaint, names: list[str]) -> Non
             await session.full.call(call, folder, name, [], None)
         except HotleverError as error:
             if not await session.full.call(f"{SHOWING}:is_spectrum", folder, name):
-                complaint.say(str(error).replace(f"{folder}/", ""))
+                complaint.say(str(error))
                 return
             complaint.say(
                 f"{name} is a spectrum: please drop it in the room Raman, as tip or plate"
