@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 import psutil
+
 from app_in_browser import EXAMPLES, browsing, running
 from bad_files import bad_files
-
 from problems import table
 
 MATERIAL = "phonon scattering exponent"
@@ -96,7 +96,7 @@ def fit(page, app):
     page.goto(f"{app.base}/fit")
     page.wait_for_load_state("networkidle")
     page.locator("input[type=file]").first.set_input_files(EXAMPLES / "lever-a.csv")
-    page.get_by_text("What was understood").wait_for()
+    page.get_by_text("What was understood").first.wait_for()
     page.wait_for_timeout(500)
     begin = time.perf_counter()
     page.locator("input[type=file]").first.set_input_files(EXAMPLES / "lever-b.csv")

@@ -1,11 +1,15 @@
-"""Draw docs/app.png, the README's picture of the app; run it after the app's looks have changed."""
+"""Draw docs/app.png, the README's picture of the app, after its looks have changed.
+
+PYTHONPATH=benchmarks python tools/app_picture.py
+"""
 
 import io
 import tempfile
 from pathlib import Path
 
-from app_in_browser import browsing, running
 from PIL import Image
+
+from app_in_browser import browsing, running
 
 TARGET = Path(__file__).parents[1] / "docs" / "app.png"
 #: Few enough for a file below 100 kB.

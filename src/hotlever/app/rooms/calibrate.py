@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 from nicegui import ui
 
-from hotlever.app.jobs import Job, named
-from hotlever.app.page import Complaint, Work, command_shown, framed, two_columns
+from hotlever.app.jobs import named
+from hotlever.app.page import framed
 from hotlever.app.project import CALIBRATION, TABLE
-from hotlever.app.rooms.measured import REFERENCE, Measured
-from hotlever.app.rooms.results import SHOWING, download_button, show_result
+from hotlever.app.rooms.measured import REFERENCE, MeasuredRoom
+from hotlever.app.rooms.results import SHOWING, download_button
+from hotlever.app.rooms.room import MEDIA, choice, field, several
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 
@@ -27,86 +25,49 @@ _ASKED = {
 async def calibrate(session: Session) -> None:
     """Fill the page."""
     with framed(session, "/calibrate") as complaint:
-        room = _Room(session, complaint)
-    await room.measured.read()
+        room = _Room(session, complaint, "Calibrate", "straighten")
+    await room.read()
 
 
-class _Room:
+class _Room(MeasuredRoom):
     """One tab of the room."""
 
-    def __init__(self, session: Session, complaint: Complaint) -> None:
-        self._session, self._complaint = session, complaint
-        self._chosen = session.chosen.setdefault("calibrate", {})
-        self.measured = Measured(session, complaint, self._chosen, self._understood)
-        with two_columns() as (left, right):
-            with left:
-                self.measured.controls()
-                self._options()
-                self._button = ui.button("Calibrate", icon="straighten", on_click=self._start)
-                self._button.classes("w-full").props("no-caps")
-                self._button.disable()  # until there is something understood
-            with right:
-                self._work = Work(session, "calibrate", self._calibrated, notes=False)
-                self._result = ui.column().classes("w-full gap-2")
-                self.measured.shown()
-                self._command = ui.column().classes("w-full gap-0")
+    name, kind, ending = "calibrate", "calibration", CALIBRATION
 
-    def _options(self) -> None:
-        project, chosen = self._session.project, self._chosen
+    def options(self) -> None:
+        """Show what the calibration rests on, and what is known beforehand."""
+        project, chosen = self.session.project, self.chosen
         rests = {"probe:": REFERENCE}
         rests |= {f"probe:{name}": name for name in project.probes}
         rests |= {f"fit:{name}": f"fit {name}" for name in project.fits}
         rests |= {f"law:{name}": f"power law of {name}" for name in project.laws}
-        if chosen.get("rests") not in rests:
-            chosen["rests"] = "probe:"
-        self._rests = ui.select(
-            rests, label="Rests on", value=chosen["rests"], on_change=self._choose
-        )
-        self._rests.classes("w-full").props("dense outlined")
-        self._medium = ui.select(
-            {"": "as the files say", "vacuum": "vacuum", "air": "air"},
-            label="Medium",
-            value=chosen.get("medium", ""),
-            on_change=self._choose,
-        )
-        self._medium.classes("w-full").props("dense outlined")
-        self._priors = ui.input(
-            "Known beforehand (n_d=3.3e17±15%)",
-            value=chosen.get("priors", ""),
-            on_change=self._choose,
-        )
-        self._priors.classes("w-full").props("dense outlined")
-        self._pulse = ui.input(
-            "For pulses too (5us or 5us,100us)",
-            value=chosen.get("pulse", ""),
-            on_change=self._choose,
-        )
-        self._pulse.classes("w-full").props("dense outlined")
+        self._rests = choice("Rests on", rests, chosen.get("rests"), self._choose)
+        chosen["rests"] = self._rests.value
+        self._medium = choice("Medium", MEDIA, chosen.get("medium", ""), self._choose)
+        known = "Known beforehand (n_d=3.3e17±15%)"
+        self._priors = field(known, chosen.get("priors", ""), self._choose)
+        pulses = "For pulses too (5us or 5us,100us)"
+        self._pulse = field(pulses, chosen.get("pulse", ""), self._choose)
 
     def _choose(self) -> None:
-        self._chosen |= {"rests": self._rests.value, "medium": self._medium.value}
-        self._chosen |= {"priors": self._priors.value or "", "pulse": self._pulse.value or ""}
-        self._show_command()
+        self.chosen |= {"rests": self._rests.value, "medium": self._medium.value}
+        self.chosen |= {"priors": self._priors.value, "pulse": self._pulse.value}
+        self.show_command()
 
-    async def _understood(self, found: dict[str, Any] | None) -> None:
-        self._button.set_enabled(found is not None)
-        self._show_command()
-        # who comes from a fit has asked for this already
-        if found is not None and self._chosen.pop("run", False):
-            self._start()
-        await self._show_calibration()
+    def understood(self) -> None:
+        """Begin at once if who comes from a fit has asked for it."""
+        if self.chosen.pop("run", False) and self.has:
+            self.start()
 
     @property
-    def _stem(self) -> str:
-        return Path(self._chosen["data"]).stem
+    def _table_file(self) -> str:
+        return f"{self.stem}{TABLE}"
 
-    @property
-    def _output(self) -> str:
-        return f"{self._stem}{CALIBRATION}"
-
-    def _arguments(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """Return the command that makes the calibration."""
-        chosen = self._chosen
+        chosen = self.chosen
+        if not chosen.get("data"):
+            return []
         arguments = ["calibrate", named(chosen["data"])]
         kind, _, name = chosen["rests"].partition(":")
         if name:
@@ -115,48 +76,25 @@ class _Room:
             arguments += ["--column", column]
         if chosen.get("medium"):
             arguments += ["--medium", chosen["medium"]]
-        for one in filter(None, (p.strip() for p in chosen.get("priors", "").split(","))):
-            arguments += ["--prior", one]
+        arguments += several("--prior", chosen.get("priors"))
         if chosen.get("pulse"):
             arguments += ["--pulse", chosen["pulse"].replace(" ", "")]
-        return [*arguments, "-o", self._output, "--table", f"{self._stem}{TABLE}"]
+        return [*arguments, "-o", self.output, "--table", self._table_file]
 
-    def _show_command(self) -> None:
-        self._command.clear()
-        if self._chosen.get("data"):
-            with self._command:
-                command_shown(self._arguments(), str(self._session.project.folder))
-
-    def _start(self) -> None:
-        with self._complaint.caught():
-            self._session.jobs.start("calibrate", self._arguments())
-            self._result.clear()
-
-    async def _calibrated(self, job: Job) -> None:
-        await self._show_calibration()
-
-    async def _show_calibration(self) -> None:
-        self._result.clear()
-        if not self._chosen.get("data") or self._session.jobs.running("calibrate"):
-            return
-        name = self._output
-        if not self._session.project.stamp(name):
-            return
-        with self._result:
-            with ui.row().classes("items-center"):
-                ui.label(name).classes("text-lg text-bold")
-                table = f"{self._stem}{TABLE}"
-                if self._session.project.stamp(table):
-                    download_button(self._session, table, "Table (CSV)")
-                download_button(self._session, name, "Calibration (JSON)")
-            await self._questions(name)
-            await show_result(self._session, self._complaint, "calibration", name)
+    async def show(self, name: str) -> None:
+        """Show what to set for a temperature."""
+        with ui.row().classes("items-center"):
+            ui.label(name).classes("text-lg text-bold")
+            if self.session.project.stamp(self._table_file):
+                download_button(self.session, self._table_file, "Table (CSV)")
+            download_button(self.session, name, "Calibration (JSON)")
+        await self._questions(name)
 
     async def _questions(self, name: str) -> None:
         """Show what to set for a temperature, and what a bias or a power gives."""
         with ui.card().classes("w-full").props("flat bordered"):
             ui.label("What do I set?").classes("text-bold")
-            asked = [_Question(self._session, name, along) for along in _ASKED]
+            asked = [_Question(self.session, name, along) for along in _ASKED]
         for one in asked:
             await one.answer()
 
