@@ -44,7 +44,7 @@ def understood(
     head, *rows = measurement.understood
     return {
         "rows": [(name, *head[1:]), *rows],
-        "notes": list(measurement.notes),
+        "notes": [note.replace(f"{folder}/", "") for note in measurement.notes],
         "observables": list(measurement.observables),
         "medium": measurement.medium,
         "figure": _svg(made),
