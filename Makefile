@@ -1,11 +1,12 @@
 # make test       all tests: ruff, mypy, pytest (with the README's examples)
+# make test-app   the app in a real browser; screenshots in tests/app/screenshots
 # make reproduce  the main job: the paper's results as one page in reproduce/
 # make docs       the documentation as a site in docs/_build/
 # Each makes the environment in .venv first. FORM=quick shortens reproduce.
 FORM ?= full
 BIN := .venv/bin
 
-.PHONY: test test-slow reproduce docs lock env clean
+.PHONY: test test-slow test-app reproduce docs lock env clean
 
 env: .venv/.ready
 
@@ -22,6 +23,10 @@ test: env
 test-slow: env
 	$(BIN)/python -m pytest -m slow -n 2 --dist loadfile
 
+test-app: env
+	sh tools/get_chromium.sh
+	$(BIN)/python -m pytest -m browser -p no:cacheprovider tests/app
+
 reproduce: env
 	$(BIN)/hotlever reproduce -o reproduce $(if $(filter quick,$(FORM)),--quick)
 
@@ -34,4 +39,4 @@ lock: env
 	    --no-header --all-extras --output-file requirements.lock pyproject.toml
 
 clean:
-	rm -rf .venv reproduce docs/_build benchmarks/results
+	rm -rf .venv reproduce docs/_build benchmarks/results tests/app/screenshots

@@ -1,6 +1,7 @@
 """All commands: importing a command's module registers it on the application."""
 
 from hotlever.cli import (
+    browser,
     cache,
     calibrate,
     design,
@@ -17,6 +18,7 @@ from hotlever.cli.application import app
 
 __all__ = [
     "app",
+    "browser",
     "cache",
     "calibrate",
     "design",

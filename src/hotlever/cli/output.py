@@ -9,7 +9,9 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, cast
+from contextvars import ContextVar
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from hotlever.errors import HotleverError, shown
 
@@ -20,6 +22,29 @@ if TYPE_CHECKING:
 FIRST_LINE_S, NEXT_LINE_S = 2.0, 10.0
 #: Characters of a line that says what went wrong.
 _LONGEST = 1200
+
+
+class Listener(Protocol):
+    """Who hears what a command says beside its result, in place of standard error."""
+
+    def told(self, line: str) -> None:
+        """Hear a line."""
+
+    def progressed(self, label: str, done: int, total: int) -> None:
+        """Hear how many steps of some work are done."""
+
+
+_listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
+
+
+@contextmanager
+def heard_by(listener: Listener) -> Iterator[None]:
+    """Let somebody hear what commands say inside the block."""
+    before = _listener.set(listener)
+    try:
+        yield
+    finally:
+        _listener.reset(before)
 
 
 def give(result: str = "") -> None:
@@ -62,7 +87,7 @@ _stderr = _StandardError()
 
 def tell(text: str) -> None:
     """Say something in one line on standard error."""
-    print(" ".join(_printable(text).split()), file=cast(Any, _stderr), flush=True)
+    _say(" ".join(_printable(text).split()))
 
 
 def tell_table(rows: Sequence[Sequence[str]]) -> None:
@@ -70,7 +95,15 @@ def tell_table(rows: Sequence[Sequence[str]]) -> None:
     from hotlever.text import aligned
 
     for line in aligned([[_printable(cell) for cell in row] for row in rows]):
+        _say(line)
+
+
+def _say(line: str) -> None:
+    listener = _listener.get()
+    if listener is None:
         print(line, file=cast(Any, _stderr), flush=True)
+    else:
+        listener.told(line)
 
 
 def _printable(text: str) -> str:
@@ -117,6 +150,10 @@ def progress(label: str) -> Iterator[Progress]:
 @contextmanager
 def progress_bars(*labels: str) -> Iterator[tuple[Progress, ...]]:
     """Show several progress bars, each from its first call on; lines where there is no terminal."""
+    listener = _listener.get()
+    if listener is not None:
+        yield tuple(partial(listener.progressed, label) for label in labels)
+        return
     if sys.stderr is None or not sys.stderr.isatty():
         yield tuple(_lines(label) for label in labels)
         return

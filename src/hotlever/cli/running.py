@@ -96,8 +96,13 @@ def _ended(error: BaseException, arguments: list[str]) -> tuple[int, str]:
         return 1, ""
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else 1, ""
+    return 1, unforeseen(error, arguments)
+
+
+def unforeseen(error: BaseException, arguments: list[str]) -> str:
+    """Return the line for an error that nobody foresaw, with where its traceback is kept."""
     what = "out of memory" if isinstance(error, MemoryError) else f"{type(error).__name__}: {error}"
-    return 1, f"internal error: {what} ({_logged(error, arguments)})"
+    return f"internal error: {what} ({_logged(error, arguments)})"
 
 
 def _logged(error: BaseException, arguments: list[str]) -> str:

@@ -20,7 +20,7 @@ import numpy as np
 
 from hotlever.lever.air_loss import AirLoss
 from hotlever.lever.atlas import Atlas
-from hotlever.lever.branch import Reach
+from hotlever.lever.branch import Branch, Reach
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.following import branch_of
 from hotlever.lever.full_space import FullSpace
@@ -272,6 +272,31 @@ class ReducedLever:
         return few, find_roots(Pinned(few, u**2), guess, _NEARLY, factors)
 
     @one_blas_thread
+    def branch(self, material: Material, reach: Reach) -> Branch:
+        """Return the branch of a material, from the atlas.
+
+        Raises
+        ------
+        NewtonError
+            If a state was not found.
+        """
+        return self._branch(material, *self._start(material, reach), None)[0]
+
+    def _start(self, material: Material, reach: Reach) -> tuple[Array, Array]:
+        """Return u of the states that suffice, and guesses of them."""
+        count = reach.count(self.atlas.shown(material))
+        return self.atlas.u[1:count], self.atlas.states(material)[:, 1:count]
+
+    def _branch(
+        self, material: Material, u: Array, guess: Array, factors: Any
+    ) -> tuple[Branch, LeverEquations, Any]:
+        """Return a branch, the equations at the few points, and the factors at its states."""
+        few, found = self.solved(material, u, guess, factors)
+        every = self.equations(material)
+        found = find_roots(Pinned(every, u**2), found.x, _DONE, found.factors)
+        return branch_of(every, u, found), few, found.factors
+
+    @one_blas_thread
     def linearised(
         self,
         probe: Probe,
@@ -285,19 +310,13 @@ class ReducedLever:
         """
         if not set(names) <= set(PARAMETERS):
             raise ValueError("a reduced lever has derivatives by the material only")
-        material = probe.material
         if near is None:
-            count = reach.count(self.atlas.shown(material))
-            u, guess = self.atlas.u[1:count], self.atlas.states(material)[:, 1:count]
-            factors = None
+            (u, guess), factors = self._start(probe.material, reach), None
         else:
             u, guess, factors = near.branch.u[1:], near.states(probe)[:, 1:], near.factors
-        few, found = self.solved(material, u, guess, factors)
-        every = self.equations(material)
-        found = find_roots(Pinned(every, u**2), found.x, _DONE, found.factors)
+        branch, few, factors = self._branch(probe.material, u, guess, factors)
         # derivatives by the material are taken at the few points: exact ones cost too much here
-        branch = branch_of(every, u, found)
-        return Linearised.of(probe, names, branch, reach, few, found.factors)
+        return Linearised.of(probe, names, branch, reach, few, factors)
 
     # --- on disk ----------------------------------------------------------------------------------
 

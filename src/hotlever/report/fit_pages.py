@@ -10,6 +10,7 @@ from hotlever.fitting.levers import compare_levers, statements
 from hotlever.fitting.result import Fit
 from hotlever.fitting.uncertainty import Uncertainty
 from hotlever.fitting.words import lever_rows, outcome, parameter_rows, uncertainty_tables
+from hotlever.lever import Lever
 from hotlever.report.page import Page
 from hotlever.text import INVERSION, sentence
 
@@ -33,9 +34,11 @@ def fit_page(fit: Fit, found: Uncertainty | None = None) -> Page:
 def add_fit(page: Page, fit: Fit) -> None:
     """Add tables and figures of a fit to a page."""
     measured = fit.measurement.dataset(fit.probe.circuit)
-    model = fit.model(measured.bias.values)
+    # solved once for both
+    lever = Lever(fit.probe)
+    model = lever.sweep(measured.bias.values)
     low, high = measured.bias.values[[0, -1]].tolist()
-    curve = fit.model(np.linspace(low, high, _POINTS))
+    curve = lever.sweep(np.linspace(low, high, _POINTS))
     page.table(
         ("parameter", "value", "unit", ""),
         parameter_rows(fit),

@@ -1,0 +1,229 @@
+"""The app in a real browser: how soon it answers, what it asks of other hosts, what it withstands.
+
+python benchmarks/app.py [speed|files|memory] [COUNT]   (needs Chromium, and the extra test-app)
+
+Times are of the wall, as a user has them, from the key press to the last figure drawn; the
+processor's, of the app and the browser together, tell what a machine without other work would need.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from app_in_browser import EXAMPLES, browsing, running
+from bad_files import bad_files
+from problems import table
+
+MATERIAL = "phonon scattering exponent"
+#: Notes when a key was pressed and when a plot was drawn.
+_COUNT = """() => {
+    window.drawn = 0; window.last = 0; window.pressed = 0;
+    document.addEventListener('keydown', () => {
+        window.pressed = performance.now(); window.drawn = 0;
+    }, true);
+    document.querySelectorAll('.js-plotly-plot').forEach(plot => plot.on('plotly_afterplot',
+        () => { window.drawn += 1; window.last = performance.now(); }));
+}"""
+#: Waits until all four figures were drawn since the key was pressed; returns milliseconds.
+_DRAWN = """() => new Promise(done => {
+    const begin = performance.now();
+    const look = () => {
+        if (window.drawn >= 4) { done(window.last - window.pressed); }
+        else if (performance.now() - begin > 5000) { done(NaN); }
+        else { setTimeout(look, 2); }
+    };
+    look();
+})"""
+
+
+def start_to_page(folder):
+    """Start the app and open it, until the page shows a button that can be pressed."""
+    begin = time.perf_counter()
+    with running(folder) as app:
+        said = time.perf_counter() - begin
+        with browsing(app) as (page, _):
+            page.get_by_role("button", name="Simulate").wait_for()
+            # the browser's own start is not the app's
+            begin = time.perf_counter()
+            page.goto(app.base)
+            page.get_by_role("button", name="Simulate").click()
+            page.wait_for_url("**/simulate")
+            return said, said + time.perf_counter() - begin
+
+
+def moves(page, label, count):
+    """Move a slider by one step, count times; return milliseconds of each."""
+    # the focus is on the inside of a slider
+    slider = page.get_by_role("slider", name=label, exact=True).locator("[tabindex]")
+    found = []
+    for number in range(count):
+        slider.press("ArrowRight" if number % 40 < 20 else "ArrowLeft")
+        found.append(page.evaluate(_DRAWN))
+        page.wait_for_timeout(30)
+    return np.array(found)
+
+
+def sliders(page, app, count):
+    page.goto(f"{app.base}/simulate")
+    page.get_by_text("full lever:").wait_for(timeout=60_000)
+    page.wait_for_timeout(1000)
+    page.evaluate(_COUNT)
+    before = _spent(app)
+    bias = moves(page, "Bias", count)
+    by_bias = 1000 * (_spent(app) - before) / count
+    # the reduced lever is made in the background
+    deadline, model = time.monotonic() + 240, ""
+    while "reduced" not in model and time.monotonic() < deadline:
+        moves(page, MATERIAL, 1)
+        model = page.locator("[aria-live=polite]").first.inner_text()
+        if "reduced" not in model:
+            page.wait_for_timeout(1000)
+    before = _spent(app)
+    material = moves(page, MATERIAL, count // 2)
+    by_material = 1000 * (_spent(app) - before) / (count // 2)
+    return bias, material, model, (by_bias, by_material)
+
+
+def fit(page, app):
+    """Drop the shipped measurement, fit, and wait for the drawn result: seconds."""
+    page.goto(f"{app.base}/fit")
+    page.wait_for_load_state("networkidle")
+    page.locator("input[type=file]").first.set_input_files(EXAMPLES / "lever-a.csv")
+    page.get_by_text("What was understood").first.wait_for()
+    page.wait_for_timeout(500)
+    begin = time.perf_counter()
+    page.locator("input[type=file]").first.set_input_files(EXAMPLES / "lever-b.csv")
+    page.get_by_role("cell", name="lever-b.csv").or_(
+        page.get_by_text("lever-b.csv")
+    ).first.wait_for()
+    page.get_by_role("button", name="Fit", exact=True).last.click()
+    page.get_by_text("lever-b.fit.json", exact=True).wait_for(timeout=120_000)
+    parameters = time.perf_counter() - begin
+    page.locator("img[alt^='Measured and modelled']").wait_for(timeout=120_000)
+    return parameters, time.perf_counter() - begin
+
+
+def speed(count):
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        said, answered = start_to_page(folder)
+        with running(folder) as app, browsing(app) as (page, seen):
+            bias, material, model, shares = sliders(page, app, count)
+            fit(page, app)
+            (folder / "lever-b.fit.json").unlink()
+            (folder / "lever-b.csv").unlink()
+            parameters, drawn = fit(page, app)
+            rows = [
+                ("address printed", f"{said:.2f} s", ""),
+                ("start to a page that answers", f"{answered:.2f} s", "3 s"),
+                ("bias slider, median", f"{np.nanmedian(bias):.0f} ms", "100 ms"),
+                ("bias slider, 95 %", f"{np.nanpercentile(bias, 95):.0f} ms", "250 ms"),
+                ("bias slider, processor", f"{shares[0]:.0f} ms", ""),
+                (
+                    f"material slider, median ({model})",
+                    f"{np.nanmedian(material):.0f} ms",
+                    "200 ms",
+                ),
+                ("material slider, processor", f"{shares[1]:.0f} ms", ""),
+                ("fit, drop to parameters, warm", f"{parameters:.1f} s", ""),
+                ("fit, drop to drawn, warm", f"{drawn:.1f} s", "3 s"),
+                ("requests to other hosts", f"{len(seen.elsewhere)} of {seen.requests}", "0"),
+                ("errors in the browser", f"{len(seen.errors)}", "0"),
+                ("load of the machine", f"{os.getloadavg()[0]:.1f} on {os.cpu_count()}", ""),
+            ]
+            table(("quantity", "measured", "target"), rows)
+            for line in (*seen.errors[:5], *seen.elsewhere[:5]):
+                print(line)
+
+
+def files(count):
+    """Drop bad files in every room; say in which the app said nothing, or stopped."""
+    rows = []
+    with (
+        tempfile.TemporaryDirectory() as name,
+        running(Path(name)) as app,
+        browsing(app) as (page, seen),
+    ):
+        for room in ("", "lever", "simulate", "raman", "fit", "calibrate", "levers"):
+            rows.append((room or "start", *_files_in(page, app, room, count)))
+        said = [line for line in app.lines if "internal error" in line]
+        table(("room", "files", "a line", "moved on or taken", "dead pages"), rows)
+        print(f"internal errors: {len(said)}; errors in the browser: {len(seen.errors)}")
+        for line in (*said[:5], *seen.errors[:5]):
+            print(line)
+
+
+def _files_in(page, app, room, count):
+    told = taken = dead = 0
+    bad = [file for file in bad_files() if "/" not in file[0] and len(file[0]) < 200][:count]
+    page.goto(f"{app.base}/{room}")
+    page.wait_for_load_state("networkidle")
+    zone = page.locator("input[type=file]").first
+    if not zone.count():
+        return 0, 0, 0, 0
+    for name, content in bad:
+        zone.set_input_files({"name": name, "mimeType": "", "buffer": content})
+        page.wait_for_timeout(400)
+        alert = " ".join(page.locator("[role=alert]").all_inner_texts()).strip()
+        told, taken = told + bool(alert), taken + (not alert)
+        if not page.url.endswith(f"/{room}"):
+            page.goto(f"{app.base}/{room}")
+        dead += not page.get_by_role("button", name="Simulate").first.is_enabled()
+    return len(bad), told, taken, dead
+
+
+def memory(count):
+    """Move sliders at random; say how the memory of the app grows."""
+    rng, rows = np.random.default_rng(1), []
+    with (
+        tempfile.TemporaryDirectory() as name,
+        running(Path(name)) as app,
+        browsing(app) as (page, seen),
+    ):
+        page.goto(f"{app.base}/simulate")
+        page.get_by_text("full lever:").wait_for(timeout=180_000)
+        names = [MATERIAL, "Bias", "scale of the thermal conductivity", "Bias"]
+        for number in range(count + 1):
+            if number % max(1, count // 5) == 0:
+                page.wait_for_timeout(3000)
+                rows.append((str(number), f"{_memory(app) / 2**20:.0f} MB"))
+            one = names[number % 4]
+            slider = page.get_by_role("slider", name=one, exact=True).locator("[tabindex]")
+            slider.press(str(rng.choice(["ArrowRight", "ArrowLeft"])))
+        table(("moves", "memory of the app and its processes"), rows)
+        print(f"errors in the browser: {len(seen.errors)}")
+
+
+def _processes(app):
+    own = psutil.Process(app.process.pid)
+    return [own, *own.children(recursive=True)]
+
+
+def _memory(app):
+    return sum(one.memory_info().rss for one in _processes(app))
+
+
+def _spent(app):
+    """Return processor seconds of the app and of the browsers."""
+    known = [*_processes(app), *psutil.Process().children(recursive=True)]
+    times = {one.pid: one.cpu_times() for one in known}
+    return sum(time.user + time.system for time in times.values())
+
+
+def main():
+    what = sys.argv[1] if len(sys.argv) > 1 else "speed"
+    count = (
+        int(sys.argv[2]) if len(sys.argv) > 2 else {"speed": 60, "files": 50, "memory": 1000}[what]
+    )
+    {"speed": speed, "files": files, "memory": memory}[what](count)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,126 @@
+"""The app, started as a user starts it, and a headless Chromium to use it with."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from playwright.sync_api import Page, sync_playwright
+
+EXAMPLES = Path(__file__).parents[1] / "src" / "hotlever" / "examples"
+#: Seconds for the app to say its address, and to end.
+_START_S, _END_S = 60, 15
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def chromium_path() -> str | None:
+    """Return the browser of this machine; None if it has none."""
+    return next((path for name in _BROWSERS if (path := shutil.which(name))), None)
+
+
+class App:
+    """A running app.
+
+    Attributes
+    ----------
+    process : subprocess.Popen
+    address : str
+        With its token.
+    """
+
+    def __init__(self, folder: Path, *options: str) -> None:
+        command = [sys.executable, "-m", "hotlever", "app", str(folder), "--no-browser", *options]
+        # NiceGUI behaves otherwise where it believes to be tested by its own fixtures
+        own = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
+        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=own)
+        self.lines: list[str] = []
+        self._said = threading.Event()
+        threading.Thread(target=self._read, daemon=True).start()
+        self._said.wait(_START_S)
+        words = [word for line in self.lines for word in line.split()]
+        self.address = next((word for word in words if word.startswith("http:")), "")
+        if not self.address:
+            self.end()
+            raise RuntimeError(f"the app did not start: {self.lines}")
+
+    @property
+    def base(self) -> str:
+        """Address without token."""
+        return self.address.partition("/?")[0]
+
+    def _read(self) -> None:
+        assert self.process.stderr is not None
+        with self.process.stderr as lines:
+            for line in lines:
+                self.lines.append(line.rstrip())
+                if "http://" in line:
+                    self._said.set()
+        # nothing more will be said
+        self._said.set()
+
+    def end(self) -> None:
+        """Stop it as Ctrl-C does."""
+        self.process.terminate()
+        try:
+            self.process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+
+
+@contextmanager
+def running(folder: Path, *options: str) -> Iterator[App]:
+    """Give an app that serves a folder."""
+    app = App(folder, *options)
+    try:
+        yield app
+    finally:
+        app.end()
+
+
+class Seen:
+    """What a browser met: errors of pages, and requests to other hosts."""
+
+    def __init__(self, page: Page, base: str) -> None:
+        self.errors: list[str] = []
+        self.elsewhere: list[str] = []
+        self.requests = 0
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("console", self._console)
+        self._own = (base, base.replace("http", "ws", 1), "data:", "blob:")
+        page.on("request", self._request)
+        page.on("websocket", lambda socket: self._address(socket.url))
+
+    def _console(self, message: object) -> None:
+        if getattr(message, "type", "") == "error":
+            self.errors.append(str(getattr(message, "text", "")))
+
+    def _request(self, request: object) -> None:
+        self._address(str(getattr(request, "url", "")))
+
+    def _address(self, url: str) -> None:
+        self.requests += 1
+        if not url.startswith(self._own):
+            self.elsewhere.append(url)
+
+
+@contextmanager
+def browsing(app: App, width: int = 1280, height: int = 800) -> Iterator[tuple[Page, Seen]]:
+    """Give a page of a headless Chromium, which has opened the app."""
+    # as root, Chromium has no sandbox; the pages are ours
+    arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=chromium_path(), args=arguments)
+        page = browser.new_context(viewport={"width": width, "height": height}).new_page()
+        seen = Seen(page, app.base)
+        page.goto(app.address)
+        page.wait_for_load_state("networkidle")
+        try:
+            yield page, seen
+        finally:
+            browser.close()

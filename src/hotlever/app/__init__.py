@@ -1,0 +1,6 @@
+"""The same in the browser: ``hotlever app`` serves a page to one user on their own machine.
+
+Nothing is computed here. Commands run in processes of their own, exactly as the command line runs
+them; what a slider moves is read from a lever in another process (`live`). `project` is the folder
+that both share with the command line, `rooms` are the pages.
+"""

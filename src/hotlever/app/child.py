@@ -1,0 +1,116 @@
+"""What runs in a worker process: functions called from the app, one after the other.
+
+A function is given a `Report` first, by which it tells its progress, then its arguments.
+"""
+
+from __future__ import annotations
+
+import importlib
+import io
+import os
+import queue
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import redirect_stdout, suppress
+from functools import partial
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from hotlever.cli.output import heard_by
+from hotlever.errors import HotleverError
+from hotlever.types import Progress
+
+#: Modules that a process imports before it is asked for anything, so that it then answers at once.
+_READY = (
+    *("hotlever.cli.commands", "hotlever.fitting", "hotlever.calibration"),
+    *("hotlever.figures", "hotlever.lever", "hotlever.report.fit_pages", "hotlever.raman"),
+)
+
+
+class Report:
+    """Tells the app how far the work is; a `Listener` of commands."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def told(self, line: str) -> None:
+        """Tell a line."""
+        self._connection.send(("said", line))
+
+    def send(self, kind: str, content: Any) -> None:
+        """Send something of what is worked on, ahead of the answer."""
+        self._connection.send((kind, content))
+
+    def progressed(self, label: str, done: int, total: int) -> None:
+        """Tell how many steps are done."""
+        self._connection.send(("progress", label, int(done), int(total)))
+
+    def progress(self, label: str) -> Progress:
+        """Return what library functions take as their ``progress``."""
+        return partial(self.progressed, label)
+
+
+def serve(connection: Connection) -> None:
+    """Answer calls until the app is gone."""
+    _quiet()
+    calls: queue.Queue[tuple[str, tuple[Any, ...]]] = queue.Queue()
+    threading.Thread(target=_listen, args=(connection, calls), daemon=True).start()
+    for name in _READY:
+        importlib.import_module(name)
+    report = Report(connection)
+    report.told("ready")
+    while True:
+        name, arguments = calls.get()
+        try:
+            connection.send(("done", _function(name)(report, *arguments)))
+        except HotleverError as error:
+            connection.send(("failed", str(error)))
+        except MemoryError:
+            connection.send(("failed", "there is too little memory for this"))
+        except Exception as error:
+            connection.send(("failed", f"internal error: {type(error).__name__}: {error}"))
+
+
+def run_command(report: Report, arguments: list[str], folder: Path) -> tuple[int, str]:
+    """Run a command in a folder as the command line does; return exit status and result."""
+    from hotlever.cli import main
+
+    os.chdir(folder)
+    result = io.StringIO()
+    with heard_by(report), redirect_stdout(result):
+        try:
+            main(arguments)
+        except SystemExit as ended:
+            return int(ended.code or 0), result.getvalue()
+
+
+def _function(name: str) -> Callable[..., Any]:
+    module, _, function = name.partition(":")
+    found: Callable[..., Any] = getattr(importlib.import_module(module), function)
+    return found
+
+
+def _quiet() -> None:
+    """Print nothing, stop when the app says so, and lead a group that can be stopped together."""
+    with suppress(OSError, AttributeError):
+        os.setsid()
+    # Ctrl-C is for the app, which ends its workers
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for number in (0, 1):
+        os.dup2(nowhere, number)
+    sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), errors="backslashreplace")
+
+
+def _listen(connection: Connection, calls: queue.Queue[tuple[str, tuple[Any, ...]]]) -> None:
+    try:
+        while True:
+            calls.put(connection.recv())
+    except (EOFError, OSError):
+        # the app is gone
+        with suppress(OSError, AttributeError):
+            os.killpg(os.getpgid(0), signal.SIGTERM)
+        os._exit(0)

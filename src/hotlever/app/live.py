@@ -1,0 +1,289 @@
+"""A lever that sliders move: what is asked for at some parameters and a bias, at once.
+
+Runs in worker processes. While parameters move, the reduced lever answers, or a coarse one where no
+reduced lever of the geometry is at hand; when they rest, the full lever, whose numbers are those of
+``hotlever sweep``.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.path import Path as Outline
+
+from hotlever.app.child import Report
+from hotlever.cli.options import load_probe
+from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.lever import Branch, Lever, State
+from hotlever.lever.branch import Reach
+from hotlever.lever.lever import COARSE
+from hotlever.lever.reduced import ReducedLever
+from hotlever.lever.reduction import cached_reduction, can_be_reduced, known_reduction
+from hotlever.probe import Layout, Probe
+from hotlever.probe.parameters import of_materials
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array
+
+#: Biases of a curve, and cells of the temperature map along its longer side.
+_POINTS, _CELLS = 121, 150
+#: How much making reduced levers steps back behind other work.
+_NICE = 10
+#: Levers kept for sliders that go back and forth.
+_KEPT = 6
+#: What a model is called on the page.
+FULL, REDUCED, COARSE_MODEL = "full lever", "reduced lever", "coarse lever"
+
+
+class _Map:
+    """Temperatures of a lever on a grid of cells, and along the line through heater and tip."""
+
+    def __init__(self, lever: Lever) -> None:
+        layout = lever.space.mesh.layout
+        low, high = layout.box
+        step = float(max(high - low)) / _CELLS
+        self.x, self.y = (np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True))
+        points = np.stack(np.meshgrid(self.x, self.y), axis=-1).reshape(-1, 2)
+        self._inside = _inside(layout, points)
+        probes = lever.space.elements.basis.probes
+        self._cells = probes(points[self._inside].T)
+        line = np.column_stack([np.linspace(low[0], high[0], 161), np.full(161, layout.tip[1])])
+        line = line[_inside(layout, line)]
+        self.along = line[:, 0]
+        self._line = probes(line.T) if len(line) else None
+
+    def cells(self, T: Array) -> Array:
+        """Return the temperature (K) of the cells, (y, x), NaN beside the lever."""
+        values = np.full(self._inside.shape, np.nan)
+        values[self._inside] = self._cells @ T
+        return values.reshape(self.y.size, self.x.size)
+
+    def line(self, T: Array) -> Array:
+        """Return the temperature (K) along the line through the tip."""
+        return np.zeros(0) if self._line is None else np.asarray(self._line @ T)
+
+
+def _inside(layout: Layout, points: Array) -> Any:
+    """Return which points lie inside a layout, and not on its edges."""
+    found = np.zeros(len(points), dtype=bool)
+    for region in layout.regions:
+        rings = [Outline([*ring, ring[0]], closed=True) for ring in region.rings]
+        outer, *holes = (ring.contains_points(points) for ring in rings)
+        found |= outer & ~np.any(holes, axis=0) if holes else outer
+    return found
+
+
+@dataclass
+class LiveLever:
+    """A branch of a lever, and how its states are drawn."""
+
+    model: str
+    lever: Lever
+    branch: Branch
+    expanded: Callable[[Array], Array]
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def curves(self) -> dict[str, Any]:
+        """I-V curve, temperature by power and the knee, by the tip temperature of the branch."""
+        u = np.linspace(0.0, self.branch.end_u, _POINTS)
+        shown = self.branch.shown(u)
+        knee = self.branch.knee
+        return {
+            "lever_V": shown["lever_V"],
+            "current_mA": shown["current_mA"],
+            "power_mW": shown["lever_V"] * shown["current_mA"],
+            "tip_K": self.branch.base_temperature_K + u**2,
+            "knee": None if knee is None else vars(knee),
+        }
+
+    def at(self, bias: float) -> dict[str, Any]:
+        """Return what the lever shows at a bias (V): numbers, map and profile.
+
+        Raises
+        ------
+        BranchEndError
+            If there is no state at this bias.
+        """
+        circuit = self.lever.circuit
+        reading = self.branch.read(circuit, np.array([bias]))
+        if not np.isfinite(reading.u).all():
+            raise self.branch.ended(reading)
+        shown = {name: float(value[0]) for name, value in self.branch.shown(reading.u).items()}
+        x = self.expanded(self.branch.states(reading.u))
+        T = State(self.lever, x).nodal[0]
+        drawn = _map_of(self.lever)
+        return {
+            **shown,
+            "bias_V": bias,
+            "tip_K": self.branch.base_temperature_K + float(reading.u[0]) ** 2,
+            "power_mW": shown["lever_V"] * shown["current_mA"],
+            "hottest_K": float(T.max()),
+            "cells": drawn.cells(T),
+            "line": drawn.line(T),
+            "notes": reading.notes(np.array([bias])),
+        }
+
+
+@lru_cache(maxsize=_KEPT)
+def _known_map(layout: Layout, fine: bool) -> list[_Map]:
+    """Return where the map of a layout is kept, empty at first."""
+    return []
+
+
+def _map_of(lever: Lever) -> _Map:
+    # maps belong to meshes, which levers of one layout share
+    kept = _known_map(lever.space.mesh.layout, lever._mesh == COARSE)
+    if not kept:
+        kept.append(_Map(lever))
+    return kept[0]
+
+
+# --- called from the app -------------------------------------------------------------------------
+
+
+@one_blas_thread
+def answer(
+    report: Report, folder: Path, name: str | None, changes: dict[str, Any], ask: dict[str, Any]
+) -> dict[str, Any]:
+    """Return what a probe of the project shows with some values changed.
+
+    Parameters
+    ----------
+    report : Report
+    folder : path
+    name : str or None
+        A probe file; None is the reference probe.
+    changes : dict
+        Values by the names of a probe file.
+    ask : dict
+        ``bias`` and ``most`` (V), whether it must be ``quick``, and whether the ``reduced`` lever
+        of the geometry has been made.
+    """
+    probe = _probe(folder, name, _stamp(folder, name), tuple(sorted(changes.items())))
+    if ask["quick"]:
+        live = _quick(probe, ask["most"], ask["reduced"])
+    else:
+        live = _full(report, probe, ask["most"])
+    drawn = _map_of(live.lever)
+    return {
+        "model": live.model,
+        "curves": live.curves,
+        "now": live.at(ask["bias"]),
+        "grid": {"x": drawn.x, "y": drawn.y, "along": drawn.along},
+        "base_K": live.branch.base_temperature_K,
+    }
+
+
+def prepare(report: Report, folder: Path, name: str | None, changes: dict[str, Any]) -> bool:
+    """Make the reduced lever of a probe, if it can have one; return whether it has."""
+    with suppress(OSError, AttributeError):
+        os.nice(_NICE)  # sliders come first
+    probe = _probe(folder, name, _stamp(folder, name), tuple(sorted(changes.items())))
+    if not can_be_reduced(probe, ()):
+        return False
+    lever = Lever(probe, progress=report.progress("air"))
+    cached_reduction(lever, report.progress("live sliders"))
+    return True
+
+
+def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
+    """Return what sliders need of a probe: its values, their bounds, units and meanings."""
+    probe = load_probe(None if name is None else folder / name)
+    sliders = []
+    known = of_materials(probe)
+    for one, value in zip(known, probe.at(list(known)).tolist(), strict=True):
+        parameter = known[one]
+        low, high = max(parameter.lower, value / 2), min(parameter.upper, value * 2)
+        if value == 0.0:
+            low, high = -0.2 * parameter.scale, 0.2 * parameter.scale
+        meaning, unit = parameter.meaning, parameter.unit
+        sliders.append(("material", one, value, min(low, value), max(high, value), unit, meaning))
+    meanings = probe.shape.description()
+    for one, value in probe.shape.dimensions().items():
+        if one not in probe.shape.tied():
+            unit, meaning = "µm", meanings.get(one, "")
+            sliders.append(("dimensions", one, value, 0.8 * value, 1.2 * value, unit, meaning))
+    circuit = probe.circuit
+    resistance, base = circuit.series_resistance_ohm, circuit.base_temperature_K
+    top = max(2 * resistance, 1000.0)
+    sliders += [
+        ("circuit", "series_resistance_ohm", resistance, 0.0, top, "Ω", "series resistance"),
+        ("circuit", "base_temperature_K", base, 250.0, 400.0, "K", "temperature of the leg ends"),
+    ]
+    return {
+        "sliders": sliders,
+        "medium": probe.surroundings.medium,
+        "gap_um": probe.surroundings.surface_gap_um,
+        "reduced": can_be_reduced(probe, ()),
+    }
+
+
+def _stamp(folder: Path, name: str | None) -> float:
+    try:
+        return 0.0 if name is None else (folder / name).stat().st_mtime
+    except OSError:
+        raise InputError(f"{name}: no such file") from None
+
+
+@lru_cache(maxsize=64)
+def _probe(
+    folder: Path, name: str | None, stamp: float, changes: tuple[tuple[str, Any], ...]
+) -> Probe:
+    probe = load_probe(None if name is None else folder / name)
+    return probe.with_(**dict(changes)) if changes else probe
+
+
+@lru_cache(maxsize=_KEPT)
+def _full(report: Report, probe: Probe, most: float) -> LiveLever:
+    lever = Lever(probe, progress=report.progress("air"))
+    return LiveLever(FULL, lever, _branch(lever, most), lambda x: x)
+
+
+@lru_cache(maxsize=_KEPT)
+def _quick(probe: Probe, most: float, is_reduced: bool) -> LiveLever:
+    """Return the reduced lever of a probe, or else a coarse one."""
+    reduced = _reduced(_geometry(probe)) if is_reduced else None
+    if reduced is not None:
+        full, small = reduced
+        try:
+            branch = small.branch(probe.material, Reach(probe.circuit, most))
+            lever = full.with_probe(probe)
+            return LiveLever(REDUCED, lever, branch, small.all_points.expanded)
+        except HotleverError:
+            pass  # beyond what it is made for
+    lever = Lever(probe, COARSE)
+    return LiveLever(COARSE_MODEL, lever, _branch(lever, most), lambda x: x)
+
+
+def _geometry(probe: Probe) -> Probe:
+    """Return a probe of the same geometry, surroundings and base temperature."""
+    usual = Probe.reference()
+    base = probe.circuit.base_temperature_K
+    same = {"material": usual.material, "circuit": usual.circuit.with_(base_temperature_K=base)}
+    return probe.model_copy(update=same)
+
+
+@lru_cache(maxsize=_KEPT)
+def _reduced(probe: Probe) -> tuple[Lever, ReducedLever] | None:
+    """Return the full and the reduced lever of a geometry."""
+    lever = Lever(probe)
+    found = known_reduction(lever)
+    return None if found is None else (lever, found)
+
+
+def _branch(lever: Lever, most: float) -> Branch:
+    """Return a branch that reaches a bias and the knee, or as far as it goes."""
+    try:
+        lever.branch_to(most)
+        return lever.branch_past_knee()
+    except ComputationError as error:
+        if isinstance(error.partial, Branch):
+            return error.partial
+        raise

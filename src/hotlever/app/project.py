@@ -1,0 +1,193 @@
+"""The folder of a project: the files that the app and the command line both read and write."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import unicodedata
+from collections.abc import Iterable
+from pathlib import Path
+
+from hotlever.errors import InputError
+from hotlever.files import output_folder, whole_file
+
+#: Bytes that a dropped file may have.
+LARGEST_FILE = 64 * 2**20
+#: Characters of a file name.
+_LONGEST = 100
+#: Files that are listed of a kind, and bytes read of one to tell what it is.
+_MOST, _BEGINNING = 500, 2**22
+
+DATA = (".csv", ".txt", ".tsv", ".dat", ".lvm", ".asc")
+DRAWINGS = (".gds", ".gds2", ".gdsii", ".oas", ".oasis", ".dxf")
+#: What the app writes beside a measurement begins with its name and ends so.
+FIT, CALIBRATION, TABLE = ".fit.json", ".calibration.json", ".table.csv"
+#: Folder of the fits of many levers.
+FITS = "fits"
+#: Endings of tables that commands write: no measurements.
+_WRITTEN = (TABLE, ".sweep.csv", ".raman.csv")
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def safe_name(name: str) -> str:
+    """Return the name under which a dropped file is kept: of one folder, printable, no option.
+
+    Examples
+    --------
+    >>> safe_name("../../etc/passwd"), safe_name("-o <b>.csv"), safe_name("")
+    ('passwd', 'o _b_.csv', 'file')
+    """
+    last = re.split(r"[/\\]", unicodedata.normalize("NFC", name))[-1]
+    kept = "".join(mark if mark.isalnum() or mark in " ._-+()=,µΩ°" else "_" for mark in last)
+    kept = kept.lstrip(" .-").rstrip(" .")
+    stem, dot, suffix = kept.rpartition(".")
+    if len(kept) > _LONGEST:
+        kept = f"{stem[: _LONGEST - len(suffix) - 1]}{dot}{suffix}"[:_LONGEST]
+    return kept or "file"
+
+
+class Project:
+    """A folder with probes, drawings, measurements, fits, calibrations and spectra.
+
+    Parameters
+    ----------
+    folder : path
+        Made if it does not exist.
+
+    Raises
+    ------
+    InputError
+        If it is a file, or cannot be made.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        if Path(folder).is_file():
+            raise InputError(f"{folder}: is a file, expected a folder")
+        self.folder = output_folder(folder).resolve()
+
+    def path(self, name: str) -> Path:
+        """Return the path of a file of the project.
+
+        Raises
+        ------
+        InputError
+            If it leads out of the folder.
+        """
+        path = (self.folder / name).resolve()
+        if not path.is_relative_to(self.folder):
+            raise InputError(f"{name}: is not in the folder of the project")
+        return path
+
+    # --- what is there ----------------------------------------------------------------------------
+
+    def names(self, *suffixes: str) -> list[str]:
+        """Return the files with one of some endings, the latest first."""
+        found = []
+        for path in self.folder.iterdir():
+            if path.name.lower().endswith(suffixes) and not path.name.startswith("."):
+                try:
+                    if path.is_file():
+                        found.append((-path.stat().st_mtime, path.name))
+                except OSError:
+                    continue
+        return [name for _, name in sorted(found)[:_MOST]]
+
+    @property
+    def probes(self) -> list[str]:
+        """Probe files."""
+        return self.names(".toml")
+
+    @property
+    def drawings(self) -> list[str]:
+        """Drawings of levers."""
+        return self.names(*DRAWINGS)
+
+    @property
+    def data(self) -> list[str]:
+        """Files that may be measurements."""
+        return [name for name in self.names(*DATA) if not name.endswith(_WRITTEN)]
+
+    @property
+    def fits(self) -> list[str]:
+        """Fit files."""
+        alone = [name for name in self.names(".json") if "correlation" in self._keys(name)]
+        among = (f"{FITS}/{path.name}" for path in sorted(self.path(FITS).glob("*.json")))
+        return [*alone, *list(among)[:_MOST]]
+
+    @property
+    def calibrations(self) -> list[str]:
+        """Calibration files."""
+        return [name for name in self.names(".json") if "route" in self._keys(name)]
+
+    @property
+    def laws(self) -> list[str]:
+        """Files that hold a power law."""
+        wanted = {"power_law", "linear_K_per_mW"}
+        return [name for name in self.names(".json") if wanted & self._keys(name)]
+
+    @property
+    def raman_calibrations(self) -> list[str]:
+        """Calibrations of a Raman thermometer."""
+        return [name for name in self.names(".json") if "anharmonic" in self._keys(name)]
+
+    def _keys(self, name: str) -> set[str]:
+        """Return the keys of a JSON file; none of one that is too large or damaged."""
+        path = self.folder / name
+        try:
+            if path.stat().st_size > _BEGINNING:
+                return set()
+            content = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError):
+            return set()
+        return set(content) if isinstance(content, dict) else set()
+
+    def spectra(self, folder: str) -> list[str]:
+        """Return the spectra in a folder of the project, which may not exist yet."""
+        path = self.path(folder)
+        return sorted(one.name for one in path.iterdir() if one.is_file()) if path.is_dir() else []
+
+    def stamp(self, name: str) -> float:
+        """Return when a file was written; 0 if it does not exist."""
+        try:
+            return self.path(name).stat().st_mtime
+        except OSError:
+            return 0.0
+
+    # --- what comes in ----------------------------------------------------------------------------
+
+    def take(self, name: str, content: bytes, folder: str = "") -> str:
+        """Keep a dropped file, beside others of the same name; return its name in the project.
+
+        Raises
+        ------
+        InputError
+            If it is larger than `LARGEST_FILE`, or cannot be written.
+        """
+        kept = safe_name(name)
+        if len(content) > LARGEST_FILE:
+            raise InputError(f"{kept}: larger than the {LARGEST_FILE // 2**20} MB of a file")
+        target = output_folder(self.path(folder))
+        stem, suffix = Path(kept).stem, Path(kept).suffix
+        number = 1
+        while (path := target / kept).exists():
+            if path.is_file() and path.read_bytes() == content:
+                break
+            number += 1
+            kept = f"{stem}-{number}{suffix}"
+        else:
+            with whole_file(path) as temporary:
+                temporary.write_bytes(content)
+        path.touch()
+        return f"{folder}/{kept}" if folder else kept
+
+    def take_example(self, name: str) -> str:
+        """Copy a file that comes with hotlever into the project; return its name."""
+        return self.take(Path(name).name, (EXAMPLES / name).read_bytes())
+
+    def take_example_folder(self, name: str, folder: str) -> Iterable[str]:
+        """Copy a folder that comes with hotlever."""
+        target = output_folder(self.path(folder))
+        for path in sorted((EXAMPLES / name).iterdir()):
+            shutil.copyfile(path, target / path.name)
+            yield f"{folder}/{path.name}"

@@ -1,0 +1,143 @@
+"""Raman: spectra of a hot plate and of a tip in, temperatures with their errors out."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+from nicegui import ui
+
+from hotlever.app.jobs import Job
+from hotlever.app.page import (
+    Complaint,
+    Work,
+    drop_zone,
+    figure,
+    framed,
+    table,
+    two_columns,
+)
+from hotlever.app.rooms.results import FIGURE_FILES, download_button
+from hotlever.app.rooms.room import Room, choice
+from hotlever.app.session import Session
+
+_TIP, _PLATE = "tip", "hot-plate"
+_TABLE, _SAVED, _FIGURE = "tip.raman.csv", "raman.json", "raman"
+_LAWS = {"anharmonic": "anharmonic", "linear": "linear, as in the paper"}
+
+
+async def raman(session: Session) -> None:
+    """Fill the page."""
+    with framed(session, "/raman") as complaint:
+        _Room(session, complaint)
+
+
+class _Room(Room):
+    """One tab of the room."""
+
+    name = "raman"
+
+    def __init__(self, session: Session, complaint: Complaint) -> None:
+        super().__init__(session, complaint)
+        self._plot, self._given = ".svg", False
+        with two_columns() as (left, right):
+            with left:
+                self._folder(_PLATE, "Drop the spectra of the hot plate here (temperatures known)")
+                self._folder(_TIP, "Drop the spectra to be measured here")
+                self._options()
+                ui.button("Measure", icon="thermostat", on_click=self.start).classes(
+                    "w-full"
+                ).props("no-caps")
+            with right:
+                Work(session, self.name, self._measured)
+                self._result = ui.column().classes("w-full gap-2")
+                self.command()
+        self.show_command()
+        if not session.jobs.running(self.name):
+            self._show()
+
+    def _folder(self, folder: str, label: str) -> None:
+        counted = ui.label().classes("text-sm")
+
+        def count() -> None:
+            number = len(self.session.project.spectra(folder))
+            counted.set_text(f"{folder}: {number or 'no'} {'file' if number == 1 else 'files'}")
+
+        async def dropped(names: list[str]) -> None:
+            count()
+            self.show_command()
+
+        drop_zone(self.session, self.complaint, label, dropped, folder)
+        counted.move(target_index=-1)
+        if folder == _TIP and not self.session.project.spectra(_TIP):
+
+            def example() -> None:
+                with self.complaint.caught():
+                    for one in (_PLATE, _TIP):
+                        list(self.session.project.take_example_folder(f"raman/{one}", one))
+                    ui.navigate.reload()
+
+            ui.button("Try the example", icon="science", on_click=example).props(
+                "outline no-caps dense"
+            )
+        count()
+
+    def _options(self) -> None:
+        saved = self.session.project.raman_calibrations
+        names = {"": f"the spectra in {_PLATE}"} | {name: name for name in saved}
+        saved_one = self.chosen.get("calibration", "")
+        self._calibration = choice("Calibrated by", names, saved_one, self._choose)
+        self._law = choice("Law", _LAWS, self.chosen.get("law"), self._choose)
+
+    def _choose(self) -> None:
+        self.chosen |= {"calibration": self._calibration.value, "law": self._law.value}
+        self.show_command()
+
+    def arguments(self) -> list[str]:
+        """Return the command that measures the spectra."""
+        arguments = ["raman", _TIP]
+        calibration = self.chosen.get("calibration")
+        if calibration:
+            arguments += ["--calibration", calibration]
+        elif self.session.project.spectra(_PLATE):
+            arguments += ["--calibrate-from", _PLATE, "--save-calibration", _SAVED]
+        if self.chosen.get("law", "anharmonic") != "anharmonic":
+            arguments += ["--law", self.chosen["law"]]
+        return [*arguments, "-o", _TABLE, "--plot", f"{_FIGURE}{self._plot}"]
+
+    async def _measured(self, job: Job) -> None:
+        if job.standing != "done":
+            return
+        if self._given:
+            ui.download.file(self.session.project.path(job.arguments[-1]))
+        else:
+            self._show()
+        self._plot, self._given = ".svg", False
+
+    def _give(self, suffix: str) -> None:
+        """Have the figure written as a file, and given."""
+        self._plot, self._given = suffix, True
+        self.start()
+
+    def _show(self) -> None:
+        self._result.clear()
+        project = self.session.project
+        if not project.stamp(_TABLE):
+            return
+        with self._result, self.complaint.caught():
+            text = project.path(_TABLE).read_text(encoding="utf-8")
+            head, *rows = [*csv.reader(io.StringIO(text))] or [[]]
+            with ui.row().classes("items-center"):
+                download_button(self.session, _TABLE, "Temperatures (CSV)")
+                if project.stamp(_SAVED):
+                    download_button(self.session, _SAVED, "Calibration (JSON)")
+                for suffix in FIGURE_FILES:
+                    ui.button(suffix[1:].upper(), on_click=lambda _, s=suffix: self._give(s)).props(
+                        "flat dense no-caps"
+                    )
+            if project.stamp(f"{_FIGURE}.svg"):
+                drawn = project.path(f"{_FIGURE}.svg").read_text(encoding="utf-8")
+                figure(
+                    drawn, "Spectra by temperature, the calibration and its residuals", wide=True
+                )
+            table(head, rows, pagination=20)

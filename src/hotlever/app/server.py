@@ -1,0 +1,136 @@
+"""The server of the app: who may talk to it, its pages, its start and its end."""
+
+from __future__ import annotations
+
+import logging
+import secrets
+import socket
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Any
+
+from nicegui import app, ui
+
+from hotlever.app.guard import Guard
+from hotlever.app.project import LARGEST_FILE, Project
+from hotlever.app.rooms.calibrate import calibrate
+from hotlever.app.rooms.fit import fit
+from hotlever.app.rooms.lever import lever
+from hotlever.app.rooms.levers import levers
+from hotlever.app.rooms.raman import raman
+from hotlever.app.rooms.simulate import simulate
+from hotlever.app.rooms.start import start
+from hotlever.app.session import Session
+from hotlever.errors import InputError
+
+LOCAL = ("127.0.0.1", "localhost", "::1")
+_PAGES: dict[str, Callable[[Session], Awaitable[None]]] = {
+    "/": start,
+    "/lever": lever,
+    "/simulate": simulate,
+    "/raman": raman,
+    "/fit": fit,
+    "/calibrate": calibrate,
+    "/levers": levers,
+}
+
+
+@dataclass(frozen=True)
+class Served:
+    """Where the app is served, and to whom.
+
+    Attributes
+    ----------
+    host : str
+    port : int
+        0 takes one that is free.
+    password : str or None
+        Asked for in place of the token in the address, when others may come.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 0
+    password: str | None = None
+
+
+def serve(
+    project: Project,
+    served: Served,
+    browser: bool,
+    say: Callable[[str], None],
+    failed: Callable[[BaseException], None],
+) -> None:
+    """Serve a project until Ctrl-C.
+
+    `say` is told the address, `failed` what nobody foresaw.
+
+    Raises
+    ------
+    InputError
+        If the port is taken.
+    """
+    port = _free(served)
+    token = secrets.token_urlsafe(24)
+    shown = f"[{served.host}]" if ":" in served.host else served.host
+    ticket = "" if served.password else f"?token={token}"
+    hosts = {served.host, *(LOCAL if served.host in LOCAL else ())}
+    if served.host in ("0.0.0.0", "::"):
+        name = socket.gethostname()
+        hosts |= {*LOCAL, name.lower(), socket.getfqdn().lower(), *_addresses(name)}
+        shown = name
+    address = f"http://{shown}:{port}/{ticket}"
+    session = Session(project)
+    app.on_startup(session.start)
+    app.on_startup(lambda: say(address))
+    # told in one line, and kept in a file, as by any command
+    logging.getLogger("nicegui").setLevel(logging.CRITICAL + 1)
+    app.on_exception(failed)
+    add_pages(session)
+    limits: Any = {"password": served.password, "largest": LARGEST_FILE}
+    app.add_middleware(Guard, token=token, hosts=hosts, **limits)
+    ui.run(
+        host=served.host,
+        port=port,
+        title="hotlever",
+        favicon="🌡",
+        dark=False,
+        reload=False,
+        show=f"/{ticket}" if browser else False,
+        show_welcome_message=False,
+        reconnect_timeout=30.0,
+    )
+
+
+def add_pages(session: Session) -> None:
+    """Make the pages of all rooms."""
+    for address, fill in _PAGES.items():
+        ui.page(address)(_page(session, fill))
+
+
+def _page(session: Session, fill: Callable[[Session], Awaitable[None]]) -> Any:
+    async def page() -> None:
+        await fill(session)
+
+    return page
+
+
+def _free(served: Served) -> int:
+    """Return the port to serve at."""
+    family = socket.AF_INET6 if ":" in served.host else socket.AF_INET
+    try:
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((served.host, served.port))
+            return int(probe.getsockname()[1])
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"--host {served.host} --port {served.port}: cannot be served at ({reason})"
+        ) from None
+
+
+def _addresses(name: str) -> set[str]:
+    try:
+        return {str(found[4][0]) for found in socket.getaddrinfo(name, None)}
+    except OSError:
+        return set()

@@ -1,0 +1,247 @@
+"""What files of a project say, told in tables, words and figures. Runs in a worker process.
+
+The figures are those of `hotlever.figures`, the pages those of `hotlever.report`.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hotlever import figures
+from hotlever.app.child import Report
+from hotlever.calibration import Calibration, read_calibration
+from hotlever.calibration.calibration import TABLE_COLUMNS
+from hotlever.cli.options import load_probe
+from hotlever.datasets import QUANTITIES
+from hotlever.errors import InputError
+from hotlever.fitting import Fit, Measurement, read_fit, read_measurement
+from hotlever.fitting.measurement import parse_columns
+from hotlever.fitting.words import parameter_rows
+from hotlever.probe import Layout, Probe, mesh_layout
+from hotlever.report.fit_pages import fit_page
+from hotlever.report.page import Page
+from hotlever.text import sentence
+
+#: Results kept, whose figures may be asked for as files.
+_KEPT = 4
+#: Rows of a calibration's table that are shown.
+_ROWS = 12
+
+
+def understood(
+    report: Report, folder: Path, name: str, columns: list[str], probe: str | None
+) -> dict[str, Any]:
+    """Return what a measurement file was understood as."""
+    measurement = _measurement(folder, name, columns, probe)
+    seen = measurement.dataset(_probe(folder, probe).circuit)
+    made = figures.iv_curves({}, measured=seen)
+    head, *rows = measurement.understood
+    return {
+        "rows": [(name, *head[1:]), *rows],
+        "notes": [note.replace(f"{folder}/", "") for note in measurement.notes],
+        "observables": list(measurement.observables),
+        "medium": measurement.medium,
+        "figure": _svg(made),
+    }
+
+
+def page(report: Report, folder: Path, kind: str, name: str) -> None:
+    """Send the blocks of the page of a result, a fit or a calibration, as they are drawn."""
+    path = folder / name
+    for block in _page(kind, path, _stamp(path)).blocks:
+        drawing = {"figure": _svg(block["figure"])} if block["kind"] == "figure" else {}
+        report.send("block", {**block, **drawing})
+
+
+def drawn(report: Report, folder: Path, kind: str, name: str, figure: str, suffix: str) -> bytes:
+    """Return a figure of a result as the content of a file."""
+    path = folder / name
+    blocks = _page(kind, path, _stamp(path)).blocks
+    made = next(block["figure"] for block in blocks if block.get("name") == figure)
+    return _file(made, suffix)
+
+
+def settings(
+    report: Report, folder: Path, name: str, along: str, value: float
+) -> dict[str, float] | None:
+    """Return what to set, and what follows, for a tip temperature, a bias or a power.
+
+    None outside the calibrated range.
+    """
+    path = folder / name
+    calibration = _calibration(path, _stamp(path))
+    table = calibration.table
+    if along == "tip_K":
+        bias = float(calibration.bias_for(value))
+    elif along == "power_mW":
+        bias = float(calibration.bias_for(calibration.tip_temperature(value)))
+    else:
+        inside = float(table.bias_V.min()) <= value <= float(table.bias_V.max())
+        bias = value if inside else np.nan
+    if not np.isfinite(bias):
+        return None
+    row = {column: float(np.interp(bias, table.bias_V, table[column])) for column in TABLE_COLUMNS}
+    return {**row, "bias_V": bias, **({along: value} if along != "bias_V" else {})}
+
+
+def probe_page(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
+    """Return the drawing of a probe, its file, and what there is to know of it."""
+    text, where = None, name or "reference probe"
+    probe = _probe(folder, name)
+    text = probe.to_toml() if name is None else (folder / name).read_text(encoding="utf-8")
+    return _described(probe, where) | {"text": text}
+
+
+def probe_of_text(report: Report, folder: Path, text: str, title: str) -> dict[str, Any]:
+    """Return the drawing of a probe file that is being written."""
+    with tempfile.NamedTemporaryFile("w", suffix=".toml", dir=folder, prefix=".hotlever-") as file:
+        file.write(text)
+        file.flush()
+        try:
+            probe = Probe.from_file(file.name)
+        except InputError as error:
+            drawing = _fault(error)
+            if drawing is None:
+                raise InputError(str(error).replace(file.name, title)) from None
+            return {"figure": drawing, "fault": str(error).replace(file.name, title)}
+    return _described(probe, title)
+
+
+def probe_of_values(
+    report: Report, shape: str, changes: dict[str, Any], title: str
+) -> dict[str, Any]:
+    """Return the drawing, and the file, of a parametric probe with some values changed."""
+    start = Probe.u_shape() if shape == "u-shape" else Probe.reference()
+    probe = start.with_(**changes) if changes else start
+    return _described(probe, title) | {"text": probe.to_toml()}
+
+
+def probe_file(report: Report, folder: Path, name: str, suffix: str) -> bytes:
+    """Return the drawing of a probe as the content of a file."""
+    return _file(figures.probe_drawing(_probe(folder, name).layout(), name), suffix)
+
+
+def is_spectrum(report: Report, folder: Path, name: str) -> bool:
+    """Return whether a file holds Raman spectra."""
+    from hotlever.raman import read_spectra
+
+    try:
+        return bool(read_spectra([folder / name]))
+    except InputError:
+        return False
+
+
+def levers(report: Report, folder: Path, names: list[str]) -> dict[str, Any]:
+    """Return the table of fits that are there."""
+    rows, head = [], ["lever"]
+    for name in names:
+        try:
+            fit = _fit(folder / name, _stamp(folder / name))
+        except InputError:
+            continue  # being written, or another kind of file
+        cells = parameter_rows(fit)
+        head = ["lever", *(f"{one} ({unit})" if unit else one for one, _, unit, _ in cells)]
+        said = "" if fit.describes_data else fit.reason
+        rows.append([Path(name).name.split(".")[0], *(value for _, value, _, _ in cells), said])
+    return {"head": [*head, "remark"], "rows": rows}
+
+
+def _described(probe: Probe, title: str) -> dict[str, Any]:
+    layout = probe.layout()
+    return {
+        "figure": _svg(figures.probe_drawing(layout, title)),
+        "fault": "",
+        "rows": _regions(layout),
+        "shape": probe.shape.shape,
+        "values": {
+            key: (value, text)
+            for key, text in probe.shape.description().items()
+            if isinstance(value := getattr(probe.shape, key), float)
+        },
+        "triangles": mesh_layout(layout).elements.nelements,
+    }
+
+
+def _regions(layout: Layout) -> list[tuple[str, str, str]]:
+    return [(region.name, region.part, f"{region.area:.4g} µm²") for region in layout.regions]
+
+
+def _fault(error: InputError) -> str | None:
+    """Return the picture of what is wrong with a drawing, if its place is known."""
+    from hotlever.drawing.fault import DrawingError
+
+    if not isinstance(error, DrawingError):
+        return None
+    return _svg(figures.outlines_drawing(error.outlines, fault=str(error), place=error.place))
+
+
+def _probe(folder: Path, name: str | None) -> Probe:
+    return load_probe(None if name is None else folder / name)
+
+
+def _measurement(folder: Path, name: str, columns: list[str], probe: str | None) -> Measurement:
+    circuit = _probe(folder, probe).circuit
+    return read_measurement(folder / name, parse_columns(columns), circuit)
+
+
+def _stamp(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        raise InputError(f"{path.name}: no such file") from None
+
+
+@lru_cache(maxsize=_KEPT)
+def _page(kind: str, path: Path, stamp: float) -> Page:
+    if kind == "fit":
+        return fit_page(_fit(path, stamp))
+    return _calibration_page(_calibration(path, stamp))
+
+
+@lru_cache(maxsize=_KEPT)
+def _calibration(path: Path, stamp: float) -> Calibration:
+    return read_calibration(path)
+
+
+def _calibration_page(calibration: Calibration) -> Page:
+    made = Page(f"Calibration of {calibration.measurement.path}")
+    made.text(calibration.text())
+    for note in calibration.notes:
+        made.text(sentence(note))
+    made.figure(
+        "calibration",
+        figures.calibration_curves(calibration),
+        "Tip temperature against power and bias with its 95 % band, the I-V curve with its knee, "
+        "and the standard error by source.",
+    )
+    table = calibration.table
+    step = max(1, table.sizes["bias"] // _ROWS)
+    columns = [f"{QUANTITIES[name][1]} ({QUANTITIES[name][0]})" for name in TABLE_COLUMNS[:-2]]
+    rows = [
+        [f"{float(table[name][place]):.4g}" for name in TABLE_COLUMNS[:-2]]
+        for place in range(0, table.sizes["bias"], step)
+    ]
+    made.table(columns, rows, "Some rows of the table for the instrument.")
+    return made
+
+
+def _svg(made: Figure) -> str:
+    return _file(made, ".svg").decode("utf-8")
+
+
+def _file(made: Figure, suffix: str) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, f"figure{suffix}")
+        figures.save_figure(made, path)
+        return path.read_bytes()
+
+
+@lru_cache(maxsize=2000)
+def _fit(path: Path, stamp: float) -> Fit:
+    return read_fit(path)

@@ -1,0 +1,64 @@
+"""``hotlever app``: the same in the browser."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import typer
+from typer import Argument, Option
+
+from hotlever.cli.application import app
+from hotlever.cli.options import check_number
+from hotlever.cli.output import fail, tell
+from hotlever.cli.running import unforeseen
+from hotlever.errors import InputError
+
+#: Where a password may stand, that would be seen by others on the command line.
+_PASSWORD = "HOTLEVER_APP_PASSWORD"
+_LEAST_PASSWORD = 8
+
+
+@app.command("app")
+def app_command(
+    folder: Path = Argument(
+        Path(), metavar="[FOLDER]", help="The project: its files are those of the command line."
+    ),
+    host: str = Option("127.0.0.1", help="Address to serve at; others need --yes-share."),
+    port: int = Option(0, help="Port to serve at; a free one if left out."),
+    yes_share: bool = Option(
+        False, "--yes-share", help="Let others in, who know the password that is asked for."
+    ),
+    no_browser: bool = Option(False, "--no-browser", help="Print the address only."),
+) -> None:
+    """Open a page in your browser in which files are dropped and sliders moved."""
+    try:
+        import nicegui  # noqa: F401
+    except ImportError:
+        raise InputError("the app is an extra: pip install 'hotlever[app]'") from None
+    from hotlever.app.project import Project
+    from hotlever.app.server import LOCAL, Served, serve
+
+    check_number("--port", port, 0, 65535)
+    password = None
+    if host not in LOCAL:
+        if not yes_share:
+            raise InputError(
+                f"--host {host}: others could reach your files; add --yes-share if they should"
+            )
+        password = os.environ.get(_PASSWORD) or typer.prompt(
+            "Password for those who may come in", hide_input=True, confirmation_prompt=True
+        )
+        if len(password) < _LEAST_PASSWORD:
+            raise InputError(
+                f"{_PASSWORD}: a password of {len(password)} characters, expected "
+                f"{_LEAST_PASSWORD} or more"
+            )
+
+    def say(address: str) -> None:
+        tell(f"hotlever app: {address}  (Ctrl-C ends it)")
+
+    def failed(error: BaseException) -> None:
+        fail(unforeseen(error, ["app", str(folder)]))
+
+    serve(Project(folder), Served(host, port, password), not no_browser, say, failed)

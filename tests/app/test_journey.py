@@ -1,0 +1,263 @@
+"""A new user's journey, in a real browser, and what may go wrong on it."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("playwright", reason="the extra test-app is not installed")
+
+from playwright.sync_api import Page, expect
+
+from app_in_browser import EXAMPLES, App, Seen, browsing, chromium_path, running
+from bad_files import bad_files
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(chromium_path() is None, reason="no Chromium on this machine"),
+]
+SCREENSHOTS = Path(__file__).with_name("screenshots")
+#: Milliseconds that work may take on a busy machine, and what a cancelled command may.
+_WORK, _CANCEL = 180_000, 1500
+expect.set_options(timeout=60_000)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("project")
+
+
+@pytest.fixture(scope="module")
+def app(folder: Path) -> Iterator[App]:
+    with running(folder) as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def browser(app: App) -> Iterator[tuple[Page, Seen]]:
+    with browsing(app) as (page, seen):
+        yield page, seen
+        assert seen.elsewhere == []
+
+
+@pytest.fixture
+def page(browser: tuple[Page, Seen]) -> Iterator[Page]:
+    page, seen = browser
+    page.set_default_timeout(60_000)
+    yield page
+    assert seen.errors == []
+    seen.errors.clear()
+
+
+def go(page: Page, app: App, room: str) -> None:
+    page.goto(f"{app.base}/{room}")
+    page.wait_for_load_state("networkidle")
+
+
+def drop(page: Page, *paths: Any, zone: int = 0) -> None:
+    page.locator("input[type=file]").nth(zone).set_input_files(list(paths))
+
+
+def picture(page: Page, name: str) -> None:
+    SCREENSHOTS.mkdir(exist_ok=True)
+    page.evaluate("window.scrollTo(0, 0)")
+    page.wait_for_timeout(500)
+    page.screenshot(path=SCREENSHOTS / f"{name}.png", full_page=True)
+
+
+def button(page: Page, name: str) -> Any:
+    """Return a button of the room, not the one of the same name that leads to it."""
+    return page.get_by_role("button", name=name, exact=True).last
+
+
+def test_from_the_shipped_measurement_to_a_table_in_five_clicks(
+    app: App, page: Page, folder: Path
+) -> None:
+    picture(page, "start")
+    drop(page, EXAMPLES / "lever-a.csv")  # 1: press +, and choose
+    page.wait_for_url("**/fit")
+    expect(page.get_by_text("heater current, 'I_h (mA)'")).to_be_visible()
+    picture(page, "fit-understood")
+    button(page, "Fit").click()  # 2
+    expect(page.get_by_text("lever-a.fit.json", exact=True)).to_be_visible(timeout=_WORK)
+    expect(page.locator("img[alt^='Tip temperature against the power']")).to_be_visible()
+    picture(page, "fit")
+    button(page, "Calibrate with this fit").click()  # 3
+    page.wait_for_url("**/calibrate")
+    answer = page.locator("[data-answer=tip_K]")
+    expect(answer).to_contain_text("set a bias of", timeout=_WORK)
+    expect(page.locator("img[alt^='Tip temperature against']")).to_be_visible()
+    picture(page, "calibrate")
+    with page.expect_download() as download:
+        button(page, "Table (CSV)").click()  # 4
+    rows = list(csv.DictReader(Path(download.value.path()).read_text().splitlines()))
+    assert len(rows) > 50
+    # what is said beside the box is what the calibration file says
+    near = min(rows, key=lambda row: abs(float(row["tip_K"]) - 600.0))
+    said = float(answer.inner_text().split("set a bias of ")[1].split(" V")[0])
+    assert abs(said - float(near["bias_V"])) < 0.1
+    with page.expect_download() as download:
+        button(page, "calibration as PDF").click()
+    assert Path(download.value.path()).read_bytes().startswith(b"%PDF")
+
+
+def test_the_files_are_those_of_the_command_line(folder: Path, tmp_path: Path) -> None:
+    command = ["fit", "lever-a.csv", "-o", str(tmp_path / "fit.json")]
+    command = [sys.executable, "-m", "hotlever", *command]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    ours = json.loads((folder / "lever-a.fit.json").read_text())
+    theirs = json.loads((tmp_path / "fit.json").read_text())
+    for key in ("parameters", "correlation", "band", "residual_rms", "probe"):
+        assert ours[key] == theirs[key]
+
+
+def test_sliders_move_the_lever(app: App, page: Page) -> None:
+    go(page, app, "simulate")
+    expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
+    tip = page.locator("[data-number=tip_K]")
+    cold = tip.inner_text()
+    page.get_by_role("slider", name="Bias", exact=True).locator("[tabindex]").press("ArrowRight")
+    expect(tip).not_to_have_text(cold)
+    expect(page.locator(".js-plotly-plot .heatmaplayer image").first).to_be_attached()
+    picture(page, "simulate")
+    button(page, "air").click()
+    expect(page.get_by_text("--medium air")).to_be_visible(timeout=_WORK)
+    expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
+    with page.expect_download(timeout=_WORK) as download:
+        button(page, "NetCDF").click()
+    assert download.value.suggested_filename == "reference.sweep.nc"
+    page.get_by_label("Light or dark").click()
+    picture(page, "simulate-dark")
+    page.get_by_label("Light or dark").click()
+
+
+def test_work_survives_a_reload_and_is_cancelled_within_a_second(
+    app: App, page: Page, folder: Path
+) -> None:
+    go(page, app, "fit")
+    page.get_by_text("More", exact=True).click()
+    page.get_by_role("checkbox", name="posterior").click()
+    expect(page.get_by_text("--posterior")).to_be_visible()
+    before = (folder / "lever-a.fit.json").read_bytes()
+    button(page, "Fit").click()
+    expect(button(page, "Cancel")).to_be_visible()
+    page.wait_for_timeout(2000)
+    page.reload()
+    expect(button(page, "Cancel")).to_be_visible()
+    picture(page, "fit-running")
+    begin = time.monotonic()
+    button(page, "Cancel").click()
+    expect(page.get_by_text("cancelled: nothing was written")).to_be_visible(timeout=_CANCEL)
+    assert time.monotonic() - begin < _CANCEL / 1000
+    assert (folder / "lever-a.fit.json").read_bytes() == before
+
+
+def test_a_killed_process_is_a_message(app: App, page: Page) -> None:
+    go(page, app, "fit")
+    button(page, "Fit").click()
+    expect(button(page, "Cancel")).to_be_visible()
+    page.wait_for_timeout(1500)
+    for pid in _children(app.process.pid):
+        if _is_worker(pid):
+            os.kill(pid, signal.SIGKILL)
+    expect(page.get_by_text("the process that worked on this died")).to_be_visible()
+    # the app goes on, with new processes
+    page.get_by_text("More", exact=True).click()
+    page.get_by_role("checkbox", name="posterior").click()
+    button(page, "Fit").click()
+    expect(page.get_by_text("lever-a.fit.json", exact=True)).to_be_visible(timeout=_WORK)
+
+
+def _children(pid: int) -> list[int]:
+    text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+    return [int(word) for word in text.split()]
+
+
+def _is_worker(pid: int) -> bool:
+    return b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
+
+
+def test_two_tabs_see_the_same_work(app: App, page: Page) -> None:
+    go(page, app, "calibrate")
+    other = page.context.new_page()
+    go(other, app, "calibrate")
+    button(page, "Calibrate").click()
+    for tab in (page, other):
+        expect(tab.locator("[data-answer=tip_K]")).to_contain_text("set a bias", timeout=_WORK)
+    other.close()
+
+
+def test_raman_spectra_become_temperatures(app: App, page: Page) -> None:
+    go(page, app, "raman")
+    page.get_by_text("Try the example").click()
+    expect(page.get_by_text("hot-plate: 7 files")).to_be_visible()
+    button(page, "Measure").click()
+    expect(page.locator("img[alt^='Spectra']")).to_be_visible(timeout=_WORK)
+    expect(page.get_by_role("cell", name="tip_08.txt")).to_be_visible()
+    picture(page, "raman")
+
+
+def test_a_drawing_becomes_a_probe(app: App, page: Page, folder: Path) -> None:
+    go(page, app, "lever")
+    expect(page.locator("img[alt^='The lever from above']")).to_be_visible()
+    picture(page, "lever")
+    drop(page, EXAMPLES / "reference-probe.gds")
+    expect(page.get_by_text("What the drawing holds")).to_be_visible(timeout=_WORK)
+    page.get_by_text("What the drawing holds").click()
+    picture(page, "lever-drawing")
+    button(page, "Simulate").click()
+    page.wait_for_url("**/simulate")
+    expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
+
+
+def test_many_levers_fill_a_table(app: App, page: Page) -> None:
+    go(page, app, "levers")
+    drop(page, EXAMPLES / "lever-b.csv")
+    expect(page.get_by_text("lever-b.csv").first).to_be_visible()
+    button(page, "Fit all").click()
+    expect(button(page, "Page (HTML)")).to_be_visible(timeout=_WORK)
+    picture(page, "levers")
+    page.get_by_role("cell", name="lever-b", exact=True).click()
+    page.wait_for_url("**/fit")
+    expect(page.get_by_text("fits/lever-b.json")).to_be_visible(timeout=_WORK)
+
+
+def test_bad_files_in_every_room_are_a_line(app: App, page: Page) -> None:
+    files = [
+        {"name": name, "mimeType": "", "buffer": content}
+        for name, content in bad_files()
+        # what a browser's file dialogue cannot give
+        if "/" not in name and len(name) < 200
+    ]
+    for room in ("", "lever", "raman", "fit", "calibrate", "levers"):
+        go(page, app, room)
+        for file in files[::6]:
+            drop(page, file)
+            page.wait_for_timeout(150)
+            if not page.url.endswith(f"/{room}"):
+                go(page, app, room)
+        assert "internal error" not in page.inner_text("body")
+    go(page, app, "fit")
+    drop(page, EXAMPLES / "lever-a.csv")
+    expect(page.get_by_text("heater current, 'I_h (mA)'")).to_be_visible()
+
+
+def test_the_pages_fit_on_a_tablet(app: App, page: Page) -> None:
+    page.set_viewport_size({"width": 820, "height": 1180})
+    for room in ("", "simulate", "fit"):
+        go(page, app, room)
+        page.wait_for_timeout(1500)
+        wide = page.evaluate("document.documentElement.scrollWidth")
+        picture(page, f"tablet-{room or 'start'}")
+        assert wide <= 830, room
+    page.set_viewport_size({"width": 1280, "height": 800})

@@ -1,0 +1,249 @@
+"""The rooms, with NiceGUI's simulated user: what is shown, dropped, and computed."""
+
+from __future__ import annotations
+
+import asyncio
+import csv
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from nicegui import ui
+from nicegui.testing import User, user_simulation
+
+from bad_files import bad_files
+from hotlever.app import live, showing
+from hotlever.app.jobs import Jobs, command_line
+from hotlever.app.project import EXAMPLES, Project
+from hotlever.app.server import add_pages
+from hotlever.app.session import Session
+from hotlever.errors import HotleverError
+from hotlever.probe import Probe
+
+#: Measurements, which only a fit or a calibration will refuse.
+POOR = ("one-row.csv", "negative.csv")
+Run = Callable[..., tuple[int, str, str]]
+
+
+class Here:
+    """Answers calls in this process, where a `Desk` has a process of its own."""
+
+    def __init__(self) -> None:
+        self.sent: list[tuple[str, Any]] = []
+
+    def told(self, line: str) -> None: ...
+
+    def send(self, kind: str, content: Any) -> None:
+        self.sent.append((kind, content))
+
+    def progress(self, label: str) -> None: ...
+
+    async def call(self, function: str, *arguments: Any, heard: Any = None) -> Any:
+        module = {"live": live, "showing": showing}[function.split(":")[0].split(".")[-1]]
+        self.sent = []
+        result = getattr(module, function.split(":")[1])(self, *arguments)
+        for message in self.sent:
+            heard(message)
+        return result
+
+
+def visit(folder: Path, story: Callable[[User, Session], Awaitable[None]]) -> None:
+    """Let a user visit the app in a folder."""
+
+    async def told() -> None:
+        async with user_simulation() as user:
+            session = Session(Project(folder))
+            session._desks = dict.fromkeys(("quick", "full", "making"), Here())  # type: ignore[arg-type]
+            add_pages(session)
+            await story(user, session)
+
+    asyncio.run(told())
+
+
+async def drop(user: User, name: str, content: bytes, zone: int = 0) -> None:
+    """Drop a file in a room."""
+    zones = [one for one in user.client.elements.values() if isinstance(one, ui.upload)]
+    upload = sorted(zones, key=lambda one: one.id)[zone]
+    await upload.handle_uploads([ui.upload.SmallFileUpload(name, "", content)])
+
+
+def shown(user: User, mark: str) -> str:
+    """Return the text of the element that has an attribute."""
+    key, _, value = mark.partition("=")
+    found = [one for one in user.client.elements.values() if one.props.get(key) == value]
+    return " ".join(one.text for one in found if getattr(one, "visible", True))
+
+
+async def until(true: Callable[[], bool]) -> None:
+    """Wait, ten seconds at most, until something is true."""
+    for _ in range(200):
+        if true():
+            return
+        await asyncio.sleep(0.05)
+    raise AssertionError("it did not become true")
+
+
+def test_every_room_opens_in_an_empty_folder(tmp_path: Path) -> None:
+    async def story(user: User, session: Session) -> None:
+        for address, words in {
+            "/": "Try it",
+            "/lever": "heater (low-doped)",
+            "/raman": "Measure",
+            "/fit": "Try the example",
+            "/calibrate": "Calibrate",
+            "/levers": "Fit all",
+        }.items():
+            await user.open(address)
+            if address != "/lever":
+                await user.should_see(words)
+            assert shown(user, "role=alert").strip() == ""
+
+    visit(tmp_path, story)
+
+
+def test_simulate_shows_the_numbers_of_the_sweep(tmp_path: Path, run: Run) -> None:
+    _, out, _ = run("sweep", "--bias", "8:8:1", "--set", "n_d=5e17")
+    row = next(csv.DictReader(out.splitlines()))
+
+    async def story(user: User, session: Session) -> None:
+        session.chosen["simulate"] = {
+            "probe": None,
+            "changes": {"n_d": 5e17},
+            "bias": 8.0,
+            "most": 12.0,
+        }
+        session.reduced[None, ()] = False  # it is not what is tested, and takes long
+        await user.open("/simulate")
+        await until(lambda: "full lever" in shown(user, "aria-live=polite"))
+        for key, form in (("tip_K", "{:.1f} K"), ("current_mA", "{:.4f} mA")):
+            assert shown(user, f"data-number={key}") == form.format(float(row[key]))
+        answer = await session.full.call(
+            "live:answer",
+            session.project.folder,
+            None,
+            {"n_d": 5e17},
+            {"bias": 8.0, "most": 12.0, "quick": False},
+        )
+        for key in ("tip_K", "current_mA", "lever_V", "reader_V", "power_mW"):
+            assert f"{answer['now'][key]:.10g}" == row[key]
+        line = "hotlever sweep --bias 0:12:49 --set n_d=5e+17 -o reference.sweep.csv"
+        await user.should_see(line)
+
+    visit(tmp_path, story)
+
+
+def test_the_reduced_lever_answers_as_the_full_one(tmp_path: Path) -> None:
+    ask = {"bias": 8.0, "most": 12.0, "quick": True, "reduced": False}
+    here: Any = Here()
+    coarse = live.answer(here, tmp_path, None, {"n_d": 5e17}, ask)
+    full = live.answer(here, tmp_path, None, {"n_d": 5e17}, {**ask, "quick": False})
+    assert coarse["model"] == "coarse lever"
+    assert abs(coarse["now"]["tip_K"] - full["now"]["tip_K"]) < 2.0
+    inside = np.isfinite(full["now"]["cells"])
+    assert inside.any()
+    assert not inside.all()
+    off = np.abs(coarse["now"]["cells"] - full["now"]["cells"])[inside]
+    assert off.max() < 5.0
+    # the map and the profile hold the tip's temperature
+    assert abs(np.nanmax(full["now"]["cells"]) - full["now"]["hottest_K"]) < 5.0
+    assert full["now"]["line"].max() == pytest.approx(full["now"]["hottest_K"], abs=2.0)
+
+
+def test_a_dropped_measurement_is_understood(tmp_path: Path) -> None:
+    async def story(user: User, session: Session) -> None:
+        await user.open("/fit")
+        await drop(user, "mine.csv", (EXAMPLES / "lever-a.csv").read_bytes())
+        await user.should_see("What was understood", retries=50)
+        await user.should_see("hotlever fit mine.csv -o mine.fit.json")
+        user.find("tip temperature").click()
+        await user.should_see("hotlever fit mine.csv --observables current,reader -o mine.fit.json")
+
+    visit(tmp_path, story)
+
+
+@pytest.mark.parametrize("address", ["/fit", "/calibrate", "/", "/lever"])
+def test_bad_files_are_a_line_each_and_the_room_goes_on(tmp_path: Path, address: str) -> None:
+    drawn = (".gds", ".oas", ".dxf")
+
+    async def story(user: User, session: Session) -> None:
+        await user.open(address)
+        for name, content in bad_files():
+            if name.endswith((*drawn, ".json")) or name in POOR:
+                continue  # taken by a command, or measurements of a kind
+            for one in user.client.elements.values():
+                if one.props.get("role") == "alert":
+                    one.set_text("")  # what was said of the file before
+            await drop(user, name, content)
+            await until(lambda: bool(shown(user, "role=alert").strip()))
+            line = shown(user, "role=alert")
+            assert "internal error" not in line, name
+            assert "Traceback" not in line
+        good = {"/lever": ("good.toml", Probe.reference().to_toml().encode())}
+        name, content = good.get(address, ("good.csv", (EXAMPLES / "lever-a.csv").read_bytes()))
+        await drop(user, name, content)
+        if address != "/":
+            await until(lambda: not shown(user, "role=alert").strip())
+
+    visit(tmp_path, story)
+
+
+def test_a_shape_is_drawn_while_its_fields_change(tmp_path: Path) -> None:
+    async def story(user: User, session: Session) -> None:
+        await user.open("/lever")
+        await until(lambda: any(one.tag == "img" for one in user.client.elements.values()))
+        room_text = next(
+            one for one in user.client.elements.values() if isinstance(one, ui.textarea)
+        )
+        assert "length_um = 54.4" in room_text.value
+        field = next(
+            one
+            for one in user.client.elements.values()
+            if isinstance(one, ui.number) and one.props["label"] == "length_um"
+        )
+        field.set_value(60.0)
+        await until(lambda: "length_um = 60" in room_text.value)
+        field.set_value(1.0)
+        await until(lambda: "length_um" in shown(user, "role=alert"))
+        field.set_value(50.0)
+        await until(lambda: not shown(user, "role=alert").strip())
+        user.find(kind=ui.button, content="Save").click()
+        await until(lambda: bool(session.project.probes))
+        assert Probe.from_file(tmp_path / "my-lever.toml").shape.length_um == 50.0
+
+    visit(tmp_path, story)
+
+
+def test_commands_run_in_processes_that_can_be_ended(tmp_path: Path) -> None:
+    (tmp_path / "lever-a.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
+
+    async def story() -> None:
+        jobs = Jobs(tmp_path)
+        job = jobs.start("fit", ["fit", "nothing.csv"])
+        with pytest.raises(HotleverError, match="cancel it first"):
+            jobs.start("fit", ["fit", "nothing.csv"])
+        while jobs.running("fit"):
+            await asyncio.sleep(0.02)
+        assert (job.standing, job.message) == ("failed", "nothing.csv: no such file")
+        job = jobs.start("fit", ["fit", "lever-a.csv", "--posterior", "-o", "fit.json"])
+        while not job.done:
+            await asyncio.sleep(0.02)
+        begin = time.monotonic()
+        await jobs.cancel("fit")
+        assert job.standing == "cancelled"
+        assert time.monotonic() - begin < 1.5
+        assert [path.name for path in tmp_path.iterdir()] == ["lever-a.csv"]
+        job = jobs.start("fit", ["sweep", "--bias", "0:12:4000"])
+        jobs._workers["fit"].kill()
+        while jobs.running("fit"):
+            await asyncio.sleep(0.02)
+        assert "died" in job.message
+        jobs._spare and jobs._spare.kill()
+
+    asyncio.run(story())
+
+
+def test_a_command_is_shown_as_a_shell_takes_it() -> None:
+    assert command_line(["fit", "my data.csv"]) == "hotlever fit 'my data.csv'"
