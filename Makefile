@@ -1,11 +1,12 @@
 # make test       all tests: ruff, mypy, pytest (with the README's examples)
+# make test-hostile  12 000 hostile files and arguments, full disks, kills: half an hour
 # make reproduce  the main job: the paper's results as one page in reproduce/
 # make docs       the documentation as a site in docs/_build/
 # Each makes the environment in .venv first. FORM=quick shortens reproduce.
 FORM ?= full
 BIN := .venv/bin
 
-.PHONY: test test-slow reproduce docs lock env clean
+.PHONY: test test-slow test-hostile reproduce docs lock env clean
 
 env: .venv/.ready
 
@@ -21,6 +22,9 @@ test: env
 
 test-slow: env
 	$(BIN)/python -m pytest -m slow -n 2 --dist loadfile
+
+test-hostile: env
+	HOTLEVER_HOSTILE=1 $(BIN)/python -m pytest tests/hostile -rP
 
 reproduce: env
 	$(BIN)/hotlever reproduce -o reproduce $(if $(filter quick,$(FORM)),--quick)
