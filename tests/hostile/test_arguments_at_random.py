@@ -16,6 +16,8 @@ from size import cases
 from test_files_at_random import time_limit
 
 LIMIT_S = 20.0
+#: How many there are with ``make test-hostile``, in this process and in others.
+CASES, PROCESSES = 2000, 150
 COMMAND = [sys.executable, "-m", "hotlever"]
 #: What is no number in bounds, no range, no file to read, no file to write.
 NUMBER = [*(one for one in NUMBERS if one not in ("-0", "0", "1_000")), *WORDS, "1e40"]
@@ -251,7 +253,7 @@ def test_wrong_arguments_are_one_line(
     monkeypatch.setattr("hotlever.files.PATIENCE_S", 0.05)
     monkeypatch.setattr("hotlever.cluster._PATIENCE_S", 0.5)
     before, found = state(folder), []
-    for case in wrong_cases(cases(2000)):
+    for case in wrong_cases(cases(CASES)):
         with time_limit(LIMIT_S):
             found += problems(case, *run(*case))
         assert state(folder) == before, case
@@ -260,7 +262,7 @@ def test_wrong_arguments_are_one_line(
 
 def test_wrong_arguments_of_a_process_are_one_line(folder: Path):
     before, found = state(folder), []
-    for case in wrong_cases(cases(150))[::-1]:
+    for case in wrong_cases(cases(PROCESSES))[::-1]:
         command = [*COMMAND, *case]
         done = subprocess.run(
             command, capture_output=True, text=True, timeout=LIMIT_S + 10, errors="replace"

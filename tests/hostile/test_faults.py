@@ -24,6 +24,8 @@ from hotlever.lever import Lever
 
 Run = Callable[..., tuple[int, str, str]]
 COMMAND = [sys.executable, "-m", "hotlever"]
+#: How many there are of each with ``make test-hostile``.
+DISKS, KILLS = 40, 200
 #: Commands, and the files that each writes together.
 WRITERS = {
     ("probe", "new", "-o", "a.toml"): ["a.toml"],
@@ -67,7 +69,7 @@ def test_a_disk_that_is_full_at_any_byte_leaves_what_was_there(
     written = contents(tmp_path)
     sizes = [len(written[name]) for name in written if name != "line.txt"]
     rng = np.random.default_rng(len(command))
-    for limit in rng.integers(0, max(sizes), cases(40)).tolist():
+    for limit in rng.integers(0, max(sizes), cases(DISKS)).tolist():
         for name in WRITERS[command]:
             (tmp_path / name).write_text("mine")
         before = contents(tmp_path)
@@ -190,7 +192,7 @@ def test_a_batch_killed_again_and_again_ends_with_the_same_fits(lever: Lever, tm
     assert len(expected) == len(names)
     rng, kills, batches = np.random.default_rng(7), {"parent": 0, "worker": 0}, 0
     deadline = time.monotonic() + float(os.environ.get("HOTLEVER_KILLS_S", "2400"))
-    while sum(kills.values()) < cases(200) and time.monotonic() < deadline:
+    while sum(kills.values()) < cases(KILLS) and time.monotonic() < deadline:
         batches += 1
         out, ended = f"out-{batches}", None
         while ended is None:

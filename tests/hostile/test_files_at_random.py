@@ -20,6 +20,8 @@ from hotlever.errors import InputError
 
 #: Seconds in which a file is read or refused; and the longest line that says why, without its name.
 LIMIT_S, LINE = 20.0, 600
+#: How many there are with ``make test-hostile``, of all kinds together.
+CASES = 10_500
 NAMES = [
     *("measurement", "columns", "probe", "fit", "calibration", "power law", "raman calibration"),
     *("spectrum", "wdf", "spc", "jcamp", "sweep", "bias log", "waveform", "temperatures"),
@@ -85,7 +87,7 @@ def test_a_good_file_is_read(known, name, tmp_path):
 def test_a_spoilt_file_is_read_or_refused_in_one_line(known, name, tmp_path):
     family, path = known[name], tmp_path / f"spoilt{known[name].suffix}"
     read, found = 0, []
-    for number in range(cases(10_500) // len(NAMES)):
+    for number in range(cases(CASES) // len(NAMES)):
         raw = spoilt(family, number)
         path.write_bytes(raw)
         try:
