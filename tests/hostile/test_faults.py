@@ -198,10 +198,11 @@ def test_a_batch_killed_again_and_again_ends_with_the_same_fits(lever: Lever, tm
         while ended is None:
             with start(out) as process:
                 while process.poll() is None:
+                    late = sum(kills.values()) >= cases(KILLS) or time.monotonic() > deadline
                     with suppress(subprocess.TimeoutExpired):
-                        process.wait(rng.uniform(0.2, 5.0))
+                        process.wait(None if late else rng.uniform(0.2, 10.0))
                         break
-                    if rng.random() < 0.3:
+                    if rng.random() < 0.15:
                         kills["parent"] += 1
                         process.kill()
                     elif found := workers(process.pid):

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -17,6 +14,7 @@ from size import cases
 from xarray import Dataset
 
 from hotlever.errors import InputError
+from limits import time_limit
 
 #: Seconds in which a file is read or refused; and the longest line that says why, without its name.
 LIMIT_S, LINE = 20.0, 600
@@ -31,20 +29,6 @@ NAMES = [
 @pytest.fixture(scope="module")
 def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Family]:
     return families(tmp_path_factory.mktemp("good"))
-
-
-@contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    def stop(*_: object) -> None:
-        raise AssertionError(f"took more than {seconds} s")
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def infinite(found: Any) -> str:
