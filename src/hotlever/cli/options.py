@@ -199,7 +199,7 @@ def parse_volts(text: str, where: str) -> float:
     volts = setting(text, "V", where, bare=True)
     if volts and not LEAST_BIAS <= abs(volts) <= MOST_BIAS:
         raise InputError(
-            f"{where}: found a bias of {volts:g} V, expected 0, or {LEAST_BIAS:g} to {MOST_BIAS:g} V"
+            f"{where}: found a bias of {volts:g} V, expected 0 or {LEAST_BIAS:g} to {MOST_BIAS:g} V"
         )
     return volts
 
