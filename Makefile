@@ -1,12 +1,13 @@
 # make test       all tests: ruff, mypy, pytest (with the README's examples)
 # make test-app   the app in a real browser; screenshots in tests/app/screenshots
+# make test-hostile  12 000 hostile files and arguments, full disks, kills: half an hour
 # make reproduce  the main job: the paper's results as one page in reproduce/
 # make docs       the documentation as a site in docs/_build/
 # Each makes the environment in .venv first. FORM=quick shortens reproduce.
 FORM ?= full
 BIN := .venv/bin
 
-.PHONY: test test-slow test-app reproduce docs lock env clean
+.PHONY: test test-slow test-app test-hostile reproduce docs lock env clean
 
 env: .venv/.ready
 
@@ -26,6 +27,9 @@ test-slow: env
 test-app: env
 	sh tools/get_chromium.sh
 	$(BIN)/python -m pytest -m browser -p no:cacheprovider tests/app
+
+test-hostile: env
+	HOTLEVER_HOSTILE=1 $(BIN)/python -m pytest tests/hostile -rP
 
 reproduce: env
 	$(BIN)/hotlever reproduce -o reproduce $(if $(filter quick,$(FORM)),--quick)

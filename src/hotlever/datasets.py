@@ -191,9 +191,9 @@ def csv_text(data: xr.Dataset, columns: Sequence[str]) -> str:
 
 
 def frame_text(frame: Any, **options: Any) -> str:
-    """Return a `pandas.DataFrame` as CSV text; empty where there is no finite number.
+    """Return a pandas DataFrame as CSV text; empty where there is no finite number.
 
-    The options are those of `pandas.DataFrame.to_csv`.
+    The options are those of its ``to_csv``.
     """
     finite = frame.replace([math.inf, -math.inf], math.nan)
     return str(finite.to_csv(lineterminator="\n", **options))
@@ -212,6 +212,9 @@ def write_dataset(data: xr.Dataset, path: str | os.PathLike[str], columns: Seque
         write_text(path, csv_text(data, columns))
     elif suffix == ".nc":
         with whole_file(path) as temporary:
-            data.to_netcdf(temporary, engine="netcdf4")
+            # with sums by which a damaged file is known
+            numbers = [name for name in data.variables if data[name].dtype.kind in "if"]
+            sums = {name: {"fletcher32": True} for name in numbers if data[name].ndim}
+            data.to_netcdf(temporary, engine="netcdf4", encoding=sums)
     else:
         raise InputError(f"{path}: unknown file type '{suffix}', expected .csv or .nc")

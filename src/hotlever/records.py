@@ -7,7 +7,10 @@ from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from hotlever.errors import InputError, quoted, unknown_name
+from hotlever.errors import InputError, quoted, shown, unknown_name
+
+#: Characters of a key that an error names.
+_LONGEST_KEY = 120
 
 
 class Record(BaseModel):
@@ -57,7 +60,7 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
     """
     reports = error.errors(include_url=False)
     first = min(reports, key=lambda report: report["type"] != "extra_forbidden")
-    key = ".".join(map(str, first["loc"]))
+    key = shown(".".join(map(str, first["loc"])), _LONGEST_KEY)
     if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
         return unknown_name("key", key, record.model_fields, where)
     if first["type"] == "missing":

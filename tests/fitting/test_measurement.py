@@ -174,6 +174,7 @@ def test_settings_as_people_write_them(tmp_path, comment, ohm, kelvin, medium):
         *("R_s: 10,000 Ohm", "R_s (kOhm): 5600 Ohm"),
         *("base temprature (K): 300", "base temperature is 300 K", "T0 = 12:30", "T_base: 68 F"),
         *("medium air", "medium:", "gas: on", "pressure: low", "p = 2.65", "293 K"),
+        *("bias resistor: 10k", "resistance 10", "stage temperature = 353", "temp: 80", "T: 353"),
     ],
 )
 def test_what_looks_like_a_setting_and_is_not_clear_is_noted(tmp_path, comment):

@@ -17,6 +17,7 @@ from hotlever.calibration import calibrate, read_calibration
 from hotlever.calibration.power_law import EQ12, read_power_law
 from hotlever.fitting import fit, read_fit, read_measurement
 from hotlever.fitting.measurement import Measurement, parse_columns
+from hotlever.fitting.models import full_model
 from hotlever.lever import Lever, read_sweep, write_sweep
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient.waveform import read_waveform
@@ -82,7 +83,7 @@ def families(folder: Path) -> dict[str, Family]:
     text = "".join(f"{a:.3f}\t{b:.1f}\n" for a, b in zip(x, y, strict=True))
     lever = Lever(Probe.reference(), COARSE)
     data = Measurement.of_sweep(lever.sweep(np.linspace(2.0, 10.0, 9)))
-    fitted = fit(data)
+    fitted = fit(data, model=lambda probe, at: full_model(lever.with_probe(probe), at))
     fitted.write(folder / "fit.json")
     write_sweep(lever.sweep([1.0, 2.0]), folder / "sweep.nc")
     law = {"linear_K_per_mW": 110, "nonlinear_K": 4, "exponent": 3, "hot_K_per_mW": 200}

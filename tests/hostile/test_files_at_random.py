@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -17,9 +14,12 @@ from size import cases
 from xarray import Dataset
 
 from hotlever.errors import InputError
+from limits import time_limit
 
 #: Seconds in which a file is read or refused; and the longest line that says why, without its name.
 LIMIT_S, LINE = 20.0, 600
+#: How many there are with ``make test-hostile``, of all kinds together.
+CASES = 10_500
 NAMES = [
     *("measurement", "columns", "probe", "fit", "calibration", "power law", "raman calibration"),
     *("spectrum", "wdf", "spc", "jcamp", "sweep", "bias log", "waveform", "temperatures"),
@@ -29,20 +29,6 @@ NAMES = [
 @pytest.fixture(scope="module")
 def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Family]:
     return families(tmp_path_factory.mktemp("good"))
-
-
-@contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    def stop(*_: object) -> None:
-        raise AssertionError(f"took more than {seconds} s")
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def infinite(found: Any) -> str:
@@ -85,7 +71,7 @@ def test_a_good_file_is_read(known, name, tmp_path):
 def test_a_spoilt_file_is_read_or_refused_in_one_line(known, name, tmp_path):
     family, path = known[name], tmp_path / f"spoilt{known[name].suffix}"
     read, found = 0, []
-    for number in range(cases(10_500) // len(NAMES)):
+    for number in range(cases(CASES) // len(NAMES)):
         raw = spoilt(family, number)
         path.write_bytes(raw)
         try:

@@ -53,6 +53,22 @@ def test_what_is_no_finite_number_is_an_empty_cell():
     )
 
 
+def test_a_damaged_file_gives_the_same_numbers_or_none(sweep, tmp_path):
+    path, rng = tmp_path / "a.nc", np.random.default_rng(2)
+    write_sweep(sweep, path)
+    raw, numbers = path.read_bytes(), sweep.tip_K.values.tobytes()
+    inside = raw.index(numbers)
+    for place in [*range(inside, inside + 16), *rng.integers(len(raw), size=40).tolist()]:
+        path.write_bytes(raw[:place] + bytes([raw[place] ^ 0x10]) + raw[place + 1 :])
+        try:
+            found = read_sweep(path)
+        except InputError:
+            continue
+        assert not inside <= place < inside + len(numbers)
+        for name in HEADER.split(","):
+            np.testing.assert_array_equal(found[name].values, sweep[name].values)
+
+
 def test_other_file_types_are_refused(sweep, tmp_path):
     with pytest.raises(InputError, match=r"unknown file type '.xls', expected .csv or .nc"):
         write_sweep(sweep, tmp_path / "a.xls")

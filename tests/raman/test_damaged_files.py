@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import signal
 import struct
 import zlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from gzip import compress
 
 import numpy as np
@@ -15,27 +13,12 @@ import pytest
 from hotlever.errors import InputError
 from hotlever.raman.series import measure
 from hotlever.raman.spectrum import Spectrum, read_file
+from limits import time_limit
 from spectrometer_files import jcamp_bytes, spc_bytes, wdf_bytes
 
 LIMIT_S = 5.0  # of a machine with other work to do; it takes some 10 ms
 LIBRARIES = {".spc": "spc_io", ".jdx": "jcamp"}
 KINDS = [".wdf", ".spc", "log.spc", ".jdx", ".txt", ".txt.gz"]
-
-
-@contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    """Fail what takes longer, even if it would never end."""
-
-    def stop(*_: object) -> None:
-        raise AssertionError(f"took more than {seconds} s")
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
 
 
 @pytest.fixture

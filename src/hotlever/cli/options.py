@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 from typer import Argument, Option
 
 from hotlever.cli.output import progress
-from hotlever.errors import InputError, quoted
+from hotlever.errors import InputError, quoted, shown
 from hotlever.files import Outputs
+from hotlever.units import setting
 
 if TYPE_CHECKING:
     from hotlever.lever import Lever
@@ -112,7 +113,7 @@ def check_medium(medium: str | None) -> None:
     from hotlever.probe.surroundings import Medium
 
     if medium is not None and medium not in get_args(Medium):
-        raise InputError(f"--medium {medium}: expected {' or '.join(get_args(Medium))}")
+        raise InputError(f"--medium {shown(medium)}: expected {' or '.join(get_args(Medium))}")
 
 
 def column_files(columns: list[str] | None) -> list[Path]:
@@ -128,7 +129,7 @@ def parse_bias(text: str) -> Array:
     >>> parse_bias("1:11:3").tolist()
     [1.0, 6.0, 11.0]
     """
-    where = f"--bias {text}"
+    where = f"--bias {shown(text)}"
     start, stop, biases = _parse_range(text, where, "such as 1:11:25 (V)", MOST_BIASES)
     if start < 0 or stop < start:
         raise InputError(f"{where}: expected 0 <= START <= STOP")
@@ -150,7 +151,7 @@ def parse_vary(text: str) -> tuple[str, Array]:
     >>> name, values.tolist()
     ('heater_length_um', [3.0, 4.0, 5.0, 6.0])
     """
-    where, example = f"--vary {text}", "such as heater_length_um=3:6:7"
+    where, example = f"--vary {shown(text)}", "such as heater_length_um=3:6:7"
     name, equals, numbers = text.partition("=")
     if not equals:
         raise InputError(f"{where}: expected NAME=START:STOP:COUNT, {example}")
@@ -187,6 +188,22 @@ def parse_number(text: str, where: str) -> float:
     return value
 
 
+def parse_volts(text: str, where: str) -> float:
+    """Parse a voltage such as ``5V`` or ``200 mV``, of either sign.
+
+    Examples
+    --------
+    >>> parse_volts("200 mV", "--step"), parse_volts("5", "--step")
+    (0.2, 5.0)
+    """
+    volts = setting(text, "V", where, bare=True)
+    if volts and not LEAST_BIAS <= abs(volts) <= MOST_BIAS:
+        raise InputError(
+            f"{where}: found a bias of {volts:g} V, expected 0 or {LEAST_BIAS:g} to {MOST_BIAS:g} V"
+        )
+    return volts
+
+
 def parse_priors(texts: list[str] | None, probe: Probe) -> dict[str, str] | None:
     """Split and check ``NAME=VALUE±SPREAD``; ``none`` alone is no prior at all, nothing is None.
 
@@ -206,7 +223,7 @@ def parse_priors(texts: list[str] | None, probe: Probe) -> dict[str, str] | None
     for text in texts:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals:
-            raise InputError(f"--prior {text}: expected NAME=VALUE±SPREAD, or none alone")
+            raise InputError(f"--prior {shown(text)}: expected NAME=VALUE±SPREAD, or none alone")
         if name in pairs:
             raise InputError(f"--prior {name}: given twice, expected once")
         pairs[name] = value
@@ -227,11 +244,11 @@ def parse_settings(settings: list[str] | None, probe: Probe) -> dict[str, Any]:
     {'a0': 0.0009, 'chip': True, 'medium': 'air', 'tip.height_um': 0.7}
     """
     values: dict[str, Any] = {}
-    for setting in settings or []:
-        name, equals, text = (part.strip() for part in setting.partition("="))
+    for one in settings or []:
+        name, equals, text = (part.strip() for part in one.partition("="))
         where = f"--set {name}"
         if not equals:
-            raise InputError(f"--set {setting}: expected NAME=VALUE")
+            raise InputError(f"--set {one}: expected NAME=VALUE")
         section, key, record = probe.field(name)
         if any(probe.field(other)[:2] == (section, key) for other in values):
             raise InputError(f"{where}: given twice, expected once")
@@ -271,10 +288,10 @@ def parse_values(
     {'n_d': 3.3e+17, 'p': None}
     """
     values: dict[str, float | None] = {}
-    for setting in settings or []:
-        name, equals, value = (part.strip() for part in setting.partition("="))
+    for one in settings or []:
+        name, equals, value = (part.strip() for part in one.partition("="))
         if not (equals or bare):
-            raise InputError(f"{option} {setting}: expected NAME=VALUE")
+            raise InputError(f"{option} {one}: expected NAME=VALUE")
         if name in values:
             raise InputError(f"{option} {name}: given twice, expected once")
         values[name] = parse_number(value, f"{option} {name}") if equals else None

@@ -21,6 +21,7 @@ from hotlever.cli.options import (
     check_plot,
     load_probe,
     make_lever,
+    parse_volts,
 )
 from hotlever.cli.output import give, note, progress
 from hotlever.errors import HistoryEndError, InputError
@@ -155,7 +156,7 @@ def _waveform(
     ((name, text),) = given.items()
     try:
         if name == "--step":
-            return transient.step(setting(text, "V", name, bare=True))
+            return transient.step(parse_volts(text, name))
         if name == "--sine":
             return transient.sine(*_sine(text))
         volts, length = _volts_and_time(text, name)
@@ -179,7 +180,7 @@ def _volts_and_time(text: str, where: str) -> tuple[float, float]:
     volts, comma, length = text.partition(",")
     if not comma:
         raise InputError(f"{where}: found '{text}', expected V,TIME such as 10V,5us")
-    return setting(volts, "V", where, bare=True), setting(length, "us", where)
+    return parse_volts(volts, where), setting(length, "us", where)
 
 
 def _sine(text: str) -> tuple[float, float, float]:
@@ -194,7 +195,7 @@ def _sine(text: str) -> tuple[float, float, float]:
     if not at:
         raise InputError(f"--sine: found '{text}', expected V+V@FREQ such as 3V+0.5V@20kHz")
     offset, _, amplitude = volts.rpartition("+")
-    biases = [setting(one, "V", "--sine", bare=True) for one in (offset or "0", amplitude)]
+    biases = [parse_volts(one, "--sine") for one in (offset or "0", amplitude)]
     return biases[0], biases[1], setting(frequency, "Hz", "--sine")
 
 

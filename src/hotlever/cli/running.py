@@ -50,9 +50,17 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     sys.exit(status)
 
 
+class Stopped(KeyboardInterrupt):
+    """A signal has come that ends a command.
+
+    Of a type of its own: where a plain KeyboardInterrupt passes through `exec`, as of a module of
+    dataclasses that is imported, Python ends itself by a signal in place of the exit status.
+    """
+
+
 def _stop(number: int, _: FrameType | None) -> NoReturn:
     _received.append(number)
-    raise KeyboardInterrupt
+    raise Stopped
 
 
 def _keep_to_ourselves() -> None:

@@ -17,9 +17,10 @@ from hotlever.cli.options import (
     check_plot,
     load_probe,
     make_lever,
+    parse_volts,
 )
 from hotlever.cli.output import give, progress
-from hotlever.errors import InputError
+from hotlever.errors import InputError, shown
 from hotlever.files import Outputs
 from hotlever.units import setting
 
@@ -50,8 +51,8 @@ def spectrum_command(
     from hotlever.lever.transient.sinusoidal import HARMONIC_COLUMNS, harmonics
     from hotlever.lever.transient.small_signals import SPECTRUM_COLUMNS, spectrum
 
-    swing = None if amplitude is None else setting(amplitude, "V", "--amplitude", bare=True)
-    volts, frequencies = setting(bias, "V", "--bias", bare=True), _frequencies(frequency)
+    swing = None if amplitude is None else parse_volts(amplitude, "--amplitude")
+    volts, frequencies = parse_volts(bias, "--bias"), _frequencies(frequency)
     check_medium(medium)
     outputs = Outputs(probe_file)
     outputs.file(output, ".csv", ".nc")
@@ -86,7 +87,7 @@ def _frequencies(text: str) -> Array:
     """
     import numpy as np
 
-    where, parts = f"--frequency {text}", text.split(":")
+    where, parts = f"--frequency {shown(text)}", text.split(":")
     if len(parts) != 3:
         raise InputError(f"{where}: expected START:STOP:COUNT such as 1Hz:10MHz:71")
     start, stop = (setting(part, "Hz", where) for part in parts[:2])

@@ -149,15 +149,16 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
     Raises
     ------
     InputError
-        If the file is not a sweep.
+        If the file is not a sweep, or is damaged.
     """
     if not Path(path).is_file():
         read_text(path)  # says why
     try:
         with xr.open_dataset(path, engine="netcdf4") as data:
             loaded = data.load()
-    except OSError as error:
-        raise InputError(f"{path}: not a NetCDF file") from error
+    except Exception as error:
+        # a damaged file raises what its libraries think of
+        raise InputError(f"{path}: not a NetCDF file, or a damaged one") from error
     missing = [name for name in SWEEP_COLUMNS if name not in loaded.variables]
     if missing:
         raise InputError(f"{path}: not a sweep: variable '{missing[0]}' is missing")

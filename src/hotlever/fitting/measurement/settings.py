@@ -34,6 +34,8 @@ _LIKE_A_SETTING = re.compile(
     r"series.?resist|base.?temp|(?:medium|pressure)\b|(?:r_?s(?:eries)?|t_?(?:base|0))\b(?!-).*\d",
     re.I,
 )
+#: What a setting may be of, in whatever words, if a number follows.
+_OF_A_SETTING = re.compile(r"resist(?:or|ance)\b|temp(?:erature)?\b|^T$", re.I)
 #: Media by their names.
 _MEDIA = {
     "vacuum": "vacuum",
@@ -195,7 +197,8 @@ def _setting(text: str, where: str) -> dict[str, Any] | None:
     in_brackets = unit if number is not None or key[-1:] in (")", "]") else None
     units = (in_brackets or "", _unit_of(rest))
     alike = any(conversion(each, inside) for each in units for _, inside, _ in _SETTINGS.values())
-    return None if alike or _LIKE_A_SETTING.match(text.strip(' \t#"')) else {}
+    named = _OF_A_SETTING.search(key) and re.search(r"\d", value or key)
+    return None if alike or named or _LIKE_A_SETTING.match(text.strip(' \t#"')) else {}
 
 
 def _words(text: str) -> set[str]:

@@ -1,0 +1,66 @@
+"""Count what stands behind the promises of docs/promises.md: ``python tools/promises.py``."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "hostile")]
+
+
+def lines(folder: str) -> int:
+    """Return how many lines of code, comments included, a folder has."""
+    files = (ROOT / folder).rglob("*.py")
+    return sum(len(file.read_text(encoding="utf-8").splitlines()) for file in files)
+
+
+def tests(*options: str) -> int:
+    """Return how many tests there are, each with each of its parameters."""
+    command = [sys.executable, "-m", "pytest", "--collect-only", "-q", *options]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return sum("::" in line for line in done.stdout.splitlines())
+
+
+def counts() -> dict[str, int]:
+    """Return how large the code and its tests are."""
+    return {
+        "lines of the package": lines("src"),
+        "lines of its tests": lines("tests"),
+        "tests of `make test`": tests(),
+        "tests of `make test-slow`": tests("-m", "slow"),
+    }
+
+
+def hostile_counts() -> dict[str, int]:
+    """Return how many hostile cases there are with ``make test-hostile``."""
+    import test_arguments_at_random as arguments
+    import test_faults as faults
+    import test_files_at_random as files
+
+    options = [choices for _, wrong in arguments.WRONG for choices in wrong.values()]
+    return {
+        "kinds of hostile files": len(files.NAMES),
+        "hostile files of `make test-hostile`": files.CASES,
+        "arguments and options that are given wrong values": len(options),
+        "wrong values of theirs": sum(map(len, options)),
+        "hostile argument lists of `make test-hostile`": arguments.CASES,
+        "the same by a process of its own": arguments.PROCESSES,
+        "commands on a disk that is full at a random byte": len(faults.WRITERS) * faults.DISKS,
+        "kills of a batch": faults.KILLS,
+    }
+
+
+def main() -> None:
+    """Print them as a table."""
+    print(*rows(counts() | hostile_counts()), sep="\n")
+
+
+def rows(found: dict[str, int]) -> list[str]:
+    """Return counts as rows of a table."""
+    return [f"| {what} | {count:,} |".replace(",", " ") for what, count in found.items()]
+
+
+if __name__ == "__main__":
+    main()
