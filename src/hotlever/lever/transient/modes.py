@@ -24,7 +24,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, unknown_name
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.space import LEVER, Fluxes
+from hotlever.lever.space import LEVER
 from hotlever.lever.state import State
 from hotlever.lever.transient.driven import InCircuit
 from hotlever.lever.transient.waveform import Waveform, step, switched_off
@@ -42,14 +42,6 @@ _ACCURATE = 1e-9
 _STEADY, _MOST_ROUNDS = 1e-4, 6
 #: Points of a history for each step of the solver.
 _PER_STEP = 8
-
-
-def stored_change(equations: LeverEquations, x: Array, change: Array) -> Array:
-    """Return how what is stored (nJ) changes with the unknowns, (size + 1, n)."""
-    by_T = equations.heat_density(equations.at(x)[0].T)[1]
-    heat = by_T * equations.space.temperature.at_points(change)[0]
-    nothing = np.zeros((equations.space.potential.kinds, *heat.shape))
-    return equations.space.weak_form(Fluxes(heat, nothing, nothing))
 
 
 @one_blas_thread
@@ -117,7 +109,7 @@ def _modes(
     """Return the slowest modes of a lever with a heat capacity (nJ/K) that goes along."""
 
     def relaxed(change: Array) -> Array:
-        stored = stored_change(equations, x, change.reshape(-1, 1))
+        stored = equations.stored_change(x, change.reshape(-1, 1))
         if coordinates is not None and bound is not None:
             stored[:, 0] += coordinates.T @ (bound @ (coordinates @ change.ravel()))
         return factors.solve(stored, np.arange(1))[:, 0]
