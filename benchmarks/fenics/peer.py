@@ -21,6 +21,10 @@ V_l is one extra unknown, eliminated exactly by bordering: one factorisation ser
 sides, the residual and a unit rise of V_l.  I_h is the consistent flux, the residual of the charge
 equation summed over the supply terminal, so that charge and energy balance to rounding error.
 
+With "times_us" in the problem the bias, the first of "bias_V", is switched on at time zero, and the
+enthalpy is stepped by the two-step backward differentiation formula, with steps that grow by a
+given factor; the results are those at the times.
+
 Units throughout: um, K, V, mA, mW, kohm (which makes every equation free of conversion factors);
 doping and carrier densities in cm^-3 and mobilities in cm^2/(V s), as printed in the paper.
 
@@ -61,6 +65,7 @@ NEWTON_RADIUS_K = 20.0
 KELVIN_PER_VOLT = 100.0  # weighs potential against temperature steps in the tests above
 STEP_LIMIT_K = 150.0  # the largest temperature change of one Newton or predictor step
 MAX_ITERATIONS = 30
+FIRST_STEP = 1e-3  # in time, as a share of the first one that is asked for
 MAX_HALVINGS = 6  # of the step to a bias that was not reached at once
 
 
@@ -95,6 +100,19 @@ def thermal_conductivity(temperature, material):
         + 5.25e-4 * (1.0 + ufl.tanh(clipped)) * above_step
     )
     return MW_PER_UM_K_FROM_W_PER_CM_K * material["c_kappa"] / resistivity_cm_k_per_w
+
+
+def enthalpy(temperature):
+    """Return the heat [nJ/um^3] of silicon, by Shomate's equation (NIST Chemistry WebBook)."""
+    t = temperature / 1000.0
+    kilojoule_per_mol = (
+        22.81719 * t
+        + 3.899510 * t**2 / 2.0
+        - 0.082885 * t**3 / 3.0
+        + 0.042111 * t**4 / 4.0
+        + 0.354063 / t
+    )
+    return kilojoule_per_mol * 2.329 / 28.0855  # 1 kJ/cm^3 = 1 nJ/um^3
 
 
 def high_doped_conductivity(temperature, material):
@@ -199,12 +217,14 @@ def cell_markers(mesh, region, regions, tapered):
     return markers
 
 
-def coupled_forms(space, state, cells, tapered, material, thickness, quadrature_degree):
+def coupled_forms(space, state, cells, tapered, material, thickness, quadrature_degree, past=()):
     """Return the residual [mW and mA] of both equations and its exact derivative.
 
     The laws of each material are integrated over their own cells only.  `tapered` lists the
     centre, axis and length of the tapered regions as dolfin constants, so that the compiled code
     serves every probe with the same number of them; or, for a region of any outline, its borders.
+    In time `past` has, for the present and the last two states, the state and its weight [1/us] in
+    the derivative of the enthalpy.
     """
     temperature, voltage = df.split(state)
     temperature_test, voltage_test = df.TestFunctions(space)
@@ -225,6 +245,8 @@ def coupled_forms(space, state, cells, tapered, material, thickness, quadrature_
             - heating * temperature_test
             + df.inner(current, df.grad(voltage_test))
         )
+        for known, weight in past:
+            integrand += weight * enthalpy(df.split(known)[0]) * temperature_test
         return thickness * integrand * dx(tag)
 
     residual = balance(high_doped_conductivity(temperature, material), HIGH_DOPED)
@@ -286,6 +308,12 @@ class Lever:
         space = df.FunctionSpace(mesh, element)
         self.state = df.Function(space)
 
+        self.past = []
+        if "times_us" in problem:
+            states = [self.state, df.Function(space), df.Function(space)]
+            self.past = [(one, df.Constant(0.0)) for one in states]
+            for one in states:  # never 0 K, even where its weight is zero
+                one.vector()[:] = problem["circuit"]["base_temperature_K"]
         self.material = {name: df.Constant(problem["material"][name]) for name in MATERIAL_NAMES}
         residual, jacobian = coupled_forms(
             space,
@@ -300,6 +328,7 @@ class Lever:
             self.material,
             df.Constant(problem["thickness_um"]),
             problem["quadrature_degree"],
+            self.past,
         )
         self.residual_form = df.Form(residual)
         self.jacobian_form = df.Form(jacobian)
@@ -437,6 +466,32 @@ class Lever:
                     "series resistance the state may not be a single-valued function of the bias"
                 )
 
+    def follow(self, bias, times, growth):
+        """Switch the bias [V] on, and return the current and the tip temperature at times [us]."""
+        stops = [FIRST_STEP * times[0]]
+        for start, end in pairwise([*stops, *times]):
+            between = max(1, int(np.ceil(np.log(end / start) / np.log(growth))))
+            stops += [start * (end / start) ** (k / between) for k in range(1, between + 1)]
+        last, now, found = self.cold, self.cold, []
+        before, time = None, 0.0
+        for stop in dict.fromkeys(stops):
+            length = stop - time
+            ratio = 0.0 if before is None else length / before
+            weights = (1 + 2 * ratio) / (1 + ratio), -(1 + ratio), ratio**2 / (1 + ratio)
+            for (_, constant), weight in zip(self.past, weights, strict=True):
+                constant.assign(weight / length)
+            for (state, _), known in zip(self.past[1:], (now, last), strict=True):
+                state.vector()[:] = known
+            self.values = now + ratio * (now - last)
+            if not self.iterate(bias):
+                raise RuntimeError(f"no convergence at {stop} us")
+            last, now, before, time = now, self.values, length, stop
+            if stop in times:
+                current = self.residual()[self.supply_dofs].sum()
+                found.append((current, self.tip_weights @ self.values))
+        currents, tips = zip(*found, strict=True)
+        return {"time_us": times, "current_mA": currents, "tip_K": tips, "steps": len(stops)}
+
     def sweep(self, bias_values):
         """Solve for each bias [V] in turn and return the lists of results."""
         rows = []
@@ -504,7 +559,10 @@ def solve_problem(problem, strategy):
     prepare(problem)
     start, used = time.perf_counter(), time.process_time()
     lever = Lever(problem, strategy)
-    result = lever.sweep(problem["bias_V"])
+    if "times_us" in problem:
+        result = lever.follow(problem["bias_V"][0], problem["times_us"], problem["growth"])
+    else:
+        result = lever.sweep(problem["bias_V"])
     seconds, used = time.perf_counter() - start, time.process_time() - used
     return {
         **result,

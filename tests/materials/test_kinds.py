@@ -44,6 +44,7 @@ def test_both_conductivities_have_exact_derivatives_by_all_that_they_depend_on(n
     laws = {
         "heat": lambda kind, T, n, t: kind.thermal_conductivity(T, t),
         "charge": lambda kind, T, n, t: kind.electrical_conductivity(T, n),
+        "held": lambda kind, T, n, t: kind.enthalpy(T),
     }
     found, at = set(), (DOPING, THICKNESS)
     for law in laws.values():

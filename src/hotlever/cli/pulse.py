@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import count as count_up
 from pathlib import Path
@@ -23,12 +24,14 @@ from hotlever.cli.options import (
     make_lever,
     parse_volts,
 )
-from hotlever.cli.output import give, note, progress
+from hotlever.cli.output import give, note, progress, tell_table
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.files import Outputs, output_folder
 from hotlever.units import setting
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from hotlever.lever import Lever, State
     from hotlever.lever.transient import Waveform
 
@@ -60,7 +63,7 @@ def pulse_command(
     ),
 ) -> None:
     """Follow a lever in time: steps, pulses, ramps, sines, or what a file says."""
-    from hotlever.lever.transient import history_csv, write_history
+    from hotlever.lever.transient import history_csv, with_times, write_history
 
     texts = {"--step": step, "--pulse": pulse, "--ramp": ramp, "--sine": sine}
     repeated = {"--period": period, "--count": count}
@@ -81,14 +84,16 @@ def pulse_command(
     outputs.folder(fields)
     probe = load_probe(probe_file, settings, medium)
     failure: HistoryEndError | None = None
-    # a figure has smooth curves, the table the steps alone
-    per_step = _CURVE if plot is not None and times is None else 1
+    # figures and rise times are of smooth curves, the table of the steps alone
+    per_step = _CURVE if times is None else 1
     states: list[tuple[float, State]] = []
+    ends: list[State] = []
     told = count_up()
     lever = make_lever(probe)
     with progress("pulse") as update:
 
         def seen(t: float, state: State) -> None:
+            ends[1:] = [state]
             if next(told) % per_step == 0 and fields is not None:
                 states.append((t, state))
 
@@ -96,8 +101,11 @@ def pulse_command(
             curve = lever.pulse(wave, end, times, per_step=per_step, progress=update, seen=seen)
         except HistoryEndError as error:
             curve, failure = error.partial, error
+    if ends:
+        curve = with_times(curve, ends[0], ends[-1], resolved=times is None)
     data = curve.isel(time=slice(None, None, per_step))
     note(*filter(None, data.attrs["notes"].split("\n")))
+    tell_table(_times(data))
     with outputs.together():
         if output is not None:
             write_history(data, output)
@@ -111,6 +119,21 @@ def pulse_command(
         give(history_csv(data))
     if failure is not None:
         raise failure
+
+
+def _times(data: xr.Dataset) -> list[list[str]]:
+    """Return rows that say how fast a history is."""
+    rows = []
+    for name in ("heating", "cooling"):
+        time = data.attrs.get(f"{name}_us", math.nan)
+        if not math.isnan(time):
+            rows.append([f"{name}, 10 to 90 %", f"{time:.3g} µs"])
+    for name in ("start", "end"):
+        constants = data.attrs.get(f"time_constants_us_at_{name}", ())
+        if len(constants):
+            listed = ", ".join(f"{one:.3g}" for one in constants)
+            rows.append([f"time constants at the {name}", f"{listed} µs"])
+    return rows
 
 
 def _report(

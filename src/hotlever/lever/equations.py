@@ -189,9 +189,25 @@ class LeverEquations:
 
         In time `balance` is what it loses per µs.
         """
-        fields, _ = self.at(x)
-        nothing = np.zeros_like(fields.grad_T)
-        return self.space.weak_form(Fluxes(self.heat_density(fields.T)[0], nothing, nothing))
+        return self._only_heat(self.heat_density(self.at(x)[0].T)[0])
+
+    def stored_change(self, x: Array, change: Array) -> Array:
+        """Return how `stored` changes with the unknowns, to first order; see `flux_changes`."""
+        by_T = self.heat_density(self.at(x)[0].T)[1]
+        rise = self.space.temperature.at_points(change)[0]
+        heat = (by_T if change.ndim == 2 else by_T[..., None]) * rise
+        return self._only_heat(heat)
+
+    def stored_by_parameter(self, x: Array, names: Sequence[str]) -> Array:
+        """Return how `stored` changes with parameters of materials, (size + 1, n, k)."""
+        cold = np.full_like(self.space.weights, self.base_temperature_K)
+        by = self._stacks.heat_by(self.at(x)[0].T, names) - self._stacks.heat_by(cold, names)
+        return self._only_heat(by)
+
+    def _only_heat(self, heat: Array) -> Array:
+        """Test a heat by area alone."""
+        nothing = np.zeros((self.space.potential.kinds, *heat.shape))
+        return self.space.weak_form(Fluxes(heat, nothing, nothing))
 
     def factorised(self, x: Array, pin: Pin = TIP, per_us: float = 0.0) -> Factors:
         """Return the factorised Jacobians of states, with the row of a pin last.

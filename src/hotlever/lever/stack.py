@@ -177,6 +177,17 @@ class Stacks:
             by_T[here] += sheet * by["T"]
         return held, by_T
 
+    def heat_by(self, T: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of the enthalpy by parameters, (points, n, k)."""
+        changes = np.zeros((*T.shape, len(names)))
+        for film in self._films:
+            here, sheet = film.film.points, PER_CM3_TO_NANO_PER_UM3 * film.film.counted_um
+            _, by = film.kind.enthalpy(T[here])
+            for place, name in enumerate(names):
+                if film.own.get(name) in by:
+                    changes[here, :, place] += sheet * by[film.own[name]]
+        return changes
+
     def _take_off_air(self, total: Conductivities, T: Array, names: Sequence[str]) -> None:
         """Take off what the air would conduct that fills the plate, see `LeverEquations`."""
         share = PER_CM_TO_MILLI_PER_UM * self._air.filling

@@ -125,7 +125,10 @@ class Kind(Record):
 
     @abstractmethod
     def enthalpy(self, T: Array) -> Evaluated:
-        """Return the heat held above that at 298.15 K (J cm⁻³), with its derivative by ``T``."""
+        """Return the heat held above that at 298.15 K (J cm⁻³), with its derivatives.
+
+        They are by ``T`` and by parameters.
+        """
 
 
 class Silicon(Kind):
@@ -136,6 +139,7 @@ class Silicon(Kind):
         description=f'scale of the thermal conductivity; or "{BY_THICKNESS}": it follows from the '
         "thickness",
     )
+    heat_capacity_scale: float = bounded(OF_SILICON["heat_capacity_scale"], default=1.0)
 
     def end(self, name: str) -> str:
         """Say what happens to a material of this name above its highest temperature."""
@@ -152,7 +156,9 @@ class Silicon(Kind):
 
     def enthalpy(self, T: Array) -> Evaluated:
         """Return the heat held (J cm⁻³), see `Kind.enthalpy`."""
-        return enthalpy(T)
+        held, by = enthalpy(T)
+        scale = self.heat_capacity_scale
+        return scale * held, {"T": scale * by["T"], "heat_capacity_scale": held}
 
 
 class Stored(Kind):
@@ -184,7 +190,8 @@ class LowDopedSilicon(Silicon):
     """Silicon whose carriers are those of its dopant and, when hot, its own."""
 
     declared: ClassVar = {
-        name: OF_SILICON[name] for name in ("c_kappa", "delta", "n_d", "p", "impurity_exponent")
+        name: OF_SILICON[name]
+        for name in ("c_kappa", "delta", "n_d", "p", "impurity_exponent", "heat_capacity_scale")
     }
     usual: ClassVar = ("c_kappa", "delta", "n_d", "p")
     #: Laws by temperature, doping, p and the impurity exponent; and where σ is least.
@@ -235,7 +242,9 @@ class PSilicon(LowDopedSilicon):
 class HighDopedSilicon(Silicon):
     """Quasi-metallic silicon; its dopant diffuses into low-doped silicon beside it."""
 
-    declared: ClassVar = {name: OF_SILICON[name] for name in ("c_kappa", "a0", "a1", "n_hd")}
+    declared: ClassVar = {
+        name: OF_SILICON[name] for name in ("c_kappa", "a0", "a1", "n_hd", "heat_capacity_scale")
+    }
     usual: ClassVar = ("c_kappa", "a0", "a1")
 
     kind: Literal["high-doped-silicon"] = "high-doped-silicon"

@@ -68,6 +68,7 @@ class Material(Record):
     a1: float = bounded(OF_SILICON["a1"])
     n_hd: float = high_doping()
     impurity_exponent: float = impurity_exponent()
+    heat_capacity_scale: float = bounded(OF_SILICON["heat_capacity_scale"], default=1.0)
 
     @model_validator(mode="after")
     def _heater_is_the_low_doped_part(self) -> Material:

@@ -41,8 +41,16 @@ OF_SILICON: dict[str, Parameter] = {
             *("impurity_exponent", "s", "1", 10.0, -2.0, 4.0),
             "power of the temperature in mobility limited by impurities",
         ),
+        Parameter(
+            *("heat_capacity_scale", "c_h", "1", 1.0, 0.5, 1.5),
+            "scale of the heat capacity, which counts in time",
+        ),
     )
 }
+
+
+#: Those that count in time only.
+IN_TIME = ("heat_capacity_scale",)
 
 
 def bounded(parameter: Parameter, **default: Any) -> Any:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from hotlever.errors import unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, full_name
-from hotlever.materials.parameters import Parameter
+from hotlever.materials.parameters import IN_TIME, Parameter
 from hotlever.text import parameter_named
 
 if TYPE_CHECKING:
@@ -24,10 +24,11 @@ def dimensions_of(probe: Probe) -> list[str]:
     return [*probe.shape.dimensions(), *(OF_THE_TIP if probe.tip is not None else ())]
 
 
-def of_materials(probe: Probe) -> dict[str, Parameter]:
+def of_materials(probe: Probe, *, in_time: bool = False) -> dict[str, Parameter]:
     """Return all parameters of what a probe is made of, by name: first those a fit usually varies.
 
-    Those of ``[material]`` keep the paper's order; two kinds of silicon share c_κ there.
+    With `in_time`, what counts in time only as well. Those of ``[material]`` keep the paper's
+    order; two kinds of silicon share c_κ there.
 
     Examples
     --------
@@ -40,6 +41,7 @@ def of_materials(probe: Probe) -> dict[str, Parameter]:
         full_name(material, own): known._replace(name=full_name(material, own))
         for material, kind in _kinds(probe)
         for own, known in kind.parameters.items()
+        if in_time or own not in IN_TIME
     }
     return {name: found[name] for name in [*usual, *(name for name in found if name not in usual)]}
 
@@ -75,7 +77,7 @@ def _kinds(probe: Probe) -> list[tuple[str, Kind]]:
 def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Parameter]:
     """Return all that a fit may vary, by name: first the materials' parameters.
 
-    With `anywhere`, what counts in other surroundings only as well.
+    With `anywhere`, what counts in other surroundings or in time only as well.
 
     Examples
     --------
@@ -93,7 +95,7 @@ def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Paramete
             shares["surface_gap_um"] = _OF_THE_VALUE
     parts = (probe.shape, probe.tip, probe.circuit, probe.surroundings)
     meaning = {name: text for part in parts if part for name, text in part.description().items()}
-    found = of_materials(probe)
+    found = of_materials(probe, in_time=anywhere)
     for (name, (least, most)), value in zip(shares.items(), probe.at(list(shares)), strict=True):
         found[name] = parameter_named(name)._replace(
             scale=float(value),

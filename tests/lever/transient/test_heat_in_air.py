@@ -13,7 +13,7 @@ from hotlever.air.surface import PanelOptions
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.transient import pulse, sine, step
 from hotlever.lever.transient.history import followed
-from hotlever.lever.transient.modes import slowest_modes, stored_change
+from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.periodic import settled
 from hotlever.lever.transient.sinusoidal import harmonics
 from hotlever.lever.transient.small_signals import spectrum
@@ -48,7 +48,7 @@ class AllPanels:
         many = np.repeat(x, len(x), axis=1)
         self.rest, self.moving = (
             equations.balance_change(many, unit),
-            stored_change(equations, many, unit),
+            equations.stored_change(many, unit),
         )
         gradient = equations.observed_gradient(x)[:, 0]
         self.tip, self.shown = space.tip_rise(unit), gradient[:, :2]

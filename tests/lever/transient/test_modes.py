@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.lever.transient import rise_times, time_constants
+from hotlever.lever.transient import pulse, rise_times, step, time_constants, with_times
 from hotlever.lever.transient.driven import DrivenLever
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.runge_kutta import Stepper
@@ -63,6 +63,24 @@ def test_rise_times_are_read_off_histories(coarse):
     # a hot lever is slow to heat towards its knee, and fast to cool
     assert float(found.heating_us[1]) > 2.0 * float(found.cooling_us[1])
     assert found.tip_K.values[1] == pytest.approx(coarse.solve([8.268])[0].tip_K)
+
+
+def test_a_history_says_how_fast_it_is(coarse):
+    states = []
+    history = coarse.pulse(
+        pulse(4.0, 300.0), 600.0, per_step=8, seen=lambda t, state: states.append(state)
+    )
+    found = with_times(history, states[0], states[-1]).attrs
+    rises = rise_times(coarse, [4.0])
+    assert found["heating_us"] == pytest.approx(rises.heating_us.item(), rel=5e-3)
+    assert found["cooling_us"] == pytest.approx(rises.cooling_us.item(), rel=5e-3)
+    # cold at both ends, but without a bias nothing feeds back
+    constants = [found[f"time_constants_us_at_{end}"] for end in ("start", "end")]
+    assert constants[0][0] > constants[1][0] == pytest.approx(slowest(coarse, 1e-3), rel=1e-3)
+    flat = with_times(coarse.pulse(step(0.0)), states[0], states[-1]).attrs
+    assert np.isnan(flat["heating_us"])
+    few = with_times(history, states[0], states[-1], resolved=False).attrs
+    assert "heating_us" not in few
 
 
 def test_what_does_not_exist_is_refused(coarse):

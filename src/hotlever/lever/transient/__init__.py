@@ -1,7 +1,7 @@
 """Levers in time: wave forms, what a lever shows under them, and its time constants."""
 
 from hotlever.lever.transient.history import followed, history_csv, write_history
-from hotlever.lever.transient.modes import rise_times, time_constants
+from hotlever.lever.transient.modes import rise_times, time_constants, with_times
 from hotlever.lever.transient.small_signals import spectrum
 from hotlever.lever.transient.waveform import (
     Waveform,
@@ -26,5 +26,6 @@ __all__ = [
     "step",
     "switched_off",
     "time_constants",
+    "with_times",
     "write_history",
 ]

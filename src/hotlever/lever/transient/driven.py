@@ -11,7 +11,7 @@ Air lets heat through as it does at rest, and holds some itself: the temperature
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from hotlever.lever.balances import heat_left
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.space import LEVER, Factors
+from hotlever.lever.stack import GAS
 from hotlever.lever.state import State
 from hotlever.probe import Circuit
 from hotlever.types import Array, Index
@@ -113,6 +114,46 @@ class DrivenLever:
         if self._air is None:
             return rest
         return np.vstack([rest, self._air.rates * (in_air - self._air.follows(lever))])
+
+    def change(self, x: Array, changes: Array, rate: float) -> Array:
+        """Return how ``rate × stored + rest`` changes with the unknowns (rows, 1, k)."""
+        return rate * self.stored_change(x, changes) + self._rest_change(x, changes)
+
+    def stored_change(self, x: Array, changes: Array) -> Array:
+        """Return how `stored` changes with the unknowns (rows, 1, k), to first order."""
+        (lever, _), (moved, in_air) = self.parts(x), self.parts(changes)
+        stored = self.equations.stored_change(lever, moved)
+        if self._air is None:
+            return stored
+        held = self._air.tested(self._air.held(moved[:, 0], in_air[:, 0]))
+        return np.concatenate([stored + held[:, None], in_air])
+
+    def _rest_change(self, x: Array, changes: Array) -> Array:
+        (lever, _), (moved, in_air) = self.parts(x), self.parts(changes)
+        rest = self.equations.balance_change(lever, moved)
+        rest[-1] = self._circuit.bias(moved[-1], rest[-1])
+        if self._air is None:
+            return rest
+        lag = self._air.rates * (in_air[:, 0] - self._air.follows(moved[:, 0]))
+        return np.concatenate([rest, lag[:, None]])
+
+    def by_parameter(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
+        """Return how `stored` and `rest` change with parameters, each (rows, 1, k)."""
+        lever, in_air = self.parts(x)
+        stored = self.equations.stored_by_parameter(lever, names)
+        rest = self.equations.by_parameter(lever, names)
+        current = self.equations.balance(lever)[-1]
+        for place, name in enumerate(names):
+            by = rest[-1, :, place]
+            rest[-1, :, place] = self._circuit.bias(0.0, by) + self._circuit.bias_by(name, current)
+        if self._air is None:
+            return stored, rest
+        lag = np.zeros((len(in_air), 1, len(names)))
+        for place in (place for place, name in enumerate(names) if name == GAS):
+            # stores in a gas that conducts better follow faster
+            away = self._air.rates * (in_air - self._air.follows(lever))
+            lag[..., place] = away / self.equations.space.air.gas_conductivity
+        return np.concatenate([stored, np.zeros_like(lag)]), np.concatenate([rest, lag])
 
     def factorised(self, x: Array, rate: float) -> Factors:
         """Return the factorised Jacobian of ``rate × stored + rest``."""

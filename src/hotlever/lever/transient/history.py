@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -116,8 +116,12 @@ def follow(
     until: float,
     tolerance_K: float,
     start: State | None = None,
+    stops: Sequence[float] = (),
 ) -> Iterator[tuple[Piece, Step]]:
-    """Give the steps of a lever under a wave form, each with the piece it belongs to."""
+    """Give the steps of a lever under a wave form, each with the piece it belongs to.
+
+    Steps end at all stops (µs) on the way.
+    """
     begin = State(lever, _at_rest(lever, waveform.before_V)) if start is None else start
     if lever.circuit.starts_cold:
         rise = _SHARE_OF_RISE * _expected_rise(lever, waveform.highest_V)
@@ -129,7 +133,7 @@ def follow(
         x = problem.start(begin) if x is None else x
         stepper = Stepper(problem, tolerance_K)
         first = None if piece.jumps else length
-        for step in stepper.steps(piece.start, piece.end, x, piece.longest, first):
+        for step in stepper.steps(piece.start, piece.end, x, piece.longest, first, stops):
             yield piece, step
             x = step.x[:, 1:]
         length = stepper.length

@@ -13,6 +13,7 @@ no exponential.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -23,7 +24,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, unknown_name
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.space import LEVER, Fluxes
+from hotlever.lever.space import LEVER
 from hotlever.lever.state import State
 from hotlever.lever.transient.driven import InCircuit
 from hotlever.lever.transient.waveform import Waveform, step, switched_off
@@ -41,14 +42,6 @@ _ACCURATE = 1e-9
 _STEADY, _MOST_ROUNDS = 1e-4, 6
 #: Points of a history for each step of the solver.
 _PER_STEP = 8
-
-
-def stored_change(equations: LeverEquations, x: Array, change: Array) -> Array:
-    """Return how what is stored (nJ) changes with the unknowns, (size + 1, n)."""
-    by_T = equations.heat_density(equations.at(x)[0].T)[1]
-    heat = by_T * equations.space.temperature.at_points(change)[0]
-    nothing = np.zeros((equations.space.potential.kinds, *heat.shape))
-    return equations.space.weak_form(Fluxes(heat, nothing, nothing))
 
 
 @one_blas_thread
@@ -116,7 +109,7 @@ def _modes(
     """Return the slowest modes of a lever with a heat capacity (nJ/K) that goes along."""
 
     def relaxed(change: Array) -> Array:
-        stored = stored_change(equations, x, change.reshape(-1, 1))
+        stored = equations.stored_change(x, change.reshape(-1, 1))
         if coordinates is not None and bound is not None:
             stored[:, 0] += coordinates.T @ (bound @ (coordinates @ change.ravel()))
         return factors.solve(stored, np.arange(1))[:, 0]
@@ -167,6 +160,52 @@ def time_constants(
     )
 
 
+def with_times(
+    history: xr.Dataset, start: State, end: State, *, resolved: bool = True
+) -> xr.Dataset:
+    """Return a history with how fast it is, as attributes.
+
+    Parameters
+    ----------
+    history : xarray.Dataset
+    start, end : State
+        At its beginning and end.
+    resolved : bool
+        Whether its times are those of the solver, or as dense.
+
+    Returns
+    -------
+    xarray.Dataset
+        With the slowest ``time_constants_us_at_start`` and ``time_constants_us_at_end``, in the
+        circuit; and, of a resolved one, ``heating_us`` and ``cooling_us``: from 10 to 90 % of the
+        way from the colder of its ends to its hottest tip, NaN where there is no such time.
+    """
+    found: dict[str, Any] = {}
+    if resolved:
+        time, tip = history.time.values, history.tip_K.values
+        low, high = min(tip[0], tip[-1]), tip.max()
+        found["heating_us"], found["cooling_us"] = (
+            _swing(time, (tip - low) / (high - low)) if high > low else (np.nan, np.nan)
+        )
+    for name, state in (("start", start), ("end", end)):
+        with suppress(ComputationError):  # none are known, such as where silicon melts
+            found[f"time_constants_us_at_{name}"] = slowest_modes(state)[0]
+    return history.assign_attrs(found)
+
+
+def _swing(time: Array, share: Array) -> tuple[float, float]:
+    """Return how long the first rise from 0.1 to 0.9, and the last fall, take; NaN without one."""
+
+    def rise(time: Array, share: Array) -> float:
+        top = int(share.argmax())
+        if share[0] > 0.1 or share[top] < 0.9:
+            return float("nan")
+        early, late = np.interp([0.1, 0.9], np.maximum.accumulate(share), time)
+        return float(late - early)
+
+    return rise(time, share), rise(-time[::-1], share[::-1])
+
+
 def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
     """Return how long heating and cooling take between 10 and 90 % of the tip's rise.
 
@@ -195,15 +234,13 @@ def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
         until = 20.0 * float(slowest_modes(state)[0][0])
         rise = state.tip_K - base
 
-        def crossed(waveform: Waveform, until: float = until, rise: float = rise) -> float:
+        def shares(waveform: Waveform, until: float = until, rise: float = rise) -> Any:
             history = lever.pulse(waveform, until, per_step=_PER_STEP)
-            share = (history.tip_K.values - base) / rise
-            share = share if share[-1] > 0.5 else 1.0 - share
-            early, late = np.interp([0.1, 0.9], np.maximum.accumulate(share), history.time)
-            return float(late - early)
+            return history.time.values, (history.tip_K.values - base) / rise
 
-        off = switched_off(state.bias_V)
-        columns[:, place] = state.tip_K, crossed(step(state.bias_V)), crossed(off)
+        heating, _ = _swing(*shares(step(state.bias_V)))
+        _, cooling = _swing(*shares(switched_off(state.bias_V)))
+        columns[:, place] = state.tip_K, heating, cooling
     names = ("tip_K", "heating_us", "cooling_us")
     return labelled(
         dict(zip(names, columns, strict=True)), coordinates={"bias": np.atleast_1d(bias)}

@@ -9,7 +9,7 @@ the sum of the rest says, whatever the tolerance.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -49,7 +49,7 @@ EMBEDDED = np.array(
 )
 
 #: Within this time (1/rate) nothing that is stored changes.
-_INSTANT_RATE = 1e9
+INSTANT_RATE = 1e9
 #: A step is made so much shorter than its error asks for; by these factors at least and at most;
 #: and by this one where Newton's method fails.
 _SAFETY, _LEAST, _MOST, _FAILED = 0.9, 0.2, 6.0, 0.25
@@ -114,6 +114,10 @@ class Step:
         `Problem.rates` at both ends.
     added : ndarray, shape (k,)
         Their integrals over the step.
+    stages : ndarray, shape (size + 1, stages)
+        The unknowns at the start and in each stage.
+    factors : Factors
+        Of the Jacobian of all stages, nearly.
     """
 
     start: float
@@ -122,6 +126,8 @@ class Step:
     slopes: Array
     rates: Array
     added: Array
+    stages: Array
+    factors: Factors
 
     def between(self, t: float) -> Array:
         """Return the unknowns at a time within the step, (size + 1, 1)."""
@@ -196,12 +202,19 @@ class Stepper:
         self.length = 0.0
 
     def steps(
-        self, start: float, end: float, x: Array, longest: float, first: float | None = None
+        self,
+        start: float,
+        end: float,
+        x: Array,
+        longest: float,
+        first: float | None = None,
+        stops: Sequence[float] = (),
     ) -> Iterator[Step]:
         """Give the steps from one time to another, none longer than a given one.
 
         What is stored at `x` is kept, the algebraic rows are fulfilled first. The length of the
-        first step is tried as given, or found from how fast things change.
+        first step is tried as given, or found from how fast things change. Steps end at all stops
+        on the way.
 
         Raises
         ------
@@ -212,7 +225,8 @@ class Stepper:
         speed = max(self._problem.size_of(here.slope), 1e-300)
         self.length = first or _FIRST * self._tolerance / speed
         while here.t < end:
-            then = _next(here.t, min(self.length, longest), end)
+            stop = min((one for one in stops if here.t < one < end), default=end)
+            then = _next(here.t, min(self.length, longest), stop)
             try:
                 step, there, error = self._step(here, then)
                 share = max(error / self._tolerance, 1e-6)
@@ -231,7 +245,7 @@ class Stepper:
 
     def _settled(self, t: float, x: Array) -> _Reached:
         """Fulfil the algebraic rows, nothing that is stored being changed; and find the slopes."""
-        problem, rate = self._problem, _INSTANT_RATE
+        problem, rate = self._problem, INSTANT_RATE
         stage = _Stage(problem, t, problem.stored(x), rate)
         found = find_roots(stage, x, NewtonOptions(tolerance=1e-9))
         x = found.x
@@ -245,8 +259,8 @@ class Stepper:
         states, slopes, flows, rates = [here.x], [here.slope], [here.flow], [here.rates]
         stored = here.stored
         for stage in range(1, len(TIMES)):
-            known = here.stored + length * _sum(STAGES[stage], flows)
-            guess = _sum(_PREDICTORS[stage - 1], [here.x, length * here.slope, *states[1:]])
+            known = here.stored + length * weighted_sum(STAGES[stage], flows)
+            guess = weighted_sum(_PREDICTORS[stage - 1], [here.x, length * here.slope, *states[1:]])
             equations = _Stage(problem, here.t + TIMES[stage] * length, known, rate)
             found = find_roots(equations, guess, self._newton, factors)
             x, factors = found.x, found.factors
@@ -255,7 +269,7 @@ class Stepper:
             flows.append(rate * (stored - known))
             rates.append(problem.rates(x))
             # the same method, read as one that steps the unknowns
-            slopes.append(rate * (x - here.x - length * _sum(STAGES[stage], slopes)))
+            slopes.append(rate * (x - here.x - length * weighted_sum(STAGES[stage], slopes)))
         assert factors is not None
         there = _Reached(then, states[-1], slopes[-1], stored, flows[-1], rates[-1])
         step = Step(
@@ -264,9 +278,11 @@ class Stepper:
             np.hstack([here.x, there.x]),
             np.hstack([here.slope, there.slope]),
             np.stack([here.rates, there.rates], axis=1),
-            length * _sum(WEIGHTS, rates),
+            length * weighted_sum(WEIGHTS, rates),
+            np.hstack(states),
+            factors,
         )
-        difference = length * rate * _sum(WEIGHTS - EMBEDDED, flows)
+        difference = length * rate * weighted_sum(WEIGHTS - EMBEDDED, flows)
         error = problem.size_of(factors.solve(difference, _ONE))
         off = step.between(here.t + TIMES[_MIDDLE] * length) - states[_MIDDLE]
         return step, there, max(error, _OFF * problem.size_of(off))
@@ -295,7 +311,7 @@ def _next(t: float, length: float, end: float) -> float:
     return t + (0.5 * (end - t) if steps < 2.0 else length)
 
 
-def _sum(weights: Array, columns: list[Array]) -> Array:
+def weighted_sum(weights: Array, columns: list[Array]) -> Array:
     """Return the sum of some columns with the first of the weights."""
     total = np.zeros_like(columns[0])
     for weight, column in zip(weights, columns, strict=False):

@@ -20,7 +20,7 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.state import State
 from hotlever.lever.transient.history import followed
-from hotlever.lever.transient.modes import slowest_modes, stored_change
+from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.reduced import space_of_modes
 from hotlever.lever.transient.small_signals import checked_frequencies
 from hotlever.lever.transient.waveform import step
@@ -192,7 +192,7 @@ class HarmonicBalance:
         many = np.repeat(x, len(x), axis=1)
         rest = self._equations.balance_change(many, unit)
         rest[-1] = self._circuit.bias(unit[-1], rest[-1])
-        moving = stored_change(self._equations, many, unit)
+        moving = self._equations.stored_change(many, unit)
         return np.linalg.inv(turns[:, None, None] * moving + rest + of_air)
 
 

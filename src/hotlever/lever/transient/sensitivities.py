@@ -1,0 +1,212 @@
+"""Derivatives by parameters of what a lever shows in time, exact for the steps that are taken.
+
+Every stage of a step is differentiated as it stands, so that derivatives obey the same matrices:
+with those of a stage factorised, each parameter costs a solution. Steps end where something is
+reported, for between them cubics would have derivatives of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from hotlever.datasets import labelled
+from hotlever.errors import HistoryEndError, InputError, unknown_name
+from hotlever.lever.dataset import OBSERVABLES, probe_attributes
+from hotlever.lever.space import Factors
+from hotlever.lever.transient.driven import DrivenLever
+from hotlever.lever.transient.history import checked_times, follow
+from hotlever.lever.transient.runge_kutta import (
+    GAMMA,
+    INSTANT_RATE,
+    STAGES,
+    TIMES,
+    Step,
+    weighted_sum,
+)
+from hotlever.lever.transient.waveform import Piece, Waveform
+from hotlever.probe.parameters import dimensions_of, parameters_of
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from hotlever.lever.lever import Lever
+
+#: Parameters that move a mesh, an air operator or all temperatures: their derivatives in time are
+#: not known.
+_UNKNOWN = ("base_temperature_K", "surface_gap_um")
+#: Error (relative) to which derivatives are solved with factors of a state nearby, and rounds.
+_EXACT, _MOST_ROUNDS = 1e-8, 12
+
+
+@one_blas_thread
+def with_sensitivities(
+    lever: Lever,
+    waveform: Waveform,
+    at: ArrayLike,
+    names: Sequence[str],
+    *,
+    tolerance_K: float = 0.1,
+) -> xr.Dataset:
+    """Follow a cold lever, with the derivatives of what it shows.
+
+    Parameters
+    ----------
+    lever : Lever
+    waveform : Waveform
+    at : array_like
+        Times (µs) to report.
+    names : sequence of str
+        Parameters: of materials, such as ``heat_capacity_scale``, ``series_resistance_ohm`` and
+        ``gas_conductivity``.
+    tolerance_K : float
+        Largest error of a step (K).
+
+    Returns
+    -------
+    xarray.Dataset
+        ``bias_V``, ``current_mA``, ``reader_V`` and ``tip_K`` on the dimension ``time``; and
+        ``sensitivity`` on (observable, time, parameter).
+
+    Raises
+    ------
+    InputError
+        If a time is out of bounds, the wave form begins at a bias, or there are no derivatives by a
+        parameter.
+    HistoryEndError, ComputationError
+        If silicon melts, or a step fails.
+    """
+    times = checked_times(at)
+    if waveform.before_V != 0.0:
+        raise InputError(f"found a wave form that begins at {waveform.before_V:g} V, expected 0 V")
+    if not names:
+        raise InputError("found no parameter, expected one by which there are derivatives")
+    known = parameters_of(lever.probe, anywhere=True)
+    for name in names:
+        if name not in known:
+            raise unknown_name("parameter", name, known)
+        if name in _UNKNOWN or name in dimensions_of(lever.probe):
+            raise InputError(
+                f"no derivatives in time by {name} are known, expected parameters of materials, "
+                "series_resistance_ohm or gas_conductivity"
+            )
+    shown, slopes, bias = [], [], []
+    along = _Along(lever, names)
+    stops = times.tolist()
+    wanted = set(stops)
+    for piece, step in follow(lever, waveform, float(times[-1]), tolerance_K, stops=stops):
+        first = along.time is None
+        along.add(piece, step)
+        if first and 0.0 in wanted:
+            bias.append(piece.bias(0.0))
+            shown.append(along.shown(step.x[:, :1]))
+            slopes.append(along.slopes_at_start)
+        limit_K, end = lever.equations.limit
+        if lever.circuit.base_temperature_K + along.hottest(step.x[:, 1:]) > limit_K:
+            raise HistoryEndError(f"{end} before {step.end:.6g} µs", step.start, None)
+        if step.end in wanted:
+            bias.append(piece.bias(step.end))
+            shown.append(along.shown(step.x[:, 1:]))
+            slopes.append(along.slopes(step.x[:, 1:]))
+    values = dict(zip(OBSERVABLES.values(), np.array(shown).T, strict=True))
+    table = np.array(slopes).transpose(1, 0, 2)
+    return labelled(
+        {
+            "bias_V": bias,
+            **values,
+            "sensitivity": (("observable", "time", "parameter"), table),
+        },
+        "time",
+        {"time": times, "observable": list(OBSERVABLES), "parameter": list(names)},
+        **probe_attributes(lever.probe),
+        waveform=waveform.text,
+    )
+
+
+class _Along:
+    """Derivatives of the unknowns (rows, 1, k) that go along with the steps."""
+
+    def __init__(self, lever: Lever, names: Sequence[str]) -> None:
+        self._lever, self._names = lever, tuple(names)
+        self._piece: Piece | None = None
+        self.time: float | None = None
+        self.slopes_at_start = np.empty((len(OBSERVABLES), len(self._names)))
+
+    def add(self, piece: Piece, step: Step) -> None:
+        """Go on over the next step."""
+        x = step.x[:, :1]
+        problem = DrivenLever(self._lever.equations, self._lever.circuit, piece.bias)
+        if piece is not self._piece:
+            self._piece = piece
+            if self.time is None:
+                # cold, whatever the parameters are
+                self._stored = np.zeros((*x.shape, len(self._names)))
+            self._settle(problem, x)
+            if self.time is None:
+                self.slopes_at_start = self.slopes(x)
+        self._over(problem, step)
+        self.time = step.end
+
+    def _settle(self, problem: DrivenLever, x: Array) -> None:
+        """Fulfil the algebraic rows, nothing that is stored being changed."""
+        stored, rest = problem.by_parameter(x, self._names)
+        known = INSTANT_RATE * (self._stored - stored) - rest
+        factors = problem.factorised(x, INSTANT_RATE)
+        self._changes = self._solved(problem, x, known, INSTANT_RATE, factors)
+        self._flow = -problem.change(x, self._changes, 0.0) - rest
+        self._stored = problem.stored_change(x, self._changes) + stored
+
+    def _over(self, problem: DrivenLever, step: Step) -> None:
+        """Differentiate each stage of a step."""
+        length = step.end - step.start
+        rate, flows = 1.0 / (GAMMA * length), [self._flow]
+        begin, stored = self._stored, self._stored
+        changes = self._changes
+        for stage in range(1, len(TIMES)):
+            x = step.stages[:, [stage]]
+            known = begin + length * weighted_sum(STAGES[stage], flows)
+            by_stored, by_rest = problem.by_parameter(x, self._names)
+            right = rate * (known - by_stored) - by_rest
+            changes = self._solved(problem, x, right, rate, step.factors)
+            stored = problem.stored_change(x, changes) + by_stored
+            flows.append(rate * (stored - known))
+        self._changes, self._stored, self._flow = changes, stored, flows[-1]
+
+    def _solved(
+        self, problem: DrivenLever, x: Array, right: Array, rate: float, factors: Factors
+    ) -> Array:
+        """Solve with factors of a state nearby; what they lack is removed by refinement."""
+        one, scale = np.arange(1), problem.scale[..., None]
+        changes = factors.solve(right, one)
+        for _ in range(_MOST_ROUNDS):
+            correction = factors.solve(right - problem.change(x, changes, rate), one)
+            changes = changes + correction
+            size = np.abs(changes / scale).max(axis=(0, 1))
+            if (np.abs(correction / scale).max(axis=(0, 1)) <= _EXACT * size).all():
+                break
+        return changes
+
+    # --- what is seen -----------------------------------------------------------------------------
+
+    def hottest(self, x: Array) -> float:
+        """Return the highest rise of the temperature (K)."""
+        return float(self._lever.space.rises(x[: self._lever.space.size + 1]).max())
+
+    def shown(self, x: Array) -> Array:
+        """Return I_h (mA), V_r (V) and T_tip (K), (3,)."""
+        own = x[: self._lever.space.size + 1]
+        _, current, reader = self._lever.equations.observed(own)[:, 0]
+        tip = self._lever.circuit.base_temperature_K + self._lever.space.tip_rise(own)[0]
+        return np.array([current, reader, tip])
+
+    def slopes(self, x: Array) -> Array:
+        """Return their derivatives by the parameters, (3, k)."""
+        size, equations = self._lever.space.size + 1, self._lever.equations
+        own, moved = x[:size], self._changes[:size]
+        _, current, reader = equations.observed_change(own, moved)[:, 0]
+        current = current + equations.by_parameter(own, self._names)[-1, 0]
+        return np.stack([current, reader, self._lever.space.tip_rise(moved)[0]])
