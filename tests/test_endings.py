@@ -233,3 +233,15 @@ def test_what_a_stopped_import_says_is_not_an_internal_error(monkeypatch):
     assert "internal error" in running._ended(error, [])[1]
     monkeypatch.setattr(running, "_received", [signal.SIGINT])
     assert running._ended(error, []) == (1, "stopped by the user")
+
+
+@pytest.mark.parametrize(("raised", "status"), [("Stopped", 1), ("KeyboardInterrupt", -2)])
+def test_a_stop_within_exec_ends_with_the_exit_status(tmp_path, raised, status):
+    """Python would end itself by a signal where a plain KeyboardInterrupt was met in `exec`."""
+    script = (
+        "from hotlever.cli.running import Stopped\n"
+        f"try:\n    exec('raise {raised}')\nexcept KeyboardInterrupt:\n    raise SystemExit(1)"
+    )
+    (tmp_path / "stopped.py").write_text(script)
+    command = [sys.executable, "-m", "stopped"]
+    assert subprocess.run(command, cwd=tmp_path, preexec_fn=as_in_a_terminal).returncode == status
