@@ -244,3 +244,15 @@ def test_progress_is_told_in_lines_where_there_is_no_terminal(run, monkeypatch):
     assert out.startswith("bias_V,")
     assert err.splitlines()[0].startswith("sweep: ")
     assert " of " in err.splitlines()[0]
+
+
+@pytest.mark.parametrize(("raised", "status"), [("Stopped", 1), ("KeyboardInterrupt", -2)])
+def test_a_stop_within_exec_ends_with_the_exit_status(tmp_path, raised, status):
+    """Python would end itself by a signal where a plain KeyboardInterrupt was met in `exec`."""
+    script = (
+        "from hotlever.cli.running import Stopped\n"
+        f"try:\n    exec('raise {raised}')\nexcept KeyboardInterrupt:\n    raise SystemExit(1)"
+    )
+    (tmp_path / "stopped.py").write_text(script)
+    command = [sys.executable, "-m", "stopped"]
+    assert subprocess.run(command, cwd=tmp_path, preexec_fn=as_in_a_terminal).returncode == status
