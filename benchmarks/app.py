@@ -22,20 +22,22 @@ from bad_files import bad_files
 from problems import table
 
 MATERIAL = "phonon scattering exponent"
-#: Notes when a key was pressed and when a plot was drawn.
+#: Notes when a key was pressed, and which plots were drawn since.
 _COUNT = """() => {
-    window.drawn = 0; window.last = 0; window.pressed = 0;
+    window.drawn = new Set(); window.last = 0; window.pressed = 0;
     document.addEventListener('keydown', () => {
-        window.pressed = performance.now(); window.drawn = 0;
+        window.pressed = performance.now(); window.drawn.clear();
     }, true);
-    document.querySelectorAll('.js-plotly-plot').forEach(plot => plot.on('plotly_afterplot',
-        () => { window.drawn += 1; window.last = performance.now(); }));
+    document.querySelectorAll('.js-plotly-plot').forEach(plot => {
+        for (const name of ['plotly_afterplot', 'plotly_animated', 'plotly_relayout'])
+            plot.on(name, () => { window.drawn.add(plot); window.last = performance.now(); });
+    });
 }"""
 #: Waits until all four figures were drawn since the key was pressed; returns milliseconds.
 _DRAWN = """() => new Promise(done => {
     const begin = performance.now();
     const look = () => {
-        if (window.drawn >= 4) { done(window.last - window.pressed); }
+        if (window.drawn.size >= 4) { done(window.last - window.pressed); }
         else if (performance.now() - begin > 5000) { done(NaN); }
         else { setTimeout(look, 2); }
     };

@@ -7,6 +7,7 @@ reduced lever of the geometry is at hand; when they rest, the full lever, whose 
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,7 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.path import Path as Outline
+from PIL import Image
 
 from hotlever.app.child import Report
 from hotlever.cli.options import load_probe
@@ -32,7 +35,10 @@ from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
 #: Biases of a curve, and cells of the temperature map along its longer side.
-_POINTS, _CELLS = 121, 150
+_POINTS, _CELLS = 121, 360
+#: Steps of the highest temperature (K) that the colours of the map reach, and the colours.
+_SCALE_K = 100.0
+_COLOURS = colormaps["inferno"](np.linspace(0.0, 1.0, 256), bytes=True)
 #: How much making reduced levers steps back behind other work.
 _NICE = 10
 #: Levers kept for sliders that go back and forth.
@@ -49,6 +55,9 @@ class _Map:
         low, high = layout.box
         step = float(max(high - low)) / _CELLS
         self.x, self.y = (np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True))
+        half = step / 2
+        ends = self.x[0] - half, self.x[-1] + half, self.y[0] - half, self.y[-1] + half
+        self.box = [float(end) for end in ends]
         points = np.stack(np.meshgrid(self.x, self.y), axis=-1).reshape(-1, 2)
         self._inside = _inside(layout, points)
         probes = lever.space.elements.basis.probes
@@ -63,6 +72,19 @@ class _Map:
         values = np.full(self._inside.shape, np.nan)
         values[self._inside] = self._cells @ T
         return values.reshape(self.y.size, self.x.size)
+
+    def picture(self, T: Array, low: float, high: float) -> bytes:
+        """Return the map as PNG, coloured from `low` to `high` (K), transparent beside the lever.
+
+        A browser shows a picture in a tenth of the time that it takes to draw a map of numbers.
+        """
+        shares = np.clip((self._cells @ T - low) / (high - low), 0.0, 1.0)
+        dots = np.zeros((self._inside.size, 4), dtype=np.uint8)
+        dots[self._inside] = _COLOURS[(shares * (len(_COLOURS) - 1)).astype(np.intp)]
+        rows = dots.reshape(self.y.size, self.x.size, 4)[::-1]
+        written = io.BytesIO()
+        Image.fromarray(rows).save(written, "png", compress_level=1)
+        return written.getvalue()
 
     def line(self, T: Array) -> Array:
         """Return the temperature (K) along the line through the tip."""
@@ -118,14 +140,17 @@ class LiveLever:
         shown = {name: float(value[0]) for name, value in self.branch.shown(reading.u).items()}
         x = self.expanded(self.branch.states(reading.u))
         T = State(self.lever, x).nodal[0]
-        drawn = _map_of(self.lever)
+        drawn, low = _map_of(self.lever), self.branch.base_temperature_K
+        # in steps, so that colours stay the same while the lever gets a little hotter
+        high = _SCALE_K * np.ceil(max(float(T.max()), low + 1.0) / _SCALE_K)
         return {
             **shown,
             "bias_V": bias,
             "tip_K": self.branch.base_temperature_K + float(reading.u[0]) ** 2,
             "power_mW": shown["lever_V"] * shown["current_mA"],
             "hottest_K": float(T.max()),
-            "cells": drawn.cells(T),
+            "scale_K": (low, high),
+            "picture": drawn.picture(T, low, high),
             "line": drawn.line(T),
             "notes": reading.notes(np.array([bias])),
         }
@@ -176,7 +201,8 @@ def answer(
         "model": live.model,
         "curves": live.curves,
         "now": live.at(ask["bias"]),
-        "grid": {"x": drawn.x, "y": drawn.y, "along": drawn.along},
+        "box": drawn.box,
+        "along": drawn.along,
         "base_K": live.branch.base_temperature_K,
     }
 
