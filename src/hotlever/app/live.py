@@ -23,6 +23,7 @@ from PIL import Image
 
 from hotlever.app.child import Report
 from hotlever.cli.options import load_probe
+from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.lever import Branch, Lever, State
 from hotlever.lever.branch import Reach
@@ -38,7 +39,7 @@ from hotlever.types import Array
 _POINTS, _CELLS = 121, 360
 #: Steps of the highest temperature (K) that the colours of the map reach, and the colours.
 _SCALE_K = 100.0
-_COLOURS = colormaps["inferno"](np.linspace(0.0, 1.0, 256), bytes=True)
+_COLOURS = colormaps[HEAT](np.linspace(0.0, 1.0, 256), bytes=True)
 #: How much making reduced levers steps back behind other work.
 _NICE = 10
 #: Levers kept for sliders that go back and forth.

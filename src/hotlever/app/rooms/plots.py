@@ -7,11 +7,9 @@ from copy import deepcopy
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
 from nicegui import ui
 
-from hotlever.figures.style import BLUE, VERMILION
+from hotlever.colours import BLUE, HEAT, VERMILION
 
 _INK, _GRID = "#8a8a8a", "rgba(128,128,128,.25)"
 _CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
@@ -61,7 +59,7 @@ class LivePlots:
             "hoverinfo": "skip",
             "marker": {
                 "color": [0],
-                "colorscale": _colours("inferno"),
+                "colorscale": _colours(),
                 "showscale": True,
                 "colorbar": {
                     "title": {"text": "K", "side": "top"},
@@ -158,10 +156,14 @@ class LivePlots:
             plot.update()
 
 
-def _colours(name: str) -> list[list[Any]]:
-    """Return one of matplotlib's colour maps, as the figures have it."""
+def _colours() -> list[list[Any]]:
+    """Return the colours of temperatures, as the figures have them."""
+    # a page that needs none of them need not wait for this
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
     shares = np.linspace(0.0, 1.0, 32)
-    return [[share, to_hex(colormaps[name](share))] for share in shares.tolist()]
+    return [[share, to_hex(colormaps[HEAT](share))] for share in shares.tolist()]
 
 
 def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:
