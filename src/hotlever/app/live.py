@@ -25,12 +25,13 @@ from hotlever.app.child import Report
 from hotlever.cli.options import load_probe
 from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.lever import Branch, Lever, State
+from hotlever.lever import Branch, Lever
 from hotlever.lever.branch import Reach
+from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced import ReducedLever
 from hotlever.lever.reduction import cached_reduction, can_be_reduced, known_reduction
-from hotlever.probe import Layout, Probe
+from hotlever.probe import Circuit, Layout, Probe
 from hotlever.probe.parameters import of_materials
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
@@ -51,8 +52,8 @@ FULL, REDUCED, COARSE_MODEL = "full lever", "reduced lever", "coarse lever"
 class _Map:
     """Temperatures of a lever on a grid of cells, and along the line through heater and tip."""
 
-    def __init__(self, lever: Lever) -> None:
-        layout = lever.space.mesh.layout
+    def __init__(self, space: FullSpace) -> None:
+        layout = space.mesh.layout
         low, high = layout.box
         step = float(max(high - low)) / _CELLS
         self.x, self.y = (np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True))
@@ -61,7 +62,7 @@ class _Map:
         self.box = [float(end) for end in ends]
         points = np.stack(np.meshgrid(self.x, self.y), axis=-1).reshape(-1, 2)
         self._inside = _inside(layout, points)
-        probes = lever.space.elements.basis.probes
+        probes = space.elements.basis.probes
         self._cells = probes(points[self._inside].T)
         line = np.column_stack([np.linspace(low[0], high[0], 161), np.full(161, layout.tip[1])])
         line = line[_inside(layout, line)]
@@ -104,13 +105,13 @@ def _inside(layout: Layout, points: Array) -> Any:
 
 @dataclass
 class LiveLever:
-    """A branch of a lever, and how its states are drawn."""
+    """A branch of a lever, in a circuit, and how its states are drawn in the space of a mesh."""
 
     model: str
-    lever: Lever
+    space: FullSpace
+    circuit: Circuit
     branch: Branch
     expanded: Callable[[Array], Array]
-    notes: tuple[str, ...] = ()
 
     @cached_property
     def curves(self) -> dict[str, Any]:
@@ -134,14 +135,13 @@ class LiveLever:
         BranchEndError
             If there is no state at this bias.
         """
-        circuit = self.lever.circuit
-        reading = self.branch.read(circuit, np.array([bias]))
+        reading = self.branch.read(self.circuit, np.array([bias]))
         if not np.isfinite(reading.u).all():
             raise self.branch.ended(reading)
         shown = {name: float(value[0]) for name, value in self.branch.shown(reading.u).items()}
         x = self.expanded(self.branch.states(reading.u))
-        T = State(self.lever, x).nodal[0]
-        drawn, low = _map_of(self.lever), self.branch.base_temperature_K
+        low = self.branch.base_temperature_K
+        drawn, T = _map_of(self.space), self.space.nodal(x[:, 0], low)[0]
         # in steps, so that colours stay the same while the lever gets a little hotter
         high = _SCALE_K * np.ceil(max(float(T.max()), low + 1.0) / _SCALE_K)
         return {
@@ -157,18 +157,18 @@ class LiveLever:
         }
 
 
-@lru_cache(maxsize=_KEPT)
-def _known_map(layout: Layout, fine: bool) -> list[_Map]:
-    """Return where the map of a layout is kept, empty at first."""
-    return []
+#: Maps by mesh; those of one shape share it.
+_maps: dict[int, tuple[object, _Map]] = {}
 
 
-def _map_of(lever: Lever) -> _Map:
-    # maps belong to meshes, which levers of one layout share
-    kept = _known_map(lever.space.mesh.layout, lever._mesh == COARSE)
-    if not kept:
-        kept.append(_Map(lever))
-    return kept[0]
+def _map_of(space: FullSpace) -> _Map:
+    known = _maps.get(id(space.mesh))
+    if known is None:
+        if len(_maps) >= _KEPT:
+            _maps.clear()
+        # the mesh is kept, so that no other gets its number
+        known = _maps[id(space.mesh)] = space.mesh, _Map(space)
+    return known[1]
 
 
 # --- called from the app -------------------------------------------------------------------------
@@ -197,7 +197,7 @@ def answer(
         live = _quick(probe, ask["most"], ask["reduced"])
     else:
         live = _full(report, probe, ask["most"])
-    drawn = _map_of(live.lever)
+    drawn = _map_of(live.space)
     return {
         "model": live.model,
         "curves": live.curves,
@@ -270,7 +270,7 @@ def _probe(
 @lru_cache(maxsize=_KEPT)
 def _full(report: Report, probe: Probe, most: float) -> LiveLever:
     lever = Lever(probe, progress=report.progress("air"))
-    return LiveLever(FULL, lever, _branch(lever, most), lambda x: x)
+    return LiveLever(FULL, lever.space, lever.circuit, _branch(lever, most), lambda x: x)
 
 
 @lru_cache(maxsize=_KEPT)
@@ -281,12 +281,12 @@ def _quick(probe: Probe, most: float, is_reduced: bool) -> LiveLever:
         full, small = reduced
         try:
             branch = small.branch(probe.material, Reach(probe.circuit, most))
-            lever = full.with_probe(probe)
-            return LiveLever(REDUCED, lever, branch, small.all_points.expanded)
+            expanded = small.all_points.expanded
+            return LiveLever(REDUCED, full.space, probe.circuit, branch, expanded)
         except HotleverError:
             pass  # beyond what it is made for
     lever = Lever(probe, COARSE)
-    return LiveLever(COARSE_MODEL, lever, _branch(lever, most), lambda x: x)
+    return LiveLever(COARSE_MODEL, lever.space, probe.circuit, _branch(lever, most), lambda x: x)
 
 
 def _geometry(probe: Probe) -> Probe:
