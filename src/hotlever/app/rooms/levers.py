@@ -27,7 +27,7 @@ _REPORT = "levers"
 _LOOK_S = 1.0
 
 
-async def levers(session: Session) -> None:
+async def fill(session: Session) -> None:
     """Fill the page."""
     with framed(session, "/levers") as complaint:
         room = _Room(session, complaint)

@@ -26,7 +26,7 @@ _TABLE, _SAVED, _FIGURE = "tip.raman.csv", "raman.json", "raman"
 _LAWS = {"anharmonic": "anharmonic", "linear": "linear, as in the paper"}
 
 
-async def raman(session: Session) -> None:
+async def fill(session: Session) -> None:
     """Fill the page."""
     with framed(session, "/raman") as complaint:
         _Room(session, complaint)

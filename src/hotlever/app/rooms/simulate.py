@@ -31,7 +31,7 @@ _SAID = {
 }
 
 
-async def simulate(session: Session) -> None:
+async def fill(session: Session) -> None:
     """Fill the page."""
     with framed(session, "/simulate") as complaint:
         room = _Room(session, complaint)
