@@ -172,7 +172,7 @@ def test_a_dropped_measurement_is_understood(tmp_path: Path) -> None:
     visit(tmp_path, story)
 
 
-@pytest.mark.parametrize("address", ["/fit", "/calibrate", "/", "/lever"])
+@pytest.mark.parametrize("address", ["/fit", "/calibrate", "/", "/lever", "/raman", "/levers"])
 def test_bad_files_are_a_line_each_and_the_room_goes_on(tmp_path: Path, address: str) -> None:
     drawn = (".gds", ".oas", ".dxf")
 
@@ -189,7 +189,10 @@ def test_bad_files_are_a_line_each_and_the_room_goes_on(tmp_path: Path, address:
             line = shown(user, "role=alert")
             assert "internal error" not in line, name
             assert "Traceback" not in line
-        good = {"/lever": ("good.toml", Probe.reference().to_toml().encode())}
+        good = {
+            "/lever": ("good.toml", Probe.reference().to_toml().encode()),
+            "/raman": ("good.txt", (EXAMPLES / "raman" / "tip" / "tip_00.txt").read_bytes()),
+        }
         name, content = good.get(address, ("good.csv", (EXAMPLES / "lever-a.csv").read_bytes()))
         await drop(user, name, content)
         if address != "/":
