@@ -128,7 +128,7 @@ def test_sliders_move_the_lever(app: App, page: Page) -> None:
     cold = tip.inner_text()
     page.get_by_role("slider", name="Bias", exact=True).locator("[tabindex]").press("ArrowRight")
     expect(tip).not_to_have_text(cold)
-    expect(page.locator(".js-plotly-plot .heatmaplayer image").first).to_be_attached()
+    expect(page.locator(".js-plotly-plot image").first).to_be_attached()
     picture(page, "simulate")
     button(page, "air").click()
     expect(page.get_by_text("--medium air")).to_be_visible(timeout=_WORK)

@@ -13,6 +13,7 @@ from hotlever.fitting import Measurement, fit
 from hotlever.fitting.models import reduced_model
 from hotlever.lever import Lever
 from hotlever.lever.atlas import BOX, material_in_box
+from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced import ReducedLever
 from hotlever.lever.reduction import cached_reduction
@@ -48,6 +49,18 @@ def test_it_follows_the_full_lever_in_its_box(request, medium, seed):
         slopes = full.sensitivity.values
         largest = np.abs(slopes).max(axis=1, keepdims=True)
         np.testing.assert_allclose(found.slopes / largest, slopes / largest, atol=1e-2)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_at_the_few_points_alone_it_is_nearly_as_good(coarse, reduced, seed):
+    shares = np.random.default_rng(seed).random(len(BOX))
+    full = coarse.with_material(material_in_box(coarse.probe.material, shares))
+    branch = reduced.branch(full.probe.material, Reach(full.circuit, BIAS[-1]))
+    u = branch.read(full.circuit, BIAS).u
+    sweep = full.sweep(BIAS)
+    np.testing.assert_allclose(branch.shown(u)["current_mA"], sweep.current_mA, rtol=1e-3)
+    np.testing.assert_allclose(branch.base_temperature_K + u**2, sweep.tip_K, rtol=0, atol=0.5)
+    assert branch.knee.tip_K == pytest.approx(full.branch_past_knee().knee.tip_K, abs=0.5)
 
 
 def test_corrected_by_the_full_lever_it_is_exact_to_first_order(coarse, reduced):

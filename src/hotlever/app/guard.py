@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import secrets
-import time
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -59,6 +59,7 @@ class Guard:
     ) -> None:
         self._app, self._token, self._hosts = app, token, hosts
         self._password, self._largest = password, largest + _FORM
+        self._one_by_one = asyncio.Lock()
         # ports of one machine share their cookies: another app has another name
         self._cookie = f"hotlever-{secrets.token_hex(4)}"
 
@@ -70,8 +71,7 @@ class Guard:
         headers = {name.lower(): value for name, value in scope["headers"]}
         refused = self._refused(scope, headers)
         if refused is None:
-            known = scope if scope["type"] == "websocket" else None
-            out = send if known is not None else _with_headers(send)
+            out = send if scope["type"] == "websocket" else _with_headers(send)
             await self._app(scope, self._limited(receive), out)
         elif scope["type"] == "websocket":
             await receive()
@@ -112,10 +112,11 @@ class Guard:
                     return
             elif scope["method"] == "POST" and scope["path"] == "/enter":
                 form = parse_qs((await _body(receive)).decode("utf-8", "replace"))
-                if _same(form.get("password", [""])[0], self._password):
-                    await self._let_in({**scope, "path": "/"}, send)
-                    return
-                time.sleep(_WRONG_S)  # for everybody: nobody tries many
+                async with self._one_by_one:  # nobody tries many
+                    if _same(form.get("password", [""])[0], self._password):
+                        await self._let_in({**scope, "path": "/"}, send)
+                        return
+                    await asyncio.sleep(_WRONG_S)
                 await _respond(send, 401, _ASK % "That was not it.", b"text/html; charset=utf-8")
                 return
             else:

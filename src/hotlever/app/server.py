@@ -13,25 +13,19 @@ from nicegui import app, ui
 
 from hotlever.app.guard import Guard
 from hotlever.app.project import LARGEST_FILE, Project
-from hotlever.app.rooms.calibrate import calibrate
-from hotlever.app.rooms.fit import fit
-from hotlever.app.rooms.lever import lever
-from hotlever.app.rooms.levers import levers
-from hotlever.app.rooms.raman import raman
-from hotlever.app.rooms.simulate import simulate
-from hotlever.app.rooms.start import start
+from hotlever.app.rooms import calibrate, fit, lever, levers, raman, simulate, start
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 
 LOCAL = ("127.0.0.1", "localhost", "::1")
 _PAGES: dict[str, Callable[[Session], Awaitable[None]]] = {
-    "/": start,
-    "/lever": lever,
-    "/simulate": simulate,
-    "/raman": raman,
-    "/fit": fit,
-    "/calibrate": calibrate,
-    "/levers": levers,
+    "/": start.fill,
+    "/lever": lever.fill,
+    "/simulate": simulate.fill,
+    "/raman": raman.fill,
+    "/fit": fit.fill,
+    "/calibrate": calibrate.fill,
+    "/levers": levers.fill,
 }
 
 

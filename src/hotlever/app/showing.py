@@ -24,6 +24,7 @@ from hotlever.fitting import Fit, Measurement, read_fit, read_measurement
 from hotlever.fitting.measurement import parse_columns
 from hotlever.fitting.words import parameter_rows
 from hotlever.probe import Layout, Probe, mesh_layout
+from hotlever.raman import read_spectra
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.page import Page
 from hotlever.text import sentence
@@ -129,12 +130,24 @@ def probe_file(report: Report, folder: Path, name: str, suffix: str) -> bytes:
 
 def is_spectrum(report: Report, folder: Path, name: str) -> bool:
     """Return whether a file holds Raman spectra."""
-    from hotlever.raman import read_spectra
-
     try:
         return bool(read_spectra([folder / name]))
     except InputError:
         return False
+
+
+def refused(report: Report, folder: Path, names: list[str], spectra: bool) -> list[str]:
+    """Return a line for each file that is no measurement, or no spectrum."""
+    lines = []
+    for name in names:
+        try:
+            if spectra:
+                read_spectra([folder / name])
+            else:
+                read_measurement(folder / name)
+        except InputError as error:
+            lines.append(str(error).replace(f"{folder}/", ""))
+    return lines
 
 
 def levers(report: Report, folder: Path, names: list[str]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import typer
@@ -46,9 +47,7 @@ def app_command(
             raise InputError(
                 f"--host {host}: others could reach your files; add --yes-share if they should"
             )
-        password = os.environ.get(_PASSWORD) or typer.prompt(
-            "Password for those who may come in", hide_input=True, confirmation_prompt=True
-        )
+        password = os.environ.get(_PASSWORD) or _asked()
         if len(password) < _LEAST_PASSWORD:
             raise InputError(
                 f"{_PASSWORD}: a password of {len(password)} characters, expected "
@@ -62,3 +61,13 @@ def app_command(
         fail(unforeseen(error, ["app", str(folder)]))
 
     serve(Project(folder), Served(host, port, password), not no_browser, say, failed)
+
+
+def _asked() -> str:
+    """Ask for a password."""
+    if sys.stdin is None or not sys.stdin.isatty():
+        raise InputError(
+            f"--yes-share: expected a password in {_PASSWORD}, or a terminal"
+        )
+    what = "Password for those who may come in"
+    return str(typer.prompt(what, hide_input=True, confirmation_prompt=True, err=True))

@@ -12,6 +12,7 @@ from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
 from hotlever.air.panels import Panels
+from hotlever.colours import HEAT
 from hotlever.figures.lever import outlines
 from hotlever.figures.style import BLACK, BLUE, COLOURS, ORANGE, VERMILION, figure
 from hotlever.probe import Layout
@@ -87,7 +88,7 @@ def temperature_slices(slices: xr.Dataset) -> Figure:
         for axes, name in zip(grid.ravel(), slices.slice.values, strict=True):
             one = slices.sel(slice=name)
             at: Any = (one.along_um, one.z_um, one.temperature)
-            image = axes.pcolormesh(*at, cmap="inferno", vmin=base, vmax=tip, rasterized=True)
+            image = axes.pcolormesh(*at, cmap=HEAT, vmin=base, vmax=tip, rasterized=True)
             lines = axes.contour(*at, levels=levels, colors="white", linewidths=0.5)
             axes.clabel(lines, fmt="%.0f", fontsize=6)
             axes.set(aspect="equal", xlabel=f"{one.axis.item()} (µm)", ylabel="z (µm)")

@@ -17,6 +17,7 @@ from matplotlib.path import Path
 from matplotlib.tri import Triangulation
 
 from hotlever.calibration.power_law import EQ12, PowerLaw
+from hotlever.colours import HEAT
 from hotlever.figures.style import (
     BLACK,
     BLUE,
@@ -132,7 +133,7 @@ def field_maps(fields: FieldMap, layout: Layout, title: str = "") -> Figure:
     strong = max(density.max(), 1e-9)
     density = np.maximum(density, strong * 1e-3)
     maps = (
-        ("temperature (K)", fields.temperature, "inferno", None),
+        ("temperature (K)", fields.temperature, HEAT, None),
         ("potential (V)", fields.potential, "viridis", None),
         ("current density (mA/µm²)", density, "cividis", LogNorm(strong * 1e-3, strong)),
     )

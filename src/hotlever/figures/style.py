@@ -13,13 +13,11 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from hotlever.errors import InputError
 from hotlever.files import whole_file
 from hotlever.text import INVERSION, parameter_named
 
-#: Okabe and Ito's colours, safe for colour-blind readers.
-BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
-BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 #: How measured points look.
 MEASURED: Any = {"ls": "none", "marker": "o", "mfc": "none", "color": BLACK, "label": "measured"}

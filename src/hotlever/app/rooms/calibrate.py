@@ -22,7 +22,7 @@ _ASKED = {
 }
 
 
-async def calibrate(session: Session) -> None:
+async def fill(session: Session) -> None:
     """Fill the page."""
     with framed(session, "/calibrate") as complaint:
         room = _Room(session, complaint, "Calibrate", "straighten")

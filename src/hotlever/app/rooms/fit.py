@@ -21,7 +21,7 @@ _OPTIONS = {
 }
 
 
-async def fit(session: Session) -> None:
+async def fill(session: Session) -> None:
     """Fill the page."""
     with framed(session, "/fit") as complaint:
         room = _Room(session, complaint, "Fit", "query_stats")

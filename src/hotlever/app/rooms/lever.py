@@ -27,7 +27,7 @@ _SHAPES = {"three-leg": "three legs", "u-shape": "two legs (U)"}
 _FILE = "a probe file or a drawing"
 
 
-async def lever(session: Session) -> None:
+async def fill(session: Session) -> None:
     """Fill the page."""
     with framed(session, "/lever") as complaint:
         room = _Room(session, complaint)

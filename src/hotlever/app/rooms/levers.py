@@ -18,7 +18,7 @@ from hotlever.app.page import (
 )
 from hotlever.app.project import FITS
 from hotlever.app.rooms.measured import REFERENCE
-from hotlever.app.rooms.results import SHOWING, download_button
+from hotlever.app.rooms.results import SHOWING, download_button, say_refused
 from hotlever.app.rooms.room import Room, choice
 from hotlever.app.session import Session
 
@@ -27,7 +27,7 @@ _REPORT = "levers"
 _LOOK_S = 1.0
 
 
-async def levers(session: Session) -> None:
+async def fill(session: Session) -> None:
     """Fill the page."""
     with framed(session, "/levers") as complaint:
         room = _Room(session, complaint)
@@ -76,12 +76,9 @@ class _Room(Room):
 
     async def _dropped(self, names: list[str]) -> None:
         self._files.set_options(self.session.project.data)
-        known = set(self.session.project.data)
-        refused = [name for name in names if name not in known]
-        if refused:
-            self.complaint.say(f"{', '.join(refused)}: unknown type of file for a measurement")
-        taken = [name for name in names if name in known]
+        taken = [name for name in names if name in self._files.options]
         self._files.set_value(list(dict.fromkeys([*self._files.value, *taken])))
+        await say_refused(self.session, self.complaint, names, spectra=False)
 
     def _choose(self) -> None:
         self.chosen |= {"data": self._files.value, "probe": self._probe.value or None}

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
 from nicegui import ui
 
-from hotlever.figures.style import BLUE, VERMILION
+from hotlever.colours import BLUE, HEAT, VERMILION
 
 _INK, _GRID = "#8a8a8a", "rgba(128,128,128,.25)"
-#: The map's colours span this (K) at least, so that a cold lever does not look hot.
-_LEAST_SPAN_K = 50.0
 _CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
 
 
@@ -34,7 +32,9 @@ def _layout(x: str, y: str, height: int, normal: str = "") -> dict[str, Any]:
 
 
 def _plot(data: list[dict[str, Any]], layout: dict[str, Any], alt: str) -> ui.plotly:
-    made = ui.plotly({"data": data, "layout": layout, "config": _CONFIG}).classes("w-full")
+    made = ui.plotly({"data": deepcopy(data), "layout": layout, "config": _CONFIG}).classes(
+        "w-full"
+    )
     made.props(f'role=img aria-label="{alt}"')
     return made
 
@@ -51,16 +51,29 @@ class LivePlots:
             "marker": {"color": BLUE, "size": 11, "symbol": "diamond-open", "line": {"width": 2}},
             "name": "knee",
         }
-        heat = {
-            "type": "heatmap",
-            "colorscale": _colours("inferno"),
-            "colorbar": {"title": {"text": "K", "side": "top"}, "thickness": 12, "outlinewidth": 0},
-            "hovertemplate": "x %{x:.1f} µm, y %{y:.1f} µm: %{z:.0f} K<extra></extra>",
+        # the picture of the map, and a point beside it that brings the bar of its colours
+        bar = {
+            **dot,
+            "x": [None],
+            "y": [None],
+            "hoverinfo": "skip",
+            "marker": {
+                "color": [0],
+                "colorscale": _colours(),
+                "showscale": True,
+                "colorbar": {
+                    "title": {"text": "K", "side": "top"},
+                    "thickness": 12,
+                    "outlinewidth": 0,
+                },
+            },
         }
-        square = _layout("x (µm)", "y (µm)", 300, normal="xy")
+        square = _layout("x (µm)", "y (µm)", 300)
         square["yaxis"] |= {"scaleanchor": "x", "constrain": "domain"}
         square["xaxis"] |= {"constrain": "domain"}
-        self._heat = _plot([heat], square, "Map of the temperature")
+        picture = {"xref": "x", "yref": "y", "sizing": "stretch", "layer": "below"}
+        square["images"] = [picture | {"xanchor": "left", "yanchor": "top", "source": ""}]
+        self._heat = _plot([bar], square, "Map of the temperature")
         with (
             ui.element("div")
             .classes("w-full grid gap-2")
@@ -83,54 +96,74 @@ class LivePlots:
         for plot in (self._heat, self._iv, self._tp, self._profile):
             plot.on("plotly_afterplot", lambda _, p=plot: self._ready.add(p), [], throttle=1.0)
         self._curves: Any = None
-        self._grid: Any = None
+        self._along: Any = None
+        self._map: Any = None
 
     def show(self, answer: dict[str, Any]) -> None:
         """Draw an answer of the live lever; what is as before is not sent again."""
-        curves, now, grid = answer["curves"], answer["now"], answer["grid"]
+        curves, now = answer["curves"], answer["now"]
         knee = curves["knee"] or dict.fromkeys(("lever_V", "current_mA", "power_mW", "tip_K"))
         same = self._curves is not None and _same(self._curves, curves)
         for plot, x, y in (
             (self._iv, "lever_V", "current_mA"),
             (self._tp, "power_mW", "tip_K"),
         ):
-            traces = {2: {"x": [now[x]], "y": [now[y]]}}
-            if not same:
-                traces[0] = {"x": _short(curves[x]), "y": _short(curves[y])}
-                traces[1] = {"x": [knee[x]], "y": [knee[y]]}
-            self._change(plot, traces)
-        heat: dict[str, Any] = {
-            "z": _rows(now["cells"]),
-            "zmin": answer["base_K"],
-            "zmax": max(now["hottest_K"], answer["base_K"] + _LEAST_SPAN_K),
-        }
-        line: dict[str, Any] = {"y": _short(now["line"])}
-        if self._grid is None or any(
-            not np.array_equal(self._grid[axis], grid[axis]) for axis in grid
-        ):
-            heat |= {"x": _short(grid["x"]), "y": _short(grid["y"])}
-            line["x"] = _short(grid["along"])
-        self._change(self._heat, {0: heat})
-        self._change(self._profile, {0: line})
-        self._curves, self._grid = curves, grid
+            here = {"x": [now[x]], "y": [now[y]]}
+            if same:
+                self._move(plot, 2, here)
+            else:
+                plot.figure["data"][0] |= {"x": _short(curves[x]), "y": _short(curves[y])}
+                plot.figure["data"][1] |= {"x": [knee[x]], "y": [knee[y]]}
+                plot.figure["data"][2] |= here
+                plot.update()
+        line = {"x": _short(answer["along"]), "y": _short(now["line"])}
+        if same and np.array_equal(self._along, answer["along"]):
+            self._move(self._profile, 0, line)
+        else:
+            # of one height for all biases, so that the profile moves and not its axis
+            highest = float(np.max(curves["tip_K"]))
+            self._profile.figure["layout"]["yaxis"]["range"] = [answer["base_K"], highest]
+            self._profile.figure["layout"]["xaxis"]["range"] = answer["box"][:2]
+            self._profile.figure["data"][0] |= line
+            self._profile.update()
+        self._show_map(answer["box"], now["scale_K"], now["picture"])
+        self._curves, self._along = curves, answer["along"]
 
-    def _change(self, plot: ui.plotly, traces: dict[int, dict[str, Any]]) -> None:
-        """Give traces of a plot new data."""
-        figure: Any = plot.figure
-        for place, values in traces.items():
-            figure["data"][place] |= values
-        if plot not in self._ready:
-            plot.update()
+    def _show_map(self, box: list[float], scale: tuple[float, float], picture: bytes) -> None:
+        """Show the picture of the map in its place, and the bar of its colours."""
+        left, right, bottom, top = box
+        source = f"data:image/png;base64,{b64encode(picture).decode('ascii')}"
+        figure = self._heat.figure
+        figure["layout"]["images"][0]["source"] = source
+        if (box, scale) == self._map and self._heat in self._ready:
+            self._heat.run_plot_method("relayout", {"images[0].source": source})
             return
-        keys = dict.fromkeys(key for values in traces.values() for key in values)
-        changed = {key: [values[key] for values in traces.values()] for key in keys}
-        plot.run_plot_method("restyle", changed, list(traces))
+        self._map = (box, scale)
+        size = {"sizex": right - left, "sizey": top - bottom}
+        figure["layout"]["images"][0] |= {"x": left, "y": top, **size}
+        figure["layout"]["xaxis"]["range"] = [left, right]
+        figure["layout"]["yaxis"]["range"] = [bottom, top]
+        figure["data"][0]["marker"] |= {"cmin": scale[0], "cmax": scale[1]}
+        self._heat.update()
+
+    def _move(self, plot: ui.plotly, place: int, values: dict[str, Any]) -> None:
+        """Move a trace, with all else as it is."""
+        plot.figure["data"][place] |= values
+        if plot in self._ready:
+            at_once = {"transition": {"duration": 0}, "frame": {"duration": 0, "redraw": False}}
+            plot.run_plot_method("animate", {"data": [values], "traces": [place]}, at_once)
+        else:
+            plot.update()
 
 
-def _colours(name: str) -> list[list[Any]]:
-    """Return one of matplotlib's colour maps, as the figures have it."""
+def _colours() -> list[list[Any]]:
+    """Return the colours of temperatures, as the figures have them."""
+    # a page that needs none of them need not wait for this
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
     shares = np.linspace(0.0, 1.0, 32)
-    return [[share, to_hex(colormaps[name](share))] for share in shares.tolist()]
+    return [[share, to_hex(colormaps[HEAT](share))] for share in shares.tolist()]
 
 
 def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:
@@ -140,9 +173,3 @@ def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:
 def _short(values: Any) -> list[float]:
     """Return numbers with as many digits as a screen shows."""
     return [float(f"{value:.5g}") for value in np.asarray(values).tolist()]
-
-
-def _rows(cells: Any) -> list[list[float | None]]:
-    """Return cells to a tenth of a kelvin; None beside the lever."""
-    rounded = np.round(np.asarray(cells), 1)
-    return [[None if value != value else value for value in row] for row in rounded.tolist()]

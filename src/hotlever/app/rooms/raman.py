@@ -17,7 +17,7 @@ from hotlever.app.page import (
     table,
     two_columns,
 )
-from hotlever.app.rooms.results import FIGURE_FILES, download_button
+from hotlever.app.rooms.results import FIGURE_FILES, download_button, say_refused
 from hotlever.app.rooms.room import Room, choice
 from hotlever.app.session import Session
 
@@ -26,7 +26,7 @@ _TABLE, _SAVED, _FIGURE = "tip.raman.csv", "raman.json", "raman"
 _LAWS = {"anharmonic": "anharmonic", "linear": "linear, as in the paper"}
 
 
-async def raman(session: Session) -> None:
+async def fill(session: Session) -> None:
     """Fill the page."""
     with framed(session, "/raman") as complaint:
         _Room(session, complaint)
@@ -66,6 +66,7 @@ class _Room(Room):
         async def dropped(names: list[str]) -> None:
             count()
             self.show_command()
+            await say_refused(self.session, self.complaint, names, spectra=True)
 
         drop_zone(self.session, self.complaint, label, dropped, folder)
         counted.move(target_index=-1)

@@ -12,6 +12,8 @@ from hotlever.app.session import Session
 
 SHOWING = "hotlever.app.showing"
 FIGURE_FILES = (".svg", ".png", ".pdf")
+#: Refused files that are named.
+_SAID = 5
 
 
 async def show_result(session: Session, complaint: Complaint, kind: str, name: str) -> None:
@@ -70,3 +72,13 @@ def download_button(session: Session, name: str, label: str) -> None:
     ui.button(
         label, icon="download", on_click=lambda: ui.download.file(session.project.path(name))
     ).props("outline dense no-caps").classes("q-px-sm")
+
+
+async def say_refused(
+    session: Session, complaint: Complaint, names: list[str], *, spectra: bool
+) -> None:
+    """Say which of some files are no measurements, or no spectra; they stay in the folder."""
+    call, folder = f"{SHOWING}:refused", session.project.folder
+    lines = await session.full.call(call, folder, names, spectra)
+    more = f"\nand {len(lines) - _SAID} more such files" if len(lines) > _SAID else ""
+    complaint.say("\n".join(lines[:_SAID]) + more)

@@ -26,12 +26,12 @@ _AROUND = {"medium", "surface_gap_um"}
 _GROUPS = {"material": "Material", "dimensions": "Dimensions", "circuit": "Circuit"}
 _SAID = {
     "full lever": "full lever: the numbers of hotlever sweep",
-    "reduced lever": "moving: reduced lever, within 0.02 K",
+    "reduced lever": "moving: reduced lever, within some 0.1 K",
     "coarse lever": "moving: coarse lever, within some 2 K",
 }
 
 
-async def simulate(session: Session) -> None:
+async def fill(session: Session) -> None:
     """Fill the page."""
     with framed(session, "/simulate") as complaint:
         room = _Room(session, complaint)

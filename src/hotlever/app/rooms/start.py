@@ -33,7 +33,7 @@ _KINDS = {
 _SHOWN = 12
 
 
-async def start(session: Session) -> None:
+async def fill(session: Session) -> None:
     """Fill the page."""
     with framed(session, "/") as complaint, ui.column().classes("w-full max-w-5xl mx-auto gap-4"):
         for sentence in _SENTENCES:

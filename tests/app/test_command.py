@@ -1,0 +1,43 @@
+"""``hotlever app`` on the command line: what it refuses before it serves."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+
+import pytest
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "password", "said"),
+    [
+        (["--host", "0.0.0.0"], "", "add --yes-share"),
+        (["--host", "0.0.0.0", "--yes-share"], "", "HOTLEVER_APP_PASSWORD"),
+        (["--host", "0.0.0.0", "--yes-share"], "short", "8 or more"),
+        (["--host", "256.0.0.1", "--yes-share"], "long enough", "cannot be served at"),
+        (["--port", "70000"], "", "from 0 to 65535"),
+        (["file"], "", "expected a folder"),
+        (["--no-brwser"], "", "No such option"),
+    ],
+)
+def test_it_says_why_it_does_not_start(
+    run: Run, monkeypatch: pytest.MonkeyPatch, arguments: list[str], password: str, said: str
+) -> None:
+    monkeypatch.setenv("HOTLEVER_APP_PASSWORD", password)
+    with open("file", "w"):
+        pass
+    status, out, err = run("app", *arguments)
+    assert (status, out) == (2, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+
+
+def test_a_port_that_is_taken_is_a_line(run: Run) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        status, _, err = run("app", "--port", str(taken.getsockname()[1]))
+    assert status == 2
+    assert "cannot be served at" in err
