@@ -18,7 +18,7 @@ from hotlever.air.panels import IDENTITY, Mirror, Panels
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
-#: Of one or several q: real where a temperature grows, complex where it oscillates.
+# One or several q: real where a temperature grows, complex where it oscillates.
 Numbers = NDArray[Any]
 
 #: Pairs whose centroids are this many times the sum of their radii apart are far.

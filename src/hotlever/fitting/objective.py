@@ -60,7 +60,7 @@ class Objective:
         self._priors = {varied.index(name): prior for name, prior in (priors or {}).items()}
         self._joint, self.informed = joint, bool(priors) or joint is not None
         self._of_joint = [] if joint is None else [varied.index(name) for name in joint.names]
-        every = parameters_of(probe)
+        every = parameters_of(probe, anywhere=True)
         self.known = [every[name] for name in varied]
         self.scale = np.array([one.scale for one in self.known])
         self.bounds = np.array([[one.lower, one.upper] for one in self.known]).T / self.scale
