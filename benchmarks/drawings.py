@@ -1,13 +1,12 @@
-"""Drawn levers: against parametric ones, against FEniCS, and how good the doping by distances is.
+"""Drawn levers: against parametric ones, in air, and how good the doping by distances is.
 
-python benchmarks/drawings.py [same|peer|doping|air|solid]
+python benchmarks/drawings.py [same|doping|air|solid]
 
-same: the reference probe as a drawing against the parametric one, results and time. peer: slanted
-levers and a bent heater against legacy FEniCS on the same mesh. doping: the distance to each border
-against diffusion solved in the plane, for heaters of several shapes; between
-parallel borders both are the same, which shows how good the diffusion is solved. air: the panels of
-each lever, what making its operator costs beside a parametric lever of as many panels, and what
-finer panels change. solid: levers in air against the full 3-D simulation.
+same: the reference probe as a drawing against the parametric one, results and time. doping: the
+distance to each border against diffusion solved in the plane, for heaters of several shapes;
+between parallel borders both are the same, which shows how good the diffusion is solved. air: the
+panels of each lever, what making its operator costs beside a parametric lever of as many panels,
+and what finer panels change. solid: levers in air against the full 3-D simulation.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ from hotlever.probe import Layout, MeshOptions, Probe, mesh_layout
 from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.threads import one_blas_thread
-from problems import BIAS, peer_problem, processor_seconds, solve_with_peer, table
+from problems import BIAS, processor_seconds, table
 
 #: Of the diffusion in the plane: largest edge in the heater (share of its width), and time steps.
 FINE, STEPS = MeshOptions(heater=0.02, lever=0.05), 400
@@ -113,21 +112,6 @@ def same() -> None:
 def fresh(lever: Lever) -> Lever:
     """The same lever without its branch."""
     return lever.with_probe(lever.probe)
-
-
-def peer() -> None:
-    """Print the differences from legacy FEniCS on the same cubic mesh."""
-    rows = []
-    bias = [2.0, 5.0, 8.0]
-    for name, probe in levers().items():
-        lever = Lever(probe)
-        own = lever.dataset(lever.solve(bias))
-        problem = peer_problem(probe, lever.space.mesh, degree=3, quadrature=5, bias=bias)
-        found = solve_with_peer(problem)
-        current = np.array(found["current_mA"]) / own.current_mA.values - 1
-        tip = np.array(found["tip_K"]) - own.tip_K.values
-        rows.append([name, f"{np.abs(current).max():.1e}", f"{np.abs(tip).max():.1e}"])
-    table(["heater", "I_h, relative", "T_tip (K)"], rows)
 
 
 def doping() -> None:
@@ -249,6 +233,6 @@ def diffused_share(probe: Probe, points: np.ndarray) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    kinds = {"same": same, "peer": peer, "doping": doping, "air": air, "solid": solid}
+    kinds = {"same": same, "doping": doping, "air": air, "solid": solid}
     for kind in sys.argv[1:] or kinds:
         kinds[kind]()

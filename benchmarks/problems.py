@@ -14,9 +14,12 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import numpy as np
+
 from hotlever.cache import CACHE_VARIABLE
+from hotlever.materials import Kind, full_name
 from hotlever.probe import Probe, ProbeMesh
-from hotlever.probe.layout import BorderTaper
+from hotlever.probe.layout import BorderTaper, Region
 from hotlever.spieser2017 import RAMP
 
 BIAS = RAMP
@@ -26,38 +29,84 @@ DEBIAN_PYTHON = "/usr/bin/python3"
 
 
 def peer_problem(
-    probe: Probe, mesh: ProbeMesh, *, degree: int, quadrature: int, bias: Sequence[float]
+    probe: Probe,
+    mesh: ProbeMesh,
+    *,
+    degree: int,
+    quadrature: int,
+    bias: Sequence[float],
+    tolerance_K: float = 1e-6,
 ) -> dict[str, Any]:
-    """Return a mesh, material and circuit as the peer reads them."""
-    layout, triangles = mesh.layout, mesh.elements
-    regions: dict[str, dict[str, Any]] = {}
-    for index, region in enumerate(layout.regions):
-        regions[str(index)] = {"name": region.name, "doping": "high"}
-        if isinstance(region.taper, BorderTaper):
-            regions[str(index)] |= {"doping": "bordered", "borders_um": region.taper.borders}
-        elif region.taper is not None:
-            regions[str(index)] |= {
-                "doping": "tapered",
+    """Return a mesh, materials and circuit as the peer reads them."""
+    layout, triangles, kinds = mesh.layout, mesh.elements, probe.made_of
+    stacks = [_stack(region, layout.thickness_um) for region in layout.regions]
+    # regions without a taper that are made of the same are one to the peer
+    unique = [stack for number, stack in enumerate(stacks) if stack not in stacks[:number]]
+    of_region = np.array([unique.index(stack) for stack in stacks])
+    named = {name: _parameters(kind) for name, kind in kinds.items()}
+    return {
+        "points_um": triangles.p.T.tolist(),
+        "triangles": triangles.t.T.tolist(),
+        "stack": of_region[mesh.region].tolist(),
+        "stacks": unique,
+        "materials": {
+            name: {
+                "kind": kinds[name].kind,
+                "parameters": {own: full_name(name, own) for own in own_values},
+            }
+            for name, own_values in named.items()
+        },
+        "parameters": {
+            full_name(name, own): value
+            for name, own_values in named.items()
+            for own, value in own_values.items()
+        },
+        "terminals": {
+            name: probe.circuit.contact(name).model_dump()
+            | {"edges": triangles.facets[:, facets].T.tolist()}
+            for name, facets in mesh.terminal_facets.items()
+        },
+        "circuit": {
+            name: getattr(probe.circuit, name)
+            for name in ("series_resistance_ohm", "base_temperature_K", "swept")
+        },
+        "tip_um": layout.tip,
+        "bias_V": list(bias),
+        "quadrature_degree": quadrature,
+        "degree": degree,
+        "tolerance_K": tolerance_K,
+    }
+
+
+def _stack(region: Region, thickness_um: float) -> dict[str, Any]:
+    """Return what lies on one another in a region, the body first."""
+    films: list[dict[str, Any]] = [
+        {"material": film.material, "thickness_um": film.thickness_um or thickness_um}
+        for film in region.stack
+    ]
+    if isinstance(region.taper, BorderTaper):
+        films[0] |= {"taper": {"borders_um": region.taper.borders}}
+    elif region.taper is not None:
+        films[0] |= {
+            "taper": {
                 "centre_um": region.taper.centre,
                 "axis": region.taper.axis,
                 "length_um": region.taper.length_um,
             }
+        }
+    if region.taper is not None:
+        films[0] |= {"dopant_from": region.dopant_from}
+    return {"films": films}
+
+
+def _parameters(kind: Kind) -> dict[str, float]:
+    """Return the parameters of a material that matter to the peer.
+
+    An impurity exponent of 0, the paper's, is left out, so that the peer raises nothing to it.
+    """
+    values = {name: getattr(kind, name) for name in kind.parameters}
     return {
-        "points_um": triangles.p.T.tolist(),
-        "triangles": triangles.t.T.tolist(),
-        "region": mesh.region.tolist(),
-        "regions": regions,
-        "terminals": {
-            name: triangles.facets[:, facets].T.tolist()
-            for name, facets in mesh.terminal_facets.items()
-        },
-        "tip_um": layout.tip,
-        "thickness_um": layout.thickness_um,
-        "circuit": probe.circuit.model_dump(),
-        "material": probe.material.model_dump(),
-        "bias_V": list(bias),
-        "quadrature_degree": quadrature,
-        "degree": degree,
+        name: value for name, value in values.items() if (name, value) != ("impurity_exponent", 0.0)
     }
 
 

@@ -77,25 +77,30 @@ def run_commands(content: str, run: Run) -> str:
     return printed
 
 
-def missing_lines(shown: str, printed: str) -> list[str]:
-    """Return the lines shown on a page that were not printed, in order, up to rounding."""
+def missing_lines(shown: str, printed: str, within: float = 0.01) -> list[str]:
+    """Return the lines shown on a page that were not printed, in order, up to rounding.
+
+    Numbers may differ by a share `within` and a unit of rounding.
+    """
     lines = iter(printed.splitlines())
-    return [line for line in shown.splitlines() if not any(_alike(line, each) for each in lines)]
+    return [
+        line for line in shown.splitlines() if not any(_alike(line, each, within) for each in lines)
+    ]
 
 
-def _alike(shown: str, printed: str) -> bool:
-    """Whether two lines have the same words, and numbers within 1 % and a unit of rounding."""
+def _alike(shown: str, printed: str, within: float) -> bool:
+    """Whether two lines have the same words, and numbers that differ by little."""
     if _words(shown) != _words(printed):
         return False
     pairs = zip(_NUMBER.finditer(shown), _NUMBER.finditer(printed), strict=True)
-    return all(_close(mine, theirs) for mine, theirs in pairs)
+    return all(_close(mine, theirs, within) for mine, theirs in pairs)
 
 
 def _words(line: str) -> Sequence[str]:
     return _NUMBER.sub("0", line).split()
 
 
-def _close(mine: re.Match[str], theirs: re.Match[str]) -> bool:
+def _close(mine: re.Match[str], theirs: re.Match[str], within: float) -> bool:
     a, b = (float(match[0].replace("−", "-")) for match in (mine, theirs))
     unit = 10.0 ** -len(mine["decimals"] or "")
-    return abs(a - b) <= 0.01 * abs(a) + 1.01 * unit
+    return abs(a - b) <= within * abs(a) + 1.01 * unit

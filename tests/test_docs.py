@@ -23,7 +23,10 @@ PAGES = {
     if "_build" not in path.parts
 }
 #: Pages whose examples take minutes.
-SLOW = {"how-to/calibrate", "how-to/design", "how-to/fit", "how-to/levers", "how-to/uncertainty"}
+SLOW = {
+    *("how-to/calibrate", "how-to/design", "how-to/fit", "how-to/levers", "how-to/uncertainty"),
+    *("examples/reference-probe", "examples/boron-lever", "examples/palladium-on-nitride"),
+}
 #: Modules whose numbers the theory page states.
 LAWS = (
     "spieser2017.py",

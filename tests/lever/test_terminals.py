@@ -119,6 +119,17 @@ def test_a_solid_lever_is_as_warm_as_a_flat_one():
     np.testing.assert_allclose(solid.tip_K, flat.tip_K, atol=0.3)
 
 
+def test_supplies_may_hold_all_terminals():
+    """Then no current goes to ground, and each has its own."""
+    held = {"kind": "supply", "bias_V": -1.0, "series_resistance_ohm": 300.0}
+    probe = Probe.u_shape().with_(**{f"circuit.ground.{key}": held[key] for key in held})
+    lever = Lever(probe, COARSE)
+    solved = lever.dataset(lever.solve([0.0, 2.0]))
+    np.testing.assert_allclose(solved.ground_mA, -solved.current_mA, rtol=1e-9)
+    np.testing.assert_allclose(solved.ground_V + 0.3 * solved.ground_mA, -1.0, rtol=1e-9)
+    assert solved.ground_current_mA.values.tolist() == [0.0, 0.0]
+
+
 def test_files_keep_circuit_and_columns(tmp_path):
     probe = wired(reader=HEATED)
     probe.to_file(tmp_path / "probe.toml")

@@ -41,6 +41,10 @@ if TYPE_CHECKING:
 
 #: Characters of a title that have room above a drawing.
 _TITLE = 90
+#: Most of the lever that is magnified, as a share of its length.
+_MAGNIFIED = 0.3
+#: Length of a terminal's name over the height of a drawing.
+_NAME = 0.33
 
 
 def _marker(sweep: xr.Dataset, marker: str = "o") -> str:
@@ -84,15 +88,12 @@ def probe_drawing(layout: Layout, title: str = "") -> Figure:
         handles["tip"] = tip
         (left, bottom), (right, high) = layout.box
         margin = 0.04 * max(right - left, high - bottom)
-        wider = {True: 5, False: 1}
-        axes.set_xlim(
-            left - wider[(0, True) in labelled] * margin,
-            right + wider[(0, False) in labelled] * margin,
-        )
-        axes.set_ylim(
-            bottom - wider[(1, True) in labelled] * margin,
-            high + wider[(1, False) in labelled] * margin,
-        )
+        # beside a lever that is as wide as long names take more of its size
+        name_um = max(5 * margin, _NAME * (high - bottom))
+        beyond = {True: name_um, False: margin}
+        axes.set_xlim(left - beyond[(0, True) in labelled], right + beyond[(0, False) in labelled])
+        beyond[True] = 5 * margin
+        axes.set_ylim(bottom - beyond[(1, True) in labelled], high + beyond[(1, False) in labelled])
         axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)")
         if title:
             lines = "\n".join(wrap(title, _TITLE))
@@ -137,7 +138,10 @@ def field_maps(fields: FieldMap, layout: Layout, title: str = "") -> Figure:
         ("potential (V)", fields.potential, "viridis", None),
         ("current density (mA/µm²)", density, "cividis", LogNorm(strong * 1e-3, strong)),
     )
-    size, centre = layout.heater.sides.max(), layout.heater.box.mean(axis=0)
+    what, size, centre = "heater", layout.heater.sides.max(), layout.heater.box.mean(axis=0)
+    most = _MAGNIFIED * np.ptp(layout.box, axis=0).max()
+    if size > most:  # where all of the conductor heats
+        what, size, centre = "tip", most, np.array(layout.tip)
     with figure(7.0, 6.8, 3, 2, width_ratios=(1.75, 1.0)) as (made, grid):
         for row, (label, values, colours, norm) in zip(grid, maps, strict=True):
             shading = "gouraud" if values.size == len(fields.points) else "flat"
@@ -149,7 +153,7 @@ def field_maps(fields: FieldMap, layout: Layout, title: str = "") -> Figure:
             row[1].set_ylim(centre[1] + np.array([-0.65, 0.65]) * size)
             made.colorbar(image, ax=row[1], label=label, extend="min" if norm else "neither")
         grid[0, 0].set_title(title)
-        grid[0, 1].set_title("heater, magnified")
+        grid[0, 1].set_title(f"{what}, magnified")
     return made
 
 

@@ -29,7 +29,7 @@ def balance_names(wiring: Wiring) -> tuple[str, ...]:
     circuit does not have.
     """
     volts = [name for name in _measured(wiring) if name != "reader"]
-    currents = [name for name in _conducting(wiring) if name != "ground"]
+    currents = _unusual(wiring)
     return (*BALANCES, *(f"{name}_V" for name in volts), *(f"{name}_mA" for name in currents))
 
 
@@ -41,6 +41,12 @@ def _measured(wiring: Wiring) -> tuple[str, ...]:
 def _conducting(wiring: Wiring) -> tuple[str, ...]:
     """Return the terminals that a current passes, beside the swept supply."""
     return (*wiring.grounds, *wiring.contacts)
+
+
+def _unusual(wiring: Wiring) -> tuple[str, ...]:
+    """Return those that a current passes, without the ground of the paper's circuit."""
+    usual = "ground" if "ground" in wiring.grounds else None
+    return tuple(name for name in _conducting(wiring) if name != usual)
 
 
 def balance_columns(equations: LeverEquations, x: Array) -> Array:
@@ -89,15 +95,16 @@ def _balances(equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array 
         name: np.einsum("dp,dpn->n", space.charge_tests[name], charge)
         for name in _conducting(space.wiring)
     }
-    ground = [-into[name] for name in into if equations.circuit.contact(name).kind == "ground"]
+    grounds = [name for name in into if equations.circuit.contact(name).kind == "ground"]
+    ground = -sum((into[name] for name in grounds), start=np.zeros_like(end_heat))
     volts = [
         np.tensordot(weights, x[unknowns], axes=1)
         for name in _measured(space.wiring)
         if name != "reader"
         for unknowns, weights in [space.potential_at(name)]
     ]
-    currents = [into[name] for name in into if name != "ground"]
-    return np.stack([*joule, sum(ground), end_heat, air_heat, *volts, *currents], axis=-1)
+    currents = [into[name] for name in _unusual(space.wiring)]
+    return np.stack([*joule, ground, end_heat, air_heat, *volts, *currents], axis=-1)
 
 
 def _joule(heat_source: Array, points: Index) -> Array:

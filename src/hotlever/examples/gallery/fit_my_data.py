@@ -1,0 +1,12 @@
+"""Which material explains my data?"""
+
+from hotlever import Lever, figures, fit, save_figure
+
+found = fit("examples/lever-a.csv")
+for name, one in found.parameters.items():
+    print(f"{name}: {one.value:.4g} ± {one.stderr:.1g} {one.unit}")
+
+measured = found.measurement.dataset(found.probe.circuit)
+model = Lever(found.probe).sweep(found.measurement.bias_V)
+made = figures.data_and_model(measured, model, found.observables)
+save_figure(made, "fit_my_data.png")

@@ -1,0 +1,43 @@
+"""The scripts of the gallery run, each draws its figure, and the page shows them as they are."""
+
+from __future__ import annotations
+
+import ast
+import re
+import runpy
+
+import pytest
+
+from documents import ROOT, missing_lines
+
+SCRIPTS = {path.stem: path for path in sorted((ROOT / "examples" / "gallery").glob("*.py"))}
+PAGE = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+#: Of a picture on the page, in bytes.
+LARGEST = 60_000
+#: Of the numbers beside a picture, as a share: it is what the script is for, not a result.
+SURE = 0.05
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_script_answers_in_words_and_draws_its_figure(name, tmp_path, monkeypatch, capsys):
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(SCRIPTS[name]))
+    printed = capsys.readouterr().out
+    # the page gives an answer that the script prints
+    (answer,) = re.findall(rf"gallery/{name}\.png\)\n\n```text\n(.+?)\n```", PAGE, flags=re.DOTALL)
+    assert missing_lines(answer, printed, within=SURE) == [], printed
+    assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+
+
+def test_the_page_shows_every_script_under_its_question():
+    sections = dict(re.findall(r"^## (.+)\n(?:.|\n)*?\(gallery/(\w+)\.png\)", PAGE, re.MULTILINE))
+    questions = {
+        ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))): name
+        for name, path in SCRIPTS.items()
+    }
+    assert sections == questions
+    assert re.findall(r"examples/gallery/(\w+)\.py", PAGE) == list(sections.values())
+    for name, path in SCRIPTS.items():
+        assert 8 <= len(path.read_text(encoding="utf-8").splitlines()) <= 26
+        assert (ROOT / "docs" / "gallery" / f"{name}.png").stat().st_size < LARGEST
