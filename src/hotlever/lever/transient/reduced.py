@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from hotlever.lever.equations import Conductivities, LeverEquations
+from hotlever.lever.equations import LeverEquations
 from hotlever.lever.reduced import ReducedSpace
 from hotlever.lever.reduction import ReductionOptions, empirical_rule
 from hotlever.lever.space import Space
+from hotlever.lever.stack import Conductivities
 from hotlever.lever.state import State
 from hotlever.materials import Kind
 from hotlever.probe import Circuit
