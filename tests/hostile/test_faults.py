@@ -60,6 +60,9 @@ def line(folder: Path) -> None:
     (folder / "line.txt").write_text(text)
 
 
+# writers of PDF and NetCDF leave a file open that they could not write
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
 @pytest.mark.parametrize("command", WRITERS, ids=" ".join)
 def test_a_disk_that_is_full_at_any_byte_leaves_what_was_there(
     command: tuple[str, ...], run: Run, tmp_path: Path
