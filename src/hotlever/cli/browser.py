@@ -66,8 +66,6 @@ def app_command(
 def _asked() -> str:
     """Ask for a password."""
     if sys.stdin is None or not sys.stdin.isatty():
-        raise InputError(
-            f"--yes-share: expected a password in {_PASSWORD}, or a terminal"
-        )
+        raise InputError(f"--yes-share: expected a password in {_PASSWORD}, or a terminal")
     what = "Password for those who may come in"
     return str(typer.prompt(what, hide_input=True, confirmation_prompt=True, err=True))
