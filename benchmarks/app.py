@@ -129,11 +129,8 @@ def speed(count):
                 ("bias slider, median", f"{np.nanmedian(bias):.0f} ms", "100 ms"),
                 ("bias slider, 95 %", f"{np.nanpercentile(bias, 95):.0f} ms", "250 ms"),
                 ("bias slider, processor", f"{shares[0]:.0f} ms", ""),
-                (
-                    f"material slider, median ({model})",
-                    f"{np.nanmedian(material):.0f} ms",
-                    "200 ms",
-                ),
+                ("material slider, median", f"{np.nanmedian(material):.0f} ms", "200 ms"),
+                ("material slider, answered by", model.removeprefix("moving: "), ""),
                 ("material slider, processor", f"{shares[1]:.0f} ms", ""),
                 ("fit, drop to parameters, warm", f"{parameters:.1f} s", ""),
                 ("fit, drop to drawn, warm", f"{drawn:.1f} s", "3 s"),

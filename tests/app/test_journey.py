@@ -170,7 +170,7 @@ def test_a_killed_process_is_a_message(app: App, page: Page) -> None:
     for pid in _children(app.process.pid):
         if _is_worker(pid):
             os.kill(pid, signal.SIGKILL)
-    expect(page.get_by_text("the process that worked on this died")).to_be_visible()
+    expect(page.get_by_text("the process that worked on this died").first).to_be_visible()
     # the app goes on, with new processes
     page.get_by_text("More", exact=True).click()
     page.get_by_role("checkbox", name="posterior").click()

@@ -172,7 +172,7 @@ def test_a_dropped_measurement_is_understood(tmp_path: Path) -> None:
     visit(tmp_path, story)
 
 
-@pytest.mark.parametrize("address", ["/fit", "/calibrate", "/", "/lever", "/raman", "/levers"])
+@pytest.mark.parametrize("address", ["/fit", "/", "/lever", "/raman", "/levers"])
 def test_bad_files_are_a_line_each_and_the_room_goes_on(tmp_path: Path, address: str) -> None:
     drawn = (".gds", ".oas", ".dxf")
 

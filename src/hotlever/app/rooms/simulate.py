@@ -48,6 +48,7 @@ class _Room:
         )
         self._wanted: dict[str, Any] | None = None
         self._settled: Any = None
+        self._rests = 0
         self._busy = False
         self._free: set[str] = set()
         self._last_command: list[str] = []
@@ -215,15 +216,24 @@ class _Room:
         try:
             while self._wanted is not None and not self._bias.is_deleted:
                 wanted, self._wanted = self._wanted, None
-                parameters = (wanted["probe"], wanted["changes"])
-                await self._show(wanted, quick=parameters != self._settled)
-                if self._wanted is None and parameters != self._settled:
-                    await asyncio.sleep(_REST_S)
-                    if self._wanted is None and await self._show(wanted, quick=False):
-                        self._settled = parameters
-                        background_tasks.create(self._prepare(), name="reduced lever")
+                settled = (wanted["probe"], wanted["changes"]) == self._settled
+                await self._show(wanted, quick=not settled)
+                if not settled and self._wanted is None:
+                    self._rests += 1
+                    background_tasks.create(self._settle(wanted, self._rests), name="full lever")
         finally:
             self._busy = False
+
+    async def _settle(self, wanted: dict[str, Any], this: int) -> None:
+        """Ask the full lever once sliders have rested; they may move on meanwhile."""
+        await asyncio.sleep(_REST_S)
+        if this != self._rests or self._wanted is not None or self._bias.is_deleted:
+            return
+        if await self._show(wanted, quick=False):
+            self._settled = (wanted["probe"], wanted["changes"])
+            background_tasks.create(self._prepare(), name="reduced lever")
+            if wanted["bias"] != self._chosen["bias"]:
+                self._ask()
 
     async def _show(self, wanted: dict[str, Any], quick: bool) -> bool:
         desk = self._session.quick if quick else self._session.full
@@ -238,7 +248,7 @@ class _Room:
             return False
         if self._bias.is_deleted:  # the tab was closed meanwhile
             return False
-        if self._wanted is not None and not quick and wanted["changes"] != self._chosen["changes"]:
+        if any(wanted[key] != self._chosen[key] for key in ("probe", "changes")) and not quick:
             return False  # parameters have moved on while the full lever was solved
         self._complaint.clear()
         now, knee = answer["now"], answer["curves"]["knee"]
