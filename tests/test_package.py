@@ -18,7 +18,8 @@ SOURCE = Path(hotlever.__file__).parent
 MODULES = sorted(
     ".".join(("hotlever", *path.relative_to(SOURCE).with_suffix("").parts))
     for path in SOURCE.rglob("*.py")
-    if path.stem != "__init__"
+    # scripts of the gallery are data of the package
+    if path.stem != "__init__" and "examples" not in path.relative_to(SOURCE).parts
 )
 #: From the ground up: a layer imports none of those behind it.
 LAYERS = (
