@@ -65,8 +65,8 @@ class LeverEquations(LawsAtPoints):
     def factorised(self, x: Array, pin: Pin = TIP, per_us: float = 0.0) -> Factors:
         """Return the factorised Jacobians of states, with the row of a pin last.
 
-        They are those of `balance` and so many times (1/µs) that of `stored`, with what the air
-        takes up where things change so fast.
+        They are those of `balance` and so many times (1/µs) that of the heat stored, with what the
+        air takes up where things change so fast.
         """
         fields, laws = self.at(x)
         heat_source_T = -laws.sigma_by["T"] * square(fields.grad_V)

@@ -184,7 +184,7 @@ class AroundLever:
     def stores(self, gas_conductivity: float) -> HeatInAir:
         """Return the heat in a gas that conducts so many times as well as air."""
         if 1.0 not in self._made:
-            self._made[1.0] = heat_in_air(*self._given)
+            self._made[1.0] = taken_up_around(*self._given)
         if gas_conductivity not in self._made:
             self._made = {1.0: self._made[1.0]}
             self._made[gas_conductivity] = self._made[1.0].in_gas(gas_conductivity)
@@ -192,7 +192,7 @@ class AroundLever:
 
 
 @one_blas_thread
-def heat_in_air(
+def taken_up_around(
     space: FullSpace, layout: Layout, surroundings: Surroundings, base_temperature_K: float
 ) -> HeatInAir:
     """Return the heat that the air around a lever takes up, from the cache or made and cached.

@@ -2,7 +2,7 @@
 
 Such a lever is warm before the swept supply heats it, and may cool at first as that takes current
 from the others. So neither its tip temperature nor its voltage need rise along the branch, and it
-is followed by the length of its curve in the plane of both, in units of `_UNIT_K` and `_UNIT_V`.
+is followed by the length of its curve in the plane of both, in units of 60 K and 1 V.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Heading:
     Attributes
     ----------
     tip, lever : float
-        In units of `_UNIT_K` and `_UNIT_V`, of length one together.
+        In units of 60 K and 1 V, of length one together.
     slope : ndarray, shape (size + 1, 1)
         Of the state by the length.
     """

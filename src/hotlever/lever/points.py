@@ -134,14 +134,14 @@ class LawsAtPoints:
         return self._stacks.heat(np.full_like(self.space.weights, self.base_temperature_K))[0]
 
     def stored(self, x: Array) -> Array:
-        """Return the heat stored in states (nJ), tested as `balance` tests, (size + 1, n).
+        """Return the heat stored in states (nJ), tested as the balance is, (size + 1, n).
 
-        In time `balance` is what it loses per µs.
+        In time the balance is what it loses per µs.
         """
         return self._only_heat(self.heat_density(self.at(x)[0].T)[0])
 
     def stored_change(self, x: Array, change: Array) -> Array:
-        """Return how `stored` changes with the unknowns, to first order; see `flux_changes`."""
+        """Return how `stored` changes with the unknowns, by one change of each state or several."""
         by_T = self.heat_density(self.at(x)[0].T)[1]
         rise = self.space.temperature.at_points(change)[0]
         heat = (by_T if change.ndim == 2 else by_T[..., None]) * rise

@@ -148,7 +148,7 @@ class ThreeLeg(Parametric):
 
     @classmethod
     def reference(cls) -> ThreeLeg:
-        """Return the shape of the reference probe, see `hotlever.probe.Probe.reference`."""
+        """Return the shape of the reference probe, see `hotlever.probe.probe.Probe.reference`."""
         return cls(
             length_um=54.4,
             centre_leg_width_um=6.44,

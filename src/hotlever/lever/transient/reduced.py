@@ -132,14 +132,17 @@ class TabulatedEquations(LeverEquations):
         return self._found[1:]
 
     def conductivities(self, T: Array, names: Sequence[str] = ("T",)) -> Conductivities:
-        """See `LeverEquations.conductivities`; derivatives by parameters are not looked up."""
+        """Return κ and σ; derivatives by parameters are not looked up.
+
+        See `hotlever.lever.points.LawsAtPoints.conductivities`.
+        """
         if tuple(names) != ("T",):
             return super().conductivities(T, names)
         values, slopes = self._look_up(T)
         return Conductivities(values[0], values[1], {"T": slopes[0]}, {"T": slopes[1]})
 
     def heat_density(self, T: Array) -> tuple[Array, Array]:
-        """See `LeverEquations.heat_density`."""
+        """See `hotlever.lever.points.LawsAtPoints.heat_density`."""
         values, slopes = self._look_up(T)
         return values[2], slopes[2]
 
