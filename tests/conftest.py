@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.cli import main
+from hotlever.cli import main, output
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced import ReducedLever
@@ -93,7 +93,7 @@ def run(
     """Run the command line in an empty folder; returns exit status, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
     # how long something takes depends on the machine
-    monkeypatch.setattr("hotlever.cli.output.FIRST_LINE_S", float("inf"))
+    monkeypatch.setattr(output, "FIRST_LINE_S", float("inf"))
 
     def call(*arguments: str) -> tuple[int, str, str]:
         with pytest.raises(SystemExit) as ended:

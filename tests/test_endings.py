@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from hotlever.cli import commands, main, running
+from hotlever.cli import commands, main, output, running
 from hotlever.cli.output import note, progress
 
 COMMAND = [sys.executable, "-c", "from hotlever.cli import main; main()"]
@@ -236,9 +236,8 @@ def test_what_a_stopped_import_says_is_not_an_internal_error(monkeypatch):
 
 
 def test_progress_is_told_in_lines_where_there_is_no_terminal(run, monkeypatch):
-    run()  # sets what these tests do without
-    monkeypatch.setattr("hotlever.cli.output.FIRST_LINE_S", 0.0)
-    monkeypatch.setattr("hotlever.cli.output.NEXT_LINE_S", 0.0)
+    monkeypatch.setattr(output, "FIRST_LINE_S", 0.0)
+    monkeypatch.setattr(output, "NEXT_LINE_S", 0.0)
     status, out, err = run("sweep", "--bias", "1:2:2")
     assert status == 0
     assert out.startswith("bias_V,")

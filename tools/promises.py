@@ -36,8 +36,8 @@ def counts() -> dict[str, int]:
 def hostile_counts() -> dict[str, int]:
     """Return how many hostile cases there are with ``make test-hostile``."""
     import test_arguments_at_random as arguments
-    import test_faults as faults
     import test_files_at_random as files
+    import test_full_disks_and_kills as faults
 
     options = [choices for _, wrong in arguments.WRONG for choices in wrong.values()]
     return {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import csv
 import io
+import sys
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -62,7 +63,10 @@ def visit(folder: Path, story: Callable[[User, Session], Awaitable[None]]) -> No
             add_pages(session)
             await story(user, session)
 
+    modules = dict(sys.modules)
     asyncio.run(told())
+    # the simulation takes out those of its pages, this package among them
+    sys.modules.update(modules)
 
 
 async def drop(user: User, name: str, content: bytes, zone: int = 0) -> None:

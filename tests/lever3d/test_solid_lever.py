@@ -134,8 +134,8 @@ def test_a_sweep_goes_on_from_the_states_in_the_cache(monkeypatch):
     monkeypatch.setattr(
         SolidLever,
         "polished",
-        lambda self, guess, value, polished=SolidLever.polished: (
-            solved.append(value) or polished(self, guess, value)
+        lambda self, guess, value, *pin, polished=SolidLever.polished: (
+            solved.append(value) or polished(self, guess, value, *pin)
         ),
     )
     resumed = SolidLever(Probe.reference(), COARSE).sweep(bias)

@@ -13,7 +13,7 @@ from contextvars import ContextVar
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from hotlever.errors import HotleverError, shown
+from hotlever.errors import HotleverError
 
 if TYPE_CHECKING:
     from hotlever.types import Progress
@@ -120,7 +120,11 @@ def note(*texts: str) -> None:
 def fail(message: str) -> None:
     """Say what went wrong, in a line that can be read whatever it quotes."""
     if message:
-        tell(f"hotlever: {shown(message, _LONGEST)}")
+        if len(message) > _LONGEST:
+            # what was found stands at the beginning, what is wrong with it at the end
+            half = _LONGEST // 2
+            message = f"{message[:half]} … {message[-half:]}"
+        tell(f"hotlever: {message}")
 
 
 def _lines(label: str) -> Progress:

@@ -131,10 +131,11 @@ def test_a_folder_that_may_not_be_written_is_said_before_any_work(tmp_path: Path
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_command_killed_at_any_moment_writes_all_or_nothing(number: int, tmp_path: Path):
     rng = np.random.default_rng(number)
+    command = [*COMMAND, "sweep", "--bias", "1:2:3", "-o", "a.csv", "--plot", "a.svg"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    whole = {(tmp_path / "a.csv").read_bytes()}
     (tmp_path / "a.csv").write_text("mine")
-    whole: set[bytes] = set()
     for _ in range(cases(40)):
-        command = [*COMMAND, "sweep", "--bias", "1:2:3", "-o", "a.csv", "--plot", "a.svg"]
         with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(rng.uniform(0.05, 4.0))
