@@ -12,13 +12,18 @@ from documents import ROOT, missing_lines
 
 SCRIPTS = {path.stem: path for path in sorted((ROOT / "examples" / "gallery").glob("*.py"))}
 PAGE = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+#: Those that take five seconds or more.
+DEAR = ("pulse_in_air", "how_sure")
 #: Of a picture on the page, in bytes.
 LARGEST = 60_000
 #: Of the numbers beside a picture, as a share: it is what the script is for, not a result.
 SURE = 0.05
 
 
-@pytest.mark.parametrize("name", SCRIPTS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(one, marks=[pytest.mark.slow] * (one in DEAR)) for one in SCRIPTS],
+)
 def test_a_script_answers_in_words_and_draws_its_figure(name, tmp_path, monkeypatch, capsys):
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)

@@ -113,6 +113,7 @@ def test_priors_say_what_was_known_and_what_the_data_made_of_it(calibrated):
     assert "gap_um" in text
 
 
+@pytest.mark.slow
 def test_a_narrow_prior_holds_and_none_at_all_varies_the_material_only(reference):
     data = measurement_of(measured_curve(reference, np.random.default_rng(8)))
     priors = default_priors(Probe.reference()) | {"heater_length_um": Prior(4.1, 1e-6)}

@@ -98,6 +98,7 @@ def test_another_material_is_solved_as_by_a_lever_made_of_it(in_air, state):
     assert warmer.tip_K > state.tip_K + 3.0
 
 
+@pytest.mark.slow
 def test_in_another_medium_it_is_meshed_anew_and_solved():
     vacuum = SolidLever(Probe.reference(), COARSE, air_order=2)
     (warm,) = vacuum.solve([3.0])  # and what it then knows of its flat lever does not come along

@@ -98,6 +98,7 @@ def test_small_signals_are_those_of_all_panels(state, all_panels, answering_at_o
     assert away[0] == pytest.approx(0.04, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_small_step_is_its_inverse_laplace_transform(state, all_panels, in_air):
     """By Talbot's contour (Abate and Valkó, Int. J. Numer. Meth. Eng. 60, 979 (2004))."""
     time, many, by = 10.0, 7, 0.05

@@ -9,6 +9,7 @@ from hotlever.lever.transient import pulse
 from hotlever.lever.transient.periodic import settled
 
 
+@pytest.mark.slow
 def test_a_train_settles_as_if_it_were_followed(coarse):
     history, start = settled(coarse, pulse(8.0, 4.0), 20.0)
     long = coarse.pulse(pulse(8.0, 4.0, 20.0, 12), at=[220.0, 224.0, 240.0])

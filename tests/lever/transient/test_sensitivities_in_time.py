@@ -20,7 +20,13 @@ def moved(lever, name, share):
     return lever.with_probe(lever.probe.moved({name: value * (1.0 + share)})), value
 
 
-@pytest.mark.parametrize(("medium", "names"), [("vacuum", NAMES), ("air", ["gas_conductivity"])])
+@pytest.mark.parametrize(
+    ("medium", "names"),
+    [
+        ("vacuum", NAMES),
+        pytest.param("air", ["gas_conductivity"], marks=pytest.mark.slow),
+    ],
+)
 def test_they_are_what_moved_levers_differ_by(coarse, in_air, medium, names):
     lever = coarse if medium == "vacuum" else in_air
     wave = pulse(10.0, 5.0)

@@ -28,6 +28,7 @@ def test_they_grow_as_powers_of_a_weak_drive(coarse):
         assert ratio == pytest.approx(2.0**power, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_strong_drive_is_as_followed_in_time(coarse):
     period, count = 10.0, 32
     found = harmonics(coarse, 3.0, 2.0, [1e6 / period])

@@ -25,6 +25,7 @@ def train(coarse, states):
     return coarse.pulse(TRAIN, at=TIMES, seen=lambda t, state: states.append((t, state)))
 
 
+@pytest.mark.slow
 def test_a_train_on_modes_is_that_of_the_full_lever(coarse, train, states):
     full = followed(coarse, TRAIN, at=TIMES)
     np.testing.assert_array_equal(train.time, TIMES)
