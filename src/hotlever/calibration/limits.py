@@ -17,11 +17,15 @@ import numpy as np
 from scipy import optimize
 
 from hotlever.errors import ComputationError
-from hotlever.fitting.diagnostics import effective_sample_size, split_rhat
-from hotlever.fitting.ensembles import Gaussian, sample
+from hotlever.fitting.ensembles import (
+    Gaussian,
+    independent_samples,
+    rhat_of_ensembles,
+    sample,
+)
 from hotlever.fitting.models import Prediction
 from hotlever.fitting.objective import UNSOLVED, Objective, Vicinity, inside
-from hotlever.types import Array, Progress
+from hotlever.types import Array, Index, Progress
 
 #: Standard errors that 95 % of a normal distribution lie within.
 BAND = 1.96
@@ -35,8 +39,8 @@ _FOUND = 1e-5
 _LEAST_RISE = 0.25
 #: A linearised error that is right within this factor holds.
 _ALIKE = 1.25
-#: Walkers of an ensemble, at least; and R̂ from which on samples are too few.
-_WALKERS, _SETTLED = 24, 1.05
+#: R̂ from which on samples are too few.
+_SETTLED = 1.05
 
 
 @dataclass(frozen=True)
@@ -87,9 +91,7 @@ def profile_of_tip(
     """
     vicinity = Vicinity(objective, at, others)
     least = _squares(vicinity.residual(vicinity.origin))
-    order = np.argsort(at.values[2])
-    some = order[np.linspace(order.size / 3, order.size - 1, _PLACES).astype(int)]
-    found = []
+    some, found = _looked_at(at), []
     for place in some:
         slope = at.slopes[2, place, objective.columns]
         along = covariance @ slope
@@ -156,25 +158,26 @@ def posterior_of_tip(
         _Density(vicinity),
         Gaussian(vicinity.origin, scaled),
         samples=samples,
-        walkers=max(_WALKERS, 3 * vicinity.origin.size),
         progress=progress,
     )
-    ensembles, walkers, draws, size = chains.points.shape
-    every = chains.points.reshape(-1, size)
+    some, every = _looked_at(at), chains.points.reshape(-1, vicinity.origin.size)
     tips = np.array([vicinity.predict(point)[0][2] for point in every])
-    order = np.argsort(at.values[2])
-    some = order[np.linspace(order.size / 3, order.size - 1, _PLACES).astype(int)]
     slopes = at.slopes[2][some][:, objective.columns]
     stderr = np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes))
     low, high = np.percentile(tips[:, some], (2.5, 97.5), axis=0)
     middle = at.values[2, some]
-    hottest = tips[:, order[-1]].reshape(ensembles, walkers, draws)
-    apart = np.swapaxes(hottest, 1, 2).reshape(ensembles, -1)
+    hottest = tips[:, some[-1]].reshape(chains.points.shape[:3])
     return TipPosterior(
         Profile(middle, (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)),
-        effective_sample_size(hottest.reshape(-1, draws)),
-        split_rhat(apart),
+        independent_samples(hottest),
+        rhat_of_ensembles(hottest),
     )
+
+
+def _looked_at(at: Prediction) -> Index:
+    """Return the places of the data at which limits are looked for, the hottest last."""
+    order = np.argsort(at.values[2])
+    return order[np.linspace(order.size / 3, order.size - 1, _PLACES).astype(int)]
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 
 from hotlever.cluster import local_processes
 from hotlever.errors import ComputationError, InputError
+from hotlever.fitting.diagnostics import effective_sample_size, split_rhat
 from hotlever.types import Array, Progress
 
 # The logarithm of a density, up to a constant; −∞ where it vanishes.
@@ -19,6 +20,8 @@ LogDensity = Callable[[Array], float]
 
 #: Ensembles that know nothing of each other, so that R̂ compares independent runs.
 ENSEMBLES = 4
+#: Walkers of an ensemble: at least, and for each parameter.
+_WALKERS, _WALKERS_EACH = 24, 3
 #: Steps of every walker that are dropped. The walkers start from the linearised posterior.
 _WARM_UP = 25
 #: Steps between two reports of progress.
@@ -51,7 +54,7 @@ def sample(
     approximation: Gaussian,
     *,
     samples: int,
-    walkers: int,
+    walkers: int | None = None,
     processes: int = 1,
     seed: int = 0,
     progress: Progress | None = None,
@@ -79,6 +82,8 @@ def sample(
         If no start is found or a worker process dies.
     """
     dimension = approximation.mean.size
+    if walkers is None:
+        walkers = max(_WALKERS, _WALKERS_EACH * dimension)
     for name, value, least in (
         ("samples", samples, 1),
         ("walkers", walkers, 2 * dimension),
@@ -112,6 +117,16 @@ def sample(
                 progress(done, _WARM_UP + draws)
     chains, densities = (np.concatenate(kept, axis=1).swapaxes(1, 2) for kept in (points, logs))
     return Chains(chains, densities, float(accepted / draws))
+
+
+def independent_samples(values: Array) -> float:
+    """Return how many independent samples some values, (ensembles, walkers, draws), are worth."""
+    return effective_sample_size(values.reshape(-1, values.shape[-1]))
+
+
+def rhat_of_ensembles(values: Array) -> float:
+    """Return R̂ of some values between ensembles, which are independent; walkers of one are not."""
+    return split_rhat(np.swapaxes(values, 1, 2).reshape(len(values), -1))
 
 
 def _started(

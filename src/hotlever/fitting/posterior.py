@@ -20,8 +20,13 @@ import xarray as xr
 
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
-from hotlever.fitting.diagnostics import effective_sample_size, split_rhat
-from hotlever.fitting.ensembles import Chains, Gaussian, sample
+from hotlever.fitting.ensembles import (
+    Chains,
+    Gaussian,
+    independent_samples,
+    rhat_of_ensembles,
+    sample,
+)
 from hotlever.fitting.objective import Objective
 from hotlever.fitting.result import Fit
 from hotlever.fitting.rough import RoughModel, rough_model
@@ -35,8 +40,6 @@ Noise = Literal["each", "common"]
 
 #: Quantiles (%) of a predictive band: median, 68 % and 95 %.
 BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)
-#: Walkers of an ensemble: at least, and for each parameter.
-_WALKERS, _WALKERS_EACH = 24, 3
 
 
 class FitPosterior:
@@ -156,7 +159,7 @@ def sample_posterior(
         target.log_probability,
         at_optimum.linearised(),
         samples=samples,
-        walkers=walkers or max(_WALKERS, _WALKERS_EACH * len(fit.names)),
+        walkers=walkers or None,
         processes=processes,
         seed=seed,
         progress=progress,
@@ -184,15 +187,12 @@ def _dataset(fit: Fit, chains: Chains, scale: Array) -> xr.Dataset:
         at = {own: columns.get(full_name(material, own)) for own in ("n_d", "p")}
         moved = silicon.model_copy(update={own: one for own, one in at.items() if one is not None})
         columns[INVERSION] = np.broadcast_to(moved.inversion_temperature(), values.shape[:3])
-    # R̂ between ensembles, which are independent; the walkers of one are not
-    rhat = [
-        split_rhat(np.swapaxes(column, 1, 2).reshape(ensembles, -1)) for column in columns.values()
-    ]
+    rhat = [rhat_of_ensembles(column) for column in columns.values()]
     chained = {
         name: column.reshape(ensembles * walkers, draws)
         for name, column in (columns | {"log_probability": chains.log_probability}).items()
     }
-    size = [effective_sample_size(chained[name]) for name in columns]
+    size = [independent_samples(column) for column in columns.values()]
     held = [name for name in usual_parameters(fit.probe) if name not in fit.names]
     at_rest = zip(held, fit.probe.at(held).tolist(), strict=True)
     data = labelled(

@@ -28,14 +28,13 @@ def balance_names(wiring: Wiring) -> tuple[str, ...]:
     These are the potential (V) and the current into the lever (mA) of those that the paper's
     circuit does not have.
     """
-    volts = [name for name in _measured(wiring) if name != "reader"]
-    currents = _unusual(wiring)
-    return (*BALANCES, *(f"{name}_V" for name in volts), *(f"{name}_mA" for name in currents))
+    volts = tuple(f"{name}_V" for name in _measured(wiring))
+    return (*BALANCES, *volts, *(f"{name}_mA" for name in _unusual(wiring)))
 
 
 def _measured(wiring: Wiring) -> tuple[str, ...]:
-    """Return the terminals whose potential follows."""
-    return (*wiring.senses, *wiring.contacts)
+    """Return the terminals whose potential follows, without the reader of the paper's circuit."""
+    return tuple(name for name in (*wiring.senses, *wiring.contacts) if name != "reader")
 
 
 def _conducting(wiring: Wiring) -> tuple[str, ...]:
@@ -100,7 +99,6 @@ def _balances(equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array 
     volts = [
         np.tensordot(weights, x[unknowns], axes=1)
         for name in _measured(space.wiring)
-        if name != "reader"
         for unknowns, weights in [space.potential_at(name)]
     ]
     currents = [into[name] for name in _unusual(space.wiring)]
