@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 from nicegui import ui
@@ -12,7 +13,7 @@ from hotlever.app.session import Session
 MEDIA = {"": "as the files say", "vacuum": "vacuum", "air": "air"}
 
 
-class Room:
+class Room(ABC):
     """One tab of a room.
 
     Attributes
@@ -31,9 +32,9 @@ class Room:
         self._command: ui.column | None = None
         self._shown: list[str] = []
 
+    @abstractmethod
     def arguments(self) -> list[str]:
         """Return the command that does what is chosen, without the word hotlever."""
-        raise NotImplementedError
 
     def command(self) -> None:
         """Show the command line here, whenever `show_command` is called."""
