@@ -37,7 +37,9 @@ def hostile_counts() -> dict[str, int]:
     """Return how many hostile cases there are with ``make test-hostile``."""
     import test_arguments_at_random as arguments
     import test_files_at_random as files
-    import test_full_disks_and_kills as faults
+    import test_full_disks as disks
+    import test_kills as kills
+    import test_memory as memory
 
     options = [choices for _, wrong in arguments.WRONG for choices in wrong.values()]
     return {
@@ -47,8 +49,11 @@ def hostile_counts() -> dict[str, int]:
         "wrong values of theirs": sum(map(len, options)),
         "hostile argument lists of `make test-hostile`": arguments.CASES,
         "the same by a process of its own": arguments.PROCESSES,
-        "commands on a disk that is full at a random byte": len(faults.WRITERS) * faults.DISKS,
-        "kills of a batch": faults.KILLS,
+        "commands on a disk that is full at a random byte": len(disks.WRITERS) * disks.DISKS,
+        "kills of a batch on this machine": kills.KILLS["local"],
+        "kills of a batch on a cluster": kills.KILLS["cluster"],
+        "kills of a posterior": kills.KILLS["posterior"],
+        "rows of the data whose memory is measured": memory.ROWS,
     }
 
 

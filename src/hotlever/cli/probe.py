@@ -118,7 +118,7 @@ def _fault_drawn(outputs: Outputs, plot: Path | None) -> Iterator[None]:
 
 
 def _described(probe: Probe, layout: Layout, name: str) -> list[str]:
-    from hotlever.probe import mesh_layout
+    from hotlever.lever.meshing import chosen_space
 
     circuit, silicon = probe.circuit, probe.heater_silicon
     x, y = layout.tip
@@ -143,7 +143,7 @@ def _described(probe: Probe, layout: Layout, name: str) -> list[str]:
             if silicon is None
             else [f"inversion temperature of the heater: {silicon.inversion_temperature():.1f} K"]
         ),
-        f"mesh: {mesh_layout(layout, wiring=probe.wiring).elements.nelements} triangles",
+        f"mesh: {chosen_space(probe).mesh.elements.nelements} triangles",
     ]
 
 

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,12 +23,13 @@ from hotlever.lever.following import Follower
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.heat_in_air import AroundLever
 from hotlever.lever.held import HeldFollower, pin_along
+from hotlever.lever.meshing import chosen_space, flat_space
 from hotlever.lever.pinned import state_at_bias
 from hotlever.lever.sensitivities import sensitivities_of
 from hotlever.lever.space import TIP, Pin
 from hotlever.lever.state import State
 from hotlever.materials import Material
-from hotlever.probe import Circuit, Layout, MeshOptions, Probe, Wiring, mesh_layout
+from hotlever.probe import Circuit, Layout, MeshOptions, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
@@ -54,6 +54,8 @@ class Lever:
     probe : Probe or path
         A probe, or the name of a probe file.
     mesh : MeshOptions, optional
+        Taken as they are; by default the usual mesh is refined where it is not fine enough, see
+        `hotlever.lever.meshing`.
     space : FullSpace, optional
         Mesh and operators of another lever of the same shape.
     progress : callable, optional
@@ -78,7 +80,9 @@ class Lever:
         progress: Progress | None = None,
     ) -> None:
         self.probe, self._mesh = Probe.given(probe), mesh or MeshOptions()
-        self.space = space or _flat_space(self.probe.layout(), self._mesh, self.probe.wiring)
+        if space is None and mesh is None:
+            space = chosen_space(self.probe)
+        self.space = space or flat_space(self.probe.layout(), self._mesh, self.probe.wiring)
         if (self.space.air is None) != (self.medium == "vacuum"):
             self.space = self._surrounded(self.space, progress)
         self._prepare()
@@ -373,12 +377,6 @@ class Lever:
             end = f"{self.equations.limit[1]}, with the tip at {branch.hottest_K:.0f} K"
             raise ComputationError(f"V_l rises until {end}: there is no knee")
         return self._dataset(branch, branch.u_at([knee.tip_K]), [])
-
-
-@lru_cache(maxsize=4)
-def _flat_space(layout: Layout, mesh: MeshOptions, wiring: Wiring) -> FullSpace:
-    """Return mesh and operators of a layout in vacuum; levers of one shape share them."""
-    return FullSpace(mesh_layout(layout, mesh, wiring), wiring=wiring)
 
 
 def sweep(

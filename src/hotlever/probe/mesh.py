@@ -84,6 +84,22 @@ class ProbeMesh:
     region: Index
     terminal_facets: Mapping[str, Index]
 
+    def refined(self, triangles: Index) -> ProbeMesh:
+        """Return the mesh with these triangles, by their numbers, split into four.
+
+        Of their neighbours, some are split too, so that the mesh stays conforming.
+        """
+        parts = {str(place): self.region == place for place in range(len(self.layout.regions))}
+        named = self.elements.with_subdomains(
+            {name: np.flatnonzero(inside) for name, inside in parts.items()}
+        )
+        elements = named.refined(triangles)
+        region = np.empty(elements.nelements, dtype=self.region.dtype)
+        for name in parts:
+            region[elements.subdomains[name]] = int(name)
+        elements = MeshTri(elements.p, elements.t)
+        return ProbeMesh(self.layout, elements, region, terminal_facets(elements, self.layout))
+
 
 def mesh_layout(
     layout: Layout, options: MeshOptions | None = None, wiring: Wiring | None = None
