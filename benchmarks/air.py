@@ -22,7 +22,7 @@ from hotlever.air.surface import PanelOptions
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.fitting.models import reduced_model
 from hotlever.lever import Lever
-from hotlever.lever.atlas import BOX, material_in_box
+from hotlever.lever.box import PAPER, Box
 from hotlever.lever.reduction import cached_reduction
 from hotlever.probe import Probe
 from hotlever.probe.surroundings import Surroundings
@@ -94,7 +94,7 @@ def accuracy(air, model, count=8):
     rng = np.random.default_rng(5)
     rows = []
     for _ in range(count):
-        material = material_in_box(air.probe.material, rng.random(len(BOX)))
+        material = Box.of(air.probe).probe(air.probe, rng.random(len(PAPER))).material
         material = material.with_(c_kappa=rng.uniform(0.6, 0.76))
         full = air.with_material(material).sweep(BIAS)
         current, reader, tip = model.predict(air.with_material(material).probe).values

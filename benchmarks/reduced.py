@@ -16,7 +16,7 @@ from hotlever.cache import CACHE_VARIABLE
 from hotlever.fitting import fit, read_measurement
 from hotlever.fitting.models import full_model, reduced_model, shown_at_bias
 from hotlever.lever import Lever
-from hotlever.lever.atlas import BOX, material_in_box
+from hotlever.lever.box import PAPER, Box
 from hotlever.lever.branch import Reach
 from hotlever.lever.certificate import estimated_error
 from hotlever.lever.reduction import cached_reduction
@@ -37,7 +37,7 @@ BIASES = 5
 
 
 def random_material(lever, rng):
-    material = material_in_box(lever.probe.material, rng.random(len(BOX)))
+    material = Box.of(lever.probe).probe(lever.probe, rng.random(len(PAPER))).material
     return material.with_(c_kappa=rng.uniform(0.6, 0.76))
 
 

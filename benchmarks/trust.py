@@ -14,7 +14,7 @@ from hotlever.errors import ComputationError
 from hotlever.fitting import Measurement, fit, read_measurement
 from hotlever.fitting.models import ForwardModel, forward_model
 from hotlever.lever import Lever
-from hotlever.lever.atlas import BOX, material_in_box
+from hotlever.lever.box import PAPER, Box
 from hotlever.lever.lever import COARSE
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
@@ -97,7 +97,7 @@ def starts(count, model, name):
     best = fit(data, probe, model=REDUCED)
     apart = []
     for _ in range(count):
-        material = material_in_box(probe.material, rng.random(len(BOX)))
+        material = Box.of(probe).probe(probe, rng.random(len(PAPER))).material
         material = material.with_(c_kappa=rng.uniform(0.4, 1.0))
         try:
             found = fit(data, probe.model_copy(update={"material": material}), model=model)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError
-from hotlever.lever.atlas import BOX, material_in_box
+from hotlever.lever.box import PAPER, Box
 from hotlever.lever.branch import Reach
 from hotlever.lever.certificate import certified_branch, estimated_error
 from hotlever.lever.reduction import ReductionOptions, reduce
@@ -22,12 +22,11 @@ def poor(coarse):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_estimate_bounds_the_true_error_without_exaggeration(coarse, poor, seed):
-    shares = np.random.default_rng(seed).uniform(-0.3, 1.3, len(BOX))
-    material = material_in_box(coarse.probe.material, shares)
-    there = coarse.with_material(material).probe
+    shares = np.random.default_rng(seed).uniform(-0.3, 1.3, len(PAPER))
+    there = Box.of(coarse.probe).probe(coarse.probe, shares)
     branch = poor.linearised(there, Reach(coarse.circuit, 11.0)).branch
     u = np.linspace(3.0, 0.98 * branch.end_u, 7)
-    full = coarse.with_material(material).branch(293.0 + u[-1] ** 2 + 50.0)
+    full = coarse.with_probe(there).branch(293.0 + u[-1] ** 2 + 50.0)
     away = (full.curve(u) - branch.curve(u))[:, :3]
     true = np.abs(at_fixed_bias(branch.curve(u, 1), u, coarse.circuit, away[:, :, None]))[..., 0]
     estimate = estimated_error(coarse, branch, u)
@@ -42,13 +41,14 @@ def test_a_reduced_lever_by_itself_is_accurate_or_refused(coarse, reduced, seed)
     """Materials over the full bounds of a fit, and every second time those it was made for."""
     rng = np.random.default_rng(seed)
     if seed % 2:
-        material = material_in_box(coarse.probe.material, rng.uniform(0.0, 1.0, len(BOX)))
+        shares = rng.uniform(0.0, 1.0, len(PAPER))
+        probe = Box.of(coarse.probe).probe(coarse.probe, shares)
     else:
-        known = {name: OF_SILICON[name] for name in BOX}
-        material = coarse.probe.material.with_(
+        known = {name: OF_SILICON[name] for name in PAPER}
+        probe = coarse.probe.with_(
             **{name: rng.uniform(one.lower, one.upper) for name, one in known.items()}
         )
-    lever = coarse.with_material(material)
+    lever = coarse.with_probe(probe)
     try:
         branch = certified_branch(lever, reduced, 6.0)
     except ComputationError:

@@ -12,7 +12,7 @@ from hotlever.cache import CACHE_VARIABLE, store_arrays, stored
 from hotlever.fitting import Measurement, fit
 from hotlever.fitting.models import reduced_model
 from hotlever.lever import Lever
-from hotlever.lever.atlas import BOX, material_in_box
+from hotlever.lever.box import Box
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced import ReducedLever
@@ -39,7 +39,8 @@ def test_it_follows_the_full_lever_in_its_box(request, medium, seed):
     names = ("coarse", "reduced") if medium == "vacuum" else ("in_air", "reduced_in_air")
     lever, reduced = map(request.getfixturevalue, names)
     rng = np.random.default_rng(seed)
-    material = material_in_box(lever.probe.material, rng.random(len(BOX)))
+    box = Box.of(lever.probe)
+    material = box.probe(lever.probe, rng.random(len(box.names))).material
     material = material.with_(c_kappa=rng.uniform(0.6, 0.76))
     full = lever.with_material(material).sweep(BIAS, sensitivities=seed == 0)
     found = predicted(reduced, lever, material)
@@ -53,9 +54,10 @@ def test_it_follows_the_full_lever_in_its_box(request, medium, seed):
 
 @pytest.mark.parametrize("seed", range(2))
 def test_at_the_few_points_alone_it_is_nearly_as_good(coarse, reduced, seed):
-    shares = np.random.default_rng(seed).random(len(BOX))
-    full = coarse.with_material(material_in_box(coarse.probe.material, shares))
-    branch = reduced.branch(full.probe.material, Reach(full.circuit, BIAS[-1]))
+    box = Box.of(coarse.probe)
+    shares = np.random.default_rng(seed).random(len(box.names))
+    full = coarse.with_probe(box.probe(coarse.probe, shares))
+    branch = reduced.branch(full.probe, Reach(full.circuit, BIAS[-1]))
     u = branch.read(full.circuit, BIAS).u
     sweep = full.sweep(BIAS)
     np.testing.assert_allclose(branch.shown(u)["current_mA"], sweep.current_mA, rtol=1e-3)
@@ -65,7 +67,8 @@ def test_at_the_few_points_alone_it_is_nearly_as_good(coarse, reduced, seed):
 
 def test_corrected_by_the_full_lever_it_is_exact_to_first_order(coarse, reduced):
     """Beside the box, where it is wrong by more than it should be."""
-    material = material_in_box(coarse.probe.material, np.array([1.3, 0.5, -0.2, 1.2, 0.5]))
+    shares = np.array([1.3, 0.5, -0.2, 1.2, 0.5])
+    material = Box.of(coarse.probe).probe(coarse.probe, shares).material
     model, probe = reduced_model(coarse, reduced, BIAS), coarse.with_material(material).probe
     first = model.predict(probe)
     exact = as_array(coarse.with_material(material).sweep(BIAS))
@@ -166,10 +169,11 @@ def test_other_geometries_have_other_files(coarse, reduced, tmp_path, monkeypatc
 def write_many_times(arguments):
     folder, count = arguments
     lever = Lever(Probe.reference(), COARSE)
-    path = folder / "one.npz"
+    path, box = folder / "one.npz", Box.of(lever.probe)
     space = None
     for _ in range(count):
-        space = stored(path, lambda a: ReducedLever.from_arrays(lever.space, 293.0, a)) or space
+        found = stored(path, lambda a: ReducedLever.from_arrays(lever.space, 293.0, box, a))
+        space = found or space
         if space is not None:
             store_arrays(path, space.arrays())
     return space is not None
@@ -179,8 +183,9 @@ def test_two_processes_may_write_the_same_file(coarse, reduced, tmp_path):
     store_arrays(tmp_path / "one.npz", reduced.arrays())
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         assert all(pool.map(write_many_times, [(tmp_path, 20)] * 2))
+    box = Box.of(coarse.probe)
     loaded = stored(
-        tmp_path / "one.npz", lambda a: ReducedLever.from_arrays(coarse.space, 293.0, a)
+        tmp_path / "one.npz", lambda a: ReducedLever.from_arrays(coarse.space, 293.0, box, a)
     )
     assert loaded is not None
     assert [path.name for path in tmp_path.iterdir()] == ["one.npz"]

@@ -26,6 +26,7 @@ from hotlever.cli.options import load_probe
 from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.lever import Branch, Lever
+from hotlever.lever.box import is_papers
 from hotlever.lever.branch import Reach
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import COARSE
@@ -213,7 +214,7 @@ def prepare(report: Report, folder: Path, name: str | None, changes: dict[str, A
     with suppress(OSError, AttributeError):
         os.nice(_NICE)  # sliders come first
     probe = _probe(folder, name, _stamp(folder, name), tuple(sorted(changes.items())))
-    if not can_be_reduced(probe, ()):
+    if not _can_be_reduced(probe):
         return False
     lever = Lever(probe, progress=report.progress("air"))
     cached_reduction(lever, report.progress("live sliders"))
@@ -248,7 +249,7 @@ def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
         "sliders": sliders,
         "medium": probe.surroundings.medium,
         "gap_um": probe.surroundings.surface_gap_um,
-        "reduced": can_be_reduced(probe, ()),
+        "reduced": _can_be_reduced(probe),
     }
 
 
@@ -280,13 +281,18 @@ def _quick(probe: Probe, most: float, is_reduced: bool) -> LiveLever:
     if reduced is not None:
         full, small = reduced
         try:
-            branch = small.branch(probe.material, Reach(probe.circuit, most))
+            branch = small.branch(probe, Reach(probe.circuit, most))
             expanded = small.all_points.expanded
             return LiveLever(REDUCED, full.space, probe.circuit, branch, expanded)
         except HotleverError:
             pass  # beyond what it is made for
     lever = Lever(probe, COARSE)
     return LiveLever(COARSE_MODEL, lever.space, probe.circuit, _branch(lever, most), lambda x: x)
+
+
+def _can_be_reduced(probe: Probe) -> bool:
+    """Whether a reduced lever serves wherever sliders move: its ranges must not move with them."""
+    return is_papers(probe) and can_be_reduced(probe, ())
 
 
 def _geometry(probe: Probe) -> Probe:

@@ -20,7 +20,7 @@ from hotlever.fitting.estimation import fit
 from hotlever.fitting.measurement import Measurement, read_measurement, with_measured_circuit
 from hotlever.fitting.options import FitOptions
 from hotlever.lever.lever import Lever
-from hotlever.lever.reduction import cached_reduction
+from hotlever.lever.reduction import cached_reduction, can_be_reduced
 from hotlever.probe import Probe
 from hotlever.types import Progress
 
@@ -233,15 +233,18 @@ def _reduced(
         measured, _ = with_measured_circuit(probe, measurement, options.medium)
         geometry = measured.circuit.base_temperature_K, measured.surroundings.medium
         if geometry not in known:
-            known[geometry] = guarded(_reduce, (measured, progress))
+            known[geometry] = guarded(_reduce, (measured, options, progress))
         return known[geometry]
 
     results = {name: guarded(reduce_one, (data,)) for name, data in waiting.items()}
     return {name: error for name, error in results.items() if error is not None}
 
 
-def _reduce(probe: Probe, progress: Progress | None) -> None:
-    cached_reduction(Lever(probe), progress=progress)
+def _reduce(probe: Probe, options: FitOptions, progress: Progress | None) -> None:
+    own = options.of(probe)
+    names = {*own.usual, *own.varied}
+    if can_be_reduced(probe, names):
+        cached_reduction(Lever(probe), progress, names)
 
 
 def _fitted(measurement: Measurement, probe: Probe, options: FitOptions) -> dict[str, Any]:

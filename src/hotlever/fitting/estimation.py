@@ -22,7 +22,7 @@ from hotlever.fitting.models import ForwardModel, Prediction, forward_model
 from hotlever.fitting.options import FitOptions
 from hotlever.fitting.residuals import Residuals
 from hotlever.fitting.result import Fit, band_dataset, statements
-from hotlever.fitting.start import starting_material
+from hotlever.fitting.start import starting_probe
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.reduced import ReducedLever
@@ -209,9 +209,7 @@ def _attempts(
 ) -> Iterator[tuple[ForwardModel, Probe]]:
     """Yield the models and places to start from, each made when the last has failed."""
     if isinstance(forward.fast, ReducedLever):
-        atlas = forward.fast.atlas
-        start = starting_material(atlas, probe.circuit, probe.material, options.material, residuals)
-        yield forward, probe.model_copy(update={"material": start})
+        yield forward, starting_probe(forward.fast.atlas, probe, options.material, residuals)
         # far from the parameters it was made for, a reduced lever may fail where others do not
         forward = replace(forward, fast=SimilarLevers(Lever(probe, COARSE)), offset=None)
     yield forward, probe

@@ -272,7 +272,7 @@ def full_model(lever: Lever, bias: Array) -> ForwardModel:
 
 def reduced_model(lever: Lever, reduced: ReducedLever, bias: Array) -> ForwardModel:
     """Return a reduced lever, corrected by the full one, as forward model."""
-    return ForwardModel(reduced, SimilarLevers(lever), bias)
+    return ForwardModel(reduced, SimilarLevers(lever), bias, reduced.names)
 
 
 def forward_model(
@@ -298,6 +298,6 @@ def forward_model(
     lever, reduced = Lever(probe), None
     names = usual_parameters(probe) if names is None else names
     if can_be_reduced(probe, names):
-        reduced = cached_reduction(lever) if reduce else known_reduction(lever)
+        reduced = cached_reduction(lever, names=names) if reduce else known_reduction(lever, names)
     fast: BranchSolver = SimilarLevers(Lever(probe, COARSE)) if reduced is None else reduced
     return ForwardModel(fast, SimilarLevers(lever), bias, names)

@@ -13,7 +13,6 @@ from hotlever.lever.curve import spline_through
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduced import ReducedLever
 from hotlever.lever.reduction import cached_reduction, can_be_reduced
-from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
@@ -53,7 +52,7 @@ def rough_model(probe: Probe, names: list[str], bias: Array) -> RoughModel:
     """
     if can_be_reduced(probe, names):
         lever = Lever(probe)
-        return OtherMaterials(lever, cached_reduction(lever), bias)
+        return OtherMaterials(lever, cached_reduction(lever, names=names), bias)
     return SimilarProbes(probe, tuple(names), bias)
 
 
@@ -65,10 +64,9 @@ class OtherMaterials:
     full lever's branch.
     """
 
-    names = tuple(PARAMETERS)
-
     def __init__(self, lever: Lever, reduced: ReducedLever, bias: Array) -> None:
         model, probe = reduced_model(lever, reduced, bias), lever.probe
+        self.names = model.names
         first = model.predict(probe)
         exact = model.confirmed(first)
         at = exact.predict(probe, first)
@@ -79,7 +77,7 @@ class OtherMaterials:
         self._branch = exact.offset.added(at.linearised.branch, probe.at(exact.names))
         self._u = self._branch.u[1:]
         few, found = reduced.solved(
-            probe.material, self._u, at.linearised.branch.x[:, 1:], at.linearised.factors
+            probe, self._u, at.linearised.branch.x[:, 1:], at.linearised.factors
         )
         self._shown = few.observed(found.x).T
 
@@ -87,7 +85,7 @@ class OtherMaterials:
     def predict(self, probe: Probe) -> Array:
         """See `RoughModel`."""
         guess = self._near.states(probe)[:, 1:]
-        few, found = self._reduced.solved(probe.material, self._u, guess, self._near.factors)
+        few, found = self._reduced.solved(probe, self._u, guess, self._near.factors)
         ratio = few.observed(found.x).T / self._shown
         # without power the ratio is that of a barely warm lever
         ratio = np.concatenate([ratio[:1], ratio])
@@ -100,7 +98,7 @@ class OtherMaterials:
         reach = Reach(probe.circuit, float(self._bias.max()))
         branch = self._reduced.linearised(probe, reach).branch
         u = branch.u[np.linspace(1, branch.u.size - 1, 4).astype(int)]
-        lever = self._lever.with_material(probe.material)
+        lever = self._lever.with_probe(probe)
         return float(estimated_error(lever, branch, u)[2].max())
 
 

@@ -12,9 +12,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from hotlever.fitting.residuals import Residuals
-from hotlever.lever.atlas import BOX, Atlas, material_in_box, place_in_box
-from hotlever.materials import Material
-from hotlever.probe import Circuit
+from hotlever.lever.atlas import Atlas
+from hotlever.probe import Probe
 from hotlever.types import Array
 
 #: c_κ is sought in this range; the others in their box, and a little beyond.
@@ -26,53 +25,53 @@ _COMPARED, _IMPROVED = 64, 3
 _SOFT = 0.03
 
 
-def quick_prediction(atlas: Atlas, circuit: Circuit, material: Material, bias: Array) -> Array:
+def quick_prediction(atlas: Atlas, probe: Probe, bias: Array) -> Array:
     """Return I_h (mA), V_r (V) and T_tip (K) at some biases, (3, n), read off an atlas.
 
     Beyond its ends the curves go on level.
     """
-    lever, current, reader = atlas.shown(material).T
-    rising = np.maximum.accumulate(circuit.bias(lever, current))
-    tip = circuit.base_temperature_K + atlas.u**2
+    lever, current, reader = atlas.shown(probe).T
+    rising = np.maximum.accumulate(probe.circuit.bias(lever, current))
+    tip = probe.circuit.base_temperature_K + atlas.u**2
     return np.stack([np.interp(bias, rising, values) for values in (current, reader, tip)])
 
 
-def starting_material(
-    atlas: Atlas, circuit: Circuit, given: Material, varied: Sequence[str], residuals: Residuals
-) -> Material:
-    """Find a material to start a fit from.
+def starting_probe(
+    atlas: Atlas, given: Probe, varied: Sequence[str], residuals: Residuals
+) -> Probe:
+    """Find a probe to start a fit from.
 
     The parameters that are not varied stay as they are in `given`, itself one of the candidates.
     """
-    box = [name for name in varied if name in BOX]
-    free = [*box, *(["c_kappa"] if "c_kappa" in varied else [])]
-    home = place_in_box(given)
+    ranges = atlas.box
+    box = [name for name in varied if name in ranges.names]
+    scale = [name for name in varied if name == ranges.scale]
+    home, places = ranges.place(given), [ranges.names.index(name) for name in box]
 
-    def material(point: Array) -> Material:
+    def probe(point: Array) -> Probe:
         shares = home.copy()
-        shares[[list(BOX).index(name) for name in box]] = point[: len(box)]
-        moved = material_in_box(given, shares) if box else given
-        values = {name: getattr(moved, name) for name in box}
-        if "c_kappa" in free:
-            low, high = _C_KAPPA
-            values["c_kappa"] = low + float(point[-1]) * (high - low)
-        return given.with_(**values)
+        shares[places] = point[: len(box)]
+        moved = ranges.values(shares)
+        values = {name: moved[name] for name in box}
+        low, high = _C_KAPPA
+        values |= {name: low + float(point[-1]) * (high - low) for name in scale}
+        return given.moved(values)
 
-    def differences(of: Material) -> Array:
-        values = quick_prediction(atlas, circuit, of, residuals.bias)[residuals.rows]
+    def differences(of: Probe) -> Array:
+        values = quick_prediction(atlas, of, residuals.bias)[residuals.rows]
         return np.asarray(((values - residuals.data) / residuals.largest)[residuals.present])
 
-    def badness(of: Material) -> float:
+    def badness(of: Probe) -> float:
         # one glitch must not decide
         return float(np.sum(np.log1p((differences(of) / _SOFT) ** 2)))
 
     from scipy.stats import qmc  # takes long, and most fits start elsewhere
 
-    candidates = qmc.Sobol(len(free), seed=0).random(_COMPARED)
-    best = sorted(candidates, key=lambda point: badness(material(point)))[:_IMPROVED]
+    candidates = qmc.Sobol(len(box) + len(scale), seed=0).random(_COMPARED)
+    best = sorted(candidates, key=lambda point: badness(probe(point)))[:_IMPROVED]
     improved = [
         least_squares(
-            lambda point: differences(material(point)),
+            lambda point: differences(probe(point)),
             point,
             bounds=(-_BEYOND, 1.0 + _BEYOND),
             loss="cauchy",
@@ -82,4 +81,4 @@ def starting_material(
         ).x
         for point in best
     ]
-    return min([given, *map(material, improved)], key=badness)
+    return min([given, *map(probe, improved)], key=badness)

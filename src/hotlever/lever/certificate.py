@@ -32,7 +32,7 @@ def certified_branch(
 ) -> Branch:
     """Return the branch of a lever from its reduced one, where that is as accurate as asked for.
 
-    A reduced lever is trained for some materials (``BOX`` in ``lever/atlas.py``) and may be off by
+    A reduced lever is trained for some materials (`hotlever.lever.box.Box`) and may be off by
     kelvins for others within the bounds of a fit. Fits are confirmed by the full lever; by itself
     a reduced one is used through this function only.
 

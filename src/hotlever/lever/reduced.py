@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +20,7 @@ import numpy as np
 
 from hotlever.lever.air_loss import AirLoss
 from hotlever.lever.atlas import Atlas
+from hotlever.lever.box import Box
 from hotlever.lever.branch import Branch, Reach
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.following import branch_of
@@ -29,7 +30,6 @@ from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
 from hotlever.lever.pinned import Pinned
 from hotlever.lever.sensitivities import Linearised
 from hotlever.lever.space import AirTangent, LinearMap, Pin, Space, Tangent, at_some
-from hotlever.materials import PARAMETERS, Material
 from hotlever.probe import Circuit, Probe
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
@@ -40,6 +40,8 @@ _NEARLY = NewtonOptions(tolerance=1e-2, keep_while=0.2, max_iterations=12)
 _DONE = NewtonOptions(tolerance=1e-3, keep_while=0.5, max_iterations=12)
 
 
+#: What is stored of an atlas.
+_OF_ATLAS = ("u", "surface", "grows", "scale")
 # Equations on the few points, and what Newton's method found.
 Solved = tuple[LeverEquations, NewtonResult]
 
@@ -251,15 +253,20 @@ class ReducedLever:
     atlas: Atlas
     base_temperature_K: float
 
-    def equations(self, material: Material, *, few: bool = False) -> LeverEquations:
-        """Return the equations of a material at all points, or at the few."""
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters that it is made for."""
+        return self.atlas.box.parameters
+
+    def equations(self, probe: Probe, *, few: bool = False) -> LeverEquations:
+        """Return the equations of a probe's materials at all points, or at the few."""
         space = self.few_points if few else self.all_points
         circuit = Circuit(base_temperature_K=self.base_temperature_K)
-        return LeverEquations(space, material.kinds, circuit)
+        return LeverEquations(space, probe.kinds, circuit)
 
     @one_blas_thread
-    def solved(self, material: Material, u: Array, guess: Array, factors: Any = None) -> Solved:
-        """Solve states of a material, (size + 1, k), on the few points.
+    def solved(self, probe: Probe, u: Array, guess: Array, factors: Any = None) -> Solved:
+        """Solve states of a probe's materials, (size + 1, k), on the few points.
 
         They are given by u = √(T_tip − T_base) above zero; the factors may be of states nearby.
 
@@ -268,26 +275,26 @@ class ReducedLever:
         NewtonError
             If a state was not found.
         """
-        few = self.equations(material, few=True)
+        few = self.equations(probe, few=True)
         return few, find_roots(Pinned(few, u**2), guess, _NEARLY, factors)
 
     @one_blas_thread
-    def branch(self, material: Material, reach: Reach) -> Branch:
-        """Return the branch of a material at the few points: within 0.1 K, in a third of the time.
+    def branch(self, probe: Probe, reach: Reach) -> Branch:
+        """Return a probe's branch at the few points: within 0.1 K, in a third of the time.
 
         Raises
         ------
         NewtonError
             If a state was not found.
         """
-        u, guess = self._start(material, reach)
-        few, found = self.solved(material, u, guess)
+        u, guess = self._start(probe, reach)
+        few, found = self.solved(probe, u, guess)
         return branch_of(few, u, found)
 
-    def _start(self, material: Material, reach: Reach) -> tuple[Array, Array]:
+    def _start(self, probe: Probe, reach: Reach) -> tuple[Array, Array]:
         """Return u of the states that suffice, and guesses of them."""
-        count = reach.count(self.atlas.shown(material))
-        return self.atlas.u[1:count], self.atlas.states(material)[:, 1:count]
+        count = reach.count(self.atlas.shown(probe))
+        return self.atlas.u[1:count], self.atlas.states(probe)[:, 1:count]
 
     @one_blas_thread
     def linearised(
@@ -295,20 +302,21 @@ class ReducedLever:
         probe: Probe,
         reach: Reach,
         near: Linearised | None = None,
-        names: tuple[str, ...] = tuple(PARAMETERS),
+        names: tuple[str, ...] | None = None,
     ) -> Linearised:
         """Solve the branch of a probe of another material, with its derivatives by the material.
 
         It starts from a branch of a similar material, or from the atlas; see `Lever.linearised`.
         """
-        if not set(names) <= set(PARAMETERS):
-            raise ValueError("a reduced lever has derivatives by the material only")
+        names = self.names if names is None else names
+        if not set(names) <= set(self.names):
+            raise ValueError(f"a reduced lever has derivatives by {', '.join(self.names)} only")
         if near is None:
-            (u, guess), factors = self._start(probe.material, reach), None
+            (u, guess), factors = self._start(probe, reach), None
         else:
             u, guess, factors = near.branch.u[1:], near.states(probe)[:, 1:], near.factors
-        few, found = self.solved(probe.material, u, guess, factors)
-        every = self.equations(probe.material)
+        few, found = self.solved(probe, u, guess, factors)
+        every = self.equations(probe)
         found = find_roots(Pinned(every, u**2), found.x, _DONE, found.factors)
         # derivatives by the material are taken at the few points: exact ones cost too much here
         branch = branch_of(every, u, found)
@@ -325,14 +333,16 @@ class ReducedLever:
             "lift": every.lift,
             "points": self.points,
             "weights": self.few_points.weights[:, 0],
-            **{f"atlas_{name}": np.asarray(values) for name, values in vars(self.atlas).items()},
+            "low": self.atlas.box.low,
+            "high": self.atlas.box.high,
+            **{f"atlas_{name}": np.asarray(getattr(self.atlas, name)) for name in _OF_ATLAS},
         }
 
     @classmethod
     def from_arrays(
-        cls, full: FullSpace, base_temperature_K: float, arrays: Mapping[str, Array]
+        cls, full: FullSpace, base_temperature_K: float, box: Box, arrays: Mapping[str, Array]
     ) -> ReducedLever:
-        """Make a reduced lever of stored arrays.
+        """Make a reduced lever of stored arrays; of the box, they have the ranges themselves.
 
         Raises
         ------
@@ -342,8 +352,6 @@ class ReducedLever:
         every = ReducedSpace(full, arrays["modes_T"], arrays["modes_V"], arrays["lift"])
         points = arrays["points"].astype(np.intp)
         few = every.at_points(points, arrays["weights"])
-        known: dict[str, Any] = {
-            name: arrays[f"atlas_{name}"] for name in Atlas.__dataclass_fields__
-        }
-        atlas = Atlas(**known)
+        known: dict[str, Any] = {name: arrays[f"atlas_{name}"] for name in _OF_ATLAS}
+        atlas = Atlas(replace(box, low=arrays["low"], high=arrays["high"]), **known)
         return cls(every, few, points, atlas, base_temperature_K)

@@ -10,13 +10,15 @@ import numpy as np
 from scipy.optimize import nnls
 
 from hotlever.cache import cache_file, store_arrays, stored
-from hotlever.lever.atlas import BOX, Atlas, material_in_box
+from hotlever.lever.atlas import Atlas
+from hotlever.lever.box import C_KAPPA, Box
 from hotlever.lever.equations import SHOWN
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduced import ReducedLever, ReducedSpace
 from hotlever.lever.sensitivities import Linearised
-from hotlever.materials import PARAMETERS
+from hotlever.materials import full_name
 from hotlever.probe import Probe
+from hotlever.probe.parameters import of_materials
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index, Progress
 
@@ -55,77 +57,93 @@ class ReductionOptions:
 
 
 def can_be_reduced(probe: Probe, names: Collection[str]) -> bool:
-    """Return whether a reduced lever serves: of one geometry, for the paper's silicon.
+    """Return whether a reduced lever serves: of one geometry, for parameters of its materials.
 
     With dimensions among the parameters it does not, since its modes are those of one geometry, nor
-    with other materials, for which there is no box of parameters to train it in, nor in another
-    circuit than the paper's.
+    in another circuit than the paper's.
     """
-    return set(names) <= set(PARAMETERS) and not probe.materials and probe.circuit.is_plain
+    return set(names) <= set(of_materials(probe)) and probe.circuit.is_plain
 
 
 @one_blas_thread
 def reduce(
-    lever: Lever, options: ReductionOptions | None = None, progress: Progress | None = None
+    lever: Lever,
+    options: ReductionOptions | None = None,
+    progress: Progress | None = None,
+    names: Collection[str] = (),
 ) -> ReducedLever:
     """Make the reduced lever of a lever's geometry, medium and base temperature.
 
     Parameters
     ----------
     lever : Lever
-        Its material and circuit do not matter.
+        Its circuit does not matter, nor the values of the paper's silicon; others are where the
+        ranges of parameters are.
     options : ReductionOptions, optional
     progress : callable, optional
         Called with the parameter sets done and their number.
+    names : collection of str
+        Parameters of the materials that vary beside those that a fit usually does.
 
     Raises
     ------
     ValueError
-        If the lever has named materials or other circuits, see `can_be_reduced`.
+        If the lever cannot be reduced, see `can_be_reduced`.
     """
-    if not can_be_reduced(lever.probe, ()):
-        raise ValueError("a reduced lever is of the paper's silicon and circuit only")
+    if not can_be_reduced(lever.probe, names):
+        raise ValueError("a reduced lever is in the paper's circuit, for materials that vary")
     from scipy.stats import qmc  # takes long, and most commands reduce nothing
 
-    options = options or ReductionOptions()
+    options, box = options or ReductionOptions(), Box.of(lever.probe, names)
     training = []
-    shares = qmc.Sobol(len(BOX), seed=options.seed).random(options.parameter_sets)
+    shares = qmc.Sobol(len(box.names), seed=options.seed).random(options.parameter_sets)
     for done, row in enumerate(shares, start=1):
-        training.append(_trained(lever.with_material(material_in_box(lever.probe.material, row))))
+        training.append(_trained(lever.with_probe(box.probe(lever.probe, row)), box))
         if progress is not None:
             progress(done, options.parameter_sets)
-    space = _modes(lever, training, options)
+    space = _modes(lever, training, box, options)
     points, weights = _empirical_rule(space, training, options)
     base = lever.circuit.base_temperature_K
-    few, atlas = space.at_points(points, weights), _atlas(space, training)
+    few, atlas = space.at_points(points, weights), _atlas(space, training, box)
     return ReducedLever(space, few, points, atlas, base)
 
 
-def cached_reduction(lever: Lever, progress: Progress | None = None) -> ReducedLever:
+def cached_reduction(
+    lever: Lever, progress: Progress | None = None, names: Collection[str] = ()
+) -> ReducedLever:
     """Return the reduced lever of a lever's geometry and medium, from the cache or `reduce`."""
-    reduced = known_reduction(lever)
+    reduced = known_reduction(lever, names)
     if reduced is None:
-        reduced = reduce(lever, None, progress)
-        store_arrays(_file(lever), reduced.arrays())
+        reduced = reduce(lever, None, progress, names)
+        store_arrays(_file(lever, Box.of(lever.probe, names)), reduced.arrays())
     return reduced
 
 
-def known_reduction(lever: Lever) -> ReducedLever | None:
+def known_reduction(lever: Lever, names: Collection[str] = ()) -> ReducedLever | None:
     """Return the reduced lever of a lever's geometry and medium, if it is in the cache."""
-    base = lever.circuit.base_temperature_K
-    return stored(_file(lever), lambda arrays: ReducedLever.from_arrays(lever.space, base, arrays))
+    base, box = lever.circuit.base_temperature_K, Box.of(lever.probe, names)
+    found = stored(
+        _file(lever, box), lambda arrays: ReducedLever.from_arrays(lever.space, base, box, arrays)
+    )
+    return found if found is not None and found.atlas.box.covers(lever.probe) else None
 
 
-def _file(lever: Lever) -> Path | None:
-    """Return the file of a reduced lever, named by all that it depends on."""
-    elements, air = lever.space.elements, lever.space.air
+def _file(lever: Lever, box: Box) -> Path | None:
+    """Return the file of a reduced lever, named by all that it depends on but the ranges."""
+    elements, air, probe = lever.space.elements, lever.space.air, lever.probe
+    held = {
+        full_name(material, name): value
+        for material, kind in probe.made_of.items()
+        for name, value in kind.model_dump().items()
+        if full_name(material, name) not in box.parameters
+    }
     facts = {
-        "shape": lever.probe.shape.model_dump(),
-        "tip": lever.probe.tip and lever.probe.tip.model_dump(),
+        "shape": probe.shape.model_dump(),
+        "tip": probe.tip and probe.tip.model_dump(),
         "base_temperature_K": lever.circuit.base_temperature_K,
-        "gas_conductivity": lever.probe.surroundings.gas_conductivity,
-        "n_hd": lever.probe.material.n_hd,
-        "impurity_exponent": lever.probe.material.impurity_exponent,
+        "gas_conductivity": probe.surroundings.gas_conductivity,
+        "held": held,
+        "parameters": list(box.parameters),
         "options": asdict(ReductionOptions()),
         # a change of Netgen's mesh makes a new file instead of a wrong answer
         "nodes": elements.nodes,
@@ -139,30 +157,32 @@ def _file(lever: Lever) -> Path | None:
 # --- training ---------------------------------------------------------------------------------
 
 
-def _trained(lever: Lever) -> Linearised:
+def _trained(lever: Lever, box: Box) -> Linearised:
     """Return a branch and its derivatives, without the factors: those of all branches are large."""
     found = Linearised.of(
-        lever.probe, tuple(PARAMETERS), lever.branch(HOTTEST), lambda _: True, lever.equations
+        lever.probe, box.parameters, lever.branch(HOTTEST), lambda _: True, lever.equations
     )
     return replace(found, factors=None)
 
 
-def _modes(lever: Lever, training: list[Linearised], options: ReductionOptions) -> ReducedSpace:
+def _modes(
+    lever: Lever, training: list[Linearised], box: Box, options: ReductionOptions
+) -> ReducedSpace:
     """Find the modes of states, and of their changes with parameters and along the branch."""
     full = lever.space
     hot = full.is_temperature[:-1]
     cold = training[0].branch.slopes[:, 0]
     lift = np.where(hot, 0.0, cold[:-1] / cold[-1])
-    widths = {name: high - low for name, (low, high) in BOX.items()}
-    if full.air is not None:
-        widths["c_kappa"] = _C_KAPPA_IN_AIR
+    widths = box.widths
+    if full.air is not None and box.scale:
+        widths[C_KAPPA] = _C_KAPPA_IN_AIR
     vectors = []
     for one in training:
         u = one.branch.u[1:]
         vectors.append(one.branch.x[:, 1:])
         vectors.append(one.branch.slopes[:, 1:] * (_BRANCH_STEP / (2.0 * u)))
         for name, width in widths.items():
-            change = one.changes[:, 1:, list(PARAMETERS).index(name)]
+            change = one.changes[:, 1:, box.parameters.index(name)]
             vectors.append(change * (_PARAMETER_STEP * width))
     together = np.concatenate(vectors, axis=1).T
     free = together[:, :-1] - together[:, -1:] * lift
@@ -181,12 +201,12 @@ def leading_modes(vectors: Array, count: int) -> Array:
     return scaled
 
 
-def _atlas(space: ReducedSpace, training: list[Linearised]) -> Atlas:
+def _atlas(space: ReducedSpace, training: list[Linearised], box: Box) -> Atlas:
     """Fit states and what they show at the nodes that all branches have."""
     common = training[0].branch.u
     for one in training[1:]:
         common = common[np.isin(common.round(9), one.branch.u.round(9))]
-    columns = [list(PARAMETERS).index(name) for name in BOX]
+    columns = [box.parameters.index(name) for name in box.names]
     values, slopes = [], []
     for one in training:
         here = np.flatnonzero(np.isin(one.branch.u.round(9), common.round(9)))
@@ -195,8 +215,9 @@ def _atlas(space: ReducedSpace, training: list[Linearised]) -> Atlas:
         together = np.concatenate([changes, one.shown.swapaxes(0, 1)])
         slopes.append(together[:, here][..., columns].swapaxes(0, 1))
     return Atlas.fitted(
+        box,
         common,
-        [one.probe.material for one in training],
+        [one.probe for one in training],
         np.nan_to_num(np.stack(values)),  # a lever without reader shows no V_r
         np.nan_to_num(np.stack(slopes)),
         np.append(~space.is_temperature, [True] * len(SHOWN)),

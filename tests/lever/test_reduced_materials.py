@@ -1,0 +1,112 @@
+"""Reduced levers of other materials than the paper's silicon, and batches that use them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever.cache import CACHE_VARIABLE
+from hotlever.fitting import FitOptions, Measurement, batch
+from hotlever.fitting.models import shown_at_bias
+from hotlever.lever import Lever
+from hotlever.lever.box import PAPER, Box, is_papers
+from hotlever.lever.branch import Reach
+from hotlever.lever.certificate import certified_branch
+from hotlever.lever.lever import COARSE
+from hotlever.lever.reduction import cached_reduction, known_reduction
+from hotlever.probe import Probe
+from of_materials import p_type_probe, strip_probe
+
+BIAS = np.linspace(0.05, 0.45, 9)
+
+
+@pytest.fixture(scope="module")
+def strip():
+    return Lever(strip_probe(), COARSE)
+
+
+@pytest.fixture(scope="module")
+def reduced(strip):
+    return cached_reduction(strip)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_follows_the_full_lever_and_is_certified(strip, reduced, seed):
+    box = Box.of(strip.probe)
+    shares = np.random.default_rng(seed).random(len(box.names))
+    lever = strip.with_probe(box.probe(strip.probe, shares))
+    branch = certified_branch(lever, reduced, BIAS[-1], within_K=0.02)
+    full = lever.sweep(BIAS)
+    current, _, tip = shown_at_bias(branch, lever.circuit, BIAS)[1]
+    np.testing.assert_allclose(current, full.current_mA, rtol=1e-5)
+    np.testing.assert_allclose(tip, full.tip_K, atol=0.02)
+    found = reduced.linearised(lever.probe, Reach(lever.circuit, BIAS[-1]))
+    assert found.names == reduced.names == box.names
+    with pytest.raises(ValueError, match=r"by nitride\.kappa, film\.resistivity, film\.tcr only"):
+        reduced.linearised(lever.probe, Reach(lever.circuit, 0.1), names=("thickness_um",))
+
+
+@pytest.mark.slow
+def test_boron_doped_silicon_is_as_good():
+    lever = Lever(p_type_probe(), COARSE)
+    reduced, box = cached_reduction(lever), Box.of(lever.probe)
+    for seed in range(3):
+        shares = np.random.default_rng(seed).random(len(box.names))
+        there = lever.with_probe(box.probe(lever.probe, shares))
+        bias = np.linspace(1.0, 5.0, 9)
+        branch = certified_branch(there, reduced, 5.0)
+        tip = shown_at_bias(branch, there.circuit, bias)[1][2]
+        np.testing.assert_allclose(tip, there.sweep(bias).tip_K, atol=0.1)
+
+
+def test_it_serves_where_it_was_made_for_and_a_little_beyond(strip, reduced):
+    near, far = (strip.probe.with_(**{"film.resistivity": 2e-5 * n}) for n in (1.2, 4.0))
+    assert known_reduction(strip.with_probe(near)) is not None
+    assert known_reduction(strip.with_probe(far)) is None
+    # what does not vary is part of what it depends on
+    other = strip.probe.with_(**{"film.lorenz_ratio": 2.0})
+    assert known_reduction(strip.with_probe(other)) is None
+    assert known_reduction(strip, ["film.lorenz_ratio"]) is None
+
+
+def test_the_paper_s_silicon_has_ranges_of_its_own():
+    probe = Probe.reference()
+    assert Box.of(probe).names == tuple(PAPER)
+    np.testing.assert_array_equal(Box.of(probe).low, Box.of(probe.with_(n_d=1e18)).low)
+    assert is_papers(probe)
+    assert not is_papers(probe, ["impurity_exponent"])
+    wider = Box.of(probe, ["impurity_exponent"])
+    place = wider.names.index("impurity_exponent")
+    assert wider.low[place] < 0 < wider.high[place]
+    middle = np.full(len(wider.names), 0.3)
+    np.testing.assert_allclose(wider.place(wider.probe(probe, middle)), 0.3)
+
+
+def test_a_batch_reduces_what_can_be_reduced(strip, monkeypatch):
+    made = []
+    monkeypatch.setattr(batch, "cached_reduction", lambda _, progress, names: made.append(names))
+    data, free = Measurement.of_sweep(strip.sweep(BIAS)), ("film.lorenz_ratio",)
+    for options in (FitOptions(), FitOptions(free=free), FitOptions(free=("thickness_um",))):
+        assert not batch._reduced(strip.probe, options, {"one": data}, None)
+    assert made == [set(Box.of(strip.probe).names), {*Box.of(strip.probe).names, *free}]
+
+
+@pytest.mark.slow
+def test_a_batch_of_film_levers_is_fitted(tmp_path, monkeypatch):
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+    paths, told = [], []
+    for number, resistivity in enumerate((1.8e-5, 2.2e-5)):
+        sweep = Lever(strip_probe().with_(**{"film.resistivity": resistivity})).sweep(BIAS)
+        rows = zip(BIAS, sweep.current_mA.values, sweep.tip_K.values, strict=True)
+        text = "\n".join(",".join(map(str, row)) for row in rows)
+        paths.append(tmp_path / f"film-{number}.csv")
+        paths[-1].write_text(f"V_b (V),I_h (mA),T_tip (K)\n{text}\n")
+    done = batch.fit_many(
+        *(paths, tmp_path / "fits", strip_probe()),
+        processes=1,
+        reducing=lambda *steps: told.append(steps),
+    )
+    assert not done.failures
+    assert told[-1] == (8, 8)
+    found = [one["parameters"]["film.resistivity"]["value"] for one in done.fits.values()]
+    assert found == pytest.approx([1.8e-5, 2.2e-5], rel=3e-3)
