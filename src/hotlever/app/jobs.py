@@ -35,6 +35,8 @@ class Job:
     notes : list of str
     label, done, total
         Of the last progress told.
+    shown : dict
+        What it showed last, by what it is: the ``curve`` of a fit, a ``table``.
     version : int
         Counts the changes, for pages to see that there is something new.
     """
@@ -47,6 +49,7 @@ class Job:
     label: str = ""
     done: int = 0
     total: int = 0
+    shown: dict[str, Any] = field(default_factory=dict)
     version: int = 0
     started: float = field(default_factory=time.monotonic)
     seconds: float = 0.0
@@ -74,6 +77,8 @@ class Job:
         kind, *content = message
         if kind == "progress":
             self.label, self.done, self.total = content
+        elif kind == "shown":
+            self.shown[content[0]] = content[1]
         elif content[0].startswith(_NOTE):
             self.notes = [*self.notes, content[0].removeprefix(_NOTE)][-_MOST_LINES:]
         elif content[0].startswith(_FAILURE):

@@ -6,6 +6,7 @@ The figures are those of `hotlever.figures`, the pages those of `hotlever.report
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ from hotlever.fitting.words import parameter_rows
 from hotlever.probe import Layout, Probe, mesh_layout
 from hotlever.raman import read_spectra
 from hotlever.report.fit_pages import fit_page
-from hotlever.report.page import Page
+from hotlever.report.page import Block, Page
 from hotlever.text import sentence
 
 #: Results kept, whose figures may be asked for as files.
@@ -54,16 +55,17 @@ def understood(
 
 def page(report: Report, folder: Path, kind: str, name: str) -> None:
     """Send the blocks of the page of a result, a fit or a calibration, as they are drawn."""
-    path = folder / name
-    for block in _page(kind, path, _stamp(path)).blocks:
+
+    def send(block: Block) -> None:
         drawing = {"figure": _svg(block["figure"])} if block["kind"] == "figure" else {}
         report.send("block", {**block, **drawing})
+
+    _page(kind, folder / name, send)
 
 
 def drawn(report: Report, folder: Path, kind: str, name: str, figure: str, suffix: str) -> bytes:
     """Return a figure of a result as the content of a file."""
-    path = folder / name
-    blocks = _page(kind, path, _stamp(path)).blocks
+    blocks = _page(kind, folder / name).blocks
     made = next(block["figure"] for block in blocks if block.get("name") == figure)
     return _file(made, suffix)
 
@@ -210,11 +212,23 @@ def _stamp(path: Path) -> float:
         raise InputError(f"{path.name}: no such file") from None
 
 
-@lru_cache(maxsize=_KEPT)
-def _page(kind: str, path: Path, stamp: float) -> Page:
-    if kind == "fit":
-        return fit_page(_fit(path, stamp))
-    return _calibration_page(_calibration(path, stamp))
+#: Pages of results, whose figures may be asked for as files; the latest last.
+_pages: dict[tuple[str, Path, float], Page] = {}
+
+
+def _page(kind: str, path: Path, added: Callable[[Block], None] | None = None) -> Page:
+    """Return the page of a result, telling of its blocks as soon as they are there."""
+    key = kind, path, _stamp(path)
+    if key in _pages:
+        for block in _pages[key].blocks if added is not None else ():
+            added(block)
+    elif kind == "fit":
+        _pages[key] = fit_page(_fit(path, key[2]), added=added)
+    else:
+        _pages[key] = _calibration_page(_calibration(path, key[2]), added)
+    if len(_pages) > _KEPT:
+        del _pages[next(iter(_pages))]
+    return _pages[key]
 
 
 @lru_cache(maxsize=_KEPT)
@@ -222,8 +236,10 @@ def _calibration(path: Path, stamp: float) -> Calibration:
     return read_calibration(path)
 
 
-def _calibration_page(calibration: Calibration) -> Page:
-    made = Page(f"Calibration of {calibration.measurement.path}")
+def _calibration_page(
+    calibration: Calibration, added: Callable[[Block], None] | None = None
+) -> Page:
+    made = Page(f"Calibration of {calibration.measurement.path}", added=added)
     made.text(calibration.text())
     for note in calibration.notes:
         made.text(sentence(note))
