@@ -37,6 +37,8 @@ class Job:
         Of the last progress told.
     shown : dict
         What it showed last, by what it is: the ``curve`` of a fit, a ``table``.
+    began : float
+        When, as files are stamped.
     version : int
         Counts the changes, for pages to see that there is something new.
     """
@@ -52,6 +54,7 @@ class Job:
     shown: dict[str, Any] = field(default_factory=dict)
     version: int = 0
     started: float = field(default_factory=time.monotonic)
+    began: float = field(default_factory=time.time)
     seconds: float = 0.0
 
     @property

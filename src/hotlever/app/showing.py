@@ -5,7 +5,9 @@ The figures are those of `hotlever.figures`, the pages those of `hotlever.report
 
 from __future__ import annotations
 
+import io
 import tempfile
+import zipfile
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -24,6 +26,7 @@ from hotlever.errors import InputError
 from hotlever.fitting import Fit, Measurement, read_fit, read_measurement
 from hotlever.fitting.measurement import parse_columns
 from hotlever.fitting.words import parameter_rows
+from hotlever.lever.dataset import OBSERVABLES
 from hotlever.probe import Layout, Probe, mesh_layout
 from hotlever.raman import read_spectra
 from hotlever.report.fit_pages import fit_page
@@ -32,8 +35,8 @@ from hotlever.text import sentence
 
 #: Results kept, whose figures may be asked for as files.
 _KEPT = 4
-#: Rows of a calibration's table that are shown.
-_ROWS = 12
+#: Rows of a calibration's table that are shown, and points of a measurement.
+_ROWS, _POINTS = 12, 1000
 
 
 def understood(
@@ -41,15 +44,16 @@ def understood(
 ) -> dict[str, Any]:
     """Return what a measurement file was understood as."""
     measurement = _measurement(folder, name, columns, probe)
-    seen = measurement.dataset(_probe(folder, probe).circuit)
-    made = figures.iv_curves({}, measured=seen)
+    data = measurement.dataset(_probe(folder, probe).circuit)
+    data = data.isel(bias=slice(None, None, data.bias.size // _POINTS + 1))
+    columns_shown = ("bias_V", "lever_V", *OBSERVABLES.values())
     head, *rows = measurement.understood
     return {
         "rows": [(name, *head[1:]), *rows],
         "notes": [note.replace(f"{folder}/", "") for note in measurement.notes],
         "observables": list(measurement.observables),
         "medium": measurement.medium,
-        "figure": _svg(made),
+        "data": {column: data[column].values.tolist() for column in columns_shown},
     }
 
 
@@ -167,6 +171,15 @@ def levers(report: Report, folder: Path, names: list[str]) -> dict[str, Any]:
     return {"head": [*head, "remark"], "rows": rows}
 
 
+def packed(report: Report, paths: list[Path]) -> bytes:
+    """Return files as the content of one."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in paths:
+            archive.write(path, path.name)
+    return content.getvalue()
+
+
 def _described(probe: Probe, title: str) -> dict[str, Any]:
     layout = probe.layout()
     return {
@@ -220,8 +233,9 @@ def _page(kind: str, path: Path, added: Callable[[Block], None] | None = None) -
     """Return the page of a result, telling of its blocks as soon as they are there."""
     key = kind, path, _stamp(path)
     if key in _pages:
-        for block in _pages[key].blocks if added is not None else ():
-            added(block)
+        if added is not None:
+            for block in _pages[key].blocks:
+                added(block)
     elif kind == "fit":
         _pages[key] = fit_page(_fit(path, key[2]), added=added)
     else:
