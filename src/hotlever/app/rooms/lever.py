@@ -8,16 +8,21 @@ from typing import Any
 from nicegui import ui
 
 from hotlever.app.jobs import Job, named
-from hotlever.app.page import Complaint, Work, drop_zone, figure, table, two_columns
+from hotlever.app.page import Complaint, Work, drop_zone, two_columns
 from hotlever.app.project import DRAWINGS, safe_name
+from hotlever.app.rooms.drawn import Fields, Picture
 from hotlever.app.rooms.results import FIGURE_FILES, SHOWING
 from hotlever.app.rooms.room import Room
 from hotlever.app.session import Session
-from hotlever.files import write_text
+from hotlever.files import read_text, write_text
 
 _SHAPES = {"three-leg": "three legs", "u-shape": "two legs (U)"}
 _FILE = "a probe file or a drawing"
 _DROP = "Drop a drawing here (GDSII, OASIS, DXF), or a probe file"
+
+
+#: Bytes that a probe file may have.
+_LARGEST = 1_000_000
 
 
 class LeverRoom(Room):
@@ -40,10 +45,10 @@ class LeverRoom(Room):
                 self._shape = ui.toggle(
                     _SHAPES, value=self.chosen["shape"], on_change=self._take_shape
                 ).props("no-caps dense unelevated")
-                self._fields = ui.column().classes("w-full gap-1")
+                self._fields = Fields(self._change)
             with right:
                 Work(session, self.name, self._imported)
-                self._picture = ui.column().classes("w-full gap-1")
+                self._picture = Picture(session, self.chosen, self._draw)
                 self._save()
                 with ui.expansion("The probe file").classes("w-full").props("dense"):
                     self._text = ui.textarea(on_change=self._edited).classes("w-full")
@@ -63,7 +68,7 @@ class LeverRoom(Room):
             ui.button("Save", icon="save", on_click=self._write).props("no-caps")
             ui.button("Simulate", icon="tune", on_click=self._simulate).props("no-caps outline")
             for suffix in FIGURE_FILES:
-                ui.button(suffix[1:].upper(), on_click=lambda _, s=suffix: self._draw(s)).props(
+                ui.button(suffix[1:].upper(), on_click=lambda _, s=suffix: self._give(s)).props(
                     "flat dense no-caps"
                 )
 
@@ -72,11 +77,10 @@ class LeverRoom(Room):
         drawing = self.chosen.pop("drawing", None)
         if drawing is not None:
             self._import(drawing)
-        elif self.chosen["text"] is not None:
+            return
+        if self.chosen["text"] is not None:
             self._quietly(self.chosen["text"])
-            await self._show_text()
-        else:
-            await self._show_values()
+        await self._draw(fields=True)
 
     # --- parametric -------------------------------------------------------------------------------
 
@@ -85,7 +89,7 @@ class LeverRoom(Room):
             return
         self.chosen |= {"shape": event.value, "changes": {}, "text": None}
         self._pick.set_value(None)
-        await self._show_values()
+        await self._draw(fields=True)
 
     async def _change(self, name: str, value: float | None) -> None:
         if value is None:
@@ -93,28 +97,27 @@ class LeverRoom(Room):
             return
         self.chosen["changes"] = {**self.chosen["changes"], name: value}
         self.chosen["text"] = None
-        await self._show_values(fields=False)
+        await self._draw()
 
-    async def _show_values(self, fields: bool = True) -> None:
-        call = f"{SHOWING}:probe_of_values"
-        chosen = self.chosen
+    async def _draw(self, fields: bool = False) -> None:
+        """Draw what is chosen."""
+        chosen, title = self.chosen, self._name.value
+        text = chosen["text"]
         with self.complaint.caught():
-            found = await self.session.quick.call(
-                call, chosen["shape"], chosen["changes"], self._name.value
-            )
-            self._show(found)
-            self._quietly(found["text"])
-            if fields:
-                self._show_fields(found["values"])
-
-    def _show_fields(self, values: dict[str, tuple[float, str]]) -> None:
-        self._fields.clear()
-        with self._fields:
-            for name, (value, meaning) in values.items():
-                number = ui.number(name, value=value, format="%.4g", step=value / 50)
-                number.props(f'dense outlined suffix=µm debounce=200 aria-label="{meaning}"')
-                number.classes("w-full").tooltip(meaning)
-                number.on_value_change(lambda event, n=name: self._change(n, event.value))
+            if text is not None:
+                folder = self.session.project.folder
+                drawn = await self._picture.of("probe_of_text", folder, text, title)
+            else:
+                values = chosen["shape"], chosen["changes"]
+                drawn = await self._picture.of("probe_of_values", *values, title)
+            if drawn["fault"]:
+                self.complaint.say(drawn["fault"])
+            elif text is None:
+                self._quietly(drawn["text"])
+                if fields:
+                    self._fields.show(drawn["values"])
+            self._fields.mark(drawn["fault"])
+        self.show_command()
 
     # --- a file -----------------------------------------------------------------------------------
 
@@ -135,14 +138,12 @@ class LeverRoom(Room):
             return
         with self.complaint.caught():
             path = self.session.project.path(name)
-            found = await self.session.quick.call(
-                f"{SHOWING}:probe_page", self.session.project.folder, name
-            )
+            text = read_text(path, largest=_LARGEST)
             self._name.set_value(path.name)
             self._fields.clear()
-            self._show(found)
-            self.chosen["text"] = found["text"]
-            self._quietly(found["text"])
+            self.chosen["text"] = text
+            self._quietly(text)
+            await self._draw()
 
     def _import(self, drawing: str) -> None:
         """Have a probe file proposed for a drawing."""
@@ -161,25 +162,16 @@ class LeverRoom(Room):
         self._fields.clear()
         self.chosen["text"] = path.read_text(encoding="utf-8")
         self._quietly(self.chosen["text"])
-        await self._show_text()
-        with self._picture, ui.expansion("What the drawing holds").classes("w-full"):
-            ui.label(job.result).classes("lines")
-            picture = self.session.project.path(f"{path.stem}.svg")
-            figure(picture.read_text(encoding="utf-8"), "All outlines of the drawing, by layer")
+        await self._draw()
+        outlines = self.session.project.path(f"{path.stem}.svg").read_text(encoding="utf-8")
+        self._picture.add(job.result, outlines)
 
     async def _edited(self, event: Any) -> None:
         if event.value != self._shown_text:
             self.chosen["text"] = self._shown_text = event.value
             self._fields.clear()
             self._shape.set_value(None)
-            await self._show_text()
-
-    async def _show_text(self) -> None:
-        call, folder = f"{SHOWING}:probe_of_text", self.session.project.folder
-        with self.complaint.caught():
-            text = self.chosen["text"] or ""
-            found = await self.session.quick.call(call, folder, text, self._name.value)
-            self._show(found)
+            await self._draw()
 
     def _quietly(self, text: str) -> None:
         """Show a probe file that nobody typed."""
@@ -190,21 +182,11 @@ class LeverRoom(Room):
 
     # --- what is shown and written ----------------------------------------------------------------
 
-    def _show(self, found: dict[str, Any]) -> None:
-        self._picture.clear()
-        with self._picture:
-            figure(found["figure"], "The lever from above: regions, terminals and tip", wide=True)
-            if found["fault"]:
-                self.complaint.say(found["fault"])
-            else:
-                table(("region", "part", "area"), found["rows"])
-                ui.label(f"mesh: {found['triangles']} triangles").classes("text-xs opacity-70")
-        self.show_command()
-
     def arguments(self) -> list[str]:
         """Return the command that draws the probe."""
         name = self._name.value or "lever"
-        return ["probe", "show", named(name), "--plot", f"{Path(name).stem}.svg"]
+        mesh = ["--mesh"] if self.chosen["mesh"] else []
+        return ["probe", "show", named(name), "--plot", f"{Path(name).stem}.svg", *mesh]
 
     def _write(self) -> bool:
         with self.complaint.caught():
@@ -223,10 +205,11 @@ class LeverRoom(Room):
             self.session.chosen["simulate"] = {"probe": self._name.value}
             ui.navigate.to("/simulate")
 
-    async def _draw(self, suffix: str) -> None:
+    async def _give(self, suffix: str) -> None:
         if self._write():
             with self.complaint.caught():
                 call, folder = f"{SHOWING}:probe_file", self.session.project.folder
                 name = self._name.value
-                content = await self.session.quick.call(call, folder, name, suffix)
+                asked = folder, name, suffix, self.chosen["mesh"]
+                content = await self.session.quick.call(call, *asked)
                 ui.download.content(content, f"{Path(name).stem}{suffix}")
