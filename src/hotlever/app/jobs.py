@@ -17,6 +17,8 @@ Standing = Literal["running", "done", "failed", "cancelled"]
 
 #: Lines kept of what a command says.
 _MOST_LINES = 200
+#: Share of the work from which on it tells how long the rest takes: it may begin slowly.
+_TELLING = 0.03
 _NOTE, _FAILURE = "note: ", "hotlever: "
 
 
@@ -71,7 +73,7 @@ class Job:
     def left_s(self) -> float | None:
         """Seconds that it may still take, by what it took so far."""
         share = self.share
-        if not share or self.standing != "running":
+        if share is None or share < _TELLING or self.standing != "running":
             return None
         return (time.monotonic() - self.started) * (1.0 - share) / share
 

@@ -14,6 +14,7 @@ from hotlever.app.rooms.drawn import Fields, Picture
 from hotlever.app.rooms.results import FIGURE_FILES, SHOWING
 from hotlever.app.rooms.room import Room
 from hotlever.app.session import Session
+from hotlever.errors import HotleverError
 from hotlever.files import read_text, write_text
 
 _SHAPES = {"three-leg": "three legs", "u-shape": "two legs (U)"}
@@ -34,7 +35,7 @@ class LeverRoom(Room):
         super().__init__(session, complaint)
         start: dict[str, Any] = {"shape": "three-leg", "changes": {}, "text": None}
         self.chosen |= start | self.chosen
-        self._shown_text = ""
+        self._shown_text, self._fault = "", ""
         with two_columns() as (left, right):
             with left:
                 drop_zone(session, complaint, _DROP, self._dropped)
@@ -103,20 +104,22 @@ class LeverRoom(Room):
         """Draw what is chosen."""
         chosen, title = self.chosen, self._name.value
         text = chosen["text"]
-        with self.complaint.caught():
+        try:
             if text is not None:
                 folder = self.session.project.folder
                 drawn = await self._picture.of("probe_of_text", folder, text, title)
             else:
                 values = chosen["shape"], chosen["changes"]
                 drawn = await self._picture.of("probe_of_values", *values, title)
-            if drawn["fault"]:
-                self.complaint.say(drawn["fault"])
-            elif text is None:
-                self._quietly(drawn["text"])
-                if fields:
-                    self._fields.show(drawn["values"])
-            self._fields.mark(drawn["fault"])
+            self._fault = drawn["fault"]
+        except HotleverError as error:
+            self._fault = str(error)
+        if text is None and not self._fault:
+            self._quietly(drawn["text"])
+            if fields:
+                self._fields.show(drawn["values"])
+        self._fields.mark(self._fault)
+        self.complaint.say(self._fault)
         self.show_command()
 
     # --- a file -----------------------------------------------------------------------------------
@@ -189,6 +192,9 @@ class LeverRoom(Room):
         return ["probe", "show", named(name), "--plot", f"{Path(name).stem}.svg", *mesh]
 
     def _write(self) -> bool:
+        if self._fault and self.chosen["text"] is None:
+            self.complaint.say(self._fault)
+            return False
         with self.complaint.caught():
             name = safe_name(self._name.value or "")
             name = name if name.endswith(".toml") else f"{name}.toml"

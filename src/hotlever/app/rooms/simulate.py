@@ -42,7 +42,11 @@ class SimulateRoom(WritingRoom):
                         self.command()
                 with ui.column().classes("w-full gap-3") as time:
                     self._pulses = Pulses(session, complaint, self.chosen)
-                for name, shown in (("rest", rest), ("time", time)):
+                for name, shown in (
+                    ("rest", rest),
+                    ("rest", self._sliders.of_bias),
+                    ("time", time),
+                ):
                     shown.bind_visibility_from(view, "value", value=name)
 
     async def open(self) -> None:

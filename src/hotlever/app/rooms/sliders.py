@@ -52,6 +52,8 @@ class Sliders:
     ----------
     free : set of str
         What may change without another reduced lever.
+    of_bias : ui.element
+        The slider of the bias, which is not of the probe.
     """
 
     def __init__(
@@ -66,7 +68,7 @@ class Sliders:
         names, probe = probe_names(session), chosen["probe"] or ""
         choice("Probe", names, probe, lambda event: self._take(event.value or None))
         self._around()
-        self._of_bias()
+        self._bias()
         self._of_probe = ui.column().classes("w-full gap-1")
 
     def _around(self) -> None:
@@ -85,8 +87,8 @@ class Sliders:
             ).props("dense outlined clearable placeholder=none stack-label")
             self._gap.bind_visibility_from(self._medium, "value", value="air")
 
-    def _of_bias(self) -> None:
-        with ui.column().classes("w-full gap-0"):
+    def _bias(self) -> None:
+        with ui.column().classes("w-full gap-0") as self.of_bias:
             with ui.row().classes("w-full items-center no-wrap justify-between"):
                 ui.label("Bias V_b").classes("text-bold")
                 number = ui.number(format="%.3f", min=0.0, step=0.05).classes("w-28")
