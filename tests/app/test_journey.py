@@ -133,7 +133,9 @@ def test_sliders_move_the_lever(app: App, page: Page) -> None:
     expect(page.locator(".js-plotly-plot image").first).to_be_attached()
     picture(page, "simulate")
     button(page, "air").click()
-    expect(page.get_by_text("--medium air")).to_be_visible(timeout=_WORK)
+    expect(page.get_by_text("hotlever sweep --bias 0:12:49 --medium air")).to_be_visible(
+        timeout=_WORK
+    )
     expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
     for kind, name in (("NetCDF", "reference.sweep.nc"), ("VTU", "reference.sweep.fields.zip")):
         with page.expect_download(timeout=_WORK) as download:

@@ -31,7 +31,6 @@ class MeasuredRoom(Room):
         super().__init__(session, complaint)
         self.has: list[str] = []
         self._reads = self._shows = 0
-        self._plots: MeasuredPlots | None = None
         with two_columns() as (left, right):
             with left:
                 self.controls()
@@ -42,7 +41,7 @@ class MeasuredRoom(Room):
             with right:
                 Work(session, self.name, self._ended, during=self._follow, notes=False)
                 self._result = ui.column().classes("w-full gap-2")
-                self._table = ui.column().classes("w-full gap-2")
+                self._understood = _Understood()
                 self.command()
 
     async def open(self) -> None:
@@ -82,8 +81,8 @@ class MeasuredRoom(Room):
     def _follow(self, job: Job) -> None:
         """Draw how near to the data the lever is that is being fitted, or was."""
         curve = job.shown.get("curve")
-        if self._plots is not None and curve and job.arguments[1] == named(self.chosen["data"]):
-            self._plots.approach(curve)
+        if curve and self.has and job.arguments[1] == named(self.chosen["data"]):
+            self._understood.plots.approach(curve)
 
     async def _ended(self, job: Job) -> None:
         await self._show_result()
@@ -168,27 +167,40 @@ class MeasuredRoom(Room):
                     self.complaint.say(str(error))
         if this != self._reads:  # something else has been chosen meanwhile
             return
-        self._table.clear()
-        self._plots = None
-        if found is not None:
-            with self._table:
-                self._plots = _show(found)
-            if job := self.session.jobs.by_room.get(self.name):
-                self._follow(job)
+        self._understood.show(found)
         self.has = [] if found is None else found["observables"]
+        if job := self.session.jobs.by_room.get(self.name):
+            self._follow(job)
         self._button.set_enabled(found is not None)
         self.understood()
         self.show_command()
         await self._show_result()
 
 
-def _show(found: dict[str, Any]) -> MeasuredPlots:
-    opened = ui.expansion("What was understood", value=True).classes("w-full")
-    opened.props("dense header-class=text-bold")
-    with opened, ui.column().classes("w-full gap-2"):
-        plots = MeasuredPlots(found["data"], found["observables"])
-        head, *rows = found["rows"]
-        table(head, rows)
-        for note in found["notes"]:
-            ui.label(f"• {note}").classes("text-sm remark")
-    return plots
+class _Understood:
+    """What a file was understood as; hidden while there is none.
+
+    Attributes
+    ----------
+    plots : MeasuredPlots
+    """
+
+    def __init__(self) -> None:
+        self._opened = ui.expansion("What was understood", value=True).classes("w-full")
+        self._opened.props("dense header-class=text-bold").set_visibility(False)
+        with self._opened, ui.column().classes("w-full gap-2"):
+            self.plots = MeasuredPlots()
+            self._rows = ui.column().classes("w-full gap-2")
+
+    def show(self, found: dict[str, Any] | None) -> None:
+        """Show what was found in a file; nothing, if that was no measurement."""
+        self._opened.set_visibility(found is not None)
+        self._rows.clear()
+        if found is None:
+            return
+        self.plots.measured(found["data"], found["observables"])
+        with self._rows:
+            head, *rows = found["rows"]
+            table(head, rows)
+            for note in found["notes"]:
+                ui.label(f"• {note}").classes("text-sm remark")

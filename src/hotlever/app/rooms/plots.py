@@ -59,29 +59,43 @@ class MeasuredPlots:
         "tip": (("bias_V", _BIAS), ("tip_K", _TIP)),
     }
 
-    def __init__(self, data: dict[str, list[float]], observables: Sequence[str]) -> None:
+    def __init__(self) -> None:
         dots: Any = {"type": "scatter", "mode": "markers", "name": "measured"}
         dots["marker"] = {"color": BLUE, "size": 6, "symbol": "circle-open"}
         line = {"mode": "lines", "line": {"color": VERMILION, "width": 2, "shape": "spline"}}
-        model = {"type": "scatter", "name": "model", "x": [], "y": [], **line}
-        self._plots: dict[str, ui.plotly] = {}
+        model = {"type": "scatter", "name": "model", **line}
+        self._plots: dict[str, tuple[ui.element, ui.plotly]] = {}
+        # once for all measurements: a browser takes long to make them
         with _side_by_side():
-            for name in observables:
-                (x, along), (y, title) = self._AXES[name]
-                layout = _layout(along, title, 240, normal="xy")
-                # of the data alone, so that the lever moves and not the axes
-                for axis, column in (("xaxis", x), ("yaxis", y)):
-                    layout[axis]["range"] = _range(data[column])
-                traces = [{**dots, "x": _short(data[x]), "y": _short(data[y])}, model]
-                self._plots[name] = _plot(traces, layout, f"Measured {name}, and the lever fitted")
+            for name, ((_, along), (_, title)) in self._AXES.items():
+                with ui.element("div") as around:
+                    layout = _layout(along, title, 240, normal="xy")
+                    made = _plot([dots, model], layout, f"Measured {name}, and the lever fitted")
+                self._plots[name] = around, made
         self._said = ui.label().classes("text-xs opacity-70")
+
+    def measured(self, data: dict[str, list[float]], observables: Sequence[str]) -> None:
+        """Draw a measurement."""
+        for name, (around, plot) in self._plots.items():
+            around.set_visibility(name in observables)
+            if name in observables:
+                (x, _), (y, _) = self._AXES[name]
+                dots, model = plot.figure["data"]
+                dots |= {"x": _short(data[x]), "y": _short(data[y])}
+                model |= {"x": [], "y": []}
+                # of the data alone, so that the lever moves and not the axes
+                plot.figure["layout"]["xaxis"]["range"] = _range(data[x])
+                plot.figure["layout"]["yaxis"]["range"] = _range(data[y])
+                plot.update()
+        self._said.set_text("")
 
     def approach(self, curve: dict[str, list[float]]) -> None:
         """Draw the lever that was found so far."""
-        for name, plot in self._plots.items():
-            (x, _), (y, _) = self._AXES[name]
-            plot.figure["data"][1] |= {"x": _short(curve[x]), "y": _short(curve[y])}
-            plot.update()
+        for name, (around, plot) in self._plots.items():
+            if around.visible:
+                (x, _), (y, _) = self._AXES[name]
+                plot.figure["data"][1] |= {"x": _short(curve[x]), "y": _short(curve[y])}
+                plot.update()
         self._said.set_text("Dots: measured. Line: the lever as the fit has it.")
 
 
