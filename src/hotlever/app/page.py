@@ -25,7 +25,7 @@ ROOMS = {
     "/levers": ("Levers", "table_rows"),
 }
 #: Seconds between two looks at the work that runs.
-_LOOK_S = 0.2
+_LOOK_S = 0.1
 _STYLE = """
 .q-uploader { width: 100%; max-height: 14rem; box-shadow: none;
   border: 1.5px dashed var(--q-primary); background: transparent; }

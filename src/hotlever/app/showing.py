@@ -136,7 +136,9 @@ def probe_of_values(
 
 def probe_file(report: Report, folder: Path, name: str, suffix: str, mesh: bool = False) -> bytes:
     """Return the drawing of a probe as the content of a file."""
-    return _file(_drawing(_probe(folder, name), name, mesh)[0], suffix)
+    probe = _probe(folder, name)
+    triangles = _mesh(probe) if mesh else None
+    return _file(figures.probe_drawing(probe.layout(), name, mesh=triangles), suffix)
 
 
 def is_spectrum(report: Report, folder: Path, name: str) -> bool:
@@ -185,25 +187,23 @@ def packed(report: Report, paths: list[Path]) -> bytes:
     return content.getvalue()
 
 
-def _drawing(probe: Probe, title: str, with_mesh: bool) -> tuple[Figure, ProbeMesh]:
-    layout = probe.layout()
-    mesh = mesh_layout(layout, wiring=probe.wiring)
-    return figures.probe_drawing(layout, title, mesh=mesh if with_mesh else None), mesh
+def _mesh(probe: Probe) -> ProbeMesh:
+    return mesh_layout(probe.layout(), wiring=probe.wiring)
 
 
 def _described(probe: Probe, title: str, with_mesh: bool) -> dict[str, Any]:
-    made, mesh = _drawing(probe, title, with_mesh)
+    layout, mesh = probe.layout(), _mesh(probe) if with_mesh else None
     return {
-        "figure": _svg(made),
+        "figure": _svg(figures.probe_drawing(layout, title, mesh=mesh)),
         "fault": "",
-        "rows": _regions(mesh.layout),
+        "rows": _regions(layout),
         "shape": probe.shape.shape,
         "values": {
             key: (value, text)
             for key, text in probe.shape.description().items()
             if isinstance(value := getattr(probe.shape, key), float)
         },
-        "triangles": mesh.elements.nelements,
+        "triangles": 0 if mesh is None else mesh.elements.nelements,
     }
 
 

@@ -74,7 +74,9 @@ class Picture:
             figure(drawn["figure"], "The lever from above: regions, terminals and tip", wide=True)
             if not drawn["fault"]:
                 table(("region", "part", "area"), drawn["rows"])
-                ui.label(f"mesh: {drawn['triangles']} triangles").classes("text-xs opacity-70")
+                if self._chosen["mesh"]:
+                    triangles = f"mesh: {drawn['triangles']} triangles"
+                    ui.label(triangles).classes("text-xs opacity-70")
         return drawn
 
     def add(self, listing: str, outlines: str) -> None:
