@@ -48,7 +48,10 @@ def test_probe_show_describes_and_draws(run, tmp_path):
     assert status == 0
     assert "three-leg, 0.4 µm thick" in out
     assert "831.3 K" in out
-    assert (tmp_path / "probe.svg").stat().st_size > 1000
+    plain = (tmp_path / "probe.svg").stat().st_size
+    assert plain > 1000
+    run("probe", "show", "probe.toml", "--plot", "probe.svg", "--mesh")
+    assert (tmp_path / "probe.svg").stat().st_size > 1.5 * plain
 
 
 def test_materials_are_listed_and_drawn(run, tmp_path):

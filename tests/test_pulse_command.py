@@ -27,7 +27,7 @@ def test_a_step_at_some_times(run):
 
 
 def test_a_pulse_writes_table_figure_and_fields(run, tmp_path):
-    status, out, _ = run(
+    status, out, err = run(
         "pulse", "--pulse", "10V,5us", "--until", "20us", "--set", "c_kappa=0.7",
         "-o", "a.csv", "--plot", "a.png", "--fields", "fields",
     )  # fmt: skip
@@ -36,6 +36,11 @@ def test_a_pulse_writes_table_figure_and_fields(run, tmp_path):
     series = ElementTree.parse(tmp_path / "fields" / "fields.pvd").findall(".//DataSet")
     # the rows are where the solver stepped, however smooth the figure is
     assert len(found) == len(series) < 40
+    tip = {row["time_us"]: float(row["tip_K"]) for row in found}
+    assert f"tip, highest                 {tip['5']:.1f} K at 5 µs" in err
+    assert f"tip, at the end              {tip['20']:.1f} K at 20 µs" in err
+    mean = float(err.partition("tip, mean ")[2].partition(" K over 20 µs")[0])
+    assert min(tip.values()) < mean < max(tip.values())
     assert [float(part.get("timestep", "")) for part in series] == pytest.approx(
         [float(row["time_us"]) for row in found]
     )

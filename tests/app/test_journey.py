@@ -89,6 +89,8 @@ def test_from_the_shipped_measurement_to_a_table_in_five_clicks(
     expect(page.get_by_text("heater current, 'I_h (mA)'")).to_be_visible()
     picture(page, "fit-understood")
     button(page, "Fit").click()  # 2
+    # the lever comes nearer to the data while it is fitted
+    expect(page.get_by_text("Line: the lever as the fit has it")).to_be_visible(timeout=_WORK)
     expect(page.get_by_text("lever-a.fit.json", exact=True)).to_be_visible(timeout=_WORK)
     expect(page.locator("img[alt^='Tip temperature against the power']")).to_be_visible()
     picture(page, "fit")
@@ -131,14 +133,34 @@ def test_sliders_move_the_lever(app: App, page: Page) -> None:
     expect(page.locator(".js-plotly-plot image").first).to_be_attached()
     picture(page, "simulate")
     button(page, "air").click()
-    expect(page.get_by_text("--medium air")).to_be_visible(timeout=_WORK)
+    expect(page.get_by_text("hotlever sweep --bias 0:12:49 --medium air")).to_be_visible(
+        timeout=_WORK
+    )
     expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
-    with page.expect_download(timeout=_WORK) as download:
-        button(page, "NetCDF").click()
-    assert download.value.suggested_filename == "reference.sweep.nc"
+    for kind, name in (("NetCDF", "reference.sweep.nc"), ("VTU", "reference.sweep.fields.zip")):
+        with page.expect_download(timeout=_WORK) as download:
+            page.get_by_role("button", name=kind, exact=True).first.click()
+        assert download.value.suggested_filename == name  # of lever and air
     page.get_by_label("Light or dark").click()
     picture(page, "simulate-dark")
     page.get_by_label("Light or dark").click()
+
+
+def test_a_pulse_is_followed_in_time(app: App, page: Page) -> None:
+    go(page, app, "simulate")
+    button(page, "vacuum").click()
+    button(page, "in time").click()
+    button(page, "Follow").click()
+    expect(page.locator("[data-number='tip, highest']")).to_have_text(
+        "409.7 K at 5 µs", timeout=_WORK
+    )
+    expect(page.locator("img[alt^='Voltages, current']")).to_be_visible()
+    picture(page, "simulate-in-time")
+    with page.expect_download(timeout=_WORK) as download:
+        button(page, "CSV").click()
+    assert len(Path(download.value.path()).read_text().splitlines()) > 10
+    button(page, "at a bias").click()
+    expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
 
 
 def test_work_survives_a_reload_and_is_cancelled_within_a_second(
@@ -211,6 +233,10 @@ def test_a_drawing_becomes_a_probe(app: App, page: Page, folder: Path) -> None:
     go(page, app, "lever")
     expect(page.locator("img[alt^='The lever from above']")).to_be_visible()
     picture(page, "lever")
+    page.get_by_role("switch", name="mesh").click()
+    expect(page.get_by_text("--mesh")).to_be_visible()
+    picture(page, "lever-mesh")
+    page.get_by_role("switch", name="mesh").click()
     drop(page, EXAMPLES / "reference-probe.gds")
     expect(page.get_by_text("What the drawing holds")).to_be_visible(timeout=_WORK)
     page.get_by_text("What the drawing holds").click()

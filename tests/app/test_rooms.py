@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 import csv
 import io
 import sys
@@ -81,6 +82,12 @@ def shown(user: User, mark: str) -> str:
     key, _, value = mark.partition("=")
     found = [one for one in user.client.elements.values() if one.props.get(key) == value]
     return " ".join(one.text for one in found if getattr(one, "visible", True))
+
+
+def drawn(user: User) -> str:
+    """Return the last figure of a page."""
+    images = [one for one in user.client.elements.values() if one.tag == "img"]
+    return base64.b64decode(images[-1].props["src"].partition(",")[2]).decode()
 
 
 async def until(true: Callable[[], bool]) -> None:
@@ -220,10 +227,19 @@ def test_a_shape_is_drawn_while_its_fields_change(tmp_path: Path) -> None:
         )
         field.set_value(60.0)
         await until(lambda: "length_um = 60" in room_text.value)
+        before = drawn(user)
         field.set_value(1.0)
         await until(lambda: "length_um" in shown(user, "role=alert"))
+        # what is wrong is drawn, and the field marked
+        await until(lambda: drawn(user) != before)
+        assert field.props.get("error")
         field.set_value(50.0)
         await until(lambda: not shown(user, "role=alert").strip())
+        assert not field.props.get("error")
+        plain = len(drawn(user))
+        user.find(kind=ui.switch, content="mesh").click()
+        await until(lambda: len(drawn(user)) > 1.5 * plain)
+        await user.should_see("hotlever probe show my-lever.toml --plot my-lever.svg --mesh")
         user.find(kind=ui.button, content="Save").click()
         await until(lambda: bool(session.project.probes))
         assert Probe.from_file(tmp_path / "my-lever.toml").shape.length_um == 50.0

@@ -40,6 +40,10 @@ class Report:
         """Tell a line."""
         self._connection.send(("said", line))
 
+    def shown(self, what: str, content: Any) -> None:
+        """Tell what can be drawn."""
+        self._connection.send(("shown", what, content))
+
     def send(self, kind: str, content: Any) -> None:
         """Send something of what is worked on, ahead of the answer."""
         self._connection.send((kind, content))

@@ -17,6 +17,8 @@ Standing = Literal["running", "done", "failed", "cancelled"]
 
 #: Lines kept of what a command says.
 _MOST_LINES = 200
+#: Share of the work from which on it tells how long the rest takes: it may begin slowly.
+_TELLING = 0.03
 _NOTE, _FAILURE = "note: ", "hotlever: "
 
 
@@ -35,6 +37,10 @@ class Job:
     notes : list of str
     label, done, total
         Of the last progress told.
+    shown : dict
+        What it showed last, by what it is: the ``curve`` of a fit, a ``table``.
+    began : float
+        When, as files are stamped.
     version : int
         Counts the changes, for pages to see that there is something new.
     """
@@ -47,8 +53,10 @@ class Job:
     label: str = ""
     done: int = 0
     total: int = 0
+    shown: dict[str, Any] = field(default_factory=dict)
     version: int = 0
     started: float = field(default_factory=time.monotonic)
+    began: float = field(default_factory=time.time)
     seconds: float = 0.0
 
     @property
@@ -65,7 +73,7 @@ class Job:
     def left_s(self) -> float | None:
         """Seconds that it may still take, by what it took so far."""
         share = self.share
-        if not share or self.standing != "running":
+        if share is None or share < _TELLING or self.standing != "running":
             return None
         return (time.monotonic() - self.started) * (1.0 - share) / share
 
@@ -74,6 +82,8 @@ class Job:
         kind, *content = message
         if kind == "progress":
             self.label, self.done, self.total = content
+        elif kind == "shown":
+            self.shown[content[0]] = content[1]
         elif content[0].startswith(_NOTE):
             self.notes = [*self.notes, content[0].removeprefix(_NOTE)][-_MOST_LINES:]
         elif content[0].startswith(_FAILURE):

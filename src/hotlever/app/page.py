@@ -25,7 +25,7 @@ ROOMS = {
     "/levers": ("Levers", "table_rows"),
 }
 #: Seconds between two looks at the work that runs.
-_LOOK_S = 0.2
+_LOOK_S = 0.1
 _STYLE = """
 .q-uploader { width: 100%; max-height: 14rem; box-shadow: none;
   border: 1.5px dashed var(--q-primary); background: transparent; }
@@ -155,6 +155,8 @@ class Work:
     room : str
     then : callable
         Called with the job when it has ended while the page is open.
+    during : callable, optional
+        Called with the job whenever there is something new of it.
     notes : bool
         Whether what the command notes is shown here, and not with its result.
     """
@@ -165,9 +167,10 @@ class Work:
         room: str,
         then: Callable[[Job], Awaitable[None]],
         *,
+        during: Callable[[Job], None] | None = None,
         notes: bool = True,
     ) -> None:
-        self._session, self._room, self._then = session, room, then
+        self._session, self._room, self._then, self._during = session, room, then, during
         self._seen: tuple[int, int] = (0, -1)
         with ui.column().classes("w-full gap-1") as self._all:
             with ui.row().classes("w-full items-center no-wrap") as self._running:
@@ -222,18 +225,36 @@ class Work:
         with self._notes:
             for text in job.notes:
                 ui.label(f"• {text}")
+        if self._during is not None:
+            self._during(job)
 
 
 def command_shown(arguments: list[str], folder: str) -> None:
     """Show the command line that does the same, to be copied."""
-    line = command_line(arguments)
+    _lines_shown(command_line(arguments), "Copy the command line")
+    ui.label(f"The same on the command line, in {folder}").classes("text-xs opacity-70")
+
+
+def python_shown(lines: str) -> None:
+    """Show the lines of Python that do the same, to be copied."""
+    _lines_shown(lines, "Copy the lines of Python")
+    ui.label("The same in Python").classes("text-xs opacity-70")
+
+
+def _lines_shown(lines: str, copy: str) -> None:
     with ui.row().classes("w-full items-start no-wrap gap-1"):
         with ui.element("pre").classes("command col"):
-            ui.label(line)
-        ui.button(icon="content_copy", on_click=lambda: ui.clipboard.write(line)).props(
-            'flat dense aria-label="Copy the command line"'
+            ui.label(lines)
+        ui.button(icon="content_copy", on_click=lambda: ui.clipboard.write(lines)).props(
+            f'flat dense aria-label="{copy}"'
         )
-    ui.label(f"The same on the command line, in {folder}").classes("text-xs opacity-70")
+
+
+def number_shown(key: str, title: str, value: str = "…") -> ui.label:
+    """Show a number with its title; return the label of the number."""
+    with ui.column().classes("gap-0"):
+        ui.label(title).classes("text-xs opacity-70")
+        return ui.label(value).classes("number").props(f'data-number="{key}"')
 
 
 def figure(content: str, alt: str, *, wide: bool = False) -> None:

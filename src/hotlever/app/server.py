@@ -13,19 +13,21 @@ from nicegui import app, ui
 
 from hotlever.app.guard import Guard
 from hotlever.app.project import LARGEST_FILE, Project
-from hotlever.app.rooms import calibrate, fit, lever, levers, raman, simulate, start
+from hotlever.app.rooms import raman, start
+from hotlever.app.rooms.calibrate import CalibrateRoom
+from hotlever.app.rooms.fit import FitRoom
+from hotlever.app.rooms.lever import LeverRoom
+from hotlever.app.rooms.levers import LeversRoom
+from hotlever.app.rooms.simulate import SimulateRoom
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 
 LOCAL = ("127.0.0.1", "localhost", "::1")
+_ROOMS = (LeverRoom, SimulateRoom, FitRoom, CalibrateRoom, LeversRoom)
 _PAGES: dict[str, Callable[[Session], Awaitable[None]]] = {
     "/": start.fill,
-    "/lever": lever.fill,
-    "/simulate": simulate.fill,
     "/raman": raman.fill,
-    "/fit": fit.fill,
-    "/calibrate": calibrate.fill,
-    "/levers": levers.fill,
+    **{f"/{room.name}": room.fill for room in _ROOMS},
 }
 
 

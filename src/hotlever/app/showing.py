@@ -5,7 +5,11 @@ The figures are those of `hotlever.figures`, the pages those of `hotlever.report
 
 from __future__ import annotations
 
+import io
+import re
 import tempfile
+import zipfile
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -23,16 +27,22 @@ from hotlever.errors import InputError
 from hotlever.fitting import Fit, Measurement, read_fit, read_measurement
 from hotlever.fitting.measurement import parse_columns
 from hotlever.fitting.words import parameter_rows
-from hotlever.probe import Layout, Probe, mesh_layout
+from hotlever.lever.dataset import OBSERVABLES
+from hotlever.lever.meshing import chosen_space
+from hotlever.probe import Layout, Probe
+from hotlever.probe.sections import read_sections
+from hotlever.probe.shapes import PARAMETRIC
 from hotlever.raman import read_spectra
 from hotlever.report.fit_pages import fit_page
-from hotlever.report.page import Page
+from hotlever.report.page import Block, Page
 from hotlever.text import sentence
 
 #: Results kept, whose figures may be asked for as files.
 _KEPT = 4
-#: Rows of a calibration's table that are shown.
-_ROWS = 12
+#: No part of a drawing of a probe lies beyond (µm).
+_DRAWABLE_UM = 1e5
+#: Rows of a calibration's table that are shown, and points of a measurement.
+_ROWS, _POINTS = 12, 1000
 
 
 def understood(
@@ -40,30 +50,32 @@ def understood(
 ) -> dict[str, Any]:
     """Return what a measurement file was understood as."""
     measurement = _measurement(folder, name, columns, probe)
-    seen = measurement.dataset(_probe(folder, probe).circuit)
-    made = figures.iv_curves({}, measured=seen)
+    data = measurement.dataset(_probe(folder, probe).circuit)
+    data = data.isel(bias=slice(None, None, data.bias.size // _POINTS + 1))
+    columns_shown = ("bias_V", "lever_V", *OBSERVABLES.values())
     head, *rows = measurement.understood
     return {
         "rows": [(name, *head[1:]), *rows],
         "notes": [note.replace(f"{folder}/", "") for note in measurement.notes],
         "observables": list(measurement.observables),
         "medium": measurement.medium,
-        "figure": _svg(made),
+        "data": {column: data[column].values.tolist() for column in columns_shown},
     }
 
 
 def page(report: Report, folder: Path, kind: str, name: str) -> None:
     """Send the blocks of the page of a result, a fit or a calibration, as they are drawn."""
-    path = folder / name
-    for block in _page(kind, path, _stamp(path)).blocks:
+
+    def send(block: Block) -> None:
         drawing = {"figure": _svg(block["figure"])} if block["kind"] == "figure" else {}
         report.send("block", {**block, **drawing})
+
+    _page(kind, folder / name, send)
 
 
 def drawn(report: Report, folder: Path, kind: str, name: str, figure: str, suffix: str) -> bytes:
     """Return a figure of a result as the content of a file."""
-    path = folder / name
-    blocks = _page(kind, path, _stamp(path)).blocks
+    blocks = _page(kind, folder / name).blocks
     made = next(block["figure"] for block in blocks if block.get("name") == figure)
     return _file(made, suffix)
 
@@ -91,15 +103,14 @@ def settings(
     return {**row, "bias_V": bias, **({along: value} if along != "bias_V" else {})}
 
 
-def probe_page(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
-    """Return the drawing of a probe, its file, and what there is to know of it."""
-    text, where = None, name or "reference probe"
-    probe = _probe(folder, name)
-    text = probe.to_toml() if name is None else (folder / name).read_text(encoding="utf-8")
-    return _described(probe, where) | {"text": text}
+def probe_page(report: Report, folder: Path, name: str) -> dict[str, Any]:
+    """Return the drawing of a probe file, and what there is to know of it."""
+    return _described(_probe(folder, name), name, False)
 
 
-def probe_of_text(report: Report, folder: Path, text: str, title: str) -> dict[str, Any]:
+def probe_of_text(
+    report: Report, folder: Path, text: str, title: str, mesh: bool = False
+) -> dict[str, Any]:
     """Return the drawing of a probe file that is being written."""
     with tempfile.NamedTemporaryFile("w", suffix=".toml", dir=folder, prefix=".hotlever-") as file:
         file.write(text)
@@ -107,25 +118,28 @@ def probe_of_text(report: Report, folder: Path, text: str, title: str) -> dict[s
         try:
             probe = Probe.from_file(file.name)
         except InputError as error:
-            drawing = _fault(error)
-            if drawing is None:
-                raise InputError(str(error).replace(file.name, title)) from None
-            return {"figure": drawing, "fault": str(error).replace(file.name, title)}
-    return _described(probe, title)
+            said = str(error).replace(file.name, title)
+            return _at_fault(error, said, lambda: read_sections(file.name)["probe"])
+    return _described(probe, title, mesh)
 
 
 def probe_of_values(
-    report: Report, shape: str, changes: dict[str, Any], title: str
+    report: Report, shape: str, changes: dict[str, Any], title: str, mesh: bool = False
 ) -> dict[str, Any]:
     """Return the drawing, and the file, of a parametric probe with some values changed."""
     start = Probe.u_shape() if shape == "u-shape" else Probe.reference()
-    probe = start.with_(**changes) if changes else start
-    return _described(probe, title) | {"text": probe.to_toml()}
+    try:
+        probe = start.with_(**changes) if changes else start
+    except InputError as error:
+        return _at_fault(error, str(error), lambda: {**start.shape.model_dump(), **changes})
+    return _described(probe, title, mesh) | {"text": probe.to_toml()}
 
 
-def probe_file(report: Report, folder: Path, name: str, suffix: str) -> bytes:
+def probe_file(report: Report, folder: Path, name: str, suffix: str, mesh: bool = False) -> bytes:
     """Return the drawing of a probe as the content of a file."""
-    return _file(figures.probe_drawing(_probe(folder, name).layout(), name), suffix)
+    probe = _probe(folder, name)
+    triangles = chosen_space(probe).mesh if mesh else None
+    return _file(figures.probe_drawing(probe.layout(), name, mesh=triangles), suffix)
 
 
 def is_spectrum(report: Report, folder: Path, name: str) -> bool:
@@ -165,10 +179,19 @@ def levers(report: Report, folder: Path, names: list[str]) -> dict[str, Any]:
     return {"head": [*head, "remark"], "rows": rows}
 
 
-def _described(probe: Probe, title: str) -> dict[str, Any]:
-    layout = probe.layout()
+def packed(report: Report, paths: list[Path]) -> bytes:
+    """Return files as the content of one."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in paths:
+            archive.write(path, path.name)
+    return content.getvalue()
+
+
+def _described(probe: Probe, title: str, with_mesh: bool) -> dict[str, Any]:
+    layout, mesh = probe.layout(), chosen_space(probe).mesh if with_mesh else None
     return {
-        "figure": _svg(figures.probe_drawing(layout, title)),
+        "figure": _svg(figures.probe_drawing(layout, title, mesh=mesh)),
         "fault": "",
         "rows": _regions(layout),
         "shape": probe.shape.shape,
@@ -177,7 +200,7 @@ def _described(probe: Probe, title: str) -> dict[str, Any]:
             for key, text in probe.shape.description().items()
             if isinstance(value := getattr(probe.shape, key), float)
         },
-        "triangles": mesh_layout(layout).elements.nelements,
+        "triangles": 0 if mesh is None else mesh.elements.nelements,
     }
 
 
@@ -185,13 +208,47 @@ def _regions(layout: Layout) -> list[tuple[str, str, str]]:
     return [(region.name, region.part, f"{region.area:.4g} µm²") for region in layout.regions]
 
 
-def _fault(error: InputError) -> str | None:
-    """Return the picture of what is wrong with a drawing, if its place is known."""
+def _at_fault(
+    error: InputError, said: str, section: Callable[[], Mapping[str, Any]]
+) -> dict[str, Any]:
+    """Return the picture of what is wrong with a drawing, or with the dimensions of a section.
+
+    Raises
+    ------
+    InputError
+        If neither has a place in a picture.
+    """
     from hotlever.drawing.fault import DrawingError
 
-    if not isinstance(error, DrawingError):
-        return None
-    return _svg(figures.outlines_drawing(error.outlines, fault=str(error), place=error.place))
+    if isinstance(error, DrawingError):
+        made = figures.outlines_drawing(error.outlines, fault=said, place=error.place)
+        return {"figure": _svg(made), "fault": said}
+    try:
+        # a section may hold anything
+        return {"figure": _svg(_impossible(section(), said)), "fault": said}
+    except (InputError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+        raise InputError(said) from None
+
+
+def _impossible(values: Mapping[str, Any], said: str) -> Figure:
+    """Draw dimensions that do not go together, and mark the part that a line about them names.
+
+    Raises
+    ------
+    ValueError
+        If it names none of them, or no picture has room for them.
+    """
+    shape, words = PARAMETRIC[values["shape"]], set(re.findall(r"\w+", said))
+    if not words & set(shape.model_fields):
+        raise ValueError(said)
+    regions = shape.model_construct(**values).layout().regions
+    if not np.abs([region.rings[0] for region in regions]).max() < _DRAWABLE_UM:
+        raise ValueError(said)
+    parts = {word.partition("_")[0] for word in words}
+    wrong = next((one for one in regions if one.name.partition(" ")[0] in parts), None)
+    place = None if wrong is None else np.mean(wrong.rings[0], axis=0).tolist()
+    outlines = {region.name: region.rings for region in regions}
+    return figures.outlines_drawing(outlines, fault=said, place=place)
 
 
 def _probe(folder: Path, name: str | None) -> Probe:
@@ -210,11 +267,24 @@ def _stamp(path: Path) -> float:
         raise InputError(f"{path.name}: no such file") from None
 
 
-@lru_cache(maxsize=_KEPT)
-def _page(kind: str, path: Path, stamp: float) -> Page:
-    if kind == "fit":
-        return fit_page(_fit(path, stamp))
-    return _calibration_page(_calibration(path, stamp))
+#: Pages of results, whose figures may be asked for as files; the latest last.
+_pages: dict[tuple[str, Path, float], Page] = {}
+
+
+def _page(kind: str, path: Path, added: Callable[[Block], None] | None = None) -> Page:
+    """Return the page of a result, telling of its blocks as soon as they are there."""
+    key = kind, path, _stamp(path)
+    if key in _pages:
+        if added is not None:
+            for block in _pages[key].blocks:
+                added(block)
+    elif kind == "fit":
+        _pages[key] = fit_page(_fit(path, key[2]), added=added)
+    else:
+        _pages[key] = _calibration_page(_calibration(path, key[2]), added)
+    if len(_pages) > _KEPT:
+        del _pages[next(iter(_pages))]
+    return _pages[key]
 
 
 @lru_cache(maxsize=_KEPT)
@@ -222,8 +292,10 @@ def _calibration(path: Path, stamp: float) -> Calibration:
     return read_calibration(path)
 
 
-def _calibration_page(calibration: Calibration) -> Page:
-    made = Page(f"Calibration of {calibration.measurement.path}")
+def _calibration_page(
+    calibration: Calibration, added: Callable[[Block], None] | None = None
+) -> Page:
+    made = Page(f"Calibration of {calibration.measurement.path}", added=added)
     made.text(calibration.text())
     for note in calibration.notes:
         made.text(sentence(note))

@@ -18,7 +18,7 @@ from hotlever.errors import HotleverError
 
 #: Seconds that a process has to end by itself, tidying up, before it is killed.
 _TIDY_S = 0.6
-#: Events while a call runs: ("said", line) and ("progress", label, done, total).
+#: Events while a call runs: ("said", line), ("progress", label, done, total), ("shown", what, it).
 Heard = Callable[[tuple[Any, ...]], None]
 
 _alive: weakref.WeakSet[Worker] = weakref.WeakSet()

@@ -20,15 +20,18 @@ from hotlever.cli.options import (
     parse_priors,
     parse_values,
 )
-from hotlever.cli.output import fail, give, note, progress, progress_bars, tell, tell_table
+from hotlever.cli.output import fail, give, note, progress, progress_bars, show, tell, tell_table
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.files import Outputs, write_text
 
 if TYPE_CHECKING:
     from hotlever.fitting import FitOptions, Measurement
+    from hotlever.fitting.models import Prediction
     from hotlever.fitting.uncertainty import Uncertainty
     from hotlever.probe import Probe
 
+#: Points of a curve that is shown while the fit goes on.
+_DRAWN = 200
 #: The table of many levers, in the folder of their fits.
 _TABLE = "levers.csv"
 
@@ -141,7 +144,7 @@ def _fit_one(
     tell_table(measurement.understood)
     note(*measurement.notes)
     with progress("fit") as update:
-        result = fit(measurement, probe, options, progress=update)
+        result = fit(measurement, probe, options, progress=update, seen=_show_curve)
     note(*result.notes)
     texts = [fit_text(result)]
     found: Uncertainty | None = None
@@ -170,6 +173,16 @@ def _fit_one(
         raise failure
     if not result.describes_data:
         raise ComputationError(f"{data}: no such lever shows these data: {result.reason}")
+
+
+def _show_curve(found: Prediction) -> None:
+    """Show how near to the data the lever is that was found so far."""
+    order = found.bias.argsort()[:: max(1, found.bias.size // _DRAWN)]
+    bias, (current, reader, tip) = found.bias[order], found.values[:, order]
+    lever = found.probe.circuit.lever_voltage(bias, current)
+    columns = {"bias_V": bias, "lever_V": lever, "current_mA": current}
+    columns |= {"reader_V": reader, "tip_K": tip}
+    show("curve", {name: values.tolist() for name, values in columns.items()})
 
 
 def _fit_several(

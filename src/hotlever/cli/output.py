@@ -33,6 +33,9 @@ class Listener(Protocol):
     def progressed(self, label: str, done: int, total: int) -> None:
         """Hear how many steps of some work are done."""
 
+    def shown(self, what: str, content: Any) -> None:
+        """Hear what can be drawn: a curve on its way to the data, a table."""
+
 
 _listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
 
@@ -94,8 +97,19 @@ def tell_table(rows: Sequence[Sequence[str]]) -> None:
     """Show rows of cells on standard error."""
     from hotlever.text import aligned
 
-    for line in aligned([[_printable(cell) for cell in row] for row in rows]):
+    cells = [[_printable(cell) for cell in row] for row in rows]
+    if show("table", cells):
+        return
+    for line in aligned(cells):
         _say(line)
+
+
+def show(what: str, content: Any) -> bool:
+    """Show what a terminal cannot draw to who listens; return whether somebody does."""
+    listener = _listener.get()
+    if listener is not None:
+        listener.shown(what, content)
+    return listener is not None
 
 
 def _say(line: str) -> None:

@@ -17,7 +17,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.files import Outputs
 
 if TYPE_CHECKING:
-    from hotlever.probe import Layout, Probe
+    from hotlever.probe import Layout, Probe, ProbeMesh
 
 probe_app = typer.Typer(
     cls=Commands, help="Write, describe, draw and import probes.", rich_markup_mode=None
@@ -46,20 +46,28 @@ def new(
 
 
 @probe_app.command()
-def show(probe_file: ProbeFile = None, plot: PlotFile = None) -> None:
+def show(
+    probe_file: ProbeFile = None,
+    plot: PlotFile = None,
+    mesh: bool = Option(False, "--mesh", help="Draw the triangles of the mesh too."),
+) -> None:
     """Draw and describe a probe."""
+    from hotlever.lever.meshing import chosen_space
+
     outputs = Outputs(probe_file)
     check_plot(outputs, plot)
     with _fault_drawn(outputs, plot):
         probe = load_probe(probe_file)
     name = "reference probe" if probe_file is None else probe_file.name
     layout = probe.layout()
-    lines = _described(probe, layout, name)
+    triangles = chosen_space(probe).mesh
+    lines = _described(probe, triangles, name)
     if plot is not None:
         from hotlever import figures
 
         with outputs.together():
-            figures.save_figure(figures.probe_drawing(layout, name), plot)
+            made = figures.probe_drawing(layout, name, mesh=triangles if mesh else None)
+            figures.save_figure(made, plot)
     give("\n".join([*lines, ""]))
 
 
@@ -117,10 +125,8 @@ def _fault_drawn(outputs: Outputs, plot: Path | None) -> Iterator[None]:
         raise
 
 
-def _described(probe: Probe, layout: Layout, name: str) -> list[str]:
-    from hotlever.lever.meshing import chosen_space
-
-    circuit, silicon = probe.circuit, probe.heater_silicon
+def _described(probe: Probe, mesh: ProbeMesh, name: str) -> list[str]:
+    circuit, silicon, layout = probe.circuit, probe.heater_silicon, mesh.layout
     x, y = layout.tip
     given = {key: getattr(probe.shape, key) for key in probe.shape.description()}
     dimensions = [
@@ -143,7 +149,7 @@ def _described(probe: Probe, layout: Layout, name: str) -> list[str]:
             if silicon is None
             else [f"inversion temperature of the heater: {silicon.inversion_temperature():.1f} K"]
         ),
-        f"mesh: {chosen_space(probe).mesh.elements.nelements} triangles",
+        f"mesh: {mesh.elements.nelements} triangles",
     ]
 
 

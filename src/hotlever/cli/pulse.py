@@ -122,8 +122,14 @@ def pulse_command(
 
 
 def _times(data: xr.Dataset) -> list[list[str]]:
-    """Return rows that say how fast a history is."""
-    rows = []
+    """Return rows that say how hot the tip gets, and how fast."""
+    rows, of = [], data.attrs
+    if "tip_mean_K" in of:
+        highest = f"{of['tip_highest_K']:.1f} K at {of['tip_highest_at_us']:.4g} µs"
+        end = f"{data.tip_K[-1].item():.1f} K at {data.time[-1].item():.4g} µs"
+        rows += [["tip, highest", highest], ["tip, at the end", end]]
+        took = data.time[-1].item() - data.time[0].item()
+        rows += [["tip, mean", f"{of['tip_mean_K']:.1f} K over {took:.4g} µs"]]
     for name in ("heating", "cooling"):
         time = data.attrs.get(f"{name}_us", math.nan)
         if not math.isnan(time):

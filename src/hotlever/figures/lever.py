@@ -30,7 +30,7 @@ from hotlever.figures.style import (
     figure,
 )
 from hotlever.materials import HIGH_DOPED
-from hotlever.probe import Layout, Region
+from hotlever.probe import Layout, ProbeMesh, Region
 from hotlever.spieser2017 import BASE_TEMPERATURE_K, POWER_LAW_SPREAD_K, PublishedPoint
 
 if TYPE_CHECKING:
@@ -58,14 +58,17 @@ def _patch(region: Region, **style: Any) -> PathPatch:
     return PathPatch(Path.make_compound_path(*rings), **style)
 
 
-def probe_drawing(layout: Layout, title: str = "") -> Figure:
-    """Draw a probe from above, with heater, reader, terminals and tip marked."""
+def probe_drawing(layout: Layout, title: str = "", *, mesh: ProbeMesh | None = None) -> Figure:
+    """Draw a probe from above, with heater, reader, terminals and tip marked, or its mesh too."""
     with figure(7.0, 3.4) as (made, axes):
         handles: dict[str, Patch | Line2D] = {}
         for region in layout.regions:
             colour, label = _shown_as(region)
             axes.add_patch(_patch(region, facecolor=colour, edgecolor="0.55", lw=0.6))
             handles.setdefault(label, Patch(facecolor=colour, edgecolor="0.55", label=label))
+        if mesh is not None:
+            x, y = mesh.elements.p
+            axes.triplot(Triangulation(x, y, mesh.elements.t.T), color="0.25", lw=0.25)
         middle, labelled = layout.box.mean(axis=0), set[tuple[int, bool]]()
         for name, edges in groupby(layout.terminals, lambda terminal: terminal.name):
             ends = np.array([(edge.start, edge.end) for edge in edges])

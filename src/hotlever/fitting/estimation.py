@@ -43,6 +43,7 @@ def fit(
     *,
     model: Callable[[Probe, Array], ForwardModel] | None = None,
     progress: Progress | None = None,
+    seen: Callable[[Prediction], None] | None = None,
     **choices: Any,
 ) -> Fit:
     """Find the material parameters that make the model match a measurement.
@@ -63,6 +64,8 @@ def fit(
         and confirmed and corrected by the full one.
     progress : callable, optional
         Called with solved sweeps and how many there usually are.
+    seen : callable, optional
+        Called with each `Prediction` on the way, which comes nearer and nearer to the data.
     **choices
         Fields of `FitOptions`, such as ``fixed={"n_d": 3.3e17}``.
 
@@ -75,7 +78,8 @@ def fit(
         If the lever cannot be solved at the start, or the fit does not converge.
     """
     options = chosen_options(options, choices)
-    return estimate(measurement, probe, options, model=model, progress=progress).fit()
+    telling: Any = {"progress": progress, "seen": seen}
+    return estimate(measurement, probe, options, model=model, **telling).fit()
 
 
 @dataclass(frozen=True)
@@ -138,6 +142,7 @@ def estimate(
     joint: JointPrior | None = None,
     model: Callable[[Probe, Array], ForwardModel] | None = None,
     progress: Progress | None = None,
+    seen: Callable[[Prediction], None] | None = None,
 ) -> Estimate:
     """Find the parameters that priors and a measurement make most likely; see `fit`.
 
@@ -172,8 +177,9 @@ def estimate(
     own = {name: prior for name, prior in priors.items() if name not in SCALES}
     start = probe.moved({name: prior.value for name, prior in own.items()})
     attempts = _attempts(forward, options.held(start), options, residuals)
+    search: Any = {"priors": own, "joint": joint, "progress": progress, "seen": seen}
     try:
-        problem, optimum = _first_found(attempts, residuals, options, own, joint, progress)
+        problem, optimum = _first_found(attempts, residuals, options, **search)
     except BranchEndError as error:
         if not known:
             raise
@@ -186,7 +192,7 @@ def estimate(
         # a lever as known before would melt; what is measured below that tells a better one
         near = estimate(colder, probe, options, joint=joint, model=model).optimum.probe
         attempts = iter([(forward, near)])
-        problem, optimum = _first_found(attempts, residuals, options, own, joint, progress)
+        problem, optimum = _first_found(attempts, residuals, options, **search)
     seconds = time.perf_counter() - began
     return Estimate(problem, optimum, measurement, options, seconds, notes)
 
@@ -223,11 +229,9 @@ def _first_found(
     attempts: Iterable[tuple[ForwardModel, Probe]],
     residuals: Residuals,
     options: FitOptions,
-    priors: Mapping[str, Prior],
-    joint: JointPrior | None,
-    progress: Progress | None,
+    **search: Any,
 ) -> tuple[LeastSquares, Optimum]:
-    """Return what the first of some models and starts leads to.
+    """Return what the first of some models and starts leads to, in such a search.
 
     Raises
     ------
@@ -237,9 +241,7 @@ def _first_found(
     failures: list[ComputationError] = []
     for forward, start in attempts:
         residuals.down[:] = 1.0
-        problem = LeastSquares(
-            forward, residuals, start, options.varied, progress, None, priors, joint
-        )
+        problem = LeastSquares(forward, residuals, start, options.varied, **search)
         try:
             return problem, problem.solve_and_confirm(options.robust)
         except ComputationError as error:

@@ -7,7 +7,7 @@ voltages at a given tip temperature are nearly powers of the parameters, a few r
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -83,7 +83,8 @@ class LeastSquares:
 
     It begins at the probe `start`, where what is not varied stays, or from a prediction for a
     similar one, `near`; priors by name, or a joint one of all that is varied, count as further
-    data. `progress` is called with the branches solved and how many there usually are.
+    data. `progress` is called with the branches solved and how many there usually are, `seen` with
+    each prediction that is compared with the data.
 
     Attributes
     ----------
@@ -108,9 +109,10 @@ class LeastSquares:
         near: Prediction | None = None,
         priors: Mapping[str, Prior] | None = None,
         joint: JointPrior | None = None,
+        seen: Callable[[Prediction], None] | None = None,
     ) -> None:
         self.model, self.residuals = model, residuals
-        self._start, self._progress = start, progress
+        self._start, self._progress, self._seen = start, progress, seen
         self.objective = Objective(residuals, start, model.names, varied, priors, joint)
         self._at_hand = {} if near is None else {near.probe: near}
         self.evaluations, self.steps, self.ended, self.left = 0, 0, False, 0.0
@@ -288,4 +290,6 @@ class LeastSquares:
             del self._at_hand[next(iter(self._at_hand))]
         if self._progress is not None:
             self._progress(self.evaluations, max(_USUAL_ROUNDS, self.evaluations))
+        if self._seen is not None:
+            self._seen(prediction)
         return prediction

@@ -74,6 +74,11 @@ class Prediction:
         """The probe it is for."""
         return self.linearised.probe
 
+    @property
+    def bias(self) -> Array:
+        """The biases (V), shape (n,)."""
+        return self.nearby.bias
+
 
 class Nearby:
     """Predictions for probes near one whose branch is known: a branch costs nothing there.
@@ -91,7 +96,7 @@ class Nearby:
         by_parameter: Array,
         bias: Array,
     ) -> None:
-        self._probe, self._names, self._branch, self._bias = probe, names, branch, bias
+        self._probe, self._names, self._branch, self.bias = probe, names, branch, bias
         self._origin = probe.at(names)
         known = parameters_of(probe)
         scale = np.array([known[name].scale for name in names])
@@ -122,7 +127,7 @@ class Nearby:
             if name in Circuit.model_fields
         ]
         circuit = self._probe.circuit.model_copy(update=dict(own))
-        return _with_slopes(branch, by_parameter, circuit, self._bias, self._names)
+        return _with_slopes(branch, by_parameter, circuit, self.bias, self._names)
 
 
 def multiplied(branch: Branch, factor: Array, growth: Array) -> Branch:

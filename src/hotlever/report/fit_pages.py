@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hotlever import figures
@@ -11,19 +13,25 @@ from hotlever.fitting.result import Fit
 from hotlever.fitting.uncertainty import Uncertainty
 from hotlever.fitting.words import lever_rows, outcome, parameter_rows, uncertainty_tables
 from hotlever.lever import Lever
-from hotlever.report.page import Page
+from hotlever.report.page import Block, Page
 from hotlever.text import INVERSION, sentence
 
 #: Points of a curve without visible corners.
 _POINTS = 110
 
 
-def fit_page(fit: Fit, found: Uncertainty | None = None) -> Page:
-    """Return the report page of one fit, and of what was sampled and profiled of it."""
+def fit_page(
+    fit: Fit, found: Uncertainty | None = None, added: Callable[[Block], None] | None = None
+) -> Page:
+    """Return the report page of one fit, and of what was sampled and profiled of it.
+
+    It takes a second; ``added`` is called with each block as soon as it is there.
+    """
     page = Page(
         f"Fit of {fit.measurement.path}",
         f"Material parameters of a {fit.probe.shape.shape} lever from its measured "
         f"{', '.join(fit.observables)}.",
+        added,
     )
     add_fit(page, fit)
     if found is not None:
@@ -33,12 +41,6 @@ def fit_page(fit: Fit, found: Uncertainty | None = None) -> Page:
 
 def add_fit(page: Page, fit: Fit) -> None:
     """Add tables and figures of a fit to a page."""
-    measured = fit.measurement.dataset(fit.probe.circuit)
-    # solved once for both
-    lever = Lever(fit.probe)
-    model = lever.sweep(measured.bias.values)
-    low, high = measured.bias.values[[0, -1]].tolist()
-    curve = lever.sweep(np.linspace(low, high, _POINTS))
     page.table(
         ("parameter", "value", "unit", ""),
         parameter_rows(fit),
@@ -47,6 +49,10 @@ def add_fit(page: Page, fit: Fit) -> None:
     for text in [f"no such lever shows these data: {fit.reason}"] * bool(fit.reason) + fit.notes:
         page.text(sentence(text))
     page.text(f"{'; '.join(outcome(fit))}.")
+    measured = fit.measurement.dataset(fit.probe.circuit)
+    # solved once for both
+    lever = Lever(fit.probe)
+    model = lever.sweep(measured.bias.values)
     page.figure(
         "fit_data_and_model",
         figures.data_and_model(
@@ -66,6 +72,8 @@ def add_fit(page: Page, fit: Fit) -> None:
         "The tip temperature that the fit predicts, with the band that follows from the "
         "covariance of the parameters (model errors not included).",
     )
+    low, high = measured.bias.values[[0, -1]].tolist()
+    curve = lever.sweep(np.linspace(low, high, _POINTS))
     page.figure(
         "fit_iv",
         figures.iv_curves({"model": curve}, measured=measured),

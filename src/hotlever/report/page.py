@@ -6,7 +6,7 @@ import base64
 import io
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,9 @@ from matplotlib.figure import Figure
 from hotlever import __version__
 from hotlever.figures import save_figure
 from hotlever.files import output_folder, write_text
+
+# A part of a page: its ``kind``, and what that has.
+Block = dict[str, Any]
 
 #: Sections from which on a page has a list of them.
 _CONTENTS_FROM = 5
@@ -49,15 +52,29 @@ def _with_links(text: str) -> Markup:
 
 @dataclass
 class Page:
-    """A page that is filled from top to bottom and then written."""
+    """A page that is filled from top to bottom and then written.
+
+    Attributes
+    ----------
+    title, summary : str
+    added : callable, optional
+        Called with each block as soon as it is there.
+    blocks : list of dict
+    """
 
     title: str
     summary: str = ""
-    blocks: list[dict[str, Any]] = field(default_factory=list)
+    added: Callable[[Block], None] | None = None
+    blocks: list[Block] = field(default_factory=list)
+
+    def _add(self, kind: str, **block: Any) -> None:
+        self.blocks.append({"kind": kind, **block})
+        if self.added is not None:
+            self.added(self.blocks[-1])
 
     def heading(self, text: str) -> None:
         """Start a section."""
-        self.blocks.append({"kind": "heading", "text": text, "anchor": _anchor(text)})
+        self._add("heading", text=text, anchor=_anchor(text))
 
     @property
     def anchor(self) -> str:
@@ -67,7 +84,7 @@ class Page:
 
     def text(self, text: str) -> None:
         """Add a paragraph."""
-        self.blocks.append({"kind": "text", "text": text})
+        self._add("text", text=text)
 
     def table(
         self,
@@ -78,12 +95,11 @@ class Page:
         prose: bool = False,
     ) -> None:
         """Add a table of strings; one of sentences is set flush left."""
-        block = {"kind": "table", "columns": columns, "rows": rows, "caption": caption}
-        self.blocks.append({**block, "prose": prose})
+        self._add("table", columns=columns, rows=rows, caption=caption, prose=prose)
 
     def figure(self, name: str, made: Figure, caption: str) -> None:
         """Add a figure; `name` is its file name without suffix."""
-        self.blocks.append({"kind": "figure", "name": name, "figure": made, "caption": caption})
+        self._add("figure", name=name, figure=made, caption=caption)
 
     def write(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page, and each figure as PDF beside it; return the page's path.

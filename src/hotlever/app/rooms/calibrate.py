@@ -5,11 +5,10 @@ from __future__ import annotations
 from nicegui import ui
 
 from hotlever.app.jobs import named
-from hotlever.app.page import framed
 from hotlever.app.project import CALIBRATION, TABLE
-from hotlever.app.rooms.measured import REFERENCE, MeasuredRoom
+from hotlever.app.rooms.measured import MeasuredRoom
 from hotlever.app.rooms.results import SHOWING, download_button
-from hotlever.app.rooms.room import MEDIA, choice, field, several
+from hotlever.app.rooms.room import MEDIA, REFERENCE, choice, field, several
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 
@@ -22,17 +21,11 @@ _ASKED = {
 }
 
 
-async def fill(session: Session) -> None:
-    """Fill the page."""
-    with framed(session, "/calibrate") as complaint:
-        room = _Room(session, complaint, "Calibrate", "straighten")
-    await room.read()
-
-
-class _Room(MeasuredRoom):
+class CalibrateRoom(MeasuredRoom):
     """One tab of the room."""
 
     name, kind, ending = "calibrate", "calibration", CALIBRATION
+    button, icon = "Calibrate", "straighten"
 
     def options(self) -> None:
         """Show what the calibration rests on, and what is known beforehand."""

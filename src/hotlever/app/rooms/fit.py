@@ -5,12 +5,10 @@ from __future__ import annotations
 from nicegui import ui
 
 from hotlever.app.jobs import named
-from hotlever.app.page import framed
 from hotlever.app.project import FIT, FITS
 from hotlever.app.rooms.measured import MeasuredRoom
 from hotlever.app.rooms.results import download_button
 from hotlever.app.rooms.room import MEDIA, choice, field, several
-from hotlever.app.session import Session
 
 _OBSERVABLES = {"current": "current I_h", "reader": "reader V_r", "tip": "tip temperature"}
 _OPTIONS = {
@@ -21,17 +19,11 @@ _OPTIONS = {
 }
 
 
-async def fill(session: Session) -> None:
-    """Fill the page."""
-    with framed(session, "/fit") as complaint:
-        room = _Room(session, complaint, "Fit", "query_stats")
-    await room.read()
-
-
-class _Room(MeasuredRoom):
+class FitRoom(MeasuredRoom):
     """One tab of the room."""
 
     name, kind, ending = "fit", "fit", FIT
+    button, icon = "Fit", "query_stats"
 
     def options(self) -> None:
         """Show what is fitted, and how."""

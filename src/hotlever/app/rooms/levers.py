@@ -8,18 +8,10 @@ from typing import Any
 from nicegui import ui
 
 from hotlever.app.jobs import Job, named
-from hotlever.app.page import (
-    Complaint,
-    Work,
-    drop_zone,
-    framed,
-    table,
-    two_columns,
-)
+from hotlever.app.page import Complaint, Work, drop_zone, table, two_columns
 from hotlever.app.project import FITS
-from hotlever.app.rooms.measured import REFERENCE
 from hotlever.app.rooms.results import SHOWING, download_button, say_refused
-from hotlever.app.rooms.room import Room, choice
+from hotlever.app.rooms.room import Room, choice, probe_names
 from hotlever.app.session import Session
 
 #: Folder of the page of the fits.
@@ -27,14 +19,7 @@ _REPORT = "levers"
 _LOOK_S = 1.0
 
 
-async def fill(session: Session) -> None:
-    """Fill the page."""
-    with framed(session, "/levers") as complaint:
-        room = _Room(session, complaint)
-    await room.look()
-
-
-class _Room(Room):
+class LeversRoom(Room):
     """One tab of the room."""
 
     name = "levers"
@@ -58,8 +43,9 @@ class _Room(Room):
                         ui.button(label, on_click=lambda _, e=every: self._all(e)).props(
                             "flat dense no-caps"
                         )
-                names = {"": REFERENCE} | {name: name for name in session.project.probes}
-                self._probe = choice("Probe", names, self.chosen.get("probe") or "", self._choose)
+                chosen_probe = self.chosen.get("probe") or ""
+                names = probe_names(session)
+                self._probe = choice("Probe", names, chosen_probe, self._choose)
                 ui.button("Fit all", icon="table_rows", on_click=self.start).classes(
                     "w-full"
                 ).props("no-caps")
@@ -73,6 +59,10 @@ class _Room(Room):
                 self.command()
         self.show_command()
         ui.timer(_LOOK_S, self.look)
+
+    async def open(self) -> None:
+        """Show the fits that are there."""
+        await self.look()
 
     async def _dropped(self, names: list[str]) -> None:
         self._files.set_options(self.session.project.data)

@@ -7,15 +7,15 @@ from typing import Any
 
 from nicegui import ui
 
-from hotlever.app.jobs import Job
-from hotlever.app.page import Complaint, Work, drop_zone, figure, table, two_columns
+from hotlever.app.jobs import Job, named
+from hotlever.app.page import Complaint, Work, drop_zone, table, two_columns
 from hotlever.app.project import DATA
+from hotlever.app.rooms.plots import MeasuredPlots
 from hotlever.app.rooms.results import SHOWING, show_result
-from hotlever.app.rooms.room import Room, choice
+from hotlever.app.rooms.room import Room, choice, probe_names
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError, InputError
 
-REFERENCE = "reference probe"
 _DROP = "Drop a measurement here (bias, current and what else there is), or press +"
 
 
@@ -24,8 +24,10 @@ class MeasuredRoom(Room):
 
     #: What is made: its kind, and what its name ends with.
     kind, ending = "", ""
+    #: Of the button that makes it.
+    button, icon = "", ""
 
-    def __init__(self, session: Session, complaint: Complaint, button: str, icon: str) -> None:
+    def __init__(self, session: Session, complaint: Complaint) -> None:
         super().__init__(session, complaint)
         self.has: list[str] = []
         self._reads = self._shows = 0
@@ -33,14 +35,18 @@ class MeasuredRoom(Room):
             with left:
                 self.controls()
                 self.options()
-                self._button = ui.button(button, icon=icon, on_click=self.start)
+                self._button = ui.button(self.button, icon=self.icon, on_click=self.start)
                 self._button.classes("w-full").props("no-caps")
                 self._button.disable()  # until there is something understood
             with right:
-                Work(session, self.name, self._ended, notes=False)
+                Work(session, self.name, self._ended, during=self._follow, notes=False)
                 self._result = ui.column().classes("w-full gap-2")
-                self._table = ui.column().classes("w-full gap-2")
+                self._understood = _Understood()
                 self.command()
+
+    async def open(self) -> None:
+        """Read the measurement that was chosen last."""
+        await self.read()
 
     def options(self) -> None:
         """Show what else can be chosen."""
@@ -71,6 +77,12 @@ class MeasuredRoom(Room):
         if started:
             self._result.clear()
         return started
+
+    def _follow(self, job: Job) -> None:
+        """Draw how near to the data the lever is that is being fitted, or was."""
+        curve = job.shown.get("curve")
+        if curve and self.has and job.arguments[1] == named(self.chosen["data"]):
+            self._understood.plots.approach(curve)
 
     async def _ended(self, job: Job) -> None:
         await self._show_result()
@@ -112,13 +124,12 @@ class MeasuredRoom(Room):
 
     def probe_choice(self) -> None:
         """Show which probe it is a measurement of."""
-        names = {"": REFERENCE} | {name: name for name in self.session.project.probes}
 
         async def pick(event: Any) -> None:
             self.chosen["probe"] = event.value or None
             await self.read()
 
-        choice("Probe", names, self.chosen.get("probe") or "", pick)
+        choice("Probe", probe_names(self.session), self.chosen.get("probe") or "", pick)
 
     async def _dropped(self, names: list[str]) -> None:
         self._select.set_options(self.session.project.data)
@@ -156,25 +167,40 @@ class MeasuredRoom(Room):
                     self.complaint.say(str(error))
         if this != self._reads:  # something else has been chosen meanwhile
             return
-        self._table.clear()
-        if found is not None:
-            with self._table:
-                _show(found)
+        self._understood.show(found)
         self.has = [] if found is None else found["observables"]
+        if job := self.session.jobs.by_room.get(self.name):
+            self._follow(job)
         self._button.set_enabled(found is not None)
         self.understood()
         self.show_command()
         await self._show_result()
 
 
-def _show(found: dict[str, Any]) -> None:
-    opened = ui.expansion("What was understood", value=True).classes("w-full")
-    opened.props("dense header-class=text-bold")
-    with opened, ui.row().classes("w-full items-start no-wrap"):
-        with ui.column().classes("col"):
+class _Understood:
+    """What a file was understood as; hidden while there is none.
+
+    Attributes
+    ----------
+    plots : MeasuredPlots
+    """
+
+    def __init__(self) -> None:
+        self._opened = ui.expansion("What was understood", value=True).classes("w-full")
+        self._opened.props("dense header-class=text-bold").set_visibility(False)
+        with self._opened, ui.column().classes("w-full gap-2"):
+            self.plots = MeasuredPlots()
+            self._rows = ui.column().classes("w-full gap-2")
+
+    def show(self, found: dict[str, Any] | None) -> None:
+        """Show what was found in a file; nothing, if that was no measurement."""
+        self._opened.set_visibility(found is not None)
+        self._rows.clear()
+        if found is None:
+            return
+        self.plots.measured(found["data"], found["observables"])
+        with self._rows:
             head, *rows = found["rows"]
             table(head, rows)
             for note in found["notes"]:
                 ui.label(f"• {note}").classes("text-sm remark")
-        with ui.column().classes("w-80"):
-            figure(found["figure"], "The measured I-V curve")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from base64 import b64encode
+from collections.abc import Sequence
 from copy import deepcopy
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from nicegui import ui
@@ -12,6 +13,10 @@ from nicegui import ui
 from hotlever.colours import BLUE, HEAT, VERMILION
 
 _INK, _GRID = "#8a8a8a", "rgba(128,128,128,.25)"
+#: Beyond the data, as a share of what they extend over.
+_MARGIN = 0.07
+_LEVER_V, _CURRENT = "lever voltage V<sub>l</sub> (V)", "current I<sub>h</sub> (mA)"
+_BIAS, _TIP = "bias V<sub>b</sub> (V)", "tip temperature (K)"
 _CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
 
 
@@ -37,6 +42,61 @@ def _plot(data: list[dict[str, Any]], layout: dict[str, Any], alt: str) -> ui.pl
     )
     made.props(f'role=img aria-label="{alt}"')
     return made
+
+
+def _side_by_side() -> ui.element:
+    columns = "grid-template-columns: repeat(auto-fit, minmax(250px, 1fr))"
+    return ui.element("div").classes("w-full grid gap-2").style(columns)
+
+
+class MeasuredPlots:
+    """A measurement, by observable, and a lever that is brought near to it."""
+
+    #: Columns along both axes, and what those are called.
+    _AXES: ClassVar = {
+        "current": (("lever_V", _LEVER_V), ("current_mA", _CURRENT)),
+        "reader": (("bias_V", _BIAS), ("reader_V", "reader voltage V<sub>r</sub> (V)")),
+        "tip": (("bias_V", _BIAS), ("tip_K", _TIP)),
+    }
+
+    def __init__(self) -> None:
+        dots: Any = {"type": "scatter", "mode": "markers", "name": "measured"}
+        dots["marker"] = {"color": BLUE, "size": 6, "symbol": "circle-open"}
+        line = {"mode": "lines", "line": {"color": VERMILION, "width": 2, "shape": "spline"}}
+        model = {"type": "scatter", "name": "model", **line}
+        self._plots: dict[str, tuple[ui.element, ui.plotly]] = {}
+        # once for all measurements: a browser takes long to make them
+        with _side_by_side():
+            for name, ((_, along), (_, title)) in self._AXES.items():
+                with ui.element("div") as around:
+                    layout = _layout(along, title, 240, normal="xy")
+                    made = _plot([dots, model], layout, f"Measured {name}, and the lever fitted")
+                self._plots[name] = around, made
+        self._said = ui.label().classes("text-xs opacity-70")
+
+    def measured(self, data: dict[str, list[float]], observables: Sequence[str]) -> None:
+        """Draw a measurement."""
+        for name, (around, plot) in self._plots.items():
+            around.set_visibility(name in observables)
+            if name in observables:
+                (x, _), (y, _) = self._AXES[name]
+                dots, model = plot.figure["data"]
+                dots |= {"x": _short(data[x]), "y": _short(data[y])}
+                model |= {"x": [], "y": []}
+                # of the data alone, so that the lever moves and not the axes
+                plot.figure["layout"]["xaxis"]["range"] = _range(data[x])
+                plot.figure["layout"]["yaxis"]["range"] = _range(data[y])
+                plot.update()
+        self._said.set_text("")
+
+    def approach(self, curve: dict[str, list[float]]) -> None:
+        """Draw the lever that was found so far."""
+        for name, (around, plot) in self._plots.items():
+            if around.visible:
+                (x, _), (y, _) = self._AXES[name]
+                plot.figure["data"][1] |= {"x": _short(curve[x]), "y": _short(curve[y])}
+                plot.update()
+        self._said.set_text("Dots: measured. Line: the lever as the fit has it.")
 
 
 class LivePlots:
@@ -74,19 +134,15 @@ class LivePlots:
         picture = {"xref": "x", "yref": "y", "sizing": "stretch", "layer": "below"}
         square["images"] = [picture | {"xanchor": "left", "yanchor": "top", "source": ""}]
         self._heat = _plot([bar], square, "Map of the temperature")
-        with (
-            ui.element("div")
-            .classes("w-full grid gap-2")
-            .style("grid-template-columns: repeat(auto-fit, minmax(250px, 1fr))")
-        ):
+        with _side_by_side():
             self._iv = _plot(
                 [line, knee, here],
-                _layout("lever voltage V<sub>l</sub> (V)", "current I<sub>h</sub> (mA)", 270),
+                _layout(_LEVER_V, _CURRENT, 270),
                 "Current against lever voltage, with the knee",
             )
             self._tp = _plot(
                 [line, knee, here],
-                _layout("power P<sub>l</sub> (mW)", "tip temperature (K)", 270, normal="y"),
+                _layout("power P<sub>l</sub> (mW)", _TIP, 270, normal="y"),
                 "Tip temperature against power",
             )
             profile = _layout("x (µm)", "temperature (K)", 270, normal="xy")
@@ -164,6 +220,13 @@ def _colours() -> list[list[Any]]:
 
     shares = np.linspace(0.0, 1.0, 32)
     return [[share, to_hex(colormaps[HEAT](share))] for share in shares.tolist()]
+
+
+def _range(values: list[float]) -> list[float]:
+    """Return the ends of an axis that shows some values, and a little more."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    margin = _MARGIN * (high - low or abs(high) or 1.0)
+    return [low - margin, high + margin]
 
 
 def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:

@@ -177,13 +177,17 @@ def with_times(
     -------
     xarray.Dataset
         With the slowest ``time_constants_us_at_start`` and ``time_constants_us_at_end``, in the
-        circuit; and, of a resolved one, ``heating_us`` and ``cooling_us``: from 10 to 90 % of the
-        way from the colder of its ends to its hottest tip, NaN where there is no such time.
+        circuit; and, of a resolved one, the highest temperature of the tip, when it has that, and
+        its mean over the whole time, ``tip_highest_K``, ``tip_highest_at_us`` and ``tip_mean_K``;
+        ``heating_us`` and ``cooling_us``: from 10 to 90 % of the way from the colder of its ends to
+        its hottest tip, NaN where there is no such time.
     """
     found: dict[str, Any] = {}
-    if resolved:
+    if resolved and history.time.size > 1:
         time, tip = history.time.values, history.tip_K.values
         low, high = min(tip[0], tip[-1]), tip.max()
+        found["tip_highest_K"], found["tip_highest_at_us"] = high, time[tip.argmax()]
+        found["tip_mean_K"] = np.trapezoid(tip, time) / (time[-1] - time[0])
         found["heating_us"], found["cooling_us"] = (
             _swing(time, (tip - low) / (high - low)) if high > low else (np.nan, np.nan)
         )

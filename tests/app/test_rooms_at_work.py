@@ -1,0 +1,128 @@
+"""What rooms show of commands: fits on their way, pulses, and the files that leave."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from nicegui import ui
+from nicegui.testing import User
+from test_rooms import Here, shown, until, visit
+
+from hotlever.app import showing
+from hotlever.app.child import run_command
+from hotlever.app.jobs import Job
+from hotlever.app.page import Complaint
+from hotlever.app.project import EXAMPLES
+from hotlever.app.rooms.pulses import Pulses
+from hotlever.app.rooms.sliders import FIRST
+from hotlever.app.session import Session
+
+
+class Hearing(Here):
+    """Hears a command in this process, for its job."""
+
+    def __init__(self, job: Job) -> None:
+        super().__init__()
+        self._job = job
+
+    def told(self, line: str) -> None:
+        self._job.hear(("said", line))
+
+    def progressed(self, *content: Any) -> None:
+        self._job.hear(("progress", *content))
+
+    def shown(self, what: str, content: Any) -> None:
+        self._job.hear(("shown", what, content))
+        self.sent.append((what, content))
+
+
+def done(arguments: list[str], folder: Path) -> tuple[Job, list[Any]]:
+    """Run a command as a worker does; return the job, and the curves that it has shown."""
+    job = Job(arguments)
+    here: Any = Hearing(job)
+    status, job.result = run_command(here, arguments, folder)
+    job.end("done" if status == 0 else "failed")
+    return job, [content for what, content in here.sent if what == "curve"]
+
+
+def test_the_lever_that_is_fitted_is_drawn_beside_the_data(tmp_path: Path) -> None:
+    (tmp_path / "mine.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
+    job, curves = done(["fit", "mine.csv", "-o", "mine.fit.json"], tmp_path)
+    assert job.standing == "done"
+    data = showing.understood(Here(), tmp_path, "mine.csv", [], None)["data"]  # type: ignore[arg-type]
+
+    def off(curve: dict[str, list[float]]) -> float:
+        model = np.interp(data["bias_V"], curve["bias_V"], curve["current_mA"])
+        return float(np.sqrt(np.mean((model - data["current_mA"]) ** 2)))
+
+    # it comes nearer, down to the noise
+    assert len(curves) > 2
+    assert off(curves[0]) > 5 * off(curves[-1])
+    assert off(curves[-1]) < 0.005
+
+    async def story(user: User, session: Session) -> None:
+        session.jobs.by_room["fit"] = job
+        await user.open("/fit")
+        await user.should_see("Line: the lever as the fit has it", retries=50)
+        plots = [one for one in user.client.elements.values() if isinstance(one, ui.plotly)]
+        measured, model = plots[0].figure["data"]  # type: ignore[index,call-overload]
+        assert len(measured["x"]) == len(model["x"]) == len(data["bias_V"])
+        assert model["y"] == pytest.approx(curves[-1]["current_mA"], rel=1e-4)
+
+    visit(tmp_path, story)
+
+
+def test_pulses_in_the_room_are_those_of_the_command_and_of_python(tmp_path: Path) -> None:
+    chosen = {"kind": "train", "height": 6.0, "length": 1.0, "period": 2.5, "count": 2}
+    lever = {"changes": {"c_kappa": 0.7}, "view": "time"}
+
+    async def story(user: User, session: Session) -> None:
+        session.reduced[None, ()] = False
+        session.chosen |= {"simulate": lever, "pulse": {**chosen, "until": 4.0}}
+        await user.open("/simulate")
+        words = "pulse --set c_kappa=0.7 --pulse 6V,1us --period 2.5us --count 2 --until 4us"
+        words += " -o reference.pulse.csv --plot reference.pulse.svg"
+        await user.should_see(f"hotlever {words}", retries=50)
+        job = session.jobs.by_room["pulse"] = done(words.split(), tmp_path)[0]
+        await user.open("/simulate")
+        labels = [one.text for one in user.client.elements.values() if isinstance(one, ui.label)]
+        lines = next(text for text in labels if "lever.pulse(" in text)
+        found: dict[str, Any] = {}
+        exec(lines, found)
+        history = found["history"]
+        tip, time_us = history.tip_K.values, history.time.values
+        highest, at = tip.max(), time_us[tip.argmax()]
+        assert shown(user, "data-number=tip, highest") == f"{highest:.1f} K at {at:.4g} µs"
+        assert at == 3.5
+        mean = np.trapezoid(tip, time_us) / 4.0
+        said = float(shown(user, "data-number=tip, mean").split()[0])
+        assert said == pytest.approx(mean, abs=0.5)
+        rows = list(csv.DictReader((tmp_path / "reference.pulse.csv").read_text().splitlines()))
+        assert [float(row["tip_K"]) for row in rows] == pytest.approx(tip)
+        assert job.standing == "done"
+
+    visit(tmp_path, story)
+
+
+def test_fields_leave_as_one_file(tmp_path: Path) -> None:
+    async def story(user: User, session: Session) -> None:
+        await user.open("/simulate")
+        job = Job(["pulse", "--fields", "a.fields"])
+        (tmp_path / "a.fields").mkdir()
+        for name in ("1.vtu", "2.vtu", "3.vtu"):
+            (tmp_path / "a.fields" / name).write_text(name)
+        os.utime(tmp_path / "a.fields" / "1.vtu", (0, 0))  # of another command
+        with user:
+            await Pulses(session, Complaint(""), dict(FIRST)).give(job)
+            await until(lambda: bool(user.download.http_responses))
+        packed = zipfile.ZipFile(io.BytesIO(user.download.http_responses[-1].content))
+        assert packed.namelist() == ["2.vtu", "3.vtu"]
+
+    visit(tmp_path, story)
