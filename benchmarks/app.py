@@ -1,6 +1,7 @@
 """The app in a real browser: how soon it answers, what it asks of other hosts, what it withstands.
 
-python benchmarks/app.py [speed|files|memory] [COUNT]   (needs Chromium, and the extra test-app)
+python benchmarks/app.py [speed|files] [COUNT]         (needs Chromium, and the extra test-app)
+python benchmarks/app.py memory [ACTIONS] [MINUTES]    (10 000 take about half an hour)
 
 Times are of the wall, as a user has them, from the key press to the last figure drawn; the
 processor's, of the app and the browser together, tell what a machine without other work would need.
@@ -12,6 +13,7 @@ import os
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,7 @@ from playwright.sync_api import Error
 from app_in_browser import EXAMPLES, browsing, running
 from bad_files import bad_files
 from problems import table
+from random_clicks import RandomUser, act
 
 MATERIAL = "phonon scattering exponent"
 #: Notes when a key was pressed, and which plots were drawn since.
@@ -182,9 +185,12 @@ def _files_in(page, app, room, count):
     return len(bad), told, taken, dead
 
 
-def memory(count):
-    """Move sliders at random; say how the memory of the app grows."""
-    rng, rows = np.random.default_rng(1), []
+def memory(count, minutes):
+    """Click at random in all rooms; say how the memory of the app grows from the first hundred on.
+
+    Before each number all work is cancelled, and pages that were closed have been forgotten.
+    """
+    parts, rows = 10, []
     with (
         tempfile.TemporaryDirectory() as name,
         running(Path(name)) as app,
@@ -192,16 +198,24 @@ def memory(count):
     ):
         page.goto(f"{app.base}/simulate")
         page.get_by_text("full lever:").wait_for(timeout=180_000)
-        names = [MATERIAL, "Bias", "scale of the thermal conductivity", "Bias"]
-        for number in range(count + 1):
-            if number % max(1, count // 5) == 0:
-                page.wait_for_timeout(3000)
-                rows.append((str(number), f"{_memory(app) / 2**20:.0f} MB"))
-            one = names[number % 4]
-            slider = page.get_by_role("slider", name=one, exact=True).locator("[tabindex]")
-            slider.press(str(rng.choice(["ArrowRight", "ArrowLeft"])))
-        table(("moves", "memory of the app and its processes"), rows)
-        print(f"errors in the browser: {len(seen.errors)}")
+        user = RandomUser(page, app.base)
+        begin = time.monotonic()
+        for done in (100, *((part + 1) * count // parts for part in range(parts))):
+            act(user, done - user.done, begin + 60 * minutes - time.monotonic())
+            user.rest()
+            _idle(app)
+            own, *others = _used(app)
+            sizes = "+".join(f"{size:.0f}" for size in others)
+            took = f"{time.monotonic() - begin:.0f} s"
+            rows.append((user.done, took, f"{own + sum(others):.0f} MB", f"{own:.0f} MB", sizes))
+            print(*rows[-1], flush=True)
+        table(("actions", "after", "memory of all", "server", "its processes"), rows)
+        first, *others = (float(row[2].split()[0]) for row in rows)
+        grown = f"{others[-1] / first - 1:+.0%}, at most {max(others) / first - 1:+.0%}"
+        print(f"growth since {rows[0][0]} actions: {grown}")
+        print(f"dead pages: {user.dead}; errors in the browser: {len(seen.errors)}")
+        for line in (*app.lines[1:], *seen.errors[:20]):
+            print(line)
 
 
 def _processes(app):
@@ -209,8 +223,33 @@ def _processes(app):
     return [own, *own.children(recursive=True)]
 
 
-def _memory(app):
-    return sum(one.memory_info().rss for one in _processes(app))
+def _idle(app):
+    """Wait until the app has nothing to do, and has given back what it can: a minute at most."""
+    for _ in range(20):
+        before = _of_app(app)
+        time.sleep(3.0)
+        if _of_app(app) - before < 0.3:
+            return
+
+
+def _of_app(app):
+    times = _each(app, psutil.Process.cpu_times)
+    return sum(time.user + time.system for time in times)
+
+
+def _used(app):
+    """Return MB of the server and of each of its processes."""
+    sizes = [info.rss / 2**20 for info in _each(app, psutil.Process.memory_info)]
+    return [size for size in sizes if size > 0]
+
+
+def _each(app, ask):
+    """Return what is known of each process that is there; some end meanwhile."""
+    found = []
+    for one in _processes(app):
+        with suppress(psutil.NoSuchProcess):
+            found.append(ask(one))
+    return found
 
 
 def _spent(app):
@@ -220,12 +259,15 @@ def _spent(app):
     return sum(time.user + time.system for time in times.values())
 
 
+#: How many moves of a slider, files and random actions, and minutes for the last.
+_USUAL = {"speed": [60], "files": [50], "memory": [1000, 30]}
+
+
 def main():
-    what = sys.argv[1] if len(sys.argv) > 1 else "speed"
-    count = (
-        int(sys.argv[2]) if len(sys.argv) > 2 else {"speed": 60, "files": 50, "memory": 1000}[what]
-    )
-    {"speed": speed, "files": files, "memory": memory}[what](count)
+    what, *given = sys.argv[1:] or ["speed"]
+    usual = _USUAL[what]
+    numbers = [*map(int, given), *usual[len(given) :]]
+    {"speed": speed, "files": files, "memory": memory}[what](*numbers)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import csv
 import io
+import shutil
 import sys
 import time
 from collections.abc import Awaitable, Callable
@@ -18,7 +19,7 @@ from nicegui.testing import User, user_simulation
 from PIL import Image
 
 from bad_files import bad_files
-from hotlever.app import live, showing
+from hotlever.app import live, showing, spectra
 from hotlever.app.jobs import Jobs, command_line
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.server import add_pages
@@ -45,7 +46,8 @@ class Here:
     def progress(self, label: str) -> None: ...
 
     async def call(self, function: str, *arguments: Any, heard: Any = None) -> Any:
-        module = {"live": live, "showing": showing}[function.split(":")[0].split(".")[-1]]
+        modules = {"live": live, "showing": showing, "spectra": spectra}
+        module = modules[function.split(":")[0].split(".")[-1]]
         self.sent = []
         result = getattr(module, function.split(":")[1])(self, *arguments)
         for message in self.sent:
@@ -203,6 +205,43 @@ def test_bad_files_are_a_line_each_and_the_room_goes_on(tmp_path: Path, address:
             await until(lambda: not shown(user, "role=alert").strip())
 
     visit(tmp_path, story)
+
+
+def test_a_line_is_corrected_by_hand_as_by_the_command(
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("tip", "hot-plate"):
+        shutil.copytree(EXAMPLES / "raman" / name, tmp_path / name)
+    monkeypatch.chdir(tmp_path)
+    told: list[str] = []
+
+    async def story(user: User, session: Session) -> None:
+        def said() -> str:
+            return shown(user, "data-spectrum=1")
+
+        asked: list[list[str]] = []
+        session.jobs.start = lambda room, arguments, then=None: asked.append(arguments)  # type: ignore
+        session.chosen["raman"] = {"spectrum": "tip/tip_04.txt"}
+        await user.open("/raman")
+        await until(lambda: "551.11 ± 2.52 K" in said())
+        user.find(kind=ui.plotly).trigger("plotly_click", {"points": [{"x": 516.94, "y": 400.0}]})
+        await until(lambda: "by-hand" in said())
+        user.find(kind=ui.plotly).trigger("plotly_selected", {"range": {"x": [545.0, 490.0]}})
+        await until(lambda: said().endswith("(by-hand)"))
+        _, out, _ = run(*asked[-1][: asked[-1].index("-o")])
+        told.extend((said(), out))
+        user.find("Leave out").click()
+        await until(lambda: said() == "left-out")
+        user.find("As found").click()
+        await until(lambda: "551.11 ± 2.52 K" in said())
+        assert "--corrections" in asked[0]
+        assert "--corrections" not in asked[-1]
+
+    visit(tmp_path, story)
+    row = next(one for one in csv.DictReader(told[1].splitlines()) if one["file"] == "tip_04.txt")
+    line = "{center_cm-1} ± {center_stderr_cm-1} cm⁻¹, width {fwhm_cm-1} cm⁻¹"
+    line += ", {temperature_K} ± {temperature_error_K} K ({flags})"
+    assert told[0] == line.format(**row)
 
 
 def test_a_shape_is_drawn_while_its_fields_change(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ A function is given a `Report` first, by which it tells its progress, then its a
 
 from __future__ import annotations
 
+import gc
 import importlib
 import io
 import os
@@ -21,8 +22,11 @@ from typing import Any
 
 from hotlever.cli.output import heard_by
 from hotlever.errors import HotleverError
+from hotlever.memory import give_back
 from hotlever.types import Progress
 
+#: Seconds without a call after which a process gives back the memory that its last calls freed.
+_REST_S = 1.0
 #: Modules that a process imports before it is asked for anything, so that it then answers at once.
 _READY = (
     *("hotlever.cli.commands", "hotlever.fitting", "hotlever.calibration"),
@@ -63,7 +67,7 @@ def serve(connection: Connection) -> None:
     report = Report(connection)
     report.told("ready")
     while True:
-        name, arguments = calls.get()
+        name, arguments = _next(calls)
         try:
             connection.send(("done", _function(name)(report, *arguments)))
         except HotleverError as error:
@@ -72,6 +76,15 @@ def serve(connection: Connection) -> None:
             connection.send(("failed", "there is too little memory for this"))
         except Exception as error:
             connection.send(("failed", f"internal error: {type(error).__name__}: {error}"))
+
+
+def _next(calls: queue.Queue[tuple[str, tuple[Any, ...]]]) -> tuple[str, tuple[Any, ...]]:
+    """Wait for a call; give memory back while there is none."""
+    with suppress(queue.Empty):
+        return calls.get(timeout=_REST_S)
+    gc.collect()
+    give_back()
+    return calls.get()
 
 
 def run_command(report: Report, arguments: list[str], folder: Path) -> tuple[int, str]:
