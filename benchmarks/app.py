@@ -15,17 +15,21 @@ import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import psutil
 from playwright.sync_api import Error
 
-from app_in_browser import EXAMPLES, browsing, running
+from app_in_browser import EXAMPLES, browsing, drop, running
 from bad_files import bad_files
+from hotlever.app.project import safe_name
 from problems import table
-from random_clicks import RandomUser, act
+from random_clicks import ROOMS, RandomUser, act
 
 MATERIAL = "phonon scattering exponent"
+#: Seconds in which a line must be said of a file.
+_SAID_S = 8.0
 #: Notes when a key was pressed, and which plots were drawn since.
 _COUNT = """() => {
     window.drawn = new Set(); window.last = 0; window.pressed = 0;
@@ -147,42 +151,53 @@ def speed(count):
 
 
 def files(count):
-    """Drop bad files in every room; say in which the app said nothing, or stopped."""
-    rows = []
+    """Drop bad files in every room; say of which no line was said that names them."""
+    rows, silent = [], []
     with (
         tempfile.TemporaryDirectory() as name,
         running(Path(name)) as app,
         browsing(app) as (page, seen),
     ):
-        for room in ("", "lever", "simulate", "raman", "fit", "calibrate", "levers"):
-            rows.append((room or "start", *_files_in(page, app, room, count)))
-        said = [line for line in app.lines if "internal error" in line]
-        table(("room", "files", "a line", "moved on or taken", "dead pages"), rows)
-        print(f"internal errors: {len(said)}; errors in the browser: {len(seen.errors)}")
-        for line in (*said[:5], *seen.errors[:5]):
+        for room in ROOMS:
+            page.goto(f"{app.base}/{room}")
+            page.wait_for_load_state("networkidle")
+            for zone in range(page.locator("input[type=file]").count()):
+                found = [_dropped(page, app, room, zone, *file) for file in bad_files()][:count]
+                where = f"{room or 'start'}{f', {zone + 1}' if zone else ''}"
+                kinds = ("said", "moved on", "silent")
+                dead = sum(not one[2] for one in found)
+                rows.append((where, len(found), *(_count(found, kind) for kind in kinds), dead))
+                silent += [f"{where}: {one[0]}" for one in found if one[1] != "said"]
+        table(("room", "files", "a line", "moved on", "no line", "dead pages"), rows)
+        print(f"errors in the browser: {len(seen.errors)}")
+        for line in (*silent, *app.lines[1:], *seen.errors[:5]):
             print(line)
 
 
-def _files_in(page, app, room, count):
-    told = taken = dead = 0
-    bad = [file for file in bad_files() if "/" not in file[0] and len(file[0]) < 200][:count]
-    page.goto(f"{app.base}/{room}")
-    page.wait_for_load_state("networkidle")
-    zone = page.locator("input[type=file]").first
-    if not zone.count():
-        return 0, 0, 0, 0
-    for name, content in bad:
-        zone.set_input_files({"name": name, "mimeType": "", "buffer": content})
-        page.wait_for_timeout(400)
+def _count(found, kind):
+    return sum(one[1] == kind for one in found)
+
+
+def _dropped(page, app, room, zone, name, content):
+    """Drop a file; return its name, what became of it, and whether the page is alive."""
+    drop(page, zone, name, content)
+    # it may be kept with a number
+    kept = Path(safe_name(name)).stem
+    said, deadline = "silent", time.monotonic() + _SAID_S
+    while said == "silent" and time.monotonic() < deadline:
+        page.wait_for_timeout(50)
         try:
-            alert = " ".join(page.locator("[role=alert]").all_inner_texts()).strip()
+            lines = page.locator("[role=alert]").all_inner_texts()
         except Error:
-            alert = ""  # it went on to another room
-        told, taken = told + bool(alert), taken + (not alert)
-        if not page.url.endswith(f"/{room}"):
-            page.goto(f"{app.base}/{room}")
-        dead += not page.get_by_role("button", name="Simulate").first.is_enabled()
-    return len(bad), told, taken, dead
+            lines = []  # it is going to another room
+        if urlsplit(page.url).path.strip("/") != room:
+            said = "moved on"
+        elif any(kept in line for line in lines):
+            said = "said"
+    if said == "moved on":
+        page.goto(f"{app.base}/{room}")
+        page.wait_for_load_state("networkidle")
+    return name, said, page.get_by_role("button", name="Simulate").first.is_enabled()
 
 
 def memory(count, minutes):

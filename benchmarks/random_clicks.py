@@ -7,7 +7,7 @@ import time
 import numpy as np
 from playwright.sync_api import Error
 
-from app_in_browser import EXAMPLES
+from app_in_browser import EXAMPLES, drop
 from bad_files import bad_files
 
 ROOMS = ("", "lever", "simulate", "raman", "fit", "calibrate", "levers")
@@ -44,8 +44,7 @@ class RandomUser:
         self._page, self._base, self._rng = page, base, np.random.default_rng(seed)
         page.context.grant_permissions(["clipboard-read", "clipboard-write"])
         good = [("lever-a.csv", (EXAMPLES / "lever-a.csv").read_bytes())]
-        bad = [file for file in bad_files() if "/" not in file[0] and len(file[0]) < 200]
-        self._files = good * 10 + bad
+        self._files = good * 10 + list(bad_files())
         self.done = self.dead = 0
 
     def act(self):
@@ -65,10 +64,8 @@ class RandomUser:
                 raise
 
     def _drop(self):
-        zone = self._page.locator("input[type=file]").first
-        if zone.count():
-            name, content = self._files[self._rng.integers(len(self._files))]
-            zone.set_input_files({"name": name, "mimeType": "", "buffer": content})
+        if self._page.locator("input[type=file]").count():
+            drop(self._page, 0, *self._files[self._rng.integers(len(self._files))])
 
     def look(self):
         """Go to Simulate, where sliders are; a page that does not is dead."""

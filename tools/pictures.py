@@ -50,7 +50,8 @@ def make(names: list[str]) -> None:
     for script in sorted((ROOT / "examples" / "gallery").glob("*.py")):
         if not names or script.stem in names:
             runpy.run_path(str(script))
-            shrunk(Path(f"{script.stem}.png"), DOCS / "gallery" / f"{script.stem}.png")
+            # beside its script: the app shows both
+            shrunk(Path(f"{script.stem}.png"), script.with_suffix(".png"))
     for page in sorted((DOCS / "examples").glob("*.md")):
         if not names or page.stem in names:
             run_page(page)

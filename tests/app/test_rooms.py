@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import csv
 import io
+import re
 import shutil
 import sys
 import time
@@ -21,7 +22,8 @@ from PIL import Image
 from bad_files import bad_files
 from hotlever.app import live, showing, spectra
 from hotlever.app.jobs import Jobs, command_line
-from hotlever.app.project import EXAMPLES, Project
+from hotlever.app.project import DRAWINGS, EXAMPLES, Project, safe_name
+from hotlever.app.rooms.gallery import QUESTIONS
 from hotlever.app.server import add_pages
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
@@ -178,21 +180,37 @@ def test_a_dropped_measurement_is_understood(tmp_path: Path) -> None:
     visit(tmp_path, story)
 
 
+def _imported(name: str) -> list[str]:
+    stem = Path(name).stem
+    return ["probe", "import", name, "-o", f"{stem}.toml", "--plot", f"{stem}.svg"]
+
+
 @pytest.mark.parametrize("address", ["/fit", "/", "/lever", "/raman", "/levers"])
 def test_bad_files_are_a_line_each_and_the_room_goes_on(tmp_path: Path, address: str) -> None:
-    drawn = (".gds", ".oas", ".dxf")
+    # what a command will refuse, and is no mistake of the room
+    taken = {"/": (*POOR, *DRAWINGS), "/fit": POOR, "/levers": POOR, "/lever": DRAWINGS}
 
     async def story(user: User, session: Session) -> None:
+        asked: list[list[str]] = []
+        session.jobs.start = lambda room, arguments, then=None: asked.append(arguments)  # type: ignore
         await user.open(address)
         for name, content in bad_files():
-            if name.endswith((*drawn, ".json")) or name in POOR:
-                continue  # taken by a command, or measurements of a kind
+            client = user.client
             for one in user.client.elements.values():
                 if one.props.get("role") == "alert":
                     one.set_text("")  # what was said of the file before
             await drop(user, name, content)
+            if name.endswith(taken.get(address, ())):
+                if address == "/":
+                    await until(lambda c=client: user.client is not c)  # it went on
+                    await user.open(address)
+                elif address == "/lever":
+                    await until(lambda n=name: asked[-1:] == [_imported(n)])
+                assert not shown(user, "role=alert").strip(), name
+                continue
             await until(lambda: bool(shown(user, "role=alert").strip()))
             line = shown(user, "role=alert")
+            assert Path(safe_name(name)).stem in line, name
             assert "internal error" not in line, name
             assert "Traceback" not in line
         good = {
@@ -242,6 +260,30 @@ def test_a_line_is_corrected_by_hand_as_by_the_command(
     line = "{center_cm-1} ± {center_stderr_cm-1} cm⁻¹, width {fwhm_cm-1} cm⁻¹"
     line += ", {temperature_K} ± {temperature_error_K} K ({flags})"
     assert told[0] == line.format(**row)
+
+
+def test_questions_of_the_gallery_open_rooms_or_scripts(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "gallery.md").read_text(encoding="utf-8")
+    assert list(QUESTIONS) == re.findall(r"gallery/(\w+)\.png", page)
+    files = {"how_sure": "lever-a.csv", "metal_film": "palladium-on-nitride.toml"}
+
+    async def story(user: User, session: Session) -> None:
+        for name, opened in QUESTIONS.items():
+            if opened is not None:
+                opened.set_up(session)
+                assert opened.room.strip("/") in session.chosen
+                assert not opened.key or (tmp_path / files.get(name, "lever-a.csv")).is_file()
+        await user.open("/fit")
+        await user.should_see("hotlever fit lever-a.csv -o lever-a.fit.json", retries=50)
+        await user.open("/raman")
+        await user.should_see("hotlever raman tip --calibrate-from hot-plate")
+        await user.open("/")
+        for question in re.findall(r"^## (.+)", page, re.MULTILINE):
+            await user.should_see(question)
+        user.find(kind=ui.button, content="Script").click()
+        await user.should_see("knee = lever.knee()")
+
+    visit(tmp_path, story)
 
 
 def test_a_shape_is_drawn_while_its_fields_change(tmp_path: Path) -> None:

@@ -13,10 +13,13 @@ from nicegui import app, ui
 
 from hotlever.app.guard import Guard
 from hotlever.app.project import LARGEST_FILE, Project
-from hotlever.app.rooms import calibrate, fit, lever, levers, raman, simulate, start
+from hotlever.app.rooms import calibrate, fit, gallery, lever, levers, raman, simulate, start
 from hotlever.app.session import Session
 from hotlever.errors import InputError
+from hotlever.memory import give_back
 
+#: Seconds after which the memory of pages that were closed is given back, again and again.
+_GIVE_BACK_S = 60.0
 LOCAL = ("127.0.0.1", "localhost", "::1")
 _PAGES: dict[str, Callable[[Session], Awaitable[None]]] = {
     "/": start.fill,
@@ -76,6 +79,7 @@ def serve(
     session = Session(project)
     app.on_startup(session.start)
     app.on_startup(lambda: say(address))
+    app.on_startup(lambda: app.timer(_GIVE_BACK_S, give_back))
     # told in one line, and kept in a file, as by any command
     logging.getLogger("nicegui").setLevel(logging.CRITICAL + 1)
     app.on_exception(failed)
@@ -97,6 +101,7 @@ def serve(
 
 def add_pages(session: Session) -> None:
     """Make the pages of all rooms."""
+    gallery.serve_pictures()
     for address, fill in _PAGES.items():
         ui.page(address)(_page(session, fill))
 
