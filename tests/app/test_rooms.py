@@ -336,10 +336,33 @@ def test_commands_run_in_processes_that_can_be_ended(tmp_path: Path) -> None:
         while jobs.running("fit"):
             await asyncio.sleep(0.02)
         assert "died" in job.message
-        jobs._spare and jobs._spare.kill()
+        # an answer that nobody waits for any more is not the next one's
+        worker = jobs._spare
+        assert worker is not None
+        first = asyncio.create_task(worker.call("hotlever.app.live:described", tmp_path, None))
+        await asyncio.sleep(0.05)
+        first.cancel()
+        assert await worker.call("builtins:isinstance", object) is True
+        worker.kill()
 
     asyncio.run(story())
 
 
 def test_a_command_is_shown_as_a_shell_takes_it() -> None:
     assert command_line(["fit", "my data.csv"]) == "hotlever fit 'my data.csv'"
+
+
+def test_a_page_that_waits_for_a_busy_process_is_shown(tmp_path: Path) -> None:
+    class Busy(Here):
+        async def call(self, function: str, *arguments: Any, heard: Any = None) -> Any:
+            await asyncio.sleep(5.0)  # longer than a page may take
+            return await super().call(function, *arguments, heard=heard)
+
+    async def story(user: User, session: Session) -> None:
+        session._desks["full"] = Busy()  # type: ignore[assignment]
+        (tmp_path / "lever-a.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
+        await user.open("/fit")
+        await user.should_see("Measurement")
+        await user.should_see("What was understood", retries=50)
+
+    visit(tmp_path, story)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import secrets
 import socket
@@ -9,7 +10,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any
 
-from nicegui import app, ui
+from nicegui import app, background_tasks, ui
 
 from hotlever.app.guard import Guard
 from hotlever.app.project import LARGEST_FILE, Project
@@ -20,6 +21,8 @@ from hotlever.memory import give_back
 
 #: Seconds after which the memory of pages that were closed is given back, again and again.
 _GIVE_BACK_S = 60.0
+#: Seconds after which a page is shown with what it has by then.
+_SOON_S = 1.0
 LOCAL = ("127.0.0.1", "localhost", "::1")
 _PAGES: dict[str, Callable[[Session], Awaitable[None]]] = {
     "/": start.fill,
@@ -108,7 +111,15 @@ def add_pages(session: Session) -> None:
 
 def _page(session: Session, fill: Callable[[Session], Awaitable[None]]) -> Any:
     async def page() -> None:
-        await fill(session)
+        client = ui.context.client
+
+        async def filled() -> None:
+            with client:
+                await fill(session)
+
+        # what waits for a busy process comes later: a page that is late is none
+        task = background_tasks.create(filled(), name="page")
+        await asyncio.wait({task}, timeout=_SOON_S)
 
     return page
 
