@@ -28,6 +28,8 @@ from problems import table
 from random_clicks import ROOMS, RandomUser, act
 
 MATERIAL = "phonon scattering exponent"
+#: Seconds after which the app has forgotten a page, and given back its memory.
+_FORGOTTEN_S = 52.0
 #: Seconds in which a line must be said of a file.
 _SAID_S = 8.0
 #: Notes when a key was pressed, and which plots were drawn since.
@@ -205,7 +207,7 @@ def memory(count, minutes):
 
     Before each number all work is cancelled, and pages that were closed have been forgotten.
     """
-    parts, rows = 10, []
+    parts, rows = 5, []
     with (
         tempfile.TemporaryDirectory() as name,
         running(Path(name)) as app,
@@ -239,7 +241,8 @@ def _processes(app):
 
 
 def _idle(app):
-    """Wait until the app has nothing to do, and has given back what it can: a minute at most."""
+    """Wait until pages are forgotten and memory is given back, and there is nothing to do."""
+    time.sleep(_FORGOTTEN_S)
     for _ in range(20):
         before = _of_app(app)
         time.sleep(3.0)

@@ -24,7 +24,7 @@ _TOUCH = """([selector, place, click]) => {
     return all.length;
 }"""
 #: Shares of all actions: what is moved by a key, a file dropped; the others are clicks.
-_KEYS, _DROPS = 0.6, 0.01
+_KEYS, _DROPS = 0.8, 0.01
 #: Milliseconds for a page to answer.
 _ANSWERS = 30_000
 

@@ -20,7 +20,10 @@ from hotlever.errors import InputError
 from hotlever.memory import give_back
 
 #: Seconds after which the memory of pages that were closed is given back, again and again.
-_GIVE_BACK_S = 60.0
+_GIVE_BACK_S = 20.0
+#: Messages kept for a page whose connection was lost, pictures of the map among them; with more it
+#: is opened anew.
+_MESSAGES = 100
 #: Seconds after which a page is shown with what it has by then.
 _SOON_S = 1.0
 LOCAL = ("127.0.0.1", "localhost", "::1")
@@ -99,6 +102,7 @@ def serve(
         show=f"/{ticket}" if browser else False,
         show_welcome_message=False,
         reconnect_timeout=30.0,
+        message_history_length=_MESSAGES,
     )
 
 
