@@ -203,9 +203,10 @@ def _dropped(page, app, room, zone, name, content):
 
 
 def memory(count, minutes):
-    """Click at random in all rooms; say how the memory of the app grows from the first hundred on.
+    """Click at random in all rooms; say how the memory of the app grows.
 
-    Before each number all work is cancelled, and pages that were closed have been forgotten.
+    Before each number all work is cancelled, and pages that were closed have been forgotten. After
+    a tenth of the actions each kind of work has been done once, and caches are full.
     """
     parts, rows = 5, []
     with (
@@ -217,7 +218,7 @@ def memory(count, minutes):
         page.get_by_text("full lever:").wait_for(timeout=180_000)
         user = RandomUser(page, app.base)
         begin = time.monotonic()
-        for done in (100, *((part + 1) * count // parts for part in range(parts))):
+        for done in (100, count // 10, *((part + 1) * count // parts for part in range(parts))):
             act(user, done - user.done, begin + 60 * minutes - time.monotonic())
             user.rest()
             _idle(app)
@@ -227,9 +228,11 @@ def memory(count, minutes):
             rows.append((user.done, took, f"{own + sum(others):.0f} MB", f"{own:.0f} MB", sizes))
             print(*rows[-1], flush=True)
         table(("actions", "after", "memory of all", "server", "its processes"), rows)
-        first, *others = (float(row[2].split()[0]) for row in rows)
-        grown = f"{others[-1] / first - 1:+.0%}, at most {max(others) / first - 1:+.0%}"
-        print(f"growth since {rows[0][0]} actions: {grown}")
+        sizes = [float(row[2].split()[0]) for row in rows]
+        for at in (0, 1):
+            first, *others = sizes[at:]
+            grown = f"{others[-1] / first - 1:+.0%}, at most {max(others) / first - 1:+.0%}"
+            print(f"growth since {rows[at][0]} actions: {grown}")
         print(f"dead pages: {user.dead}; errors in the browser: {len(seen.errors)}")
         for line in (*app.lines[1:], *seen.errors[:20]):
             print(line)

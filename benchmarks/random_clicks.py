@@ -69,6 +69,7 @@ class RandomUser:
 
     def look(self):
         """Go to Simulate, where sliders are; a page that does not is dead."""
+        self._page.keyboard.press("Escape")  # a menu that is open covers the rest
         try:
             self._page.get_by_role("button", name="Simulate").first.click(timeout=_ANSWERS)
             self._page.wait_for_url("**/simulate", timeout=_ANSWERS)
