@@ -68,16 +68,20 @@ class RandomUser:
             drop(self._page, 0, *self._files[self._rng.integers(len(self._files))])
 
     def look(self):
-        """Go to Simulate, where sliders are; a page that does not is dead."""
-        self._page.keyboard.press("Escape")  # a menu that is open covers the rest
-        try:
-            self._page.get_by_role("button", name="Simulate").first.click(timeout=_ANSWERS)
-            self._page.wait_for_url("**/simulate", timeout=_ANSWERS)
-            self._page.get_by_role("slider").first.wait_for(timeout=_ANSWERS)
-        except Error as error:
-            self.dead += 1
-            print(f"after {self.done} actions, {self._page.url}: {error}")
-            self.open("simulate")
+        """Go to Simulate, where sliders are; a page that does not, when asked twice, is dead."""
+        for again in (True, False):
+            # a menu that is open covers the rest; a click before may lead elsewhere meanwhile
+            self._page.keyboard.press("Escape")
+            try:
+                self._page.get_by_role("button", name="Simulate").first.click(timeout=_ANSWERS)
+                self._page.wait_for_url("**/simulate", timeout=_ANSWERS)
+                self._page.get_by_role("slider").first.wait_for(timeout=_ANSWERS)
+                return
+            except Error as error:
+                if not again:
+                    self.dead += 1
+                    print(f"after {self.done} actions, {self._page.url}: {error}")
+        self.open("simulate")
 
     def open(self, room):
         """Open a room anew."""
