@@ -118,8 +118,13 @@ def _page(session: Session, fill: Callable[[Session], Awaitable[None]]) -> Any:
         client = ui.context.client
 
         async def filled() -> None:
-            with client:
-                await fill(session)
+            try:
+                with client:
+                    await fill(session)
+            except RuntimeError:
+                # a page that was closed before it was filled has lost its elements
+                if not client.is_deleted:
+                    raise
 
         # what waits for a busy process comes later: a page that is late is none
         task = background_tasks.create(filled(), name="page")
