@@ -1,6 +1,7 @@
 """The app in a real browser: how soon it answers, what it asks of other hosts, what it withstands.
 
-python benchmarks/app.py [speed|files|memory] [COUNT]   (needs Chromium, and the extra test-app)
+python benchmarks/app.py [speed|files] [COUNT]         (needs Chromium, and the extra test-app)
+python benchmarks/app.py memory [ACTIONS] [MINUTES]    (10 000 take about half an hour)
 
 Times are of the wall, as a user has them, from the key press to the last figure drawn; the
 processor's, of the app and the browser together, tell what a machine without other work would need.
@@ -12,17 +13,25 @@ import os
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import psutil
 from playwright.sync_api import Error
 
-from app_in_browser import EXAMPLES, browsing, running
+from app_in_browser import EXAMPLES, browsing, drop, running
 from bad_files import bad_files
+from hotlever.app.project import safe_name
 from problems import table
+from random_clicks import ROOMS, RandomUser, act
 
 MATERIAL = "phonon scattering exponent"
+#: Seconds after which the app has forgotten a page, and given back its memory.
+_FORGOTTEN_S = 52.0
+#: Seconds in which a line must be said of a file.
+_SAID_S = 8.0
 #: Notes when a key was pressed, and which plots were drawn since.
 _COUNT = """() => {
     window.drawn = new Set(); window.last = 0; window.pressed = 0;
@@ -144,47 +153,62 @@ def speed(count):
 
 
 def files(count):
-    """Drop bad files in every room; say in which the app said nothing, or stopped."""
-    rows = []
+    """Drop bad files in every room; say of which no line was said that names them."""
+    rows, silent = [], []
     with (
         tempfile.TemporaryDirectory() as name,
         running(Path(name)) as app,
         browsing(app) as (page, seen),
     ):
-        for room in ("", "lever", "simulate", "raman", "fit", "calibrate", "levers"):
-            rows.append((room or "start", *_files_in(page, app, room, count)))
-        said = [line for line in app.lines if "internal error" in line]
-        table(("room", "files", "a line", "moved on or taken", "dead pages"), rows)
-        print(f"internal errors: {len(said)}; errors in the browser: {len(seen.errors)}")
-        for line in (*said[:5], *seen.errors[:5]):
+        for room in ROOMS:
+            page.goto(f"{app.base}/{room}")
+            page.wait_for_load_state("networkidle")
+            for zone in range(page.locator("input[type=file]").count()):
+                found = [_dropped(page, app, room, zone, *file) for file in bad_files()][:count]
+                where = f"{room or 'start'}{f', {zone + 1}' if zone else ''}"
+                kinds = ("said", "moved on", "silent")
+                dead = sum(not one[2] for one in found)
+                rows.append((where, len(found), *(_count(found, kind) for kind in kinds), dead))
+                silent += [f"{where}: {one[0]}" for one in found if one[1] != "said"]
+        table(("room", "files", "a line", "moved on", "no line", "dead pages"), rows)
+        print(f"errors in the browser: {len(seen.errors)}")
+        for line in (*silent, *app.lines[1:], *seen.errors[:5]):
             print(line)
 
 
-def _files_in(page, app, room, count):
-    told = taken = dead = 0
-    bad = [file for file in bad_files() if "/" not in file[0] and len(file[0]) < 200][:count]
-    page.goto(f"{app.base}/{room}")
-    page.wait_for_load_state("networkidle")
-    zone = page.locator("input[type=file]").first
-    if not zone.count():
-        return 0, 0, 0, 0
-    for name, content in bad:
-        zone.set_input_files({"name": name, "mimeType": "", "buffer": content})
-        page.wait_for_timeout(400)
+def _count(found, kind):
+    return sum(one[1] == kind for one in found)
+
+
+def _dropped(page, app, room, zone, name, content):
+    """Drop a file; return its name, what became of it, and whether the page is alive."""
+    drop(page, zone, name, content)
+    # it may be kept with a number
+    kept = Path(safe_name(name)).stem
+    said, deadline = "silent", time.monotonic() + _SAID_S
+    while said == "silent" and time.monotonic() < deadline:
+        page.wait_for_timeout(50)
         try:
-            alert = " ".join(page.locator("[role=alert]").all_inner_texts()).strip()
+            lines = page.locator("[role=alert]").all_inner_texts()
         except Error:
-            alert = ""  # it went on to another room
-        told, taken = told + bool(alert), taken + (not alert)
-        if not page.url.endswith(f"/{room}"):
-            page.goto(f"{app.base}/{room}")
-        dead += not page.get_by_role("button", name="Simulate").first.is_enabled()
-    return len(bad), told, taken, dead
+            lines = []  # it is going to another room
+        if urlsplit(page.url).path.strip("/") != room:
+            said = "moved on"
+        elif any(kept in line for line in lines):
+            said = "said"
+    if said == "moved on":
+        page.goto(f"{app.base}/{room}")
+        page.wait_for_load_state("networkidle")
+    return name, said, page.get_by_role("button", name="Simulate").first.is_enabled()
 
 
-def memory(count):
-    """Move sliders at random; say how the memory of the app grows."""
-    rng, rows = np.random.default_rng(1), []
+def memory(count, minutes):
+    """Click at random in all rooms; say how the memory of the app grows.
+
+    Before each number all work is cancelled, and pages that were closed have been forgotten. After
+    a tenth of the actions each kind of work has been done once, and caches are full.
+    """
+    parts, rows = 5, []
     with (
         tempfile.TemporaryDirectory() as name,
         running(Path(name)) as app,
@@ -192,16 +216,26 @@ def memory(count):
     ):
         page.goto(f"{app.base}/simulate")
         page.get_by_text("full lever:").wait_for(timeout=180_000)
-        names = [MATERIAL, "Bias", "scale of the thermal conductivity", "Bias"]
-        for number in range(count + 1):
-            if number % max(1, count // 5) == 0:
-                page.wait_for_timeout(3000)
-                rows.append((str(number), f"{_memory(app) / 2**20:.0f} MB"))
-            one = names[number % 4]
-            slider = page.get_by_role("slider", name=one, exact=True).locator("[tabindex]")
-            slider.press(str(rng.choice(["ArrowRight", "ArrowLeft"])))
-        table(("moves", "memory of the app and its processes"), rows)
-        print(f"errors in the browser: {len(seen.errors)}")
+        user = RandomUser(page, app.base)
+        begin = time.monotonic()
+        for done in (100, count // 10, *((part + 1) * count // parts for part in range(parts))):
+            act(user, done - user.done, begin + 60 * minutes - time.monotonic())
+            user.rest()
+            _idle(app)
+            own, *others = _used(app)
+            sizes = "+".join(f"{size:.0f}" for size in others)
+            took = f"{time.monotonic() - begin:.0f} s"
+            rows.append((user.done, took, f"{own + sum(others):.0f} MB", f"{own:.0f} MB", sizes))
+            print(*rows[-1], flush=True)
+        table(("actions", "after", "memory of all", "server", "its processes"), rows)
+        sizes = [float(row[2].split()[0]) for row in rows]
+        for at in (0, 1):
+            first, *others = sizes[at:]
+            grown = f"{others[-1] / first - 1:+.0%}, at most {max(others) / first - 1:+.0%}"
+            print(f"growth since {rows[at][0]} actions: {grown}")
+        print(f"dead pages: {user.dead}; errors in the browser: {len(seen.errors)}")
+        for line in (*app.lines[1:], *seen.errors[:20]):
+            print(line)
 
 
 def _processes(app):
@@ -209,8 +243,34 @@ def _processes(app):
     return [own, *own.children(recursive=True)]
 
 
-def _memory(app):
-    return sum(one.memory_info().rss for one in _processes(app))
+def _idle(app):
+    """Wait until pages are forgotten and memory is given back, and there is nothing to do."""
+    time.sleep(_FORGOTTEN_S)
+    for _ in range(20):
+        before = _of_app(app)
+        time.sleep(3.0)
+        if _of_app(app) - before < 0.3:
+            return
+
+
+def _of_app(app):
+    times = _each(app, psutil.Process.cpu_times)
+    return sum(time.user + time.system for time in times)
+
+
+def _used(app):
+    """Return MB of the server and of each of its processes."""
+    sizes = [info.rss / 2**20 for info in _each(app, psutil.Process.memory_info)]
+    return [size for size in sizes if size > 0]
+
+
+def _each(app, ask):
+    """Return what is known of each process that is there; some end meanwhile."""
+    found = []
+    for one in _processes(app):
+        with suppress(psutil.NoSuchProcess):
+            found.append(ask(one))
+    return found
 
 
 def _spent(app):
@@ -220,12 +280,15 @@ def _spent(app):
     return sum(time.user + time.system for time in times.values())
 
 
+#: How many moves of a slider, files and random actions, and minutes for the last.
+_USUAL = {"speed": [60], "files": [50], "memory": [1000, 30]}
+
+
 def main():
-    what = sys.argv[1] if len(sys.argv) > 1 else "speed"
-    count = (
-        int(sys.argv[2]) if len(sys.argv) > 2 else {"speed": 60, "files": 50, "memory": 1000}[what]
-    )
-    {"speed": speed, "files": files, "memory": memory}[what](count)
+    what, *given = sys.argv[1:] or ["speed"]
+    usual = _USUAL[what]
+    numbers = [*map(int, given), *usual[len(given) :]]
+    {"speed": speed, "files": files, "memory": memory}[what](*numbers)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import threading
+from base64 import b64encode
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +17,14 @@ from playwright.sync_api import Page, sync_playwright
 EXAMPLES = Path(__file__).parents[1] / "src" / "hotlever" / "examples"
 #: Seconds for the app to say its address, and to end.
 _START_S, _END_S = 60, 15
+_DROP = """([zone, name, content]) => {
+    const bytes = Uint8Array.from(atob(content), one => one.charCodeAt(0));
+    const given = new DataTransfer();
+    given.items.add(new File([bytes], name));
+    const input = document.querySelectorAll('input[type=file]')[zone];
+    input.files = given.files;
+    input.dispatchEvent(new Event('change', {bubbles: true}));
+}"""
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -81,6 +90,11 @@ def running(folder: Path, *options: str) -> Iterator[App]:
         yield app
     finally:
         app.end()
+
+
+def drop(page: Page, zone: int, name: str, content: bytes) -> None:
+    """Give a file to a drop zone of a page, under a name that a dialogue may not give."""
+    page.evaluate(_DROP, [zone, name, b64encode(content).decode("ascii")])
 
 
 class Seen:

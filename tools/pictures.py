@@ -1,9 +1,9 @@
-"""Make the pictures of the gallery and of the worked examples again.
+"""Make the pictures of the gallery, the tutorial and the worked examples again.
 
     PYTHONPATH=tests python tools/pictures.py [NAME ...]
 
-Runs the scripts of examples/gallery, and the commands on the pages in docs/examples, in an empty
-folder, and puts the figures that the pages show beside them, small.
+Runs the scripts of examples/gallery, and the commands of the tutorial and of the pages in
+docs/examples, in an empty folder, and puts the figures that the pages show beside them, small.
 """
 
 from __future__ import annotations
@@ -50,11 +50,13 @@ def make(names: list[str]) -> None:
     for script in sorted((ROOT / "examples" / "gallery").glob("*.py")):
         if not names or script.stem in names:
             runpy.run_path(str(script))
-            shrunk(Path(f"{script.stem}.png"), DOCS / "gallery" / f"{script.stem}.png")
-    for page in sorted((DOCS / "examples").glob("*.md")):
+            # beside its script: the app shows both
+            shrunk(Path(f"{script.stem}.png"), script.with_suffix(".png"))
+    for page in (DOCS / "tutorial.md", *sorted((DOCS / "examples").glob("*.md"))):
         if not names or page.stem in names:
             run_page(page)
-            for name in re.findall(r"\]\((\S+\.png)\)", page.read_text(encoding="utf-8")):
+            # others are of the gallery
+            for name in re.findall(r"\]\(([\w-]+\.png)\)", page.read_text(encoding="utf-8")):
                 shrunk(Path(name), page.parent / name)
 
 

@@ -5,6 +5,7 @@ A function is given a `Report` first, by which it tells its progress, then its a
 
 from __future__ import annotations
 
+import gc
 import importlib
 import io
 import os
@@ -21,8 +22,11 @@ from typing import Any
 
 from hotlever.cli.output import heard_by
 from hotlever.errors import HotleverError
+from hotlever.memory import give_back
 from hotlever.types import Progress
 
+#: Seconds without a call after which a process gives back the memory that its last calls freed.
+_REST_S = 1.0
 #: Modules that a process imports before it is asked for anything, so that it then answers at once.
 _READY = (
     *("hotlever.cli.commands", "hotlever.fitting", "hotlever.calibration"),
@@ -33,7 +37,7 @@ _READY = (
 class Report:
     """Tells the app how far the work is; a `Listener` of commands."""
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: _Numbered) -> None:
         self._connection = connection
 
     def told(self, line: str) -> None:
@@ -57,25 +61,53 @@ class Report:
         return partial(self.progressed, label)
 
 
+class _Numbered:
+    """Sends messages with the number of the call that they belong to.
+
+    Who asked may be gone, and somebody else wait for the next answer.
+    """
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection, self.number = connection, 0
+
+    def send(self, message: tuple[Any, ...]) -> None:
+        """Send a message."""
+        self._connection.send((self.number, *message))
+
+
+#: A call: its number, the function, and its arguments.
+_Call = tuple[int, str, tuple[Any, ...]]
+
+
 def serve(connection: Connection) -> None:
     """Answer calls until the app is gone."""
     _quiet()
-    calls: queue.Queue[tuple[str, tuple[Any, ...]]] = queue.Queue()
+    calls: queue.Queue[_Call] = queue.Queue()
     threading.Thread(target=_listen, args=(connection, calls), daemon=True).start()
     for name in _READY:
         importlib.import_module(name)
-    report = Report(connection)
+    answers = _Numbered(connection)
+    report = Report(answers)
     report.told("ready")
     while True:
-        name, arguments = calls.get()
+        answers.number, name, arguments = _next(calls)
         try:
-            connection.send(("done", _function(name)(report, *arguments)))
+            answers.send(("done", _function(name)(report, *arguments)))
         except HotleverError as error:
-            connection.send(("failed", str(error)))
+            answers.send(("failed", str(error)))
         except MemoryError:
-            connection.send(("failed", "there is too little memory for this"))
+            answers.send(("failed", "there is too little memory for this"))
         except Exception as error:
-            connection.send(("failed", f"internal error: {type(error).__name__}: {error}"))
+            answers.send(("failed", f"internal error: {type(error).__name__}: {error}"))
+
+
+def _next(calls: queue.Queue[_Call]) -> _Call:
+    """Wait for a call; give memory back while there is none."""
+    with suppress(queue.Empty):
+        return calls.get(timeout=_REST_S)
+    gc.collect()
+    give_back()
+    return calls.get()
 
 
 def run_command(report: Report, arguments: list[str], folder: Path) -> tuple[int, str]:
@@ -109,7 +141,7 @@ def _quiet() -> None:
     sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), errors="backslashreplace")
 
 
-def _listen(connection: Connection, calls: queue.Queue[tuple[str, tuple[Any, ...]]]) -> None:
+def _listen(connection: Connection, calls: queue.Queue[_Call]) -> None:
     try:
         while True:
             calls.put(connection.recv())

@@ -45,7 +45,7 @@ _COLOURS = colormaps[HEAT](np.linspace(0.0, 1.0, 256), bytes=True)
 #: How much making reduced levers steps back behind other work.
 _NICE = 10
 #: Levers kept for sliders that go back and forth.
-_KEPT = 6
+_KEPT = 3
 #: What a model is called on the page.
 FULL, REDUCED, COARSE_MODEL = "full lever", "reduced lever", "coarse lever"
 

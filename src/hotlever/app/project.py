@@ -26,7 +26,7 @@ FIT, CALIBRATION, TABLE = ".fit.json", ".calibration.json", ".table.csv"
 #: Folder of the fits of many levers.
 FITS = "fits"
 #: Endings of tables that commands write: no measurements.
-_WRITTEN = (TABLE, ".sweep.csv", ".pulse.csv", ".raman.csv")
+_WRITTEN = (TABLE, ".sweep.csv", ".pulse.csv", ".raman.csv", ".corrections.csv")
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 

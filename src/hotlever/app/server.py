@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import secrets
 import socket
@@ -9,24 +10,32 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any
 
-from nicegui import app, ui
+from nicegui import app, background_tasks, ui
 
 from hotlever.app.guard import Guard
 from hotlever.app.project import LARGEST_FILE, Project
-from hotlever.app.rooms import raman, start
+from hotlever.app.rooms import gallery, start
 from hotlever.app.rooms.calibrate import CalibrateRoom
 from hotlever.app.rooms.fit import FitRoom
 from hotlever.app.rooms.lever import LeverRoom
 from hotlever.app.rooms.levers import LeversRoom
+from hotlever.app.rooms.raman import RamanRoom
 from hotlever.app.rooms.simulate import SimulateRoom
 from hotlever.app.session import Session
 from hotlever.errors import InputError
+from hotlever.memory import give_back
 
+#: Seconds after which the memory of pages that were closed is given back, again and again.
+_GIVE_BACK_S = 20.0
+#: Messages kept for a page whose connection was lost, pictures of the map among them; with more it
+#: is opened anew.
+_MESSAGES = 100
+#: Seconds after which a page is shown with what it has by then.
+_SOON_S = 1.0
 LOCAL = ("127.0.0.1", "localhost", "::1")
-_ROOMS = (LeverRoom, SimulateRoom, FitRoom, CalibrateRoom, LeversRoom)
+_ROOMS = (LeverRoom, SimulateRoom, RamanRoom, FitRoom, CalibrateRoom, LeversRoom)
 _PAGES: dict[str, Callable[[Session], Awaitable[None]]] = {
     "/": start.fill,
-    "/raman": raman.fill,
     **{f"/{room.name}": room.fill for room in _ROOMS},
 }
 
@@ -78,6 +87,7 @@ def serve(
     session = Session(project)
     app.on_startup(session.start)
     app.on_startup(lambda: say(address))
+    app.on_startup(lambda: app.timer(_GIVE_BACK_S, give_back))
     # told in one line, and kept in a file, as by any command
     logging.getLogger("nicegui").setLevel(logging.CRITICAL + 1)
     app.on_exception(failed)
@@ -94,18 +104,33 @@ def serve(
         show=f"/{ticket}" if browser else False,
         show_welcome_message=False,
         reconnect_timeout=30.0,
+        message_history_length=_MESSAGES,
     )
 
 
 def add_pages(session: Session) -> None:
     """Make the pages of all rooms."""
+    gallery.serve_pictures()
     for address, fill in _PAGES.items():
         ui.page(address)(_page(session, fill))
 
 
 def _page(session: Session, fill: Callable[[Session], Awaitable[None]]) -> Any:
     async def page() -> None:
-        await fill(session)
+        client = ui.context.client
+
+        async def filled() -> None:
+            try:
+                with client:
+                    await fill(session)
+            except RuntimeError:
+                # a page that was closed before it was filled has lost its elements
+                if not client.is_deleted:
+                    raise
+
+        # what waits for a busy process comes later: a page that is late is none
+        task = background_tasks.create(filled(), name="page")
+        await asyncio.wait({task}, timeout=_SOON_S)
 
     return page
 

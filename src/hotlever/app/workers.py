@@ -16,6 +16,8 @@ from typing import Any
 from hotlever.app import child
 from hotlever.errors import HotleverError
 
+#: Number of what a process says of no call.
+_ANY = 0
 #: Seconds that a process has to end by itself, tidying up, before it is killed.
 _TIDY_S = 0.6
 #: Events while a call runs: ("said", line), ("progress", label, done, total), ("shown", what, it).
@@ -40,6 +42,7 @@ class Worker:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._answer: asyncio.Future[Any] | None = None
         self._heard: Heard | None = None
+        self._number = 0
         self._turn = asyncio.Lock()
         self.lost = False
         _alive.add(self)
@@ -63,10 +66,11 @@ class Worker:
         async with self._turn:
             self._loop = asyncio.get_running_loop()
             self._answer, self._heard = self._loop.create_future(), heard
+            self._number += 1
             try:
                 if self.lost:
                     raise OSError
-                self._connection.send((function, arguments))
+                self._connection.send((self._number, function, arguments))
                 return await self._answer
             except OSError:
                 raise WorkerLostError(_LOST) from None
@@ -80,7 +84,7 @@ class Worker:
                 message = self._connection.recv()
             except (EOFError, OSError):
                 self.lost = True
-                message = ("lost",)
+                message = (_ANY, "lost")
             if self._loop is not None:
                 with suppress(RuntimeError):  # the loop is closed
                     self._loop.call_soon_threadsafe(self._take, message)
@@ -91,7 +95,9 @@ class Worker:
         answer = self._answer
         if answer is None or answer.done():
             return
-        kind, *content = message
+        number, kind, *content = message
+        if number not in (_ANY, self._number):
+            return  # of a call that nobody waits for any more
         if kind == "done":
             answer.set_result(content[0])
         elif kind == "failed":
@@ -99,7 +105,7 @@ class Worker:
         elif kind == "lost":
             answer.set_exception(WorkerLostError(_LOST))
         elif self._heard is not None:
-            self._heard(message)
+            self._heard((kind, *content))
 
     async def end(self) -> None:
         """End the process and all that it started."""

@@ -179,7 +179,7 @@ def _read_by(thermometer: partial[Setup]) -> list[Any]:
     """Return the files that a thermometer is set up from."""
     given = thermometer.keywords
     several = (given["calibrate_from"] or []) + (given["reference"] or [])
-    return [*several, given["temperatures"], given["calibration"]]
+    return [*several, *(given[name] for name in ("temperatures", "calibration", "corrections"))]
 
 
 def _answer(text: str, output: Path | None) -> None:

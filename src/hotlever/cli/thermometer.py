@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from hotlever.raman import PeakOptions, RamanCalibration, Spectrum, Thermometer
+    from hotlever.raman.correction import Correction
     from hotlever.raman.series import Line
 
 PUBLISHED = "published"
@@ -36,21 +37,33 @@ CalibrationOption = Annotated[
 class Setup:
     """A thermometer as the command line asked for it, or none.
 
-    `hot_plate` is what the calibration was made of, if it was made now.
+    `hot_plate` is what the calibration was made of, if it was made now; `read` are all spectra that
+    the thermometer was set up from.
     """
 
     options: PeakOptions
     calibration: RamanCalibration | None = None
     thermometer: Thermometer | None = None
     hot_plate: Sequence[Line] = ()
+    read: Sequence[Spectrum] = ()
+    corrections: Mapping[str, Correction] = field(default_factory=dict)
+    corrected_by: str = ""  #: name of the table
 
     def measure(self, paths: list[Path]) -> tuple[list[Line], xr.Dataset]:
         """Read and fit spectra; a folder's other files are noted, a missing line too."""
         from hotlever.raman import read_lines
+        from hotlever.raman.correction import check_corrections
 
-        lines = _lines(paths, self.options, "spectra")
-        if all(line.peak is None for line in lines):
-            found = "this spectrum" if len(lines) == 1 else f"any of {len(lines)} spectra"
+        spectra = _read(paths)
+        table, known = self.corrected_by, [*self.read, *spectra]
+        elsewhere = check_corrections(self.corrections, known, table)
+        _few_notes([f"{table}: passed over {name}, of no folder read here" for name in elsewhere])
+        lines = _lines(spectra, self.options, self.corrections, "spectra")
+        used = [line for line in lines if line.used]
+        if not used:
+            raise InputError(f"{table}: leaves out every spectrum, expected some to use")
+        if all(line.peak is None for line in used):
+            found = "this spectrum" if len(used) == 1 else f"any of {len(used)} spectra"
             raise InputError(f"{paths[0]}: no silicon line in {found}, expected one near 520 cm⁻¹")
         return lines, read_lines(lines, self.thermometer)
 
@@ -73,6 +86,11 @@ def set_up(
         None,
         metavar="TABLE.csv",
         help="Hot-plate temperatures: file name, temperature. Left out: header or file name.",
+    ),
+    corrections: File = Option(
+        None,
+        metavar="TABLE.csv",
+        help="By hand: file, start_cm-1 of the line, from_cm-1 and to_cm-1 of what is fitted, use.",
     ),
     reference: list[Path] | None = Option(
         None,
@@ -101,7 +119,7 @@ def set_up(
     ),
 ) -> Setup:
     """Return what the options of ``hotlever raman`` and ``hotlever join`` ask for."""
-    from hotlever.raman import Thermometer, laser_heating, series
+    from hotlever.raman import Thermometer, laser_heating, read_corrections, series
     from hotlever.raman.peak import LineShape
     from hotlever.raman.thermometer import Law
 
@@ -122,19 +140,23 @@ def set_up(
     chosen = calibration_of(calibration)
     hot_plate: list[Line] = []
     options = _options(chosen, shape, resolution)
+    by_hand = read_corrections(corrections) if corrections else {}
+    plate: list[Spectrum] = []
     if calibrate_from:
         table = series.read_temperatures(temperatures) if temperatures else None
         plate = _read(calibrate_from)
         with progress("hot plate") as update:
             source = ", ".join(path.name or str(path) for path in calibrate_from)
-            chosen, hot_plate = series.calibrate_from(plate, options, table, update, source)
+            chosen, hot_plate = series.calibrate_from(
+                plate, options, table, update, source, by_hand
+            )
         _describe(chosen)
     if chosen is None:
         unused = {"--reference": reference, "--stress": stress, "--laser-power": laser_power}
         for name, given in unused.items():
             if given:
                 raise InputError(f"{name} needs --calibration or --calibrate-from")
-        return Setup(options)
+        return Setup(options, corrections=by_hand, corrected_by=str(corrections))
     if chosen.reference_cm is None and not reference:
         raise InputError(
             "--calibration published: give --reference, a spectrum of your instrument at room "
@@ -145,10 +167,11 @@ def set_up(
     chosen_law: Any = law
     thermometer = Thermometer(chosen, chosen_law, start, 0.0, heating, stress)
     if reference:
-        found = _lines(reference, options, "reference")
+        found = _lines(_read(reference), options, by_hand, "reference")
         pairs = [(line.peak, line.spectrum.temperature) for line in found if line.peak]
         thermometer = thermometer.with_reference(pairs)
-    return Setup(options, chosen, thermometer, hot_plate)
+        plate += [line.spectrum for line in found]
+    return Setup(options, chosen, thermometer, hot_plate, plate, by_hand, str(corrections))
 
 
 def _options(
@@ -206,16 +229,16 @@ def _read(paths: list[Path]) -> list[Spectrum]:
     return found
 
 
-def _lines(paths: list[Path], options: PeakOptions, label: str) -> list[Line]:
+def _lines(
+    spectra: list[Spectrum], options: PeakOptions, by_hand: Mapping[str, Correction], label: str
+) -> list[Line]:
     from hotlever.raman import measure
 
-    spectra = _read(paths)
     with progress(label) as update:
-        lines = measure(spectra, options, update)
+        lines = measure(spectra, options, update, by_hand)
     if len(lines) > 1:
-        _few_notes(
-            [f"{line.spectrum.name}: no silicon line" for line in lines if line.peak is None]
-        )
+        without = [line.spectrum.name for line in lines if line.used and line.peak is None]
+        _few_notes([f"{name}: no silicon line" for name in without])
     return lines
 
 

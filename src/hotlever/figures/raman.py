@@ -47,6 +47,9 @@ def thermometry(
         The hot-plate spectra, to be stacked in place of `lines`.
     """
     names = [str(name) for name in table.file.values]
+    used = np.array([line.used for line in lines], dtype=bool)
+    names = [name for name, kept in zip(names, used, strict=True) if kept]
+    lines, table = [line for line in lines if line.used], table.isel(spectrum=used)
     if calibration is None:
         with figure(4.2, 5.4) as (made, axes):
             _stack(axes, list(zip(names, lines, strict=True)))
@@ -205,6 +208,10 @@ def one_spectrum(line: Line) -> Figure:
         upper.plot(x, y, ".", ms=3, color=GREY, label="counts")
         if line.peak is not None:
             residual = _fitted(upper, line.peak, x, y)
+        low, high = line.window
+        if line.window != WINDOW:
+            upper.axvspan(low, high, color=GREEN, alpha=0.12, lw=0, label="fitted part")
+            residual = np.where((x >= low) & (x <= high), residual, np.nan)
         lower.plot(x, residual, ".", ms=3, color=GREY)
         lower.axhline(0.0, color=BLACK, lw=0.8)
         upper.set(ylabel="counts", title=line.spectrum.name)

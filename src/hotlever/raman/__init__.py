@@ -1,8 +1,8 @@
 """Raman thermometry: from silicon's spectra to the tip temperature with its error.
 
 Section III of Spieser et al. 2017. A spectrum (`spectrum`) is fitted for its line (`fit`,
-`peak`); a hot-plate series gives a calibration (`calibration`); a thermometer (`thermometer`)
-turns line positions into temperatures.
+`peak`), with what is said of it by hand (`correction`); a hot-plate series gives a calibration
+(`calibration`); a thermometer (`thermometer`) turns line positions into temperatures.
 """
 # ruff: noqa: F401 (what is imported here is what the package offers)
 
@@ -13,6 +13,7 @@ from hotlever.raman.calibration import (
     published_raman_calibration,
     read_raman_calibration,
 )
+from hotlever.raman.correction import Correction, read_corrections
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.series import calibrate_from, measure, read_lines

@@ -1,9 +1,10 @@
 """Where the silicon line of a spectrum is, how wide and how strong, and how sure we are.
 
-The fit needs no start values. Its model is the line (`hotlever.raman.lineshape.line`) on a sloping
-background, and, where the residuals ask for it, a broad band on the low side: disordered
-silicon near 480 cm⁻¹, or a shoulder from warmer surroundings in the laser spot. Left out,
-such a band pulls the centre of a hot, weak line by more than a wavenumber (tens of kelvin).
+The fit needs no start values, but takes the line's place as one. Its model is the line
+(`hotlever.raman.lineshape.line`) on a sloping background, and, where the residuals ask for it, a
+broad band on the low side: disordered silicon near 480 cm⁻¹, or a shoulder from warmer
+surroundings in the laser spot. Left out, such a band pulls the centre of a hot, weak line by more
+than a wavenumber (tens of kelvin).
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ _NARROWEST = 1.2  # cm⁻¹; silicon's line is wider at any temperature
 _NARROWEST_SEEN = 0.5  # cm⁻¹; far below any line of silicon's, with noise
 _SPIKE_MAX_STEP = 1.2  # cm⁻¹; on a coarser axis a cosmic ray is no narrower than the line
 _MAX_FWHM = 45.0
+_NEAR = 3.0  # cm⁻¹; how far from the start that is given the line may be
 _FLAT = 1e-20  # in whatever unit the intensity is
 
 
@@ -83,10 +85,11 @@ def fit_peak(x: Array, y: Array, options: PeakOptions | None = None, where: str 
     options = (options or PeakOptions()).validate()
     prefix = f"{where}: " if where else ""
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    inside = in_window(x, prefix)
+    inside = in_window(x, prefix, options.window)
     x, y = x[inside], y[inside]
     peak, step = _fit(x, y, options), _step(x)
-    if step > _SPIKE_MAX_STEP and (peak is None or _spiky(peak, step)):
+    searched = options.start is None and step > _SPIKE_MAX_STEP
+    if searched and (peak is None or _spiky(peak, step)):
         peak = _beside_cosmic_ray(x, y, options, peak) or peak
     if peak is None:
         raise NoSiliconLine(
@@ -101,6 +104,12 @@ def _step(x: Array) -> float:
 
 def _in_range(x: Array) -> Mask:
     return np.asarray((x >= LINE_RANGE[0]) & (x <= LINE_RANGE[1]))
+
+
+def _near(x: Array, start: float) -> Mask:
+    """The samples about the place that is given, the nearest at least."""
+    away = np.abs(x - start)
+    return np.asarray(away <= max(_NEAR, float(away.min())))
 
 
 def _spiky(peak: Peak, step: float) -> bool:
@@ -128,7 +137,7 @@ def _fit(x: Array, y: Array, options: PeakOptions) -> Peak | None:
     if started is None:
         return None
     problem, start = started
-    use = problem.shown & ~_likely_spikes(x, y, float(np.percentile(y, 20)))
+    use = problem.shown & ~_likely_spikes(x, y, float(np.percentile(y, 20)), options.start)
     variance = np.maximum(noise.robust_sigma(y - np.median(y), np.abs(y)) ** 2, 1e-300)
     plain = _refine(problem, start, use, variance, passes=2)
     # beside a clipped line's flanks a band cannot be told from the hidden shape
@@ -136,9 +145,11 @@ def _fit(x: Array, y: Array, options: PeakOptions) -> Peak | None:
     return _peak(richer or _refine(problem, plain.p, plain.use, plain.variance))
 
 
-def _likely_spikes(x: Array, y: Array, base: float) -> Mask:
-    """Cosmic rays by sight; on a coarse axis only where no line of silicon can be."""
+def _likely_spikes(x: Array, y: Array, base: float, start: float | None) -> Mask:
+    """Cosmic rays by sight; none where a line is said or, on a coarse axis, can be."""
     found = noise.likely_spikes(y, base)
+    if start is not None:
+        return np.asarray(found & ~_near(x, start))
     return found & ~_in_range(x) if _step(x) > _SPIKE_MAX_STEP else found
 
 
@@ -148,11 +159,13 @@ def _start(x: Array, y: Array, options: PeakOptions) -> tuple[Problem, Array] | 
     origin = float(0.5 * (x[0] + x[-1]))
     flat = y - background - slope * (x - origin)
     step = _step(x)
-    clean = ~_likely_spikes(x, y, background)
+    clean = ~_likely_spikes(x, y, background, options.start)
     flat = np.interp(x, x[clean], flat[clean])
     # three samples and their median: no single spike makes a line, a coarse axis keeps one
     smooth = median_filter(flat, 3, mode="wrap")
-    candidates = _in_range(x) & clean
+    in_range = _in_range(x) & clean
+    said = np.ones_like(clean) if options.start is None else _near(x, options.start)
+    candidates = in_range & said
     if not candidates.any():
         return None
     top = int(np.argmax(np.where(candidates, smooth, -np.inf)))
@@ -163,7 +176,9 @@ def _start(x: Array, y: Array, options: PeakOptions) -> tuple[Problem, Array] | 
     above[top] = True
     run = next(run for run in noise.runs(above) if run.start <= top < run.stop)
     fwhm = float(np.clip(np.ptp(x[run]) + step, 1.5 * step, _MAX_FWHM))
-    clipped = noise.plateau(y, candidates, float(np.percentile(y, 5)))
+    clipped = noise.plateau(y, in_range, float(np.percentile(y, 5)))
+    if clipped is not None and not said[clipped].any():
+        clipped = None  # another line
     if clipped is not None:
         # flanks alone: the hidden top is higher than the clipped one
         top = (clipped.start + clipped.stop - 1) // 2

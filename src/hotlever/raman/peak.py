@@ -38,11 +38,26 @@ class PeakOptions:
     #: FWHM of the spectrometer's response, cm⁻¹. Left out with "voigt", it is fitted.
     resolution: float | None = None
     band: bool = True  #: whether a broad band on the low side may be added to the model
+    #: Where the line is, cm⁻¹, near enough for the fit to begin there; left out, it is looked for.
+    start: float | None = None
+    window: tuple[float, float] = WINDOW  #: part of the spectrum that is fitted, cm⁻¹
 
     def validate(self) -> PeakOptions:
         """Return self, or raise InputError naming the option at fault."""
         if self.shape not in get_args(LineShape):
             raise unknown_name("line shape", str(self.shape), get_args(LineShape))
+        low, high = LINE_RANGE
+        if self.start is not None and not low < self.start < high:
+            raise InputError(
+                f"start: found {self.start:g} cm⁻¹, expected a place between {low:g} and {high:g}, "
+                "where silicon's line can be"
+            )
+        low, high = self.window
+        if not WINDOW[0] <= low < high <= WINDOW[1]:
+            raise InputError(
+                f"window: found {low:g} to {high:g} cm⁻¹, expected a part of {WINDOW[0]:g} to "
+                f"{WINDOW[1]:g}"
+            )
         if self.resolution is None:
             return self
         if not 0 < self.resolution < 50:
@@ -104,12 +119,13 @@ class Peak:
         return np.asarray(self.background + self.slope * (np.asarray(x) - self.origin))
 
 
-def in_window(x: Array, where: str) -> Mask:
+def in_window(x: Array, where: str, window: tuple[float, float] = WINDOW) -> Mask:
     """Samples of an axis (cm⁻¹) that are fitted; InputError if they are too few."""
-    inside = (x >= WINDOW[0]) & (x <= WINDOW[1])
+    low, high = window
+    inside = (x >= low) & (x <= high)
     if np.count_nonzero(inside) < MIN_SAMPLES:
         raise InputError(
-            f"{where}{np.count_nonzero(inside)} samples between {WINDOW[0]:g} and {WINDOW[1]:g} "
+            f"{where}{np.count_nonzero(inside)} samples between {low:g} and {high:g} "
             f"cm⁻¹, expected at least {MIN_SAMPLES} around silicon's line"
         )
     return np.asarray(inside)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ import numpy as np
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.raman.calibration import Point, RamanCalibration, calibrate_raman
+from hotlever.raman.correction import Correction, of_spectrum
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.part import file_and_label
 from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
@@ -42,25 +43,70 @@ COLUMNS = ("file", *(name.replace("_per_cm", "_cm-1") for name in DIGITS), "flag
 
 @dataclass(frozen=True)
 class Line:
-    """A spectrum and its silicon line, None where it has none."""
+    """A spectrum and its silicon line, None where it has none or is left out."""
 
     spectrum: Spectrum
     peak: Peak | None
+    correction: Correction | None = None  #: by hand
+
+    @property
+    def used(self) -> bool:
+        """Whether it is measured, and not left out."""
+        return self.correction is None or self.correction.use
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """The part that is fitted, cm⁻¹."""
+        return (self.correction or Correction()).of(PeakOptions()).window
+
+    @property
+    def flags(self) -> list[str]:
+        """What was noticed of the line, and done by hand."""
+        if not self.used:
+            return ["left-out"]
+        flags = ["no-line"] if self.peak is None else list(self.peak.flags)
+        return flags if self.correction in (None, Correction()) else [*flags, "by-hand"]
 
 
 def measure(
     spectra: Sequence[Spectrum],
     options: PeakOptions | None = None,
     progress: Progress | None = None,
+    corrections: Mapping[str, Correction] | None = None,
 ) -> list[Line]:
-    """Fit the silicon line of each spectrum; calls ``progress`` with (spectra done, in all)."""
+    """Fit the silicon line of each spectrum.
+
+    Parameters
+    ----------
+    spectra : sequence of Spectrum
+    options : PeakOptions, optional
+    progress : callable, optional
+        Called with (spectra done, in all).
+    corrections : mapping of Correction, optional
+        By hand, by the name of the spectrum; see `read_corrections`.
+
+    Returns
+    -------
+    list of Line
+
+    Raises
+    ------
+    InputError
+        If the window of a correction holds too few samples.
+    """
+    options = options or PeakOptions()
     lines = []
     for spectrum in each(spectra, progress):
-        try:
-            peak = fit_peak(spectrum.x, spectrum.y, options, spectrum.name)
-        except NoSiliconLine:
-            peak = None
-        lines.append(Line(spectrum, peak))
+        correction = of_spectrum(spectrum, corrections or {})
+        line = Line(spectrum, None, correction)
+        if line.used:
+            own = options if correction is None else correction.of(options)
+            try:
+                peak = fit_peak(spectrum.x, spectrum.y, own, spectrum.name)
+                line = replace(line, peak=peak)
+            except NoSiliconLine:
+                pass
+        lines.append(line)
     return lines
 
 
@@ -78,7 +124,7 @@ def read_lines(lines: Sequence[Line], thermometer: Thermometer | None) -> xr.Dat
         # whole paths, where two folders hold the same name
         names = [str(Path(line.spectrum.folder) / line.spectrum.name) for line in lines]
     numbers = np.full((len(DIGITS), len(lines)), np.nan)
-    flags = [["no-line"] if line.peak is None else list(line.peak.flags) for line in lines]
+    flags = [line.flags for line in lines]
     for place, peak in enumerate(line.peak for line in lines):
         if peak is not None:
             numbers[:3, place] = peak.centre, peak.centre_stderr, peak.fwhm
@@ -112,17 +158,24 @@ def calibrate_from(
     temperatures: dict[str, float] | None = None,
     progress: Progress | None = None,
     source: str = "hot-plate series",
+    corrections: Mapping[str, Correction] | None = None,
 ) -> tuple[RamanCalibration, list[Line]]:
     """Calibrate from hot-plate spectra, each with its temperature by header or file name.
 
     Parameters
     ----------
-    spectra, options, progress
+    spectra, options, progress, corrections
         See `measure`.
     temperatures : dict, optional
         Kelvin by file name (see `read_temperatures`), which goes before header and name.
     source : str
         Named in the calibration file.
+
+    Returns
+    -------
+    RamanCalibration
+    list of Line
+        Without those that are left out.
 
     Raises
     ------
@@ -130,8 +183,12 @@ def calibrate_from(
         If a spectrum has no temperature, no silicon line, or a clipped one.
     """
     options = options or PeakOptions()
-    stated = [_temperature(spectrum, temperatures or {}) for spectrum in spectra]
-    lines = measure(spectra, options, progress)
+    known = corrections or {}
+    kept = [one for one in spectra if (said := of_spectrum(one, known)) is None or said.use]
+    if not kept:
+        raise InputError(f"{source}: every spectrum is left out, expected some to calibrate with")
+    stated = [_temperature(spectrum, temperatures or {}) for spectrum in kept]
+    lines = measure(kept, options, progress, known)
     points = []
     for line, temperature in zip(lines, stated, strict=True):
         name, peak = line.spectrum.name, line.peak

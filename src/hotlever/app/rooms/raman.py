@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from typing import Any
 
 from nicegui import ui
 
@@ -13,12 +14,12 @@ from hotlever.app.page import (
     Work,
     drop_zone,
     figure,
-    framed,
     table,
     two_columns,
 )
 from hotlever.app.rooms.results import FIGURE_FILES, download_button, say_refused
 from hotlever.app.rooms.room import Room, choice
+from hotlever.app.rooms.spectrum import CORRECTIONS, OneSpectrum
 from hotlever.app.session import Session
 
 _TIP, _PLATE = "tip", "hot-plate"
@@ -26,20 +27,14 @@ _TABLE, _SAVED, _FIGURE = "tip.raman.csv", "raman.json", "raman"
 _LAWS = {"anharmonic": "anharmonic", "linear": "linear, as in the paper"}
 
 
-async def fill(session: Session) -> None:
-    """Fill the page."""
-    with framed(session, "/raman") as complaint:
-        _Room(session, complaint)
-
-
-class _Room(Room):
+class RamanRoom(Room):
     """One tab of the room."""
 
     name = "raman"
 
     def __init__(self, session: Session, complaint: Complaint) -> None:
         super().__init__(session, complaint)
-        self._plot, self._given = ".svg", False
+        self._plot, self._given, self._again = ".svg", False, False
         with two_columns() as (left, right):
             with left:
                 self._folder(_PLATE, "Drop the spectra of the hot plate here (temperatures known)")
@@ -50,11 +45,18 @@ class _Room(Room):
                 ).props("no-caps")
             with right:
                 Work(session, self.name, self._measured)
+                self._one = OneSpectrum(
+                    session, complaint, self.chosen, self._thermometer, self._corrected
+                )
                 self._result = ui.column().classes("w-full gap-2")
                 self.command()
         self.show_command()
         if not session.jobs.running(self.name):
             self._show()
+
+    async def open(self) -> None:
+        """Show one of the spectra that are there."""
+        await self._one.look([_PLATE, _TIP])
 
     def _folder(self, folder: str, label: str) -> None:
         counted = ui.label().classes("text-sm")
@@ -67,6 +69,7 @@ class _Room(Room):
             count()
             self.show_command()
             await say_refused(self.session, self.complaint, names, spectra=True)
+            await self.open()
 
         drop_zone(self.session, self.complaint, label, dropped, folder)
         counted.move(target_index=-1)
@@ -90,23 +93,50 @@ class _Room(Room):
         self._calibration = choice("Calibrated by", names, saved_one, self._choose)
         self._law = choice("Law", _LAWS, self.chosen.get("law"), self._choose)
 
-    def _choose(self) -> None:
+    async def _choose(self) -> None:
         self.chosen |= {"calibration": self._calibration.value, "law": self._law.value}
         self.show_command()
+        await self._one.refresh()
+
+    def _thermometer(self) -> dict[str, Any]:
+        """Return the options of the thermometer."""
+        project, calibration = self.session.project, self.chosen.get("calibration")
+        plate = _PLATE if not calibration and project.spectra(_PLATE) else None
+        by_hand = CORRECTIONS if project.stamp(CORRECTIONS) else None
+        law = self.chosen.get("law", "anharmonic")
+        return {
+            "calibration": calibration or None,
+            "calibrate_from": plate,
+            "law": law,
+            "corrections": by_hand,
+        }
+
+    def _corrected(self) -> None:
+        """Measure anew, once what runs has ended."""
+        self.show_command()
+        if self.session.jobs.running(self.name):
+            self._again = True
+        else:
+            self.start()
 
     def arguments(self) -> list[str]:
         """Return the command that measures the spectra."""
-        arguments = ["raman", _TIP]
-        calibration = self.chosen.get("calibration")
-        if calibration:
-            arguments += ["--calibration", calibration]
-        elif self.session.project.spectra(_PLATE):
+        arguments, asked = ["raman", _TIP], self._thermometer()
+        if asked["calibration"]:
+            arguments += ["--calibration", asked["calibration"]]
+        elif asked["calibrate_from"]:
             arguments += ["--calibrate-from", _PLATE, "--save-calibration", _SAVED]
-        if self.chosen.get("law", "anharmonic") != "anharmonic":
-            arguments += ["--law", self.chosen["law"]]
+        if asked["law"] != "anharmonic":
+            arguments += ["--law", asked["law"]]
+        if asked["corrections"]:
+            arguments += ["--corrections", asked["corrections"]]
         return [*arguments, "-o", _TABLE, "--plot", f"{_FIGURE}{self._plot}"]
 
     async def _measured(self, job: Job) -> None:
+        if self._again:
+            self._again = False
+            self.start()
+            return
         if job.standing != "done":
             return
         if self._given:
@@ -141,4 +171,6 @@ class _Room(Room):
                 figure(
                     drawn, "Spectra by temperature, the calibration and its residuals", wide=True
                 )
-            table(head, rows, pagination=20)
+            shown = table(head, rows, pagination=20).classes("cursor-pointer")
+            shown.on("rowClick", lambda event: self._one.show(f"{_TIP}/{event.args[1]['0']}"))
+            ui.label("A click on a row shows its spectrum above.").classes("text-xs opacity-70")

@@ -7,7 +7,8 @@ from functools import partial
 from nicegui import ui
 
 from hotlever.app.page import Complaint, drop_zone, framed
-from hotlever.app.project import DRAWINGS, EXAMPLES
+from hotlever.app.project import DRAWINGS
+from hotlever.app.rooms.gallery import Opened, questions
 from hotlever.app.rooms.results import SHOWING
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
@@ -20,10 +21,19 @@ _SENTENCES = (
     "that does the same.",
 )
 _TRY = {
-    "lever-a.csv": ("A measured lever", "Bias, current, reader voltage, tip temperature", "/fit"),
-    "lever-b.csv": ("A lever with a tip", "The same, of a lever that the model lacks", "/fit"),
-    "reference-probe.gds": ("A drawing", "The reference lever as GDSII", "/lever"),
-    "raman": ("Raman spectra", "A hot plate and a tip", "/raman"),
+    "A measured lever": (
+        "Bias, current, reader voltage, tip temperature",
+        Opened("/fit", example="lever-a.csv", key="data"),
+    ),
+    "A lever with a tip": (
+        "The same, of a lever that the model lacks",
+        Opened("/fit", example="lever-b.csv", key="data"),
+    ),
+    "A drawing": (
+        "The reference lever as GDSII",
+        Opened("/lever", example="reference-probe.gds", key="drawing"),
+    ),
+    "Raman spectra": ("A hot plate and a tip", Opened("/raman", example="raman")),
 }
 _KINDS = {
     "Probes": ("probes", "/simulate", "simulate", "probe"),
@@ -46,14 +56,16 @@ async def fill(session: Session) -> None:
         )
         ui.label("Try it").classes("text-lg text-bold")
         with ui.row().classes("w-full gap-3"):
-            for name, (title, text, to) in _TRY.items():
+            for title, (text, opened) in _TRY.items():
                 with ui.card().props("flat bordered").classes("w-56 gap-1"):
                     ui.label(title).classes("text-bold")
                     ui.label(text).classes("text-sm opacity-70")
-                    button = ui.button("Try", on_click=partial(_try, session, complaint, name, to))
+                    button = ui.button("Try", on_click=partial(opened.open, session, complaint))
                     button.props(f'outline dense no-caps aria-label="Try: {title}"')
                     button.classes("q-px-md")
         _listed(session)
+        ui.label("Or begin with a question").classes("text-lg text-bold")
+        questions(session, complaint)
 
 
 def _listed(session: Session) -> None:
@@ -78,19 +90,6 @@ def _open(session: Session, to: str, room: str, key: str, name: str) -> None:
     if room == "simulate":
         session.chosen[room] = {"probe": name, "changes": {}, "bias": 8.0, "most": 12.0}
     ui.navigate.to(to)
-
-
-def _try(session: Session, complaint: Complaint, name: str, to: str) -> None:
-    with complaint.caught():
-        project = session.project
-        if (EXAMPLES / name).is_dir():
-            for folder in ("hot-plate", "tip"):
-                list(project.take_example_folder(f"{name}/{folder}", folder))
-            ui.navigate.to(to)
-        else:
-            kept = project.take_example(name)
-            room, key = ("lever", "drawing") if to == "/lever" else ("fit", "data")
-            _open(session, to, room, key, kept)
 
 
 async def _sort(session: Session, complaint: Complaint, names: list[str]) -> None:

@@ -1,0 +1,142 @@
+"""Spectra of a project, one by one, as the command measures them. Runs in a worker process."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hotlever.app.child import Report
+from hotlever.cli.output import heard_by
+from hotlever.cli.thermometer import Setup, set_up
+from hotlever.errors import HotleverError, InputError
+from hotlever.raman import measure, read_lines
+from hotlever.raman.peak import WINDOW, in_window
+from hotlever.raman.series import Line
+from hotlever.raman.spectrum import Spectrum, read_file, spectrum_files
+from hotlever.types import Array
+
+#: Points of the fitted curve.
+_POINTS = 800
+#: What the room does not ask for.
+_UNASKED: dict[str, Any] = {
+    **dict.fromkeys(("temperatures", "reference", "shape", "resolution")),
+    **dict.fromkeys(("laser_power", "thermal_resistance")),
+    "stress": 0.0,
+}
+
+
+class _Nobody:
+    """Hears what the command will say once more."""
+
+    def told(self, line: str) -> None: ...
+
+    def progressed(self, label: str, done: int, total: int) -> None: ...
+
+    def shown(self, what: str, content: Any) -> None: ...
+
+
+def names(report: Report, folder: Path, folders: Sequence[str]) -> list[str]:
+    """Return the names of the spectra in some folders of a project, each with its folder."""
+    found: list[str] = []
+    for one in folders:
+        try:
+            files = spectrum_files([folder / one])
+        except InputError:
+            continue  # there is none yet
+        for file, _ in files:
+            try:
+                found += (f"{one}/{name}" for name in _names(file, file.stat().st_mtime))
+            except (InputError, OSError):
+                continue  # no spectrum: the command says so
+    return found
+
+
+def one(report: Report, folder: Path, name: str, asked: dict[str, Any]) -> dict[str, Any]:
+    """Return the counts of a spectrum, its fit, and what is read from it, in words.
+
+    Parameters
+    ----------
+    report : Report
+    folder : path
+    name : str
+        As `names` has it.
+    asked : dict
+        Of the thermometer: ``calibration``, ``calibrate_from`` and ``corrections`` are names in the
+        folder, or None, and ``law`` is one.
+    """
+    spectrum = _spectrum(folder, name)
+    setup, doubt = _setup(folder, asked)
+    (line,) = measure([spectrum], setup.options, corrections=setup.corrections)
+    table = read_lines([line], setup.thermometer)
+    inside = in_window(spectrum.x, "")
+    x, y = spectrum.x[inside], spectrum.y[inside]
+    low, high = line.window
+    curves, heights = [(x, y), *[(x[:0], y[:0])] * 3], _with_room(y)
+    if line.peak is not None:
+        fine = np.linspace(max(low, x[0]), min(high, x[-1]), _POINTS)
+        model = line.peak.model(fine)
+        # a cosmic ray may be many times higher than the line
+        heights = _with_room(np.append(model, np.percentile(y, (1, 99))))
+        hit = np.isin(x, line.peak.spikes)
+        marks = x[hit], np.minimum(y[hit], heights[1])
+        curves[1:] = [(fine, model), (fine, line.peak.baseline(fine)), marks]
+    return {
+        "curves": curves,
+        "heights": heights,
+        "ends": WINDOW,
+        "window": line.window,
+        "centre": None if line.peak is None else line.peak.centre,
+        "said": "; ".join(filter(None, (_words(line, table), doubt))),
+    }
+
+
+def _with_room(values: Array) -> list[float]:
+    """Return the ends of an axis that shows some values."""
+    low, high = float(values.min()), float(values.max())
+    room = 0.08 * (high - low) or 1.0
+    return [low - room, high + room]
+
+
+def _words(line: Line, table: Any) -> str:
+    """Say what was read from a line, with the digits of the command's table."""
+    flags = ", ".join(line.flags)
+    if line.peak is None:
+        return flags
+    peak, T = line.peak, float(table.temperature_K.values[0])
+    error = float(table.temperature_error_K.values[0])
+    said = f"{peak.centre:.4f} ± {peak.centre_stderr:.4f} cm⁻¹, width {peak.fwhm:.3f} cm⁻¹"
+    if np.isfinite(T):
+        said += f", {T:.2f} ± {error:.2f} K"
+    return f"{said} ({flags})" if flags else said
+
+
+def _setup(folder: Path, asked: dict[str, Any]) -> tuple[Setup, str]:
+    """Return the thermometer; one without temperatures, and why, if that cannot be made."""
+    paths = {key: asked[key] and folder / asked[key] for key in ("calibration", "corrections")}
+    plate = [folder / asked["calibrate_from"]] if asked["calibrate_from"] else None
+    given = {**_UNASKED, **paths, "calibrate_from": plate, "law": asked["law"]}
+    with heard_by(_Nobody()):
+        try:
+            return set_up(**given), ""
+        except HotleverError as error:
+            doubt = f"no temperature: {str(error).replace(f'{folder}/', '')}"
+        return set_up(**{**given, "calibration": None, "calibrate_from": None}), doubt
+
+
+def _spectrum(folder: Path, name: str) -> Spectrum:
+    where, _, last = name.rpartition("/")
+    for file, _ in spectrum_files([folder / where]):
+        if last == file.name or last.startswith(f"{file.name}["):
+            for spectrum in read_file(file):
+                if spectrum.name == last:
+                    return spectrum
+    raise InputError(f"{name}: no such spectrum any more")
+
+
+@lru_cache(maxsize=5000)
+def _names(file: Path, stamp: float) -> list[str]:
+    return [spectrum.name for spectrum in read_file(file)]

@@ -1,0 +1,168 @@
+"""What is said of single spectra by hand: where the line is, which part is fitted, or neither."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from hotlever.errors import InputError, shown, unknown_name
+from hotlever.raman.peak import PeakOptions
+from hotlever.raman.spectrum import Spectrum
+from hotlever.tables import Table, read_table
+
+#: Header of a table of corrections.
+COLUMNS = ("file", "start_cm-1", "from_cm-1", "to_cm-1", "use")
+_USE = {"": True, "yes": True, "no": False}
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Of one spectrum; what is left out is as for all."""
+
+    start: float | None = None  #: the line's place, cm⁻¹, near enough for the fit to begin there
+    low: float | None = None  #: the part that is fitted begins here, cm⁻¹
+    high: float | None = None  #: and ends here, cm⁻¹
+    use: bool = True  #: whether the spectrum is measured at all
+
+    def of(self, options: PeakOptions) -> PeakOptions:
+        """Return how the line of this spectrum is fitted, where those of all are as in `options`.
+
+        Examples
+        --------
+        >>> Correction(start=516.0, high=540.0).of(PeakOptions()).window
+        (440.0, 540.0)
+        """
+        low, high = options.window
+        window = (low if self.low is None else self.low, high if self.high is None else self.high)
+        start = options.start if self.start is None else self.start
+        return replace(options, start=start, window=window).validate()
+
+
+def corrections_text(corrections: Mapping[str, Correction]) -> str:
+    """Return the table that `read_corrections` reads.
+
+    Examples
+    --------
+    >>> print(corrections_text({"tip_04.txt": Correction(start=516.5)}), end="")
+    file,start_cm-1,from_cm-1,to_cm-1,use
+    tip_04.txt,516.5,,,yes
+    """
+    written = io.StringIO()
+    table = csv.writer(written, lineterminator="\n")
+    table.writerow(COLUMNS)
+    for name, one in corrections.items():
+        numbers = ("" if at is None else f"{at:.10g}" for at in (one.start, one.low, one.high))
+        table.writerow((name, *numbers, "yes" if one.use else "no"))
+    return written.getvalue()
+
+
+def read_corrections(path: str | os.PathLike[str]) -> dict[str, Correction]:
+    """Read a table of corrections: one row for each spectrum that needs one.
+
+    Parameters
+    ----------
+    path : path
+        A table with the columns ``file``, ``start_cm-1``, ``from_cm-1``, ``to_cm-1`` and ``use``
+        (yes or no), in any order and all but the first as far as they are needed; a cell is empty
+        where nothing is said. A file may be named with some of its folders before it.
+
+    Raises
+    ------
+    InputError
+        If it is no such table, names a file twice, or says what no spectrum can be fitted with.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     table = Path(folder) / "by-hand.csv"
+    ...     _ = table.write_text("file,start_cm-1,use\\ntip_04.txt,516.5,\\ntip_07.txt,,no\\n")
+    ...     read_corrections(table)["tip_07.txt"].use
+    False
+    """
+    table = read_table(path, "rows of file name and what is corrected")
+    heads = [name.strip().lower().replace(" (", "_").rstrip(")") for name in table.names]
+    for name, head in zip(table.names, heads, strict=True):
+        if head not in COLUMNS:
+            raise unknown_name("column", name, COLUMNS, table.where(-1))
+    if "file" not in heads or len(set(heads)) < len(heads):
+        raise InputError(
+            f"{table.where(-1)}: found {shown(', '.join(table.names))}, expected the column file "
+            f"and any of {', '.join(COLUMNS[1:])}, each once"
+        )
+    found: dict[str, Correction] = {}
+    numbers = {name: _numbers(table, heads, name) for name in COLUMNS[1:4]}
+    for row, cells in enumerate(table.rows):
+        name = Path(cells[heads.index("file")]).as_posix()
+        if name in found:
+            raise InputError(f"{table.where(row)}: '{shown(name)}' has a row above")
+        start, low, high = (None if np.isnan(one[row]) else one[row] for one in numbers.values())
+        use = cells[heads.index("use")].strip().lower() if "use" in heads else ""
+        if use not in _USE:
+            raise InputError(f"{table.where(row)}: use: found '{shown(use)}', expected yes or no")
+        found[name] = Correction(start, low, high, _USE[use])
+        try:
+            found[name].of(PeakOptions())
+        except InputError as error:
+            raise InputError(f"{table.where(row)}: {error}") from None
+    return found
+
+
+def _numbers(table: Table, heads: list[str], name: str) -> list[float]:
+    if name not in heads:
+        return [np.nan] * len(table.rows)
+    return [float(value) for value in table.numbers(heads.index(name), name)]
+
+
+def of_spectrum(spectrum: Spectrum, corrections: Mapping[str, Correction]) -> Correction | None:
+    """Return what is said of a spectrum, the row with the most folders before its name first."""
+    if not corrections:
+        return None
+    return next((corrections[one] for one in _names(spectrum) if one in corrections), None)
+
+
+def check_corrections(
+    corrections: Mapping[str, Correction], spectra: Iterable[Spectrum], where: str
+) -> list[str]:
+    """Check that there is a spectrum for each correction.
+
+    Parameters
+    ----------
+    corrections : mapping
+    spectra : iterable of Spectrum
+        All that there are.
+    where : str
+        The table's name, for the error.
+
+    Returns
+    -------
+    list of str
+        Corrections for folders that none of the spectra is from.
+
+    Raises
+    ------
+    InputError
+        If there is none; the text names the nearest one.
+    """
+    known: dict[str, None] = {}
+    for spectrum in spectra if corrections else ():
+        known |= dict.fromkeys(_names(spectrum))
+    folders = {Path(one).parent for one in known}
+    elsewhere = [name for name in corrections if Path(name).parent not in folders]
+    for name in corrections:
+        if name not in known and name not in elsewhere:
+            beside = [one for one in known if Path(one).parent == Path(name).parent]
+            raise unknown_name("spectrum", name, beside, where)
+    return elsewhere
+
+
+def _names(spectrum: Spectrum) -> list[str]:
+    """By what a spectrum may be called: its name, with more or fewer folders before it."""
+    folders = Path(spectrum.folder).parts
+    return [Path(*folders[place:], spectrum.name).as_posix() for place in range(len(folders) + 1)]

@@ -1,0 +1,146 @@
+"""The rooms, with NiceGUI's simulated user: bad files, peaks by hand, and where to begin."""
+
+from __future__ import annotations
+
+import asyncio
+import csv
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from nicegui import ui
+from nicegui.testing import User
+from test_rooms import Here, Run, drop, shown, until, visit
+
+from bad_files import bad_files
+from hotlever.app.project import DRAWINGS, EXAMPLES, safe_name
+from hotlever.app.rooms.gallery import QUESTIONS
+from hotlever.app.session import Session
+from hotlever.probe import Probe
+
+#: Measurements, which only a fit or a calibration will refuse.
+POOR = ("one-row.csv", "negative.csv")
+
+
+def _imported(name: str) -> list[str]:
+    stem = Path(name).stem
+    return ["probe", "import", name, "-o", f"{stem}.toml", "--plot", f"{stem}.svg"]
+
+
+@pytest.mark.parametrize("address", ["/fit", "/", "/lever", "/raman", "/levers"])
+def test_bad_files_are_a_line_each_and_the_room_goes_on(tmp_path: Path, address: str) -> None:
+    # what a command will refuse, and is no mistake of the room
+    taken = {"/": (*POOR, *DRAWINGS), "/fit": POOR, "/levers": POOR, "/lever": DRAWINGS}
+
+    async def story(user: User, session: Session) -> None:
+        asked: list[list[str]] = []
+        session.jobs.start = lambda room, arguments, then=None: asked.append(arguments)  # type: ignore
+        await user.open(address)
+        for name, content in bad_files():
+            client = user.client
+            for one in user.client.elements.values():
+                if one.props.get("role") == "alert":
+                    one.set_text("")  # what was said of the file before
+            await drop(user, name, content)
+            if name.endswith(taken.get(address, ())):
+                if address == "/":
+                    await until(lambda c=client: user.client is not c)  # it went on
+                    await user.open(address)
+                elif address == "/lever":
+                    await until(lambda n=name: asked[-1:] == [_imported(n)])
+                assert not shown(user, "role=alert").strip(), name
+                continue
+            await until(lambda: bool(shown(user, "role=alert").strip()))
+            line = shown(user, "role=alert")
+            assert Path(safe_name(name)).stem in line, name
+            assert "internal error" not in line, name
+            assert "Traceback" not in line
+        good = {
+            "/lever": ("good.toml", Probe.reference().to_toml().encode()),
+            "/raman": ("good.txt", (EXAMPLES / "raman" / "tip" / "tip_00.txt").read_bytes()),
+        }
+        name, content = good.get(address, ("good.csv", (EXAMPLES / "lever-a.csv").read_bytes()))
+        await drop(user, name, content)
+        if address != "/":
+            await until(lambda: not shown(user, "role=alert").strip())
+
+    visit(tmp_path, story)
+
+
+def test_a_line_is_corrected_by_hand_as_by_the_command(
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("tip", "hot-plate"):
+        shutil.copytree(EXAMPLES / "raman" / name, tmp_path / name)
+    monkeypatch.chdir(tmp_path)
+    told: list[str] = []
+
+    async def story(user: User, session: Session) -> None:
+        def said() -> str:
+            return shown(user, "data-spectrum=1")
+
+        asked: list[list[str]] = []
+        session.jobs.start = lambda room, arguments, then=None: asked.append(arguments)  # type: ignore
+        session.chosen["raman"] = {"spectrum": "tip/tip_04.txt"}
+        await user.open("/raman")
+        await until(lambda: "551.11 ± 2.52 K" in said())
+        user.find(kind=ui.plotly).trigger("plotly_click", {"points": [{"x": 516.94, "y": 400.0}]})
+        await until(lambda: "by-hand" in said())
+        user.find(kind=ui.plotly).trigger("plotly_selected", {"range": {"x": [545.0, 490.0]}})
+        await until(lambda: said().endswith("(by-hand)"))
+        _, out, _ = run(*asked[-1][: asked[-1].index("-o")])
+        told.extend((said(), out))
+        user.find("Leave out").click()
+        await until(lambda: said() == "left-out")
+        user.find("As found").click()
+        await until(lambda: "551.11 ± 2.52 K" in said())
+        assert "--corrections" in asked[0]
+        assert "--corrections" not in asked[-1]
+
+    visit(tmp_path, story)
+    row = next(one for one in csv.DictReader(told[1].splitlines()) if one["file"] == "tip_04.txt")
+    line = "{center_cm-1} ± {center_stderr_cm-1} cm⁻¹, width {fwhm_cm-1} cm⁻¹"
+    line += ", {temperature_K} ± {temperature_error_K} K ({flags})"
+    assert told[0] == line.format(**row)
+
+
+def test_questions_of_the_gallery_open_rooms_or_scripts(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "gallery.md").read_text(encoding="utf-8")
+    assert list(QUESTIONS) == re.findall(r"gallery/(\w+)\.png", page)
+    files = {"how_sure": "lever-a.csv", "metal_film": "palladium-on-nitride.toml"}
+
+    async def story(user: User, session: Session) -> None:
+        for name, opened in QUESTIONS.items():
+            if opened is not None:
+                opened.set_up(session)
+                assert opened.room.strip("/") in session.chosen
+                assert not opened.key or (tmp_path / files.get(name, "lever-a.csv")).is_file()
+        await user.open("/fit")
+        await user.should_see("hotlever fit lever-a.csv -o lever-a.fit.json", retries=50)
+        await user.open("/raman")
+        await user.should_see("hotlever raman tip --calibrate-from hot-plate")
+        await user.open("/")
+        for question in re.findall(r"^## (.+)", page, re.MULTILINE):
+            await user.should_see(question)
+        user.find(kind=ui.button, content="Script").click()
+        await user.should_see("knee = lever.knee()")
+
+    visit(tmp_path, story)
+
+
+def test_a_page_that_waits_for_a_busy_process_is_shown(tmp_path: Path) -> None:
+    class Busy(Here):
+        async def call(self, function: str, *arguments: Any, heard: Any = None) -> Any:
+            await asyncio.sleep(5.0)  # longer than a page may take
+            return await super().call(function, *arguments, heard=heard)
+
+    async def story(user: User, session: Session) -> None:
+        session._desks["full"] = Busy()  # type: ignore[assignment]
+        (tmp_path / "lever-a.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
+        await user.open("/fit")
+        await user.should_see("Measurement")
+        await user.should_see("What was understood", retries=50)
+
+    visit(tmp_path, story)
