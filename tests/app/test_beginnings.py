@@ -133,7 +133,7 @@ def test_questions_of_the_gallery_open_rooms_or_scripts(tmp_path: Path) -> None:
 def test_a_page_that_waits_for_a_busy_process_is_shown(tmp_path: Path) -> None:
     class Busy(Here):
         async def call(self, function: str, *arguments: Any, heard: Any = None) -> Any:
-            await asyncio.sleep(5.0)  # longer than a page may take
+            await asyncio.sleep(3.5)  # longer than a page may take
             return await super().call(function, *arguments, heard=heard)
 
     async def story(user: User, session: Session) -> None:
@@ -141,6 +141,6 @@ def test_a_page_that_waits_for_a_busy_process_is_shown(tmp_path: Path) -> None:
         (tmp_path / "lever-a.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
         await user.open("/fit")
         await user.should_see("Measurement")
-        await user.should_see("What was understood", retries=50)
+        await user.should_see("What was understood", retries=200)
 
     visit(tmp_path, story)
