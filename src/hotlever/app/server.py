@@ -10,6 +10,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any
 
+from fastapi.dependencies import models
 from nicegui import app, background_tasks, ui
 
 from hotlever.app.guard import Guard
@@ -87,7 +88,7 @@ def serve(
     session = Session(project)
     app.on_startup(session.start)
     app.on_startup(lambda: say(address))
-    app.on_startup(lambda: app.timer(_GIVE_BACK_S, give_back))
+    app.on_startup(lambda: app.timer(_GIVE_BACK_S, forget_pages))
     # told in one line, and kept in a file, as by any command
     logging.getLogger("nicegui").setLevel(logging.CRITICAL + 1)
     app.on_exception(failed)
@@ -106,6 +107,18 @@ def serve(
         reconnect_timeout=30.0,
         message_history_length=_MESSAGES,
     )
+
+
+def forget_pages() -> None:
+    """Give back the memory of pages that were closed.
+
+    FastAPI remembers what kind of function each route had, 4096 of them. A drop zone is a route,
+    whose function holds the page.
+    """
+    for kept in vars(models).values():
+        if hasattr(kept, "cache_clear"):
+            kept.cache_clear()
+    give_back()
 
 
 def add_pages(session: Session) -> None:
