@@ -15,7 +15,15 @@ from hotlever.app.project import EXAMPLES
 from hotlever.app.session import Session
 
 _SCRIPTS, _ADDRESS = EXAMPLES / "gallery", "/gallery"
-_SIMULATE: dict[str, Any] = {"probe": None, "changes": {}, "bias": 8.0, "most": 12.0}
+_SIMULATE: dict[str, Any] = {
+    "probe": None,
+    "changes": {},
+    "bias": 8.0,
+    "most": 12.0,
+    "view": "rest",
+}
+
+_IN_TIME = _SIMULATE | {"view": "time"}
 
 
 @dataclass(frozen=True)
@@ -65,8 +73,8 @@ QUESTIONS: dict[str, Opened | None] = {
     "raman_to_temperature": Opened("/raman", {"calibration": ""}, "raman"),
     "what_air_takes": Opened("/simulate", {**_SIMULATE, "changes": {"medium": "air"}}),
     "where_the_heat_goes": None,
-    "pulse_in_air": None,
-    "five_us_pulse": None,
+    "pulse_in_air": Opened("/simulate", {**_IN_TIME, "changes": {"medium": "air"}}),
+    "five_us_pulse": Opened("/simulate", _IN_TIME),
     "heat_the_reader": None,
     "heater_width": None,
     "metal_film": Opened(

@@ -12,7 +12,7 @@ from nicegui import ui
 
 from hotlever.colours import BLUE, HEAT, VERMILION
 
-_INK, _GRID = "#8a8a8a", "rgba(128,128,128,.25)"
+INK, _GRID = "#8a8a8a", "rgba(128,128,128,.25)"
 #: Beyond the data, as a share of what they extend over.
 _MARGIN = 0.07
 _LEVER_V, _CURRENT = "lever voltage V<sub>l</sub> (V)", "current I<sub>h</sub> (mA)"
@@ -20,23 +20,23 @@ _BIAS, _TIP = "bias V<sub>b</sub> (V)", "tip temperature (K)"
 _CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
 
 
-def _layout(x: str, y: str, height: int, normal: str = "") -> dict[str, Any]:
+def axes(x: str, y: str, height: int, normal: str = "") -> dict[str, Any]:
     """Return how a plot looks; its axes begin at zero but for those that are `normal`."""
-    axis = {"gridcolor": _GRID, "zeroline": False, "linecolor": _INK}
+    axis = {"gridcolor": _GRID, "zeroline": False, "linecolor": INK}
     starts = {name: "normal" if name in normal else "tozero" for name in "xy"}
     return {
         "height": height,
         "margin": {"l": 55, "r": 12, "t": 8, "b": 42},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"color": _INK, "size": 12},
+        "font": {"color": INK, "size": 12},
         "showlegend": False,
         "xaxis": {**axis, "title": {"text": x, "standoff": 6}, "rangemode": starts["x"]},
         "yaxis": {**axis, "title": {"text": y, "standoff": 6}, "rangemode": starts["y"]},
     }
 
 
-def _plot(data: list[dict[str, Any]], layout: dict[str, Any], alt: str) -> ui.plotly:
+def plotted(data: list[dict[str, Any]], layout: dict[str, Any], alt: str) -> ui.plotly:
     made = ui.plotly({"data": deepcopy(data), "layout": layout, "config": _CONFIG}).classes(
         "w-full"
     )
@@ -69,8 +69,8 @@ class MeasuredPlots:
         with _side_by_side():
             for name, ((_, along), (_, title)) in self._AXES.items():
                 with ui.element("div") as around:
-                    layout = _layout(along, title, 240, normal="xy")
-                    made = _plot([dots, model], layout, f"Measured {name}, and the lever fitted")
+                    layout = axes(along, title, 240, normal="xy")
+                    made = plotted([dots, model], layout, f"Measured {name}, and the lever fitted")
                 self._plots[name] = around, made
         self._said = ui.label().classes("text-xs opacity-70")
 
@@ -81,7 +81,7 @@ class MeasuredPlots:
             if name in observables:
                 (x, _), (y, _) = self._AXES[name]
                 dots, model = plot.figure["data"]
-                dots |= {"x": _short(data[x]), "y": _short(data[y])}
+                dots |= {"x": short(data[x]), "y": short(data[y])}
                 model |= {"x": [], "y": []}
                 # of the data alone, so that the lever moves and not the axes
                 plot.figure["layout"]["xaxis"]["range"] = _range(data[x])
@@ -94,7 +94,7 @@ class MeasuredPlots:
         for name, (around, plot) in self._plots.items():
             if around.visible:
                 (x, _), (y, _) = self._AXES[name]
-                plot.figure["data"][1] |= {"x": _short(curve[x]), "y": _short(curve[y])}
+                plot.figure["data"][1] |= {"x": short(curve[x]), "y": short(curve[y])}
                 plot.update()
         self._said.set_text("Dots: measured. Line: the lever as the fit has it.")
 
@@ -128,25 +128,25 @@ class LivePlots:
                 },
             },
         }
-        square = _layout("x (µm)", "y (µm)", 300)
+        square = axes("x (µm)", "y (µm)", 300)
         square["yaxis"] |= {"scaleanchor": "x", "constrain": "domain"}
         square["xaxis"] |= {"constrain": "domain"}
         picture = {"xref": "x", "yref": "y", "sizing": "stretch", "layer": "below"}
         square["images"] = [picture | {"xanchor": "left", "yanchor": "top", "source": ""}]
-        self._heat = _plot([bar], square, "Map of the temperature")
+        self._heat = plotted([bar], square, "Map of the temperature")
         with _side_by_side():
-            self._iv = _plot(
+            self._iv = plotted(
                 [line, knee, here],
-                _layout(_LEVER_V, _CURRENT, 270),
+                axes(_LEVER_V, _CURRENT, 270),
                 "Current against lever voltage, with the knee",
             )
-            self._tp = _plot(
+            self._tp = plotted(
                 [line, knee, here],
-                _layout("power P<sub>l</sub> (mW)", _TIP, 270, normal="y"),
+                axes("power P<sub>l</sub> (mW)", _TIP, 270, normal="y"),
                 "Tip temperature against power",
             )
-            profile = _layout("x (µm)", "temperature (K)", 270, normal="xy")
-            self._profile = _plot([line], profile, "Temperature along the lever, through the tip")
+            profile = axes("x (µm)", "temperature (K)", 270, normal="xy")
+            self._profile = plotted([line], profile, "Temperature along the lever, through the tip")
         # before its first plot a browser takes whole figures only
         self._ready: set[ui.plotly] = set()
         for plot in (self._heat, self._iv, self._tp, self._profile):
@@ -168,11 +168,11 @@ class LivePlots:
             if same:
                 self._move(plot, 2, here)
             else:
-                plot.figure["data"][0] |= {"x": _short(curves[x]), "y": _short(curves[y])}
+                plot.figure["data"][0] |= {"x": short(curves[x]), "y": short(curves[y])}
                 plot.figure["data"][1] |= {"x": [knee[x]], "y": [knee[y]]}
                 plot.figure["data"][2] |= here
                 plot.update()
-        line = {"x": _short(answer["along"]), "y": _short(now["line"])}
+        line = {"x": short(answer["along"]), "y": short(now["line"])}
         if same and np.array_equal(self._along, answer["along"]):
             self._move(self._profile, 0, line)
         else:
@@ -233,6 +233,6 @@ def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:
     return all(np.array_equal(one[name], other[name]) for name in ("lever_V", "tip_K"))
 
 
-def _short(values: Any) -> list[float]:
+def short(values: Any) -> list[float]:
     """Return numbers with as many digits as a screen shows."""
     return [float(f"{value:.5g}") for value in np.asarray(values).tolist()]

@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from hotlever.app.page import Complaint
-from hotlever.app.rooms.plots import _INK, _layout, _plot, _short
+from hotlever.app.rooms.plots import INK, axes, plotted, short
 from hotlever.app.session import Session
 from hotlever.colours import BLUE, GREEN, VERMILION
 from hotlever.errors import HotleverError
@@ -61,13 +61,13 @@ class OneSpectrum:
                 ):
                     button = ui.button(icon=icon, on_click=lambda _, s=step: self._move(s))
                     button.props(f'flat dense aria-label="{label}"')
-            layout = _layout("Raman shift (cm⁻¹)", "counts", 300, normal="xy")
+            layout = axes("Raman shift (cm⁻¹)", "counts", 300, normal="xy")
             layout |= {"hovermode": "x", "dragmode": "select", "selectdirection": "h"}
             line = {"type": "scatter", "mode": "lines", "hoverinfo": "skip"}
             hit = {"color": VERMILION, "size": 8, "symbol": "x-thin-open"}
-            self._plot = _plot(
+            self._plot = plotted(
                 [
-                    {"type": "scatter", "mode": "markers", "marker": {"color": _INK, "size": 4}},
+                    {"type": "scatter", "mode": "markers", "marker": {"color": INK, "size": 4}},
                     {**line, "line": {"color": BLUE, "width": 2}},
                     {**line, "line": {"color": GREEN, "width": 1, "dash": "dot"}},
                     {"type": "scatter", "mode": "markers", "marker": hit, "hoverinfo": "skip"},
@@ -200,7 +200,7 @@ class OneSpectrum:
     def _draw(self, found: dict[str, Any]) -> None:
         figure = self._plot.figure
         for trace, (x, y) in zip(figure["data"], found["curves"], strict=True):
-            trace |= {"x": _short(x), "y": _short(y)}
+            trace |= {"x": short(x), "y": short(y)}
         low, high = found["ends"]
         shade = {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "line": {"width": 0}}
         shade |= {"fillcolor": "rgba(128,128,128,.25)", "layer": "below"}
