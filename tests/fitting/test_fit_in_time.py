@@ -37,7 +37,8 @@ def test_a_scale_of_the_heat_capacity_is_found(coarse):
     measured = Measurement.in_time(
         TIMES, WAVE, shown.current_mA.values * noise[0], shown.reader_V.values * noise[1]
     )
-    as_it_is = partial(HistoryModel.of, waveform=WAVE, names=names, lever=coarse)
+    # a model may have its parameters in another order than the fit
+    as_it_is = partial(HistoryModel.of, waveform=WAVE, names=names[::-1], lever=coarse)
     found = fit(measured, coarse.probe, model=as_it_is, free=["n_d"])
     assert found.names == names
     values = {name: found.parameters[name].value for name in names}

@@ -308,7 +308,7 @@ def _band(estimate: Estimate) -> xr.Dataset:
     values, slopes, along = at.values, estimate.slopes(at), {"bias_V": residuals.bias}
     waveform = estimate.measurement.waveform
     if waveform is not None and isinstance(at, HistoryPrediction):
-        values, slopes = at.seen, at.seen_by
+        values, slopes = at.seen, at.seen_by[:, :, estimate.problem.objective.columns]
         along = {"time_us": at.at, "bias_V": waveform.bias(at.at)}
     by = slopes[list(OBSERVABLES).index("tip")]
     shown: dict[str, Array] = dict(zip(OBSERVABLES.values(), values, strict=True))
