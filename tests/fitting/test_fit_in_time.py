@@ -73,6 +73,10 @@ def test_the_command_fits_a_file_in_time(coarse, run):
     assert again.in_time
     assert again.band.time_us.values.tolist() == times.tolist()
     assert Path("page/fit_in_time.pdf").exists()
+    content["data"]["waveform"]["volts"] = [9.0, 9.0, 9.0]
+    Path("bad.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match="data: waveform: expected the one that belongs"):
+        read_fit("bad.json")
     for words in (("data.csv", "--column", "t (ms)=Time"), ("iv.csv", "--fit", "fit.json")):
         Path("iv.csv").write_text("V_b (V),I_h (mA)\n1,0.14\n2,0.28\n3,0.42\n")
         Path("data.csv").write_text("Time/ms,V_b (V),I_h (mA)\n0.001,9,1.28\n0.002,9,1.27\n")

@@ -143,6 +143,7 @@ class HistoryModel:
     full : SimilarLevers or None
         What it is corrected by; None where it is right as it is.
     times : _Times
+        When it is followed, and how rows are read off that.
     offset : ndarray, shape (3, m), or float
         That correction.
     """

@@ -61,10 +61,8 @@ def take_time(
     # clocks show no numbers
     if asked or number(cell, table.decimal_comma) is not None:
         times = column.values(table)
-        if (
-            asked
-            or 0.0 < np.nanmax(times, initial=-np.inf) - np.nanmin(times, initial=np.inf) <= BRIEF
-        ):
+        known = times[np.isfinite(times)]
+        if asked or (known.size and 0.0 < np.ptp(known) <= BRIEF):
             return True
     del columns[TIME]
     unused.append(f"{table.path}: column '{shown(column.heading)}' is not used")
