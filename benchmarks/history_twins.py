@@ -1,6 +1,6 @@
 """Twins measured in time, without any spectrum: is the tip as hot as their fits say?
 
-    python benchmarks/history_twins.py [COUNT [PULSE_US]]
+    python benchmarks/history_twins.py [COUNT [PULSE_US [SEED]]]
 
 Each twin is a lever of its own material and heat capacity, drawn from what is known beforehand (the
 usual priors; 3 % for the heat capacity), on the drawing that its fit knows. Its current alone, or
@@ -29,6 +29,7 @@ from problems import table
 
 COUNT = int(sys.argv[1]) if len(sys.argv) > 1 else 6
 LENGTH = float(sys.argv[2]) if len(sys.argv) > 2 else 100.0
+SEED = int(sys.argv[3]) if len(sys.argv) > 3 else 1
 HEIGHT, NOISE, METERS, HEAT_CAPACITY = 10.0, 1e-3, 1e-3, 0.03
 NAMES = (*PARAMETERS, "series_resistance_ohm", "heat_capacity_scale")
 TIMES = np.geomspace(0.1, LENGTH, 40)
@@ -41,7 +42,7 @@ def main() -> None:
     priors = {name: usual[name] for name in NAMES[:-1]}
     priors["heat_capacity_scale"] = Prior(1.0, HEAT_CAPACITY)
     model = partial(HistoryModel.of, waveform=wave, names=list(priors), lever=lever)
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(SEED)
     rows, off, sure = [], {}, {}
     guess = lever.pulse(wave, at=TIMES).tip_K.values[-1]
     number = 0
