@@ -75,6 +75,13 @@ _UNIT_WORDS = {
     for prefix, power in _PREFIX_WORDS.items()
     for word, (quantity, factor) in _WORDS.items()
 }
+#: Headings that name a time; of these alone a unit of time is one.
+TIMES = {"t", "time", "relative time", "elapsed time"}
+_TIME_WORDS = {
+    prefix + word: power
+    for prefix, power in _PREFIX_WORDS.items()
+    for word in ("sec", "second", "seconds")
+}
 _CELSIUS = {"°C", "degC", "C", "oC", "celsius", "Celsius", "degreesC", "degreesCelsius"}
 #: What µ, Ω and °C of other encodings (UTF-8 read twice, DOS, GBK, Shift-JIS, Mac) look like when
 #: a file is read as Windows' Latin-1.
@@ -107,16 +114,20 @@ def _known(unit: str) -> tuple[str, int, float] | None:
     """Look up a unit: quantity, power of ten and factor; degrees Celsius have the quantity °C."""
     if not 0 < len(unit) < 20:
         return None
-    for misread, meant in _MISREAD.items():
-        # the longest first, as they stand in the list
-        if misread in unit:
-            unit = unit.replace(misread, meant)
-            break
     # one spelling for the two signs of micro, of ohm, and for the compact degree
-    unit = unicodedata.normalize("NFKC", unit).replace(" ", "")
+    unit = unicodedata.normalize("NFKC", _as_meant(unit)).replace(" ", "")
     if unit in _CELSIUS:
         return "°C", 0, 1.0
     return _UNITS.get(unit) or _UNIT_WORDS.get(unit.casefold())
+
+
+def _as_meant(unit: str) -> str:
+    """Return a unit as it was meant, if its file was read by another encoding."""
+    for misread, meant in _MISREAD.items():
+        # the longest first, as they stand in the list
+        if misread in unit:
+            return unit.replace(misread, meant)
+    return unit
 
 
 def is_unit(text: str) -> bool:
@@ -133,14 +144,17 @@ def is_unit(text: str) -> bool:
 def conversion(unit: str, inside: str, difference: bool = False) -> tuple[float, float] | None:
     """Return factor and offset that turn a value in one unit into another's; None if they differ.
 
-    Units are V, A, ohm, K, bar, Pa or Torr with an SI prefix, atm, or degrees Celsius.
-    Differences of temperatures have the same zero on any scale.
+    Units are V, A, ohm, K, bar, Pa or Torr with an SI prefix, atm, or degrees Celsius; where the
+    other is one of time, seconds. Differences of temperatures have the same zero on any scale.
 
     Examples
     --------
     >>> conversion("µA", "mA"), conversion("°C", "K"), conversion("degC", "K", difference=True)
     ((0.001, 0.0), (1.0, 273.15), (1.0, 0.0))
     """
+    if _SETTINGS.get(inside, ("",))[0] == "s":
+        power = _power_of_seconds(unit)
+        return None if power is None else (10.0 ** (power - _SETTINGS[inside][1]), 0.0)
     found, (wanted, ours, part) = _known(unit), _UNITS[inside]
     if found is None:
         return None
@@ -148,6 +162,15 @@ def conversion(unit: str, inside: str, difference: bool = False) -> tuple[float,
     if (measured, wanted) == ("°C", "K"):
         return 10.0**-ours, 0.0 if difference else ZERO_CELSIUS_K * 10.0**-ours
     return (10.0 ** (theirs - ours) * (factor / part), 0.0) if measured == wanted else None
+
+
+def _power_of_seconds(unit: str) -> int | None:
+    """Return the power of ten that a unit of time is of a second; None if it is another unit."""
+    if not 0 < len(unit) < 20:
+        return None
+    plain = unicodedata.normalize("NFKC", _as_meant(unit)).replace(" ", "")
+    symbol, power = _SETTINGS.get(plain, ("", 0))
+    return power if symbol == "s" else _TIME_WORDS.get(plain.casefold())
 
 
 def unknown_unit(unit: str, inside: str, where: str) -> InputError:
@@ -160,14 +183,15 @@ def unknown_unit(unit: str, inside: str, where: str) -> InputError:
 def name_and_unit(heading: str) -> tuple[str, str | None]:
     """Split a heading such as ``V_b (V)``, ``I_h [mA]`` or ``I/µA``; None where it has no unit.
 
-    Without brackets only a known unit is taken for one.
+    Without brackets only a known unit is taken for one; that of a time only behind its name, since
+    ``V_s`` is no voltage in seconds.
 
     Examples
     --------
     >>> name_and_unit("V_b (V)"), name_and_unit("I/µA"), name_and_unit("bias_V")
     (('V_b', 'V'), ('I', 'µA'), ('bias', 'V'))
-    >>> name_and_unit("file")
-    ('file', None)
+    >>> name_and_unit("file"), name_and_unit("time_us")
+    (('file', None), ('time', 'us'))
     """
     heading = heading.strip()
     bracket = re.search(r"[(\[{<]", heading)
@@ -175,8 +199,10 @@ def name_and_unit(heading: str) -> tuple[str, str | None]:
         return heading[: bracket.start()].strip(" _/,"), heading[bracket.end() : -1].strip()
     for mark in _BETWEEN:
         name, _, unit = heading.rpartition(mark)
-        if name.strip(" _/,") and is_unit(unit):
-            return name.strip(" _/,"), unit.strip()
+        name, unit = name.strip(" _/,"), unit.strip()
+        of_time = name.casefold() in TIMES and _power_of_seconds(unit) is not None
+        if name and (is_unit(unit) or of_time):
+            return name, unit
     return heading, None
 
 

@@ -95,8 +95,10 @@ def calibrate(
     if law is not None and priors is not None:
         raise InputError("a power law takes no priors; a probe or a fit does")
     measured = averaged(whole := Measurement.given(measurement), robust=True)
+    measured.need_rest("a calibration")
     if fit is not None:
         fit = fit if isinstance(fit, Fit) else read_fit(fit)
+        fit.measurement.need_rest("a calibration with a fit")
         route, origin = f"fit in {fit.medium}", fit.probe
     else:
         route = "probe" if law is None else "power law"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,10 +18,12 @@ from hotlever.cli.options import (
     check_number,
     column_files,
     load_probe,
+    options_of,
     parse_priors,
     parse_values,
 )
 from hotlever.cli.output import fail, give, note, progress, progress_bars, show, tell, tell_table
+from hotlever.cli.waveforms import drive, options_given, table_of
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.files import Outputs, write_text
 
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
     from hotlever.fitting import FitOptions, Measurement
     from hotlever.fitting.models import Prediction
     from hotlever.fitting.uncertainty import Uncertainty
+    from hotlever.lever.transient import Waveform
     from hotlever.probe import Probe
 
 #: Points of a curve that is shown while the fit goes on.
@@ -37,7 +41,9 @@ _TABLE = "levers.csv"
 
 
 @app.command("fit")
+@options_of(drive, "driven")
 def fit_command(
+    driven: partial[Any],
     data: list[Path] = Argument(
         metavar="DATA.csv...", help="Measurement files, one for each lever."
     ),
@@ -82,6 +88,9 @@ def fit_command(
 ) -> None:
     """Find the material parameters that make the model match a measurement.
 
+    Of what was measured in time, a file with a column as 'time (us)', the heat capacity, and what
+    else is free; the wave form is the column V_b, or what is told.
+
     With several data files: of each lever, in parallel, and how the levers scatter. The same
     command again goes on where it was stopped.
     """
@@ -94,6 +103,9 @@ def fit_command(
         raise InputError("--processes and --scheduler: expected one of them, not both")
     if len(data) > 1 and (posterior or profiles):
         raise InputError("--posterior and --profiles: expected a single data file")
+    waves = options_given(driven)
+    if len(data) > 1 and waves:
+        raise InputError(f"{next(iter(waves))}: expected a single data file")
     if len(data) == 1 and scheduler is not None:
         raise InputError("--scheduler: expected several data files")
     chosen: Any = {"weights": weights, "medium": medium, "robust": robust, "drift": drift}
@@ -108,7 +120,7 @@ def fit_command(
         **chosen,
     )
     columns = parse_columns(column or [])
-    outputs = Outputs(*data, probe_file, *column_files(column))
+    outputs = Outputs(*data, probe_file, *column_files(column), table_of(driven))
     to = Destination(outputs, output, report)
     where: Any = {"processes": processes}
     if len(data) > 1:
@@ -116,7 +128,7 @@ def fit_command(
         _fit_several(data, probe, options, where, to)
     else:
         asked = {"samples": samples if posterior else None, "profiles": profiles}
-        _fit_one(data[0], columns, probe, options, where | asked, to)
+        _fit_one(data[0], columns, driven(), probe, options, where | asked, to)
 
 
 class Destination(NamedTuple):
@@ -130,6 +142,7 @@ class Destination(NamedTuple):
 def _fit_one(
     data: Path,
     columns: dict[str, str],
+    waveform: Waveform | None,
     probe: Probe,
     options: FitOptions,
     examined: dict[str, Any],
@@ -140,7 +153,9 @@ def _fit_one(
 
     to.outputs.file(to.output)
     to.outputs.folder(to.report)
-    measurement = read_measurement(data, columns, probe.circuit)
+    measurement = read_measurement(data, columns, probe.circuit, waveform)
+    if examined["samples"] or examined["profiles"]:
+        measurement.need_rest("--posterior" if examined["samples"] else "--profiles")
     tell_table(measurement.understood)
     note(*measurement.notes)
     with progress("fit") as update:

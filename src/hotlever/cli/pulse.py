@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from itertools import count as count_up
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from typer import Option
 
@@ -22,9 +23,10 @@ from hotlever.cli.options import (
     check_plot,
     load_probe,
     make_lever,
-    parse_volts,
+    options_of,
 )
 from hotlever.cli.output import give, note, progress, tell_table
+from hotlever.cli.waveforms import KINDS, drive, options_given, table_of
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.files import Outputs, output_folder
 from hotlever.units import setting
@@ -33,22 +35,16 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from hotlever.lever import Lever, State
-    from hotlever.lever.transient import Waveform
 
 #: Times that may be asked for; and points of a curve for each step of the solver.
 MOST_TIMES, _CURVE = 10_000, 8
 
 
 @app.command("pulse")
+@options_of(drive, "driven")
 def pulse_command(
+    driven: partial[Any],
     probe_file: ProbeFile = None,
-    step: str | None = Option(None, metavar="V", help="Switch the bias on, and leave it."),
-    pulse: str | None = Option(None, metavar="V,TIME", help="A pulse, such as 10V,5us."),
-    period: str | None = Option(None, metavar="TIME", help="Of pulses that are repeated."),
-    count: int | None = Option(None, metavar="N", help="Number of pulses."),
-    ramp: str | None = Option(None, metavar="V,TIME", help="Raise the bias, such as 8V,50us."),
-    sine: str | None = Option(None, metavar="V+V@FREQ", help="Such as 3V+0.5V@20kHz."),
-    waveform: File = Option(None, help="A table of times and biases, such as a supply takes."),
     until: str | None = Option(None, metavar="TIME", help="When to stop."),
     at: str | None = Option(
         None, metavar="TIME,...", help="Times to report; where the solver stepped if left out."
@@ -65,20 +61,20 @@ def pulse_command(
     """Follow a lever in time: steps, pulses, ramps, sines, or what a file says."""
     from hotlever.lever.transient import history_csv, with_times, write_history
 
-    texts = {"--step": step, "--pulse": pulse, "--ramp": ramp, "--sine": sine}
-    repeated = {"--period": period, "--count": count}
     if report is not None:
-        others = {**texts, **repeated, "--waveform": waveform, "--until": until, "--at": at}
+        others = {**options_given(driven), "--until": until, "--at": at}
         others |= {"--output": output, "--plot": plot, "--fields": fields}
         _report(report, others, probe_file, medium, settings)
         return
-    wave = _waveform(texts, repeated, waveform)
+    wave = driven()
+    if wave is None:
+        raise InputError(f"found none: expected one of {', '.join(KINDS)}")
     end = None if until is None else setting(until, "us", "--until")
     times = None if at is None else [setting(one, "us", "--at") for one in at.split(",")]
     if times is not None and len(times) > MOST_TIMES:
         raise InputError(f"--at: found {len(times)} times, expected at most {MOST_TIMES}")
     check_medium(medium)
-    outputs = Outputs(probe_file, waveform)
+    outputs = Outputs(probe_file, table_of(driven))
     outputs.file(output, ".csv", ".nc")
     check_plot(outputs, plot)
     outputs.folder(fields)
@@ -164,68 +160,6 @@ def _report(
     with outputs.together():
         written = page.write(folder)
     give(f"{written}\n")
-
-
-def _waveform(
-    texts: dict[str, str | None], repeated: dict[str, str | int | None], path: Path | None
-) -> Waveform:
-    """Make the one wave form that is asked for."""
-    from hotlever.lever import transient
-
-    given = {name: text for name, text in texts.items() if text is not None}
-    if len(given) + (path is not None) != 1:
-        found = ", ".join([*given, *["--waveform"] * (path is not None)]) or "none"
-        expected = ", ".join([*texts, "--waveform"])
-        raise InputError(f"found {found}: expected one of {expected}")
-    alone = [name for name, value in repeated.items() if value is not None]
-    if alone and "--pulse" not in given:
-        raise InputError(f"{alone[0]}: goes with --pulse")
-    if path is not None:
-        return transient.read_waveform(path)
-    ((name, text),) = given.items()
-    try:
-        if name == "--step":
-            return transient.step(parse_volts(text, name))
-        if name == "--sine":
-            return transient.sine(*_sine(text))
-        volts, length = _volts_and_time(text, name)
-        if name == "--ramp":
-            return transient.ramp(volts, length)
-        period, count = repeated.values()
-        each = None if period is None else setting(str(period), "us", "--period")
-        return transient.pulse(volts, length, each, 1 if count is None else int(count))
-    except InputError as error:
-        raise error if str(error).startswith("--") else InputError(f"{name}: {error}") from None
-
-
-def _volts_and_time(text: str, where: str) -> tuple[float, float]:
-    """Parse ``10V,5us``.
-
-    Examples
-    --------
-    >>> _volts_and_time("10V,5us", "--pulse")
-    (10.0, 5.0)
-    """
-    volts, comma, length = text.partition(",")
-    if not comma:
-        raise InputError(f"{where}: found '{text}', expected V,TIME such as 10V,5us")
-    return parse_volts(volts, where), setting(length, "us", where)
-
-
-def _sine(text: str) -> tuple[float, float, float]:
-    """Parse ``3V+0.5V@20kHz``; the offset may be left out.
-
-    Examples
-    --------
-    >>> _sine("3V+0.5V@20kHz"), _sine("2@1MHz")
-    ((3.0, 0.5, 20000.0), (0.0, 2.0, 1000000.0))
-    """
-    volts, at, frequency = text.partition("@")
-    if not at:
-        raise InputError(f"--sine: found '{text}', expected V+V@FREQ such as 3V+0.5V@20kHz")
-    offset, _, amplitude = volts.rpartition("+")
-    biases = [parse_volts(one, "--sine") for one in (offset or "0", amplitude)]
-    return biases[0], biases[1], setting(frequency, "Hz", "--sine")
 
 
 def _write_fields(lever: Lever, states: list[tuple[float, State]], folder: Path) -> None:

@@ -11,6 +11,7 @@ from hotlever.figures.drawing import outlines_drawing
 from hotlever.figures.fit import (
     correlation_matrix,
     data_and_model,
+    fitted_history,
     lever_parameters,
     posterior_corner,
     profile_curves,

@@ -40,6 +40,13 @@ _QUANTILES = (0.025, 0.16, 0.5, 0.84, 0.975)
 #: More levers than this are numbered instead of named along an axis.
 _MOST_NAMES = 24
 
+#: Observable, label, column, and the unit of differences, in parts of the column's.
+_PANELS = (
+    ("current", "heater current I$_h$ (mA)", "current_mA", "µA", 1000.0),
+    ("reader", "reader voltage V$_r$ (V)", "reader_V", "mV", 1000.0),
+    ("tip", "tip temperature (K)", "tip_K", "K", 1.0),
+)
+
 
 def data_and_model(
     measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str], *, with_priors: bool = False
@@ -58,13 +65,8 @@ def data_and_model(
         Whether it had priors: its data scatter less, or are marked.
     """
     usual = usual_scatter(with_priors)
-    every = (
-        ("current", "heater current I$_h$ (mA)", "current_mA", "µA", 1000.0),
-        ("reader", "reader voltage V$_r$ (V)", "reader_V", "mV", 1000.0),
-        ("tip", "tip temperature (K)", "tip_K", "K", 1.0),
-    )
     # a lever without a reader shows no voltage of it
-    panels = [panel for panel in every if model[panel[2]].notnull().any()]
+    panels = [panel for panel in _PANELS if model[panel[2]].notnull().any()]
     bias, shape = measured.bias.values, (2, len(panels))
     with figure(2.8 * len(panels), 4.6, *shape, sharex=True, height_ratios=(1.8, 1.0)) as (
         made,
@@ -93,6 +95,64 @@ def data_and_model(
             lower.set(xlabel="bias V$_b$ (V)", ylabel=f"data − model ({unit})")
         panel_letters(grid[0])
         grid[0, 0].legend(loc="upper left")
+    return made
+
+
+def fitted_history(
+    measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str], band: xr.Dataset
+) -> Figure:
+    """Draw what was measured in time with its model, their difference, and the tip's band.
+
+    Parameters
+    ----------
+    measured : xarray.Dataset
+        From `Measurement.dataset`.
+    model : xarray.Dataset
+        The history of the fitted lever at the measured times.
+    fitted : sequence of str
+        The observables that entered the fit.
+    band : xarray.Dataset
+        `Fit.band`.
+    """
+    # the tip is always drawn, others where they were measured
+    panels = [one for one in _PANELS if one[0] == "tip" or measured[one[2]].notnull().any()]
+    settles = float(measured.bias_V.max()) == float(measured.bias_V.min())
+    time = measured.time.values
+    with figure(3.4 * len(panels), 4.6, 2, len(panels), sharex=True, height_ratios=(1.8, 1.0)) as (
+        made,
+        grid,
+    ):
+        for (upper, lower), (name, label, column, unit, factor) in zip(grid.T, panels, strict=True):
+            data, values = measured[column].values, model[column].values
+            if np.isfinite(data).any():
+                upper.plot(time, data, **{**MEASURED, "ms": 2.5})
+            if name == "tip":
+                width = 1.96 * band.tip_stderr_K
+                upper.fill_between(
+                    band.time, band.tip_K - width, band.tip_K + width, color=SKY, label="95 %"
+                )
+                upper.plot(band.time, band.tip_K, "-", color=BLUE, label="model")
+                upper.legend()
+            else:
+                upper.plot(time, values, "-", color=BLUE, label="model")
+            upper.set(ylabel=label)
+            if np.isfinite(data).any():
+                lower.axhline(0, color="0.4", lw=0.8)
+                lower.plot(time, (data - values) * factor, "o", color=VERMILION, ms=2)
+                lower.set(ylabel=f"data − model ({unit})")
+                if name not in fitted:
+                    where = (0.96, 0.05)
+                    upper.annotate(
+                        "not fitted", where, None, "axes fraction", ha="right", color="0.4"
+                    )
+            else:
+                lower.plot(band.time, band.tip_stderr_K, color=VERMILION)
+                lower.set(ylabel="standard error (K)", ylim=(0, None))
+            lower.set(xlabel="time (µs)")
+        if settles:
+            grid[0, 0].set_xscale("log")
+        panel_letters(grid[0])
+        grid[0, 0].legend(loc="best")
     return made
 
 

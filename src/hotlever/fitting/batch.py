@@ -118,6 +118,7 @@ def fit_many(
     for name, path in data.items():
         try:
             measurement = read_measurement(path, columns, probe.circuit)
+            measurement.need_rest("a fit of several levers")
             if reading is not None:
                 reading(measurement)
             if target.is_dir():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -12,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, WrapValidato
 from hotlever.errors import InputError
 from hotlever.files import read_json
 from hotlever.fitting.measurement import COLUMNS, Measurement
+from hotlever.lever.transient.waveform import Polyline, Sine
 from hotlever.probe.surroundings import Medium
 from hotlever.records import explained
 from hotlever.types import Array
@@ -59,6 +61,8 @@ class EmbeddedMeasurement(Section):
     pressure_mbar: float | None = None
     columns: dict[str, list[Number]]
     rows: list[Annotated[int, Field(ge=1)]] | None = None
+    time_us: list[float] | None = None
+    waveform: Polyline | Sine | None = None
 
     def measurement(self, where: str) -> Measurement:
         """Return the measurement; `where` names the file in an error.
@@ -66,7 +70,7 @@ class EmbeddedMeasurement(Section):
         Raises
         ------
         InputError
-            If its columns do not belong together, or a bias is missing or negative.
+            If its columns do not belong together, or a bias is missing, or negative at rest.
         """
         if "V_b" not in self.columns:
             raise InputError(f"{where}: columns: V_b is missing")
@@ -76,7 +80,15 @@ class EmbeddedMeasurement(Section):
             for name, (attribute, _) in COLUMNS.items()
             if name in self.columns or name not in ("dI_h", "dV_r")
         }
-        if not np.all(columns["bias_V"] >= 0):
+        if self.time_us is not None:
+            columns["time_us"] = array(self.time_us, (rows,), f"{where}: time_us")
+            if not isinstance(self.waveform, Polyline | Sine) or (
+                isinstance(self.waveform, Polyline)
+                and len(self.waveform.times) != len(self.waveform.volts)
+            ):
+                raise InputError(f"{where}: waveform: expected the one that belongs to the times")
+            columns["waveform"] = self.waveform
+        elif not np.all(columns["bias_V"] >= 0):
             raise InputError(f"{where}: V_b: expected biases of 0 or more")
         if self.rows is not None:
             columns["rows"] = array(self.rows, (rows,), f"{where}: rows")
@@ -89,7 +101,11 @@ def embed(measurement: Measurement) -> dict[str, Any]:
     present = {name: values.tolist() for name, values in columns.items() if values is not None}
     averaged = {} if measurement.rows is None else {"rows": measurement.rows.astype(int).tolist()}
     named = {name: getattr(measurement, name) for name in _NAMED}
-    return {**named, "columns": present, **averaged}
+    history: dict[str, Any] = {}
+    if measurement.time_us is not None:
+        waveform: Any = measurement.waveform
+        history = {"time_us": measurement.time_us.tolist(), "waveform": asdict(waveform)}
+    return {**named, "columns": present, **averaged, **history}
 
 
 def array(values: Sequence[Any], shape: tuple[int, ...], where: str) -> Array:

@@ -10,10 +10,13 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from hotlever import memory
 from hotlever.errors import BranchEndError, ComputationError, InputError, unknown_name
+from hotlever.fitting.band import band_dataset
 from hotlever.fitting.common_errors import errors_of_scales
+from hotlever.fitting.in_time import HistoryModel, HistoryPrediction, known_in_time
 from hotlever.fitting.least_squares import LeastSquares, Optimum
 from hotlever.fitting.measurement import OBSERVABLE_SYMBOLS, Measurement, with_measured_circuit
 from hotlever.fitting.measurement.averages import averaged, note_on_averages
@@ -21,7 +24,7 @@ from hotlever.fitting.misfit import undescribed
 from hotlever.fitting.models import ForwardModel, Prediction, forward_model
 from hotlever.fitting.options import FitOptions
 from hotlever.fitting.residuals import Residuals
-from hotlever.fitting.result import Fit, band_dataset, statements
+from hotlever.fitting.result import Fit, statements
 from hotlever.fitting.start import starting_probe
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.lever import COARSE, Lever
@@ -60,8 +63,8 @@ def fit(
         found from the data suits them better (see `hotlever.fitting.start`).
     options : FitOptions, optional
     model : callable, optional
-        Makes the forward model of a probe at some biases. By default a lever that is solved fast
-        and confirmed and corrected by the full one.
+        Makes the forward model of a probe at some biases or, in time, times (µs). By default a
+        lever that is solved fast and confirmed and corrected by the full one.
     progress : callable, optional
         Called with solved sweeps and how many there usually are.
     seen : callable, optional
@@ -105,7 +108,8 @@ class Estimate:
     @property
     def known(self) -> dict[str, Prior]:
         """The priors that were asked for."""
-        return priors_of(self.options.priors, self.optimum.probe, "priors")
+        in_time = self.measurement.time_us is not None
+        return priors_of(self.options.priors, self.optimum.probe, "priors", in_time=in_time)
 
     def priors(self, known: Mapping[str, Prior]) -> dict[str, PriorUse]:
         """Return what was known before, and what the data made of it."""
@@ -153,12 +157,16 @@ def estimate(
     # what an earlier one used
     memory.give_back()
     measurement = averaged(whole := Measurement.given(measurement), options.robust)
+    in_time = measurement.time_us is not None
     given = Probe.reference() if probe is None else Probe.given(probe)
     probe, notes = with_measured_circuit(given, measurement, options.medium)
     notes += note_on_averages(whole, measurement)
-    options = options.of(probe)
-    priors = priors_of(options.priors, probe, "priors")
+    options = options.of(probe, in_time=in_time)
+    priors = priors_of(options.priors, probe, "priors", in_time=in_time)
     options = replace(options, priors=priors)
+    if in_time:
+        priors, more = known_in_time(probe, measurement, priors, options.varied)
+        options, notes = replace(options, priors=priors), notes + more
     observables = _observables(options, measurement, probe, notes)
     # priors are in standard deviations, so the data must be too
     known = bool(options.priors) or joint is not None
@@ -168,12 +176,18 @@ def estimate(
     if not known and residuals.different < len(options.varied):
         raise InputError(
             f"{measurement.path or 'measurement'}: {residuals.different} different data for "
-            f"{len(options.varied)} parameters; fix some or measure at more biases"
+            f"{len(options.varied)} parameters; fix some or measure at more "
+            f"{'times' if in_time else 'biases'}"
         )
     names = tuple(dict.fromkeys([*options.usual, *options.varied]))
-    make = model or partial(forward_model, names=names)
-    # with priors errors are a matter of standard deviations, to which the fast lever's slopes do
-    forward = replace(make(probe, residuals.bias), names=names, first_order=not known)
+    forward: Any
+    if measurement.waveform is not None:
+        follow = partial(HistoryModel.of, waveform=measurement.waveform, names=options.varied)
+        forward = (model or follow)(probe, residuals.along)
+    else:
+        make = model or partial(forward_model, names=names)
+        # with priors errors are a matter of standard deviations; the fast lever's slopes do
+        forward = replace(make(probe, residuals.bias), names=names, first_order=not known)
     own = {name: prior for name, prior in priors.items() if name not in SCALES}
     start = probe.moved({name: prior.value for name, prior in own.items()})
     attempts = _attempts(forward, options.held(start), options, residuals)
@@ -259,8 +273,6 @@ def _found(estimate: Estimate) -> Fit:
     problem, optimum, options = estimate.problem, estimate.optimum, estimate.options
     residuals, values = problem.residuals, optimum.prediction.values
     every, covariance = estimate.slopes(optimum.prediction), estimate.covariance
-    slopes = every[list(OBSERVABLES).index("tip")]
-    current, _, tip = values
     notes = residuals.suspicious(values, options.robust) + residuals.zeros(values, every)
     chi_square = residuals.reduced_chi_square(values, len(options.varied))
     if chi_square is not None:
@@ -280,12 +292,7 @@ def _found(estimate: Estimate) -> Fit:
         data_weights=residuals.data_weights,
         sum_of_squares=float(weighted @ weighted),
         residual_rms=residuals.rms(values),
-        band=band_dataset(
-            bias_V=residuals.bias,
-            power_mW=optimum.probe.circuit.power(residuals.bias, current),
-            tip_K=tip,
-            tip_stderr_K=np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes)),
-        ),
+        band=_band(estimate),
         evaluations=problem.evaluations,
         steps=problem.steps,
         reason=undescribed(residuals, values, with_priors=bool(options.priors)),
@@ -293,6 +300,21 @@ def _found(estimate: Estimate) -> Fit:
         priors=estimate.priors(priors) if (priors := estimate.known) else {},
         notes=notes,
     )
+
+
+def _band(estimate: Estimate) -> xr.Dataset:
+    """Return the tip temperature and its standard error, at the rows or where it was followed."""
+    at, residuals = estimate.optimum.prediction, estimate.problem.residuals
+    values, slopes, along = at.values, estimate.slopes(at), {"bias_V": residuals.bias}
+    waveform = estimate.measurement.waveform
+    if waveform is not None and isinstance(at, HistoryPrediction):
+        values, slopes = at.seen, at.seen_by[:, :, estimate.problem.objective.columns]
+        along = {"time_us": at.at, "bias_V": waveform.bias(at.at)}
+    by = slopes[list(OBSERVABLES).index("tip")]
+    shown: dict[str, Array] = dict(zip(OBSERVABLES.values(), values, strict=True))
+    power = estimate.optimum.probe.circuit.power(along["bias_V"], shown["current_mA"])
+    stderr = np.sqrt(np.einsum("bi,ij,bj->b", by, estimate.covariance, by))
+    return band_dataset(**along, power_mW=power, tip_K=shown["tip_K"], tip_stderr_K=stderr)
 
 
 def chosen_options(options: FitOptions | None, choices: dict[str, Any]) -> FitOptions:

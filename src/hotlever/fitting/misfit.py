@@ -32,35 +32,36 @@ def undescribed(residuals: Residuals, values: Array, *, with_priors: bool) -> st
     """
     scatter = usual_scatter(with_priors)
     difference = residuals.difference(values) / residuals.largest
-    by_bias = np.argsort(residuals.bias, kind="stable")
+    in_order = np.argsort(residuals.along, kind="stable")
     for name, whole in zip(residuals.observables, difference, strict=True):
         known = np.isfinite(whole)
         if name == "tip" or known.sum() < _ROWS:
             continue
         square = float(np.mean(whole[known] ** 2))
         # a drift shows in the order of the rows, another lever in that of the bias
-        rows = (whole[known], whole[by_bias][known[by_bias]])
+        rows = (whole[known], whole[in_order][known[in_order]])
         together = min(float(np.mean(np.diff(row) ** 2)) for row in rows)
         if square > scatter**2 and together < _TOGETHER * 2.0 * square:
             worst = int(np.nanargmax(np.abs(whole)))
             return (
                 f"{name} differs by {np.sqrt(square):.1%} of its largest value (rms), and not at "
-                f"random; most at {residuals.bias[worst]:.3g} V"
+                f"random; most at {residuals.along[worst]:.3g} {residuals.unit}"
             )
     return ""
 
 
 def off_together(residuals: Residuals, values: Array) -> str:
     """Return where neighbouring data are off together, as no outliers are; empty if none are."""
-    by_bias = np.argsort(residuals.bias, kind="stable")
-    bias = residuals.bias[by_bias]
+    in_order = np.argsort(residuals.along, kind="stable")
+    along = residuals.along[in_order]
     for name, row in zip(residuals.observables, residuals.deviations(values), strict=True):
-        far = np.abs(row[by_bias]) > _FAR
+        far = np.abs(row[in_order]) > _FAR
         if name == "tip" or far.size < _ROWS:
             continue
         together = np.lib.stride_tricks.sliding_window_view(far, _NEIGHBOURS).all(axis=1)
         if together.any():
             first = int(np.argmax(together))
-            last = bias[first + _NEIGHBOURS - 1]
-            return f"{name} is off in neighbouring rows, from {bias[first]:.3g} to {last:.3g} V"
+            last, unit = along[first + _NEIGHBOURS - 1], residuals.unit
+            ends = f"{along[first]:.3g} to {last:.3g} {unit}"
+            return f"{name} is off in neighbouring rows, from {ends}"
     return ""

@@ -9,8 +9,14 @@ from typing import Any, Literal, get_args
 from hotlever.errors import InputError, unknown_name
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import PARAMETERS, parameter
+from hotlever.materials.parameters import OF_SILICON
 from hotlever.probe import Probe
-from hotlever.probe.parameters import of_materials, parameter_of, usual_parameters
+from hotlever.probe.parameters import (
+    heat_capacities,
+    of_materials,
+    parameter_of,
+    usual_parameters,
+)
 from hotlever.probe.priors import SCALES, Prior
 from hotlever.probe.surroundings import Medium
 
@@ -45,7 +51,8 @@ class FitOptions:
         What else is varied, beside what usually is.
     usual : sequence of str
         What usually is: by default the six parameters of the paper's lever. A fit takes what its
-        probe is made of (`hotlever.probe.parameters.usual_parameters`).
+        probe is made of (`hotlever.probe.parameters.usual_parameters`), and one of what was
+        measured in time the scales of the heat capacities.
 
     Raises
     ------
@@ -65,7 +72,7 @@ class FitOptions:
 
     def __post_init__(self) -> None:
         for name in self.fixed:
-            if "." not in name:
+            if "." not in name and name not in OF_SILICON:
                 parameter(name)
             for others, what in ((self.priors, "has a prior"), (self.free, "is free")):
                 if name in others:
@@ -99,7 +106,7 @@ class FitOptions:
         more = dict.fromkeys([*self.priors, *self.free])
         return [*self.material, *(name for name in more if name not in {*self.usual, *SCALES})]
 
-    def of(self, probe: Probe) -> FitOptions:
+    def of(self, probe: Probe, *, in_time: bool = False) -> FitOptions:
         """Return the options for a probe: what usually varies is what it is made of.
 
         Raises
@@ -108,13 +115,14 @@ class FitOptions:
             If it has no such parameter as is fixed or free, with the nearest that it has; or if
             all are fixed.
         """
-        known = of_materials(probe)
+        known = of_materials(probe, in_time=in_time)
         for name in self.fixed:
             if name not in known:
                 raise unknown_name("parameter", name, known)
         for name in self.free:
-            parameter_of(probe, name)
-        return replace(self, usual=usual_parameters(probe))
+            parameter_of(probe, name, in_time=in_time)
+        usual = heat_capacities(probe) if in_time else usual_parameters(probe)
+        return replace(self, usual=usual)
 
     def held(self, probe: Probe) -> Probe:
         """Return a probe with the fixed values in place.

@@ -59,6 +59,7 @@ def profile_likelihood(
     ComputationError
         If the lever cannot be solved at the optimum.
     """
+    result.measurement.need_rest("a profile")
     known = parameter_of(result.probe, name)
     if name not in result.names or len(result.names) < 2:
         raise InputError(

@@ -43,6 +43,8 @@ class Residuals:
     ----------
     bias : ndarray, shape (n,)
         Of the rows that have data (V).
+    along, unit : ndarray, shape (n,), and str
+        What tells these rows apart: their bias (V), or their time (µs).
     rows : list of int
         Places of the observables among `OBSERVABLES`.
     data, present : ndarray, shape (observables, n)
@@ -75,6 +77,8 @@ class Residuals:
         every = np.stack([measurement.observable(name) for name in observables])
         self._used = np.isfinite(every).any(axis=0)
         self.bias, self.data = measurement.bias_V[self._used], every[:, self._used]
+        along, self.unit = measurement.along
+        self.along = along[self._used]
         self.present = np.isfinite(self.data)
         self.largest = np.nanmax(np.abs(self.data), axis=1, keepdims=True)
         for name, size in zip(observables, self.largest, strict=True):
@@ -102,11 +106,11 @@ class Residuals:
         errors = np.stack([self._measurement.error(n)[self._used] for n in self.observables])
         usable = errors > 0
         for place, name in enumerate(self.observables):
-            missing = self.bias[self.present[place] & ~usable[place]]
+            missing = self.along[self.present[place] & ~usable[place]]
             if usable[place].any() and missing.size:
                 raise InputError(
-                    f"{self._where}: {name} has no error above 0 at {missing[0]:g} V, expected "
-                    "one for each of its values or none at all"
+                    f"{self._where}: {name} has no error above 0 at {missing[0]:g} {self.unit}, "
+                    "expected one for each of its values or none at all"
                 )
         self.without_errors = np.all(np.isnan(errors), axis=1)
         guessed = 0.01 * self.largest / self._root
@@ -119,8 +123,8 @@ class Residuals:
 
     @property
     def different(self) -> int:
-        """How many of them are at different biases: the same again tells of noise only."""
-        return sum(np.unique(self.bias[row]).size for row in self.present)
+        """How many of them are at different places: the same again tells of noise only."""
+        return sum(np.unique(self.along[row]).size for row in self.present)
 
     @property
     def by(self) -> Array:
@@ -261,8 +265,8 @@ class Residuals:
         odd = np.argwhere(size > _SUSPICIOUS)
         worst = np.sort(np.argsort(-size[tuple(odd.T)], kind="stable")[:_NAMED])
         found = [
-            f"{self.observables[row]} at {self.bias[place]:g} V is {size[row, place]:.0f} standard "
-            f"deviations from the fit; {advice}"
+            f"{self.observables[row]} at {self.along[place]:g} {self.unit} is "
+            f"{size[row, place]:.0f} standard deviations from the fit; {advice}"
             for row, place in odd[worst].tolist()
         ]
         more = len(odd) - len(found)

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from hotlever import __version__
-from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import json_text, without_nan, write_text
+from hotlever.fitting.band import band_dataset, band_names
 from hotlever.fitting.common_errors import errors_of_scales
 from hotlever.fitting.embedded import (
     EmbeddedMeasurement,
@@ -52,8 +52,6 @@ _AS_THEY_ARE = (
     *("options", "residual_rms", "sum_of_squares"),
     *("evaluations", "steps", "seconds", "priors", "reason", "notes"),
 )
-#: Variables of `Fit.band`.
-BAND = ("bias_V", "power_mW", "tip_K", "tip_stderr_K")
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,8 @@ class Fit:
     band : xarray.Dataset
         What the fit predicts at the measured biases, and the standard error of the predicted
         tip temperature that follows from the covariance of the parameters: ``bias_V``,
-        ``power_mW``, ``tip_K``, ``tip_stderr_K``, rising in bias.
+        ``power_mW``, ``tip_K``, ``tip_stderr_K``, rising in bias; or, of what was measured in time,
+        rising in ``time_us``.
     evaluations, steps : int
         Solved sweeps, and Levenberg-Marquardt steps among them.
     seconds : float
@@ -136,6 +135,11 @@ class Fit:
         return f"<Fit of {self.measurement.path or 'a measurement'}>\n{fit_text(self)}"
 
     @property
+    def in_time(self) -> bool:
+        """Whether it is of what was measured in time."""
+        return self.measurement.time_us is not None
+
+    @property
     def medium(self) -> str:
         """What was around the lever."""
         return self.probe.surroundings.medium
@@ -144,7 +148,7 @@ class Fit:
     def parameters(self) -> dict[str, FittedParameter]:
         """Value and standard error of what is usually varied, and of what else was."""
         spread = dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-        known = parameters_of(self.probe)
+        known = parameters_of(self.probe, in_time=True)
         names = dict.fromkeys([*usual_parameters(self.probe), *self.names])
         return {
             name: FittedParameter(
@@ -158,7 +162,7 @@ class Fit:
 
     @cached_property
     def _stated(self) -> dict[str, Prior]:
-        return priors_of(self.options.priors, self.probe, "priors")
+        return priors_of(self.options.priors, self.probe, "priors", in_time=self.in_time)
 
     @property
     def known_before(self) -> dict[str, Prior]:
@@ -199,8 +203,14 @@ class Fit:
         return float(np.sqrt(slope @ self.covariance @ slope))
 
     def model(self, bias: ArrayLike | None = None) -> xr.Dataset:
-        """Solve the fitted lever, at the measured biases by default; see `Lever.sweep`."""
-        return Lever(self.probe).sweep(self.measurement.bias_V if bias is None else bias)
+        """Solve the fitted lever, at the measured biases by default; see `Lever.sweep`.
+
+        Of what was measured in time: follow it at the measured times (`Lever.pulse`).
+        """
+        lever, measured = Lever(self.probe), self.measurement
+        if bias is None and measured.waveform is not None:
+            return lever.pulse(measured.waveform, at=measured.time_us)
+        return lever.sweep(measured.bias_V if bias is None else bias)
 
     def residuals(self) -> Residuals:
         """Return the data with the fit's own weights, to be compared with predictions."""
@@ -236,7 +246,7 @@ class Fit:
             "options": self.options.values(),
             "common_noise_covariance": self.common_noise_covariance.tolist(),
             "sum_of_squares": self.sum_of_squares,
-            "band": {name: self.band[name].values.tolist() for name in BAND},
+            "band": {name: self.band[name].values.tolist() for name in band_names(self.in_time)},
             "notes": self.notes,
             "software": f"hotlever {__version__}",
         }
@@ -249,12 +259,6 @@ class Fit:
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the fit file, whole or not at all."""
         write_text(path, self.to_json())
-
-
-def band_dataset(**columns: Array) -> xr.Dataset:
-    """Return `Fit.band` of its variables, one row per bias, rising."""
-    bias, order = np.unique(columns["bias_V"], return_index=True)
-    return labelled({name: columns[name][order] for name in BAND}, coordinates={"bias": bias})
 
 
 class _Parameter(Section):
@@ -310,15 +314,16 @@ def read_fit(path: str | os.PathLike[str]) -> Fit:
     if not found.parameters.keys() >= set(names):
         raise InputError(f"{path}: parameters and correlation do not belong together")
     probe = Probe.from_values(found.probe, f"{path}: probe")
+    measurement = found.data.measurement(f"{path}: data")
+    in_time = measurement.time_us is not None
     for name in names:
-        parameter_of(probe, name, f"{path}: correlation")
+        parameter_of(probe, name, f"{path}: correlation", in_time=in_time)
     stderr = [found.parameters[name].stderr for name in names]
     size = (len(names), len(names))
     correlation = array(found.correlation.matrix, size, f"{path}: correlation")
     noise = array(found.common_noise_covariance, size, f"{path}: common_noise_covariance")
-    measurement = found.data.measurement(f"{path}: data")
     weights = (rows, measurement.bias_V.size)
-    band = {name: found.band.get(name, []) for name in BAND}
+    band = {name: found.band.get(name, []) for name in band_names(in_time)}
     length = (len(band["bias_V"]),)
     return Fit(
         probe=probe,
@@ -352,7 +357,7 @@ def statements(fit: Fit) -> list[str]:
                 f"{name} is poorly determined by these data: its standard error is {share:.0%} of "
                 "its value"
             )
-    for name, known in of_materials(fit.probe).items():
+    for name, known in of_materials(fit.probe, in_time=True).items():
         if name not in fit.names:
             continue
         value = fit.parameters[name].value

@@ -43,10 +43,26 @@ def outcome(fit: Fit) -> list[str]:
         for name, value in fit.residual_rms.items()
     )
     return [
+        *_tip_in_time(fit),
         *([f"inversion temperature: {inversion} K"] if has_one else []),
         f"rms of data - model: {', '.join(rms)}",
         f"fitted to {', '.join(fit.observables)} in {fit.steps} steps, {fit.seconds:.1f} s",
     ]
+
+
+def _tip_in_time(fit: Fit) -> list[str]:
+    """Say how hot the tip became, if it was followed in time."""
+    if not fit.in_time:
+        return []
+    hottest, last = fit.band.isel(time=fit.band.tip_K.argmax("time")), fit.band.isel(time=-1)
+    said = [
+        f"{value_with_error(one.tip_K.item(), one.tip_stderr_K.item())} K after "
+        f"{one.time_us.item():.4g} µs"
+        for one in (hottest, last)
+    ]
+    if hottest.time_us.item() == last.time_us.item():
+        return [f"tip temperature: {said[0]}, at its hottest and last"]
+    return [f"tip temperature: {said[0]}, at its hottest, {said[1]}, at last"]
 
 
 def prior_lines(priors: Mapping[str, PriorUse]) -> list[str]:

@@ -155,8 +155,10 @@ class LawsAtPoints:
 
     def _only_heat(self, heat: Array) -> Array:
         """Test a heat by area alone."""
-        nothing = np.zeros((self.space.potential.kinds, *heat.shape))
-        return self.space.weak_form(Fluxes(heat, nothing, nothing))
+        tested = self.space.temperature.values_tested(self.space.weighted(heat[None])[0])
+        weak = np.zeros((self.space.size + 1, *heat.shape[1:]))
+        weak[self.space.temperature.columns] = tested
+        return weak
 
 
 def square(gradient: Array) -> Array:

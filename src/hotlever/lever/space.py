@@ -54,6 +54,7 @@ class LinearMap:
     def __init__(self, matrix: Any, kinds: int, columns: slice = slice(None)) -> None:
         self.matrix, self.kinds, self.columns = matrix, kinds, columns
         self._transposed = matrix.T.tocsr() if hasattr(matrix, "tocsr") else matrix.T
+        self._of_values: Any = None
 
     def among(self, points: Index) -> LinearMap:
         """Return the same dense map to some of the points."""
@@ -71,6 +72,13 @@ class LinearMap:
         rows = self._transposed.shape[1]
         tested = np.asarray(self._transposed @ samples.reshape(rows, -1))
         return tested.reshape(-1, *samples.shape[2:])
+
+    def values_tested(self, samples: Array) -> Array:
+        """Return the same of weighted samples of the value alone, (points, ...)."""
+        if self._of_values is None:
+            self._of_values = self._transposed[:, : len(samples)]
+        tested = np.asarray(self._of_values @ samples.reshape(len(samples), -1))
+        return tested.reshape(-1, *samples.shape[1:])
 
 
 @dataclass(frozen=True)

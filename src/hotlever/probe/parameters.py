@@ -74,10 +74,35 @@ def _kinds(probe: Probe) -> list[tuple[str, Kind]]:
     return sorted(probe.made_of.items(), key=lambda item: item[0] != LOW_DOPED)
 
 
-def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Parameter]:
+def heat_capacities(probe: Probe) -> tuple[str, ...]:
+    """Return what a fit varies of what was measured in time unless it is told otherwise.
+
+    Examples
+    --------
+    >>> from hotlever import Probe
+    >>> heat_capacities(Probe.reference())
+    ('heat_capacity_scale',)
+    """
+    return tuple(name for name in of_materials(probe, in_time=True) if own_name(name) in IN_TIME)
+
+
+def own_name(name: str) -> str:
+    """Return the name of a parameter without that of its material.
+
+    Examples
+    --------
+    >>> own_name("film.tcr"), own_name("n_d")
+    ('tcr', 'n_d')
+    """
+    return name.rpartition(".")[2]
+
+
+def parameters_of(
+    probe: Probe, *, anywhere: bool = False, in_time: bool = False
+) -> dict[str, Parameter]:
     """Return all that a fit may vary, by name: first the materials' parameters.
 
-    With `anywhere`, what counts in other surroundings or in time only as well.
+    With `in_time`, what counts in time only as well; with `anywhere`, in other surroundings too.
 
     Examples
     --------
@@ -95,7 +120,7 @@ def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Paramete
             shares["surface_gap_um"] = _OF_THE_VALUE
     parts = (probe.shape, probe.tip, probe.circuit, probe.surroundings)
     meaning = {name: text for part in parts if part for name, text in part.description().items()}
-    found = of_materials(probe, in_time=anywhere)
+    found = of_materials(probe, in_time=anywhere or in_time)
     for (name, (least, most)), value in zip(shares.items(), probe.at(list(shares)), strict=True):
         found[name] = parameter_named(name)._replace(
             scale=float(value),
@@ -106,7 +131,7 @@ def parameters_of(probe: Probe, *, anywhere: bool = False) -> dict[str, Paramete
     return found
 
 
-def parameter_of(probe: Probe, name: str, where: str = "") -> Parameter:
+def parameter_of(probe: Probe, name: str, where: str = "", *, in_time: bool = False) -> Parameter:
     """Return one of them.
 
     Raises
@@ -114,7 +139,7 @@ def parameter_of(probe: Probe, name: str, where: str = "") -> Parameter:
     InputError
         If there is none of this name; the text gives the nearest one.
     """
-    known = parameters_of(probe)
+    known = parameters_of(probe, in_time=in_time)
     if name not in known:
         raise unknown_name("parameter", name, known, where)
     return known[name]

@@ -25,6 +25,7 @@ from hotlever.materials.parameters import Parameter
 from hotlever.probe.parameters import (
     OF_THE_TIP,
     of_materials,
+    own_name,
     parameters_of,
     usual_parameters,
 )
@@ -207,7 +208,7 @@ def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) ->
     """
     known = {name: prior.spread for name, prior in published_material().items()}
     known["n_d"] = _DOPING
-    spreads = {name: known.get(_own(name), _FILM) for name in usual_parameters(probe)}
+    spreads = {name: known.get(own_name(name), _FILM) for name in usual_parameters(probe)}
     if probe.tip is not None:
         spreads |= dict.fromkeys(OF_THE_TIP, _TIP)
     spreads |= dict.fromkeys(nuisances(probe), _DIMENSIONS)
@@ -225,17 +226,12 @@ def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) ->
     }
     absolute = {"base_temperature_K": _BASE_K}
     absolute |= {
-        name: _IMPURITIES for name in of_materials(probe) if _own(name) == "impurity_exponent"
+        name: _IMPURITIES for name in of_materials(probe) if own_name(name) == "impurity_exponent"
     }
     for name, spread in absolute.items():
         found[name] = Prior(float(probe.at([name])[0]), spread, relative=False)
     own = {name: prior for name, prior in (material or {}).items() if name in found}
     return found | own | priors_of(probe.stated_priors, probe, "[prior]")
-
-
-def _own(name: str) -> str:
-    """Return the name of a parameter without that of its material."""
-    return name.rpartition(".")[2]
 
 
 def known_beforehand(probe: Probe, stated: Mapping[str, Prior | str] | None) -> dict[str, Prior]:
@@ -251,10 +247,12 @@ def known_beforehand(probe: Probe, stated: Mapping[str, Prior | str] | None) -> 
     return default_priors(probe) | priors_of(stated or {}, probe, "priors")
 
 
-def priors_of(stated: Mapping[str, Prior | str], probe: Probe, where: str) -> dict[str, Prior]:
+def priors_of(
+    stated: Mapping[str, Prior | str], probe: Probe, where: str, *, in_time: bool = False
+) -> dict[str, Prior]:
     """Return priors of which some are written as text.
 
-    What does not count in the probe's surroundings is left out.
+    What does not count in the probe's surroundings, or in time only, is left out.
 
     Raises
     ------
@@ -297,7 +295,7 @@ def priors_of(stated: Mapping[str, Prior | str], probe: Probe, where: str) -> di
         for one, own in zip(some, probe.at(some).tolist(), strict=True):
             found[one] = Prior(own if value is None else value, spread, relative)
             _check(found[one], known[one], f"{where}: {one}")
-    counting = parameters_of(probe)
+    counting = parameters_of(probe, in_time=in_time)
     return {name: prior for name, prior in found.items() if name in counting or name in SCALES}
 
 

@@ -33,7 +33,7 @@ def fit_page(
         f"{', '.join(fit.observables)}.",
         added,
     )
-    add_fit(page, fit)
+    (_add_fit_in_time if fit.in_time else add_fit)(page, fit)
     if found is not None:
         _add_uncertainty(page, found)
     return page
@@ -41,14 +41,7 @@ def fit_page(
 
 def add_fit(page: Page, fit: Fit) -> None:
     """Add tables and figures of a fit to a page."""
-    page.table(
-        ("parameter", "value", "unit", ""),
-        parameter_rows(fit),
-        "Material parameters; standard errors in units of the last digits.",
-    )
-    for text in [f"no such lever shows these data: {fit.reason}"] * bool(fit.reason) + fit.notes:
-        page.text(sentence(text))
-    page.text(f"{'; '.join(outcome(fit))}.")
+    _add_words(page, fit)
     measured = fit.measurement.dataset(fit.probe.circuit)
     # solved once for both
     lever = Lever(fit.probe)
@@ -61,11 +54,7 @@ def add_fit(page: Page, fit: Fit) -> None:
         "Measured and modelled observables against bias, and their difference. "
         "Grey: the stated error of the measured temperature.",
     )
-    page.figure(
-        "fit_correlation",
-        figures.correlation_matrix(fit.names, fit.correlation),
-        "Correlation of the fitted parameters.",
-    )
+    _add_correlation(page, fit)
     page.figure(
         "fit_tip_band",
         figures.tip_band(fit.band, measured),
@@ -85,6 +74,40 @@ def add_fit(page: Page, fit: Fit) -> None:
         figures.temperature_power(curve, measured=measured, base_temperature_K=base),
         "Tip temperature against the power dissipated in the lever, beside the published law.",
     )
+
+
+def _add_words(page: Page, fit: Fit) -> None:
+    page.table(
+        ("parameter", "value", "unit", ""),
+        parameter_rows(fit),
+        "Material parameters; standard errors in units of the last digits.",
+    )
+    for text in [f"no such lever shows these data: {fit.reason}"] * bool(fit.reason) + fit.notes:
+        page.text(sentence(text))
+    page.text(f"{'; '.join(outcome(fit))}.")
+
+
+def _add_correlation(page: Page, fit: Fit) -> None:
+    if len(fit.names) < 2:
+        return
+    page.figure(
+        "fit_correlation",
+        figures.correlation_matrix(fit.names, fit.correlation),
+        "Correlation of the fitted parameters.",
+    )
+
+
+def _add_fit_in_time(page: Page, fit: Fit) -> None:
+    _add_words(page, fit)
+    measured = fit.measurement.dataset(fit.probe.circuit)
+    page.figure(
+        "fit_in_time",
+        figures.fitted_history(measured, fit.model(), fit.observables, fit.band),
+        "Measured and modelled observables against time, and their difference; and the tip "
+        "temperature that the fit predicts, with the 95 % band that follows from the covariance of "
+        "the parameters (model errors not included).",
+    )
+    _add_correlation(page, fit)
 
 
 def _add_uncertainty(page: Page, found: Uncertainty) -> None:

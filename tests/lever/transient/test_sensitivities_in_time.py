@@ -1,4 +1,4 @@
-"""Derivatives in time: against moved levers, at rest, and what has none."""
+"""Derivatives in time: by the Taylor test, at rest, and what has none."""
 
 from __future__ import annotations
 
@@ -8,43 +8,52 @@ import pytest
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.transient import pulse, step, switched_off
+from hotlever.lever.transient.history import follow
 from hotlever.lever.transient.sensitivities import with_sensitivities
+from hotlever.materials import PARAMETERS
 
-#: At a corner of the wave form, before it and behind.
-TIMES = [0.0, 2.0, 5.0, 9.0]
 NAMES = ["heat_capacity_scale", "series_resistance_ohm"]
+OF_SILICON = [*PARAMETERS, "impurity_exponent", "n_hd"]
+#: What each parameter moves the tip by (K), and the largest share of its value that it moves by.
+MOVED_K, MOST = 1.0, 0.2
 
 
-def moved(lever, name, share):
-    value = float(lever.probe.at([name])[0])
-    return lever.with_probe(lever.probe.moved({name: value * (1.0 + share)})), value
+def values_of(data):
+    return np.stack([data[column].values for column in OBSERVABLES.values()])
 
 
 @pytest.mark.parametrize(
     ("medium", "names"),
     [
-        ("vacuum", NAMES),
-        pytest.param("air", ["gas_conductivity"], marks=pytest.mark.slow),
+        ("vacuum", [*OF_SILICON, *NAMES]),
+        pytest.param("air", ["gas_conductivity", *NAMES], marks=pytest.mark.slow),
     ],
 )
-def test_they_are_what_moved_levers_differ_by(coarse, in_air, medium, names):
+def test_they_have_taylor_order_two(coarse, in_air, medium, names):
+    """All parameters move at once, each by as much as it matters, on the same steps."""
     lever = coarse if medium == "vacuum" else in_air
-    wave = pulse(10.0, 5.0)
-    data = with_sensitivities(lever, wave, TIMES, names)
-    assert data.bias_V.values.tolist() == [10.0, 10.0, 10.0, 0.0]
-    plain = lever.pulse(wave, at=TIMES, tolerance_K=0.01)
-    np.testing.assert_allclose(data.tip_K[1:], plain.tip_K[1:], atol=0.1)
-    for name in names:
-        sides = []
-        for share in (0.01, -0.01):
-            other, value = moved(lever, name, share)
-            sides.append(with_sensitivities(other, wave, TIMES, names[:1]))
-        for observable, column in OBSERVABLES.items():
-            difference = ((sides[0][column] - sides[1][column]) / (0.02 * value)).values
-            found = data.sensitivity.sel(observable=observable, parameter=name).values
-            size = np.abs(difference).max()
-            # second differences, and steps that differ
-            np.testing.assert_allclose(found, difference, atol=2e-3 * size)
+    wave = pulse(10.0, 1.0)
+    ends = [0.0, *(step.end for _, step in follow(lever, wave, 2.0, 0.1))]
+    # with stops at half of what errors allow nothing but the stops makes steps
+    stops = np.union1d(ends[1:], 0.5 * np.add(ends[1:], ends[:-1])).tolist()
+    assert [step.end for _, step in follow(lever, wave, 2.0, 0.1, stops=stops)] == stops
+    base = with_sensitivities(lever, wave, stops, names)
+    assert set(base.bias_V.values.tolist()) == {10.0, 0.0}
+    plain = lever.pulse(wave, at=stops, tolerance_K=0.05)
+    np.testing.assert_allclose(base.tip_K, plain.tip_K, atol=0.1)
+    slopes, value = base.sensitivity.values, lever.probe.at(names)
+    unit = np.where(value == 0.0, 1.0, value)
+    share = np.minimum(MOVED_K / np.abs(slopes[2] * unit).max(axis=0), MOST)
+    moved = share * unit * np.random.default_rng(0).choice([-1.0, 1.0], len(names))
+    rest = []
+    for h in (1.0, 0.5):
+        changes = dict(zip(names, (value + h * moved).tolist(), strict=True))
+        other = with_sensitivities(
+            lever.with_probe(lever.probe.moved(changes)), wave, stops, names[-1:]
+        )
+        missed = values_of(other) - values_of(base) - h * (slopes @ moved)
+        rest.append(np.abs(missed).max(axis=1))
+    np.testing.assert_allclose(np.log2(rest[0] / rest[1]), 2.0, atol=0.1)
 
 
 def test_after_long_they_are_those_at_rest(coarse):

@@ -9,6 +9,7 @@ from hotlever.errors import HistoryEndError
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.transient import followed, pulse, step
+from hotlever.lever.transient.alike import Train
 from hotlever.lever.transient.reduced import reduced_in_time
 
 TRAIN = pulse(9.0, 4.0, 20.0, 20)
@@ -39,6 +40,24 @@ def test_a_train_on_modes_is_that_of_the_full_lever(coarse, train, states):
     for (_, state), tip in zip(states, train.tip_K.values, strict=True):
         assert isinstance(state.lever.space, FullSpace)
         assert state.tip_K == pytest.approx(tip, abs=1e-6)
+
+
+def test_periods_that_are_alike_are_copied(coarse):
+    """A lever on modes, with itself followed all the way, also where the train ends."""
+    snapshots = []
+    followed(coarse, TRAIN, 40.0, per_step=2, seen=lambda t, state: snapshots.append(state.x))
+    reduced = reduced_in_time(coarse, np.hstack(snapshots))
+    at = np.array([0.0, *TIMES, 403.0, 430.0])
+    train = Train(reduced, TRAIN, 20.0, 0.1, at)
+    copied, full = train.followed(430.0), followed(reduced, TRAIN, 430.0, at)
+    assert 4 < train.alike < 16
+    np.testing.assert_array_equal(copied.time_us, at)
+    np.testing.assert_array_equal(copied.bias_V, full.bias_V)
+    np.testing.assert_allclose(copied.tip_K, full.tip_K, atol=0.01)
+    for name in ("supplied_nJ", "stored_nJ", "lost_nJ"):
+        np.testing.assert_allclose(copied[name], full[name], rtol=1e-4, atol=2e-3)
+    assert [t for t, _ in train.states] == at.tolist()
+    assert [state.tip_K for _, state in train.states] == pytest.approx(copied.tip_K.values.tolist())
 
 
 def test_what_melts_or_is_short_is_followed_in_full(coarse):

@@ -37,10 +37,11 @@ def averaged(measurement: Measurement, robust: bool = False) -> Measurement:
     Returns
     -------
     Measurement
-        As it was, if it has few rows or is one of averages. Else its ``rows`` say of how many
-        each is the mean; in the order of the file.
+        As it was, if it has few rows, is one of averages or in time. Else its ``rows`` say of how
+        many each is the mean; in the order of the file.
     """
-    if measurement.bias_V.size <= MANY or measurement.rows is not None:
+    as_it_is = measurement.rows is not None or measurement.time_us is not None
+    if measurement.bias_V.size <= MANY or as_it_is:
         return measurement
     columns: dict[str, Array] = {
         name: np.array(values)

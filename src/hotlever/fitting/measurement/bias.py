@@ -46,7 +46,7 @@ def find_bias(
     lever, current = values[LEVER], values["I_h"]
     if symbol == "V_b":
         if LEVER in columns:
-            _compare_voltages(table, values, settings, notes)
+            compare_voltages(table, values, settings, notes)
         return
     if ohm is None:
         if circuit is None:
@@ -84,10 +84,16 @@ def _load(lever: Array, current: Array, kohm: float) -> float:
     return float(f"{enough:.2g}") if falls and enough > kohm else kohm
 
 
-def _compare_voltages(
+def compare_voltages(
     table: Table, values: dict[str, Array], settings: Settings, notes: list[str]
 ) -> None:
-    """Where a file has bias and lever voltage, take R_s from them, or check that it agrees."""
+    """Where a file has bias and lever voltage, take R_s from them, or check that it agrees.
+
+    Raises
+    ------
+    InputError
+        If it does not.
+    """
     behind, current = values["V_b"] - values[LEVER], values["I_h"]
     known = np.isfinite(behind) & (
         np.abs(current) > _COLD * np.nanmax(np.abs(current), initial=0.0)

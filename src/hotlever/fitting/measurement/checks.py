@@ -46,8 +46,13 @@ def check(
     values: dict[str, Array],
     settings: dict[str, Any],
     notes: list[str],
+    *,
+    in_time: bool = False,
 ) -> None:
-    """Refuse what no lever can show, and note what it hardly can."""
+    """Refuse what no lever can show, and note what it hardly can.
+
+    In time a bias may be of either sign, and a current goes on or off before the bias is known to.
+    """
     for symbol in (symbol for symbol in COLUMNS if symbol in columns):
         of, data = symbol.removeprefix("d"), values[symbol]
         unit, (low, high) = COLUMNS[of][1], _PLAUSIBLE[of]
@@ -62,14 +67,17 @@ def check(
             cell = shown(table.rows[row][columns[symbol].place])
             raise InputError(f"{table.where(row)}: {symbol} is '{cell}', expected {expected}")
         if symbol == of and not np.isnan(data).all():
-            for largest in (np.nanmax(data), size):
+            for largest in (size,) if in_time else (np.nanmax(data), size):
                 plausible(f"{table.path}: the largest {symbol}", unit, largest, low, high)
-            note_rows(notes, table, data < -NOISE * size, f"{symbol} is negative")
+            negative = (data < -NOISE * size) & (not in_time)
+            note_rows(notes, table, negative, f"{symbol} is negative")
 
     base = settings.get("base_temperature_K", _COLDEST_BASE_K)
     colder = colder_than_base(values["T_tip"], values["dT_tip"], base)
     text = f"T_tip is below the base temperature ({base:g} K), perhaps in another unit"
     note_rows(notes, table, colder, text)
+    if in_time:
+        return
 
     bias, current = values["V_b"], values["I_h"]
     ohm = settings.get("series_resistance_ohm", 0.0)

@@ -10,21 +10,22 @@ from dataclasses import dataclass
 from hotlever.cells import text_lines
 from hotlever.errors import InputError, quoted, shown, unknown_name
 from hotlever.files import read_bytes
-from hotlever.fitting.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS
+from hotlever.fitting.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, TIME
 from hotlever.tables import Table
 from hotlever.types import Array
-from hotlever.units import conversion, name_and_unit, unknown_unit
+from hotlever.units import TIMES, conversion, name_and_unit, unknown_unit
 
 #: The voltage over the lever, from which the bias follows.
 LEVER = "V_l"
 #: Quantities that a column can be, with the unit inside.
-QUANTITIES = {symbol: unit for symbol, (_, unit) in COLUMNS.items()} | {LEVER: "V"}
+QUANTITIES = {symbol: unit for symbol, (_, unit) in COLUMNS.items()} | {LEVER: "V", TIME: "us"}
 MEANING = {
     "V_b": "bias",
     "I_h": "heater current",
     "V_r": "reader voltage",
     "T_tip": "tip temperature",
     LEVER: "voltage over the lever",
+    TIME: "time",
     "dT_tip": "standard error",
     "dI_h": "standard error",
     "dV_r": "standard error",
@@ -118,7 +119,8 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
 def _asked(quantity: str, where: str) -> tuple[str, str | None]:
     """Return symbol and unit of what a column is told to be."""
     name, unit = name_and_unit(quantity)
-    symbol = symbol_of(name)
+    # no heading of that name alone is a time: settings of instruments are called so too
+    symbol = TIME if name.casefold() in TIMES else symbol_of(name)
     if symbol is None:
         raise unknown_name("quantity", name, QUANTITIES, where)
     if unit is not None and conversion(unit, QUANTITIES[symbol]) is None:
@@ -144,8 +146,7 @@ def find_columns(table: Table, told: Mapping[str, str], notes: list[str]) -> dic
     Raises
     ------
     InputError
-        If there is no bias or nothing to compare, a unit is missing or unknown, or two columns
-        are the same quantity.
+        If a unit is missing or unknown, or two columns are the same quantity.
     """
     where = table.where(-1)
     found: dict[str, Column] = {}
@@ -153,7 +154,7 @@ def find_columns(table: Table, told: Mapping[str, str], notes: list[str]) -> dic
         symbol, unit = _asked(quantity, where)
         place = _place(table, heading, where)
         found[symbol] = _column(table, symbol, place, unit)
-    exact = {symbol.lower(): symbol for symbol in QUANTITIES}
+    exact = {symbol.lower(): symbol for symbol in QUANTITIES if symbol != TIME}
     used = {column.place for column in found.values()}
     # its own symbol names a quantity before any other name
     for names in (exact, _NAMES):
@@ -169,12 +170,17 @@ def find_columns(table: Table, told: Mapping[str, str], notes: list[str]) -> dic
                 )
             found[symbol] = _column(table, symbol, place, None)
             used.add(place)
-    _require(table, found)
+    for place, heading in enumerate(table.names):
+        name, unit = name_and_unit(heading)
+        of_time = name.casefold() in TIMES and conversion(unit or "", QUANTITIES[TIME])
+        if of_time and TIME not in found and place not in used:
+            found[TIME] = _column(table, TIME, place, None)
+            used.add(place)
     for place, heading in enumerate(table.names):
         if place not in used and heading != _IN_SI and heading.strip():
             unit = name_and_unit(heading)[1] or ""
             alike = (s for s, u in QUANTITIES.items() if s not in found and conversion(unit, u))
-            likely = next((s for s in alike if s != LEVER), None)
+            likely = next((s for s in alike if s not in (LEVER, TIME)), None)
             hint = f"; if it is {likely}, name it '{likely} ({unit})'" if likely else ""
             notes.append(f"{table.path}: column '{shown(heading)}' is not used{hint}")
     return found
@@ -227,14 +233,26 @@ def _told(symbol: str, heading: str = "HEADING") -> str:
     return f"--column '{symbol} ({QUANTITIES[symbol]})={shown(heading)}'"
 
 
-def _require(table: Table, found: Mapping[str, Column]) -> None:
-    """Refuse a table without bias, or without anything that depends on it."""
-    driven = "V_b" in found or {LEVER, "I_h"} <= set(found)
-    if driven and found.keys() & set(OBSERVABLE_SYMBOLS.values()):
+def require(table: Table, found: Mapping[str, Column], *, driven: bool = False) -> None:
+    """Refuse a table without bias, unless it is `driven`, or without anything that depends on it.
+
+    Raises
+    ------
+    InputError
+        If either is missing.
+    """
+    shows = {*OBSERVABLE_SYMBOLS.values()} | ({LEVER} if TIME in found else set())
+    given = driven or "V_b" in found or {LEVER, "I_h"} <= set(found)
+    if given and found.keys() & shows:
         return
     where = table.where(-1)
     names = ", ".join(repr(shown(name)) for name in table.names[:9])
     what = f"the header names {names}" if table.names else "numbers without a header row"
+    if TIME in found:
+        raise InputError(
+            f"{where}: {what}; expected 'V_b (V)', or a wave form such as --pulse 10V,5us, and at "
+            "least one of 'I_h (mA)', 'V_l (V)', 'V_r (mV)', 'T_tip (K)' beside the time"
+        )
     voltage = (name for name in table.names if conversion(name_and_unit(name)[1] or "", "V"))
     first = next(voltage, "HEADING" if table.names else "1")
     raise InputError(

@@ -8,14 +8,19 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from hotlever.datasets import labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.lever.dataset import OBSERVABLES, probe_of
+from hotlever.lever.transient.history import checked_times
+from hotlever.lever.transient.waveform import Waveform
 from hotlever.probe import Circuit
 from hotlever.probe.surroundings import Medium
 from hotlever.types import Array
 
+#: The time, in files of what was measured in time.
+TIME = "t"
 #: Quantities of a measurement file: symbol in the header, attribute, unit inside.
 COLUMNS = {
     "V_b": ("bias_V", "V"),
@@ -54,6 +59,10 @@ class Measurement:
         What each column and setting of the file was taken for, as rows of a table.
     rows : ndarray, shape (n,), or None
         Of how many rows of the file each is the mean, if they were averaged.
+    time_us : ndarray, shape (n,), or None
+        When each row was measured (µs, rising) of a lever that was cold before; None at rest.
+    waveform : Waveform or None
+        Of the bias, for what was measured in time.
     """
 
     bias_V: Array
@@ -73,6 +82,72 @@ class Measurement:
     pressure_mbar: float | None = None
     understood: tuple[tuple[str, ...], ...] = ()
     rows: Array | None = None
+    time_us: Array | None = None
+    waveform: Waveform | None = None
+
+    @classmethod
+    def in_time(
+        cls,
+        time_us: ArrayLike,
+        waveform: Waveform,
+        current_mA: ArrayLike | None = None,
+        reader_V: ArrayLike | None = None,
+        **more: Any,
+    ) -> Measurement:
+        """Return what was measured of a cold lever under a wave form.
+
+        Parameters
+        ----------
+        time_us : array_like, shape (n,)
+            Rising, from 0 on.
+        waveform : Waveform
+        current_mA, reader_V : array_like, shape (n,), optional
+            NaN where nothing was measured.
+        **more
+            Other attributes.
+
+        Raises
+        ------
+        InputError
+            If the times do not rise, or a column has another shape.
+
+        Examples
+        --------
+        >>> from hotlever.lever.transient import step
+        >>> Measurement.in_time([1.0, 2.0], step(4.0), [0.577, 0.576]).observables
+        ('current',)
+        """
+        times = checked_times(time_us)
+        nothing = np.full(times.shape, np.nan)
+        given = {
+            name: nothing if values is None else np.asarray(values, dtype=float)
+            for name, values in (("current_mA", current_mA), ("reader_V", reader_V))
+        }
+        if not np.array_equal(times, np.ravel(time_us)) or any(
+            values.shape != times.shape for values in given.values()
+        ):
+            raise InputError("expected times that rise, and one current and reader voltage each")
+        columns: Any = {"tip_K": nothing, "tip_error_K": nothing, **given, **more}
+        return cls(waveform.bias(times), time_us=times, waveform=waveform, **columns)
+
+    @property
+    def along(self) -> tuple[Array, str]:
+        """What tells the rows apart, and its unit: the time (µs), or at rest the bias (V)."""
+        return (self.bias_V, "V") if self.time_us is None else (self.time_us, "µs")
+
+    def need_rest(self, what: str) -> None:
+        """Refuse what was measured in time.
+
+        Raises
+        ------
+        InputError
+            If it was; the text says that `what` needs a sweep.
+        """
+        if self.time_us is not None:
+            raise InputError(
+                f"{self.path or 'measurement'}: was measured in time, within "
+                f"{np.ptp(self.time_us):.4g} µs; {what} expects a slow sweep of the bias"
+            )
 
     @classmethod
     def given(cls, measurement: Measurement | str | os.PathLike[str]) -> Measurement:
@@ -113,11 +188,16 @@ class Measurement:
         )
 
     def dataset(self, circuit: Circuit) -> xr.Dataset:
-        """Return the data by the names that a sweep has, V_l and P_l included, rising in bias."""
+        """Return the data by the names that a sweep has, V_l and P_l included.
+
+        Rising in bias, or in time.
+        """
         named = ((name, getattr(self, name)) for name, _ in COLUMNS.values())
         columns = {name: values for name, values in named if values is not None}
         columns["lever_V"] = circuit.lever_voltage(self.bias_V, self.current_mA)
         columns["power_mW"] = circuit.power(self.bias_V, self.current_mA)
+        if self.time_us is not None:
+            return labelled(columns, "time", {"time": self.time_us})
         return labelled(columns, coordinates={"bias": self.bias_V}).sortby("bias")
 
     def observable(self, name: str) -> Array:

@@ -20,10 +20,13 @@ from hotlever.fitting.measurement.columns import (
     find_columns,
     is_heading,
     parse_columns,
+    require,
 )
-from hotlever.fitting.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, Measurement
+from hotlever.fitting.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, TIME, Measurement
+from hotlever.fitting.measurement.histories import find_waveform, take_time
 from hotlever.fitting.measurement.settings import Settings
 from hotlever.fitting.measurement.sweeps import described, disagreements, sweeps_of
+from hotlever.lever.transient.waveform import Waveform
 from hotlever.probe import Circuit
 from hotlever.tables import Table, read_table
 from hotlever.types import Array
@@ -36,6 +39,7 @@ def read_measurement(
     path: str | os.PathLike[str],
     columns: Mapping[str, str] | None = None,
     circuit: Circuit | None = None,
+    waveform: Waveform | None = None,
 ) -> Measurement:
     """Read a measurement file.
 
@@ -48,6 +52,10 @@ def read_measurement(
     For the voltage over the lever, ``V_l (V)``, the bias follows from R_s and I_h. Rows of
     negative bias are mirrored: lever and circuit are symmetric.
 
+    A table with a column ``time (us)``, in any unit of time, is of what was measured in time if it
+    lasts `hotlever.fitting.measurement.histories.BRIEF` at most, or a wave form or the column are
+    told of; it begins with a cold lever.
+
     Parameters
     ----------
     path : path
@@ -56,6 +64,8 @@ def read_measurement(
         columns: ``{"I_h (uA)": "Current"}``.
     circuit : Circuit, optional
         Its R_s makes the bias of V_l in a file that does not give R_s.
+    waveform : Waveform, optional
+        Of the bias in time, instead of the column ``V_b``.
 
     Raises
     ------
@@ -73,20 +83,29 @@ def read_measurement(
     for line, text in table.remarks:
         notes.append(f"{table.path}: line {line}: '{shown(text)}' is taken for a comment")
     values = dict.fromkeys(QUANTITIES, np.full(len(table.rows), np.nan))
+    in_time = take_time(table, found, told, unused, expected=waveform is not None)
+    require(table, found, driven=waveform is not None)
     for symbol, column in found.items():
         values[symbol] = column.values(table)
         written = np.isnan(values[symbol]) & [bool(row[column.place]) for row in table.rows]
-        if symbol not in ("V_b", LEVER):
+        if symbol not in ("V_b", LEVER, TIME):
             note_rows(notes, table, written, f"{symbol} is written as missing")
-    find_bias(table, found, values, settings, circuit, notes)
-    sign = mirror(table, found, values, notes)
-    check(table, found, values, settings.values, notes)
-    bias = sign * values["V_b"]
-    parts = sweeps_of(bias)
-    if len(parts) > 1:
-        notes.append(f"{path}: {len(parts)} sweeps, all of them used: {described(bias, parts)}")
-        data = {symbol: values[symbol] for symbol in OBSERVABLE_SYMBOLS.values()}
-        notes += [f"{path}: {text}" for text in disagreements(bias, parts, data)]
+    if in_time:
+        history = find_waveform(table, found, values, settings, circuit, waveform, notes)
+        check(table, found, values, settings.values, notes, in_time=True)
+        order = f"in time, {len(table.rows)} rows; {history['waveform'].text}"
+    else:
+        history = {}
+        find_bias(table, found, values, settings, circuit, notes)
+        sign = mirror(table, found, values, notes)
+        check(table, found, values, settings.values, notes)
+        bias = sign * values["V_b"]
+        parts = sweeps_of(bias)
+        order = described(bias, parts)
+        if len(parts) > 1:
+            notes.append(f"{path}: {len(parts)} sweeps, all of them used: {order}")
+            data = {symbol: values[symbol] for symbol in OBSERVABLE_SYMBOLS.values()}
+            notes += [f"{path}: {text}" for text in disagreements(bias, parts, data)]
     notes += unused
     more = len(notes) - _MOST_NOTES
     if more > 0:
@@ -95,10 +114,11 @@ def read_measurement(
     measurement = Measurement(
         **content,
         **settings.values,
+        **history,
         path=table.path,
         sha256=table.sha256,
         notes=tuple(notes),
-        understood=_understood(table, found, values, settings, described(bias, parts)),
+        understood=_understood(table, found, values, settings, order),
     )
     if not measurement.observables:
         raise InputError(f"{path}: no values in any of the columns I_h, V_r, T_tip")
@@ -117,9 +137,15 @@ def _understood(
     rows = [
         (table.path, f"{separator}, decimal comma" if table.decimal_comma else separator, sweeps)
     ]
-    for symbol in (symbol for symbol in (LEVER, *COLUMNS) if np.isfinite(values[symbol]).any()):
+    reckoned = {
+        "V_b": ("V", f"bias, {LEVER} + R_s I_h" if LEVER in columns else "bias, the wave form"),
+        "I_h": ("mA", f"heater current, (V_b - {LEVER}) / R_s"),
+    }
+    every = (TIME, LEVER, *COLUMNS)
+    for symbol in (symbol for symbol in every if np.isfinite(values[symbol]).any()):
         if symbol not in columns:
-            rows.append((symbol, _range(values[symbol], "V"), f"bias, {LEVER} + R_s I_h"))
+            unit, how = reckoned[symbol]
+            rows.append((symbol, _range(values[symbol], unit), how))
             continue
         column = columns[symbol]
         heading = f"'{shown(column.heading)}'" if column.heading else f"column {column.place + 1}"

@@ -81,6 +81,7 @@ class DrivenLever:
         self.equations, self._circuit, self._bias = equations, circuit, bias
         self._air, self._own = equations.heat_in_air, len(equations.scale)
         self.scale, self.step_limit = equations.scale, equations.step_limit
+        self._latest: tuple[Array, Array] | None = None
         if self._air is not None:
             free = np.ones((self._air.size, 1))
             self.scale = np.vstack([self.scale, free])
@@ -88,7 +89,12 @@ class DrivenLever:
 
     def parts(self, x: Array) -> tuple[Array, Array]:
         """Return the unknowns of the lever, and the temperatures in the air."""
-        return x[: self._own], x[self._own :]
+        if self._air is None:
+            return x, x[len(x) :]
+        # the equations know what they evaluated last by the array itself
+        if self._latest is None or self._latest[0] is not x:
+            self._latest = x, x[: self._own]
+        return self._latest[1], x[self._own :]
 
     def start(self, state: State) -> Array:
         """Return the unknowns at a state; the air is at rest if the state does not say."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +33,8 @@ _FOLLOWED = (
     *("lever_V", "current_mA", "reader_V", "tip_K", "max_K"),
     *("supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ"),
 )
+#: What is added up since the start.
+ENERGIES = ("supplied_nJ", "lost_nJ")
 #: Errors are at most this share of the rise that a lever would end with, so that a response is
 #: resolved however weak it is; but never less than this (K), which is near rounding errors.
 _SHARE_OF_RISE, _LEAST_TOLERANCE = 2e-3, 1e-6
@@ -230,7 +232,7 @@ def followed(
                 progress(int(_PARTS * reached / until), _PARTS)
     except ComputationError as error:
         failure = f"the lever could be followed up to {reached:.6g} µs only: {error}"
-    data = _dataset(lever, waveform, rows)
+    data = _of_rows(lever, waveform, rows)
     if failure:
         raise HistoryEndError(failure, reached, data)
     return data
@@ -300,20 +302,25 @@ def checked_times(at: ArrayLike) -> Array:
     return times
 
 
-def _dataset(lever: Lever, waveform: Waveform, rows: _Rows) -> xr.Dataset:
+def _of_rows(lever: Lever, waveform: Waveform, rows: _Rows) -> xr.Dataset:
     followed = np.array(rows.followed).reshape(-1, len(_FOLLOWED)).T
     columns = dict(zip(_FOLLOWED, followed, strict=True))
-    time, bias = np.array(rows.time), np.array(rows.bias)
     columns["power_mW"] = columns["lever_V"] * columns["current_mA"]
     # the reader, where there is none, is NaN throughout
-    variables = {"time_us": time, "bias_V": bias}
+    variables = {"time_us": np.array(rows.time), "bias_V": np.array(rows.bias)}
     more = ("max_K", "supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ")
     variables |= {name: columns[name] for name in (*TIME_COLUMNS[2:], *more)}
+    return history_dataset(lever, waveform, variables)
+
+
+def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Array]) -> xr.Dataset:
+    """Return the dataset of a history of its columns, with notes on what it leaves out."""
+    time = columns["time_us"]
     at_rest = lever.space.air is not None and lever.equations.heat_in_air is None
     notes = [_AIR_NOTE] if at_rest else []
     notes += range_notes(lever.probe, "{} µs on", time, columns["max_K"])
     return labelled(
-        variables,
+        columns,
         "time",
         {"time": time},
         **probe_attributes(lever.probe),

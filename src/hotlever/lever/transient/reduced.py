@@ -112,23 +112,27 @@ class TabulatedEquations(LeverEquations):
             3.0 * rise - 2.0 * first - last,
             first + last - 2.0 * rise,
         ]
-        # the order of looking up: points, nodes, powers, laws
-        self._table = np.ascontiguousarray(np.stack(table).transpose(2, 3, 0, 1))
-        self._every = np.arange(space.weights.size)[:, None]
+        # looked up as rows by point and node: powers, laws
+        self._pieces = _NODES.size - 1
+        rows = np.stack(table).transpose(2, 3, 0, 1)
+        self._table = np.ascontiguousarray(rows).reshape(-1, 4, 3)
+        self._first = self._pieces * np.arange(space.weights.size)[:, None]
 
     def _look_up(self, T: Array) -> tuple[Array, Array]:
         """Return κ, σ and the heat (3, points, n), and their slopes."""
         if self._found is None or self._found[0] is not T:
-            place = (T - _NODES[0]) / _NODE_STEP
-            node = np.minimum(np.maximum(place, 0.0), _NODES.size - 2.0).astype(np.intp)
-            along = np.minimum(np.maximum(place - node, 0.0), 1.0)[..., None]
-            a, b, c, d = np.moveaxis(self._table[self._every, node], 2, 0)
-            values = a + along * (b + along * (c + along * d))
-            slopes = (b + along * (2.0 * c + 3.0 * along * d)) / _NODE_STEP
+            place = (T - _NODES[0]) * (1.0 / _NODE_STEP)
+            node = place.clip(0.0, self._pieces - 1.0).astype(np.intp)
+            off = (place - node)[..., None]
+            along = off.clip(0.0, 1.0)
+            rows = self._table.take(self._first + node, axis=0)
+            a, b, c, d = (rows[..., power, :] for power in range(4))
+            ad = along * d
+            slopes = b + along * (2.0 * c + 3.0 * ad)
             # Newton's method may stray beyond the nodes
-            beyond = place - node - along[..., 0]
-            values = values + slopes * (_NODE_STEP * beyond)[..., None]
-            self._found = T, np.moveaxis(values, -1, 0), np.moveaxis(slopes, -1, 0)
+            values = a + along * (b + along * (c + ad)) + (off - along) * slopes
+            slopes *= 1.0 / _NODE_STEP
+            self._found = T, values.transpose(2, 0, 1), slopes.transpose(2, 0, 1)
         return self._found[1:]
 
     def conductivities(self, T: Array, names: Sequence[str] = ("T",)) -> Conductivities:

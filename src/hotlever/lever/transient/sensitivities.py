@@ -29,6 +29,7 @@ from hotlever.lever.transient.runge_kutta import (
     weighted_sum,
 )
 from hotlever.lever.transient.waveform import Piece, Waveform
+from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, parameters_of
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
@@ -41,6 +42,18 @@ if TYPE_CHECKING:
 _UNKNOWN = ("base_temperature_K", "surface_gap_um")
 #: Error (relative) to which derivatives are solved with factors of a state nearby, and rounds.
 _EXACT, _MOST_ROUNDS = 1e-8, 12
+
+
+def derivable(probe: Probe, name: str) -> bool:
+    """Whether there are derivatives in time by a parameter of a probe.
+
+    Examples
+    --------
+    >>> from hotlever import Probe
+    >>> derivable(Probe.reference(), "n_d"), derivable(Probe.reference(), "thickness_um")
+    (True, False)
+    """
+    return name not in _UNKNOWN and name not in dimensions_of(probe)
 
 
 @one_blas_thread
@@ -89,7 +102,7 @@ def with_sensitivities(
     for name in names:
         if name not in known:
             raise unknown_name("parameter", name, known)
-        if name in _UNKNOWN or name in dimensions_of(lever.probe):
+        if not derivable(lever.probe, name):
             raise InputError(
                 f"no derivatives in time by {name} are known, expected parameters of materials, "
                 "series_resistance_ohm or gas_conductivity"

@@ -1,9 +1,9 @@
 """Long trains of pulses, followed on modes where those are certified by the full lever.
 
-Modes are those of the first periods. On them the whole train is followed; then the full lever is
-followed from states early and late in the train, and tells how far the reduced one departs within
-a period, and from that to the next. Where it departs too far, what the full lever did there joins
-the snapshots, and the train is followed once more.
+Modes are those of the first periods. On them the train is followed, until its periods are alike;
+then the full lever is followed from a state late in the train, and tells, as the first periods do,
+how far the reduced one departs within a period, and from that to the next. Where it departs too
+far, what the full lever did there joins the snapshots, and the train is followed once more.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 
 from hotlever.errors import ComputationError
 from hotlever.lever.state import State
-from hotlever.lever.transient.history import Seen, checked_times, followed, kept_in
+from hotlever.lever.transient.alike import Train
+from hotlever.lever.transient.history import Seen, checked_times, followed
 from hotlever.lever.transient.reduced import on_all_nodes, reduced_in_time
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.types import Array
@@ -69,8 +70,9 @@ class _Train:
     ) -> None:
         self._lever, self._waveform, self._period = lever, waveform, period
         self._end, self._options = end, options
+        self._tolerance_K: float = options["tolerance_K"]
         whole = min(waveform.count, int(end / period * (1.0 + 1e-9)))
-        self._places = (_PERIODS, whole - _PERIODS)
+        self._late = whole - _PERIODS
         self._snapshots: list[Array] = []
 
     def followed(self, at: ArrayLike | None, seen: Seen | None) -> xr.Dataset:
@@ -81,38 +83,37 @@ class _Train:
         ComputationError
             If there are none.
         """
-        self._full(None)
-        tolerance = self._options["tolerance_K"]
-        starts = self._period * np.array(self._places, dtype=float)
+        first = self._full(None)
+        asked = None if at is None else checked_times(at)
         for _ in range(_ROUNDS):
             reduced = reduced_in_time(self._lever, np.hstack(self._snapshots))
-            times = None if at is None else np.union1d(checked_times(at), starts)
-            states: list[tuple[float, State]] = []
-            history = followed(
+            train = Train(
                 reduced,
                 self._waveform,
-                self._end,
-                times,
-                seen=kept_in(states),
-                **self._options,
+                self._period,
+                self._tolerance_K,
+                asked,
+                self._options.get("per_step", 1),
             )
-            known = np.array([t for t, _ in states])
-            begins = [states[int(np.abs(known - t).argmin())][1] for t in starts.tolist()]
-            away = max(self._departure(state) for state in begins)
-            if away < tolerance:
+            history = train.followed(self._end, self._options.get("progress"))
+            late = train.begin(self._late)
+            away = max(
+                self._departure(first, train.begin(0)),
+                self._departure(self._full(on_all_nodes(self._lever, late)), late),
+            )
+            if away < self._tolerance_K:
                 break
         else:
             raise ComputationError(f"modes of the first periods are off by {away:.2g} K")
-        if at is not None:
-            history = history.isel(time=np.isin(known, checked_times(at)))
         if seen is not None:
-            for t, state in states:
-                if at is None or t in history.time:
-                    seen(t, on_all_nodes(self._lever, state))
+            for t, state in train.states:
+                seen(t, on_all_nodes(self._lever, state))
         note = (
             f"followed on {reduced.space.size} modes, within {away:.1g} K of the full lever as "
-            f"compared from periods {self._places[0] + 1} and {self._places[1] + 1} on"
+            f"compared from periods 1 and {self._late + 1} on"
         )
+        if train.alike is not None:
+            note += f"; from period {train.alike + 1} on all are alike"
         history.attrs["notes"] = "\n".join(filter(None, [history.attrs["notes"], note]))
         return history
 
@@ -127,21 +128,20 @@ class _Train:
             self._waveform,
             _PERIODS * self._period,
             start=start,
-            tolerance_K=self._options["tolerance_K"],
+            tolerance_K=self._tolerance_K,
             per_step=_PER_STEP,
             seen=seen,
         )
 
-    def _departure(self, start: State) -> float:
+    def _departure(self, full: xr.Dataset, start: State) -> float:
         """Estimate how far (K) the reduced lever departs from the full one in the long run."""
-        full = self._full(on_all_nodes(self._lever, start))
         other = followed(
             start.lever,
             self._waveform,
             _PERIODS * self._period,
             full.time.values,
             start=start,
-            tolerance_K=self._options["tolerance_K"],
+            tolerance_K=self._tolerance_K,
         )
         away = np.abs(full.tip_K.values - other.tip_K.values)
         first = full.time.values <= self._period

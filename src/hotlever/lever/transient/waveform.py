@@ -17,6 +17,7 @@ import numpy as np
 
 from hotlever.errors import InputError, shown
 from hotlever.tables import read_table
+from hotlever.types import Array
 from hotlever.units import name_and_unit, setting
 
 #: Biases (V), times (µs) and numbers of pulses that a wave form may have at most.
@@ -86,6 +87,17 @@ class Waveform(ABC):
     @abstractmethod
     def pieces(self, until: float) -> Iterator[Piece]:
         """Give the smooth parts up to a time (µs)."""
+
+    def bias(self, times: Array) -> Array:
+        """Return the bias (V) at times (µs, rising); where it jumps that before, but at 0."""
+        found = np.full(times.shape, self.before_V)
+        for piece in self.pieces(math.inf):
+            if piece.start > times[-1]:
+                break
+            behind = times > piece.start if piece.start > 0.0 else times >= 0.0
+            here = behind & (times <= piece.end)
+            found[here] = [piece.bias(t) for t in times[here].tolist()]
+        return found
 
 
 @dataclass(frozen=True)
@@ -247,7 +259,7 @@ def read_waveform(path: str | os.PathLike[str]) -> Waveform:
     """
     expected = "a header row like 'time (us),bias (V)'"
     table = read_table(path, expected)
-    headings = [_name_and_unit(heading) for heading in table.names]
+    headings = [name_and_unit(heading) for heading in table.names]
     columns = []
     for known, inside, what in ((_TIME, "us", "time"), (_BIAS, "V", "bias")):
         place = next((k for k, (name, _) in enumerate(headings) if known.fullmatch(name)), None)
@@ -257,9 +269,8 @@ def read_waveform(path: str | os.PathLike[str]) -> Waveform:
                 f"{table.where(-1)}: no {what} column in '{found}', expected {expected}"
             )
         where = f"{table.where(-1)}: unit of the {what}"
-        columns.append(
-            setting(f"1{headings[place][1]}", inside, where) * table.numbers(place, what)
-        )
+        unit = headings[place][1] or ""
+        columns.append(setting(f"1{unit}", inside, where) * table.numbers(place, what))
     times, volts = columns
     times = times - times[0]
     for wrong, meant in (
@@ -275,11 +286,3 @@ def read_waveform(path: str | os.PathLike[str]) -> Waveform:
     end = float(times[-1]) or _SETTLING
     points = tuple(times.tolist()), tuple(volts.tolist())
     return Polyline(f"wave form of {name}", *points, end, float(volts[0]))
-
-
-def _name_and_unit(heading: str) -> tuple[str, str]:
-    """Split ``time (us)``, or ``time_us`` as in our own files."""
-    name, unit = name_and_unit(heading)
-    if unit is None and "_" in heading:
-        name, _, unit = heading.rpartition("_")
-    return name, unit or ""
