@@ -126,3 +126,11 @@ def test_fields_leave_as_one_file(tmp_path: Path) -> None:
         assert packed.namelist() == ["2.vtu", "3.vtu"]
 
     visit(tmp_path, story)
+
+
+def test_what_was_measured_in_time_is_drawn_against_time(tmp_path: Path) -> None:
+    rows = "".join(f"{0.1 * n},9,{1.28 - 0.01 * n:.3f}\n" for n in range(20))
+    (tmp_path / "mine.csv").write_text(f"t (us),V_b (V),I_h (mA)\n{rows}")
+    found = showing.understood(Here(), tmp_path, "mine.csv", [], None)  # type: ignore[arg-type]
+    assert found["data"]["time_us"] == pytest.approx([0.1 * n for n in range(20)])
+    assert len(found["data"]["current_mA"]) == 20

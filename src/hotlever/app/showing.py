@@ -51,7 +51,9 @@ def understood(
     """Return what a measurement file was understood as."""
     measurement = _measurement(folder, name, columns, probe)
     data = measurement.dataset(_probe(folder, probe).circuit)
-    data = data.isel(bias=slice(None, None, data.bias.size // _POINTS + 1))
+    (along,) = data.sizes
+    data = data.isel({along: slice(None, None, data.sizes[along] // _POINTS + 1)})
+    in_time = {"time_us": data.time.values.tolist()} if along == "time" else {}
     columns_shown = ("bias_V", "lever_V", *OBSERVABLES.values())
     head, *rows = measurement.understood
     return {
@@ -59,7 +61,7 @@ def understood(
         "notes": [note.replace(f"{folder}/", "") for note in measurement.notes],
         "observables": list(measurement.observables),
         "medium": measurement.medium,
-        "data": {column: data[column].values.tolist() for column in columns_shown},
+        "data": in_time | {column: data[column].values.tolist() for column in columns_shown},
     }
 
 

@@ -29,6 +29,7 @@ from hotlever.files import Outputs, write_text
 
 if TYPE_CHECKING:
     from hotlever.fitting import FitOptions, Measurement
+    from hotlever.fitting.in_time import HistoryPrediction
     from hotlever.fitting.models import Prediction
     from hotlever.fitting.uncertainty import Uncertainty
     from hotlever.lever.transient import Waveform
@@ -190,14 +191,12 @@ def _fit_one(
         raise ComputationError(f"{data}: no such lever shows these data: {result.reason}")
 
 
-def _show_curve(found: Prediction) -> None:
+def _show_curve(found: Prediction | HistoryPrediction) -> None:
     """Show how near to the data the lever is that was found so far."""
-    order = found.bias.argsort()[:: max(1, found.bias.size // _DRAWN)]
-    bias, (current, reader, tip) = found.bias[order], found.values[:, order]
-    lever = found.probe.circuit.lever_voltage(bias, current)
-    columns = {"bias_V": bias, "lever_V": lever, "current_mA": current}
-    columns |= {"reader_V": reader, "tip_K": tip}
-    show("curve", {name: values.tolist() for name, values in columns.items()})
+    columns = found.columns()
+    along, *_ = columns.values()
+    some = along.argsort()[:: max(1, along.size // _DRAWN)]
+    show("curve", {name: values[some].tolist() for name, values in columns.items()})
 
 
 def _fit_several(

@@ -118,6 +118,11 @@ class HistoryPrediction:
     seen_by: Array
     uncorrected: Array
 
+    def columns(self) -> dict[str, Array]:
+        """Return what it shows, by the names that a history has, each (m,)."""
+        current, reader, tip = self.seen
+        return {"time_us": self.at, "current_mA": current, "reader_V": reader, "tip_K": tip}
+
     @property
     def nearby(self) -> HistoryPrediction:
         """Predictions for similar probes."""

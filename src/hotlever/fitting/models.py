@@ -74,10 +74,12 @@ class Prediction:
         """The probe it is for."""
         return self.linearised.probe
 
-    @property
-    def bias(self) -> Array:
-        """The biases (V), shape (n,)."""
-        return self.nearby.bias
+    def columns(self) -> dict[str, Array]:
+        """Return what it shows, by the names that a sweep has, each (n,)."""
+        bias, (current, reader, tip) = self.nearby.bias, self.values
+        lever = self.probe.circuit.lever_voltage(bias, current)
+        shown = {"bias_V": bias, "lever_V": lever}
+        return shown | {"current_mA": current, "reader_V": reader, "tip_K": tip}
 
 
 class Nearby:
@@ -205,8 +207,8 @@ class ForwardModel:
     """Predicts a measurement at some biases (V, in any order) with a lever that is solved fast.
 
     The full lever corrects the fast one, unless it is None. What is predicted depends on the
-    probe alone: correcting the model makes another one. Derivatives are by `names`, and are
-    corrected too if ``first_order``.
+    probe alone: correcting the model makes another one. Derivatives are by ``names``, and
+    are corrected too if ``first_order``.
     """
 
     fast: BranchSolver

@@ -74,8 +74,8 @@ def making(by_element: Array, share: float) -> Index:
 def energy_between_degrees(space: FullSpace, kinds: Mapping[str, Kind], circuit: Circuit) -> Array:
     """Return the energy between quadratic and cubic elements, without power, of each triangle.
 
-    It is the sum of ∫ σ |∇(V₂ − V₃)|² and ∫ κ |∇(T₂ − T₃)|², each over that of the whole lever;
-    for self-adjoint problems the first is the difference of the resistances (Galerkin
+    It is the sum of ∫ σ (∇δV)² and ∫ κ (∇δT)², with δ what the two differ by, each over the
+    same of the whole lever; the first is the difference of the resistances (Galerkin
     orthogonality).
 
     Parameters

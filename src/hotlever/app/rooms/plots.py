@@ -52,7 +52,8 @@ def _side_by_side() -> ui.element:
 class MeasuredPlots:
     """A measurement, by observable, and a lever that is brought near to it."""
 
-    #: Columns along both axes, and what those are called.
+    #: Columns along both axes, and what those are called; what was measured in time has its times
+    #: along the first.
     _AXES: ClassVar = {
         "current": (("lever_V", _LEVER_V), ("current_mA", _CURRENT)),
         "reader": (("bias_V", _BIAS), ("reader_V", "reader voltage V<sub>r</sub> (V)")),
@@ -79,21 +80,26 @@ class MeasuredPlots:
         for name, (around, plot) in self._plots.items():
             around.set_visibility(name in observables)
             if name in observables:
-                (x, _), (y, _) = self._AXES[name]
+                (x, along), (y, _) = self._along(data, name)
                 dots, model = plot.figure["data"]
                 dots |= {"x": short(data[x]), "y": short(data[y])}
                 model |= {"x": [], "y": []}
+                plot.figure["layout"]["xaxis"]["title"]["text"] = along
                 # of the data alone, so that the lever moves and not the axes
                 plot.figure["layout"]["xaxis"]["range"] = _range(data[x])
                 plot.figure["layout"]["yaxis"]["range"] = _range(data[y])
                 plot.update()
         self._said.set_text("")
 
+    def _along(self, data: dict[str, list[float]], name: str) -> Any:
+        along, across = self._AXES[name]
+        return (("time_us", "time (µs)") if "time_us" in data else along), across
+
     def approach(self, curve: dict[str, list[float]]) -> None:
         """Draw the lever that was found so far."""
         for name, (around, plot) in self._plots.items():
             if around.visible:
-                (x, _), (y, _) = self._AXES[name]
+                (x, _), (y, _) = self._along(curve, name)
                 plot.figure["data"][1] |= {"x": short(curve[x]), "y": short(curve[y])}
                 plot.update()
         self._said.set_text("Dots: measured. Line: the lever as the fit has it.")
