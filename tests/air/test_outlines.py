@@ -44,7 +44,7 @@ def test_a_thin_square(angle):
     "outline",
     [
         [(0, 0), (30, 0), (30, 4), (0, 4)],
-        [(0, 0), (20, -1), (20, 3), (8, 6)],
+        pytest.param([(0, 0), (20, -1), (20, 3), (8, 6)], marks=pytest.mark.slow),
         [(0, 0), (12, 0), (12, 9), (9, 9), (9, 2), (0, 2)],
     ],
     ids=["rectangle", "slanted", "angle"],

@@ -84,6 +84,7 @@ def test_the_lever_that_is_fitted_is_drawn_beside_the_data(
     visit(tmp_path, story)
 
 
+@pytest.mark.slow
 def test_pulses_in_the_room_are_those_of_the_command_and_of_python(tmp_path: Path) -> None:
     chosen = {"kind": "train", "height": 6.0, "length": 1.0, "period": 2.5, "count": 2}
     lever = {"changes": {"c_kappa": 0.7}, "view": "time"}

@@ -65,9 +65,15 @@ def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
     ("current", "probe", "question"),
     [
         (lambda i, n: i + 0.04 * i.max() * n, {}, "zero of the current drift"),
-        (lambda i, n: i + 0.03 * i.max(), {}, "zero of the current off"),
+        pytest.param(
+            *(lambda i, n: i + 0.03 * i.max(), {}, "zero of the current off"),
+            marks=pytest.mark.slow,
+        ),
         (lambda i, n: i, {"medium": "air"}, "in vacuum, not in air"),
-        (lambda i, n: i, {"thickness_um": 0.8}, "thickness rather 0.[34]"),
+        pytest.param(
+            *(lambda i, n: i, {"thickness_um": 0.8}, "thickness rather 0.[34]"),
+            marks=pytest.mark.slow,
+        ),
         (lambda i, n: i, {"series_resistance_ohm": 5000.0}, r"resistance, .* rather 5\.[56]"),
         (lambda i, n: np.minimum(i, 0.8 * i.max()), {}, "is the current clipped"),
         (lambda i, n: np.where(n < 0.5, i, 0.9 * i), {}, "two sweeps, a new one from row"),

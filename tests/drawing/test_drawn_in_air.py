@@ -53,7 +53,10 @@ def test_the_reference_probe_as_a_drawing(tmp_path, parametric, turn):
     [
         ({}, (1.0, 1.5)),
         # not symmetric about the mid-plane: twice as many panels
-        ({"surface_gap_um": 6.0, "surface_tilt_deg": 3.0, "chip": True}, (0.7, 1.0)),
+        pytest.param(
+            *({"surface_gap_um": 6.0, "surface_tilt_deg": 3.0, "chip": True}, (0.7, 1.0)),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_panels_of_a_slanted_lever_are_fine_enough(tmp_path, surroundings, panels):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from size import SHARE, cases
+from size import SHARE
 
 from hotlever.lever import Lever
 
@@ -36,11 +36,12 @@ LONG = pytest.mark.skipif(SHARE < 1, reason="takes long; run with `make test-hos
 
 
 @LINUX
-@pytest.mark.parametrize("command", ["fit", pytest.param("calibrate", marks=LONG)])
+@LONG
+@pytest.mark.parametrize("command", ["fit", "calibrate"])
 def test_many_rows_take_no_more_memory_than_a_few(command: str, lever: Lever, tmp_path: Path):
     knots = np.linspace(0.5, 10.5, 60)
     current = lever.sweep(knots).current_mA.values
-    bias = np.linspace(0.5, 10.5, cases(ROWS))
+    bias = np.linspace(0.5, 10.5, ROWS)
     noise = np.random.default_rng(3).normal(1.0, 1e-3, bias.size)
     measured = np.interp(bias, knots, current) * noise
     lines = (f"{v:.5f},{i:.6f}" for v, i in zip(bias, measured, strict=True))
