@@ -24,6 +24,7 @@ from hotlever.lever.transient.waveform import read_waveform
 from hotlever.probe import Probe
 from hotlever.raman.bias_log import read_bias_log
 from hotlever.raman.calibration import published_raman_calibration, read_raman_calibration
+from hotlever.raman.correction import read_corrections
 from hotlever.raman.series import read_temperatures
 from hotlever.raman.spectrum import read_file
 from hotlever.spieser2017 import published
@@ -105,9 +106,15 @@ def families(folder: Path) -> dict[str, Family]:
     probes = [Probe.reference().to_toml().encode(), Probe.u_shape().to_toml().encode(), drawn]
     log = "time (s),V_b (V),I_h (mA)\n0,1,0.14\n10,2,0.28\n20,3,0.42\n"
     wave = "time (us),V_b (V)\n0,0\n5,1\n10,8\n20,0\n"
+    timed = [
+        b"# R_s (kOhm): 5.6\nt (us),V_b (V),I_h (mA)\n0,0,0\n1,4,0.571\n2,4,0.57\n5,4,0.568\n",
+        b"# R_s (ohm): 5600\nTime/ms;V_b (V);V_l (V)\n0,001;9;1,9\n0,002;9;1,95\n0,004;9;2,01\n",
+    ]
+    by_hand = "file,start_cm-1,from_cm-1,to_cm-1,use\na.txt,516.5,480,540,yes\nb.txt,,,,no\n"
     hot = "file,temperature (C)\na.txt,25\nb.txt,100\nc.txt,200\n"
     return {
         "measurement": Family(".csv", measured, read_measurement),
+        "in time": Family(".csv", timed, read_measurement),
         "columns": Family(".txt", [b"I_h (uA)=Current\nV_b (V)=1\n"], _columns),
         "probe": Family(".toml", probes, Probe.from_file),
         "fit": Family(".json", [(folder / "fit.json").read_bytes()], read_fit, "json"),
@@ -126,6 +133,7 @@ def families(folder: Path) -> dict[str, Family]:
         "bias log": Family(".csv", [log.encode()], read_bias_log),
         "waveform": Family(".csv", [wave.encode()], read_waveform),
         "temperatures": Family(".csv", [hot.encode()], read_temperatures),
+        "corrections": Family(".csv", [by_hand.encode()], read_corrections),
     }
 
 
