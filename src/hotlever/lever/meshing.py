@@ -25,7 +25,8 @@ from hotlever.probe.circuit import Contact
 from hotlever.types import Array, Index
 
 #: Energy (relative) by which quadratic elements may differ from cubic ones: with that, currents
-#: are within some 1e-4 of a converged mesh. The reference probe's usual mesh has 2.3e-4.
+#: are within 2e-4 of a converged mesh, and T_tip within 0.2 K. The reference probe's usual mesh has
+#: 2.3e-4.
 TOLERANCE = 5e-4
 #: Of that energy, the share made by the triangles that are split at once; and how often they are.
 _SHARE, _MOST_ROUNDS = 0.8, 10
