@@ -32,7 +32,7 @@ def energy(probe, space):
 def test_the_usual_mesh_does_for_the_reference_probe():
     probe = Probe.reference()
     chosen, usual = chosen_space(probe), Lever(probe, MeshOptions()).space
-    assert chosen is usual
+    np.testing.assert_array_equal(chosen.mesh.elements.p, usual.mesh.elements.p)
     assert energy(probe, usual).sum() < TOLERANCE / 2
 
 
