@@ -61,11 +61,11 @@ def start_to_page(folder):
     with running(folder) as app:
         said = time.perf_counter() - begin
         with browsing(app) as (page, _):
-            page.get_by_role("button", name="Simulate").wait_for()
+            page.get_by_role("button", name="Simulate", exact=True).wait_for()
             # the browser's own start is not the app's
             begin = time.perf_counter()
             page.goto(app.base)
-            page.get_by_role("button", name="Simulate").click()
+            page.get_by_role("button", name="Simulate", exact=True).click()
             page.wait_for_url("**/simulate")
             return said, said + time.perf_counter() - begin
 
@@ -199,7 +199,7 @@ def _dropped(page, app, room, zone, name, content):
     if said == "moved on":
         page.goto(f"{app.base}/{room}")
         page.wait_for_load_state("networkidle")
-    return name, said, page.get_by_role("button", name="Simulate").first.is_enabled()
+    return name, said, page.get_by_role("button", name="Simulate", exact=True).first.is_enabled()
 
 
 def memory(count, minutes):

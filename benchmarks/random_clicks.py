@@ -73,7 +73,8 @@ class RandomUser:
             # a menu that is open covers the rest; a click before may lead elsewhere meanwhile
             self._page.keyboard.press("Escape")
             try:
-                self._page.get_by_role("button", name="Simulate").first.click(timeout=_ANSWERS)
+                tab = self._page.get_by_role("button", name="Simulate", exact=True).first
+                tab.click(timeout=_ANSWERS)
                 self._page.wait_for_url("**/simulate", timeout=_ANSWERS)
                 self._page.get_by_role("slider").first.wait_for(timeout=_ANSWERS)
                 return
