@@ -15,23 +15,18 @@ import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import numpy as np
 import psutil
-from playwright.sync_api import Error
 
-from app_in_browser import EXAMPLES, browsing, drop, running
+from app_in_browser import EXAMPLES, answer, browsing, go, running
 from bad_files import bad_files
-from hotlever.app.project import safe_name
 from problems import table
 from random_clicks import ROOMS, RandomUser, act
 
 MATERIAL = "phonon scattering exponent"
 #: Seconds after which the app has forgotten a page, and given back its memory.
 _FORGOTTEN_S = 52.0
-#: Seconds in which a line must be said of a file.
-_SAID_S = 8.0
 #: Notes when a key was pressed, and which plots were drawn since.
 _COUNT = """() => {
     window.drawn = new Set(); window.last = 0; window.pressed = 0;
@@ -105,8 +100,7 @@ def sliders(page, app, count):
 
 def fit(page, app):
     """Drop the shipped measurement, fit, and wait for the drawn result: seconds."""
-    page.goto(f"{app.base}/fit")
-    page.wait_for_load_state("networkidle")
+    go(page, app, "fit")
     page.locator("input[type=file]").first.set_input_files(EXAMPLES / "lever-a.csv")
     page.get_by_text("What was understood").first.wait_for()
     page.wait_for_timeout(500)
@@ -161,8 +155,7 @@ def files(count):
         browsing(app) as (page, seen),
     ):
         for room in ROOMS:
-            page.goto(f"{app.base}/{room}")
-            page.wait_for_load_state("networkidle")
+            go(page, app, room)
             for zone in range(page.locator("input[type=file]").count()):
                 found = [_dropped(page, app, room, zone, *file) for file in bad_files()][:count]
                 where = f"{room or 'start'}{f', {zone + 1}' if zone else ''}"
@@ -182,23 +175,7 @@ def _count(found, kind):
 
 def _dropped(page, app, room, zone, name, content):
     """Drop a file; return its name, what became of it, and whether the page is alive."""
-    drop(page, zone, name, content)
-    # it may be kept with a number
-    kept = Path(safe_name(name)).stem
-    said, deadline = "silent", time.monotonic() + _SAID_S
-    while said == "silent" and time.monotonic() < deadline:
-        page.wait_for_timeout(50)
-        try:
-            lines = page.locator("[role=alert]").all_inner_texts()
-        except Error:
-            lines = []  # it is going to another room
-        if urlsplit(page.url).path.strip("/") != room:
-            said = "moved on"
-        elif any(kept in line for line in lines):
-            said = "said"
-    if said == "moved on":
-        page.goto(f"{app.base}/{room}")
-        page.wait_for_load_state("networkidle")
+    said = answer(page, app, room, zone, name, content)
     return name, said, page.get_by_role("button", name="Simulate", exact=True).first.is_enabled()
 
 

@@ -7,16 +7,22 @@ import shutil
 import subprocess
 import sys
 import threading
+import time
 from base64 import b64encode
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import urlsplit
 
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Error, Page, sync_playwright
+
+from hotlever.app.project import safe_name
 
 EXAMPLES = Path(__file__).parents[1] / "src" / "hotlever" / "examples"
 #: Seconds for the app to say its address, and to end.
 _START_S, _END_S = 60, 15
+#: Seconds in which a line must be said of a file.
+_SAID_S = 8.0
 _DROP = """([zone, name, content]) => {
     const bytes = Uint8Array.from(atob(content), one => one.charCodeAt(0));
     const given = new DataTransfer();
@@ -92,9 +98,38 @@ def running(folder: Path, *options: str) -> Iterator[App]:
         app.end()
 
 
-def drop(page: Page, zone: int, name: str, content: bytes) -> None:
-    """Give a file to a drop zone of a page, under a name that a dialogue may not give."""
+def answer(page: Page, app: App, room: str, zone: int, name: str, content: bytes) -> str:
+    """Drop a file in a room, under a name that a dialogue may not give, and wait for the answer.
+
+    Afterwards the page shows the room again.
+
+    Returns
+    -------
+    str
+        "said" if a line names the file, "moved on" if the page went to another room, or "silent".
+    """
     page.evaluate(_DROP, [zone, name, b64encode(content).decode("ascii")])
+    # it may be kept with a number
+    kept = Path(safe_name(name)).stem
+    deadline = time.monotonic() + _SAID_S
+    while time.monotonic() < deadline:
+        page.wait_for_timeout(50)
+        try:
+            lines = page.locator("[role=alert]").all_inner_texts()
+        except Error:
+            lines = []  # it is going to another room
+        if urlsplit(page.url).path.strip("/") != room:
+            go(page, app, room)
+            return "moved on"
+        if any(kept in line for line in lines):
+            return "said"
+    return "silent"
+
+
+def go(page: Page, app: App, room: str) -> None:
+    """Open a room, and wait until it is there."""
+    page.goto(f"{app.base}/{room}")
+    page.wait_for_load_state("networkidle")
 
 
 class Seen:

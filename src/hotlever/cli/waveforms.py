@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from typer import Option
 
@@ -12,8 +12,8 @@ from hotlever.cli.options import File, parse_volts
 from hotlever.errors import InputError
 from hotlever.units import setting
 
-if TYPE_CHECKING:
-    pass
+#: Options of which each is a wave form; that of a table comes last.
+KINDS = ("--step", "--pulse", "--ramp", "--sine", "--waveform")
 
 
 def drive(
@@ -28,7 +28,7 @@ def drive(
     """Make the one wave form that is asked for; None if none is."""
     from hotlever.lever import transient
 
-    texts = {"--step": step, "--pulse": pulse, "--ramp": ramp, "--sine": sine}
+    texts = dict(zip(KINDS, (step, pulse, ramp, sine), strict=False))
     repeated: dict[str, str | int | None] = {"--period": period, "--count": count}
     given = {name: text for name, text in texts.items() if text is not None}
     names = [*given, *["--waveform"] * (waveform is not None)]
@@ -54,10 +54,6 @@ def drive(
         return transient.pulse(volts, length, each, 1 if count is None else count)
     except InputError as error:
         raise error if str(error).startswith("--") else InputError(f"{name}: {error}") from None
-
-
-#: Options of which each is a wave form.
-KINDS = ("--step", "--pulse", "--ramp", "--sine", "--waveform")
 
 
 def options_given(driven: partial[Any]) -> dict[str, Any]:

@@ -90,8 +90,7 @@ def data_and_model(
                 lower.legend(loc="best")
             upper.set(ylabel=label)
             if name not in fitted:
-                where = (0.96, 0.05)
-                upper.annotate("not fitted", where, None, "axes fraction", ha="right", color="0.4")
+                _not_fitted(upper)
             lower.set(xlabel="bias V$_b$ (V)", ylabel=f"data − model ({unit})")
         panel_letters(grid[0])
         grid[0, 0].legend(loc="upper left")
@@ -141,10 +140,7 @@ def fitted_history(
                 lower.plot(time, (data - values) * factor, "o", color=VERMILION, ms=2)
                 lower.set(ylabel=f"data − model ({unit})")
                 if name not in fitted:
-                    where = (0.96, 0.05)
-                    upper.annotate(
-                        "not fitted", where, None, "axes fraction", ha="right", color="0.4"
-                    )
+                    _not_fitted(upper)
             else:
                 lower.plot(band.time, band.tip_stderr_K, color=VERMILION)
                 lower.set(ylabel="standard error (K)", ylim=(0, None))
@@ -154,6 +150,10 @@ def fitted_history(
         panel_letters(grid[0])
         grid[0, 0].legend(loc="best")
     return made
+
+
+def _not_fitted(axes: Axes) -> None:
+    axes.annotate("not fitted", (0.96, 0.05), None, "axes fraction", ha="right", color="0.4")
 
 
 def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:

@@ -93,9 +93,8 @@ class Box:
 
     def values(self, shares: Array) -> dict[str, float]:
         """Return the values at a place given by numbers between 0 and 1, (p,)."""
-        low, high = self.low, self.high
-        ratio = np.where(self.by_logarithm, high / np.where(self.by_logarithm, low, 1.0), 1.0)
-        even = np.where(self.by_logarithm, low * ratio**shares, low + shares * (high - low))
+        straight = self.low + shares * (self.high - self.low)
+        even = np.where(self.by_logarithm, self.low * self._ratio**shares, straight)
         return dict(zip(self.names, even.tolist(), strict=True))
 
     def probe(self, probe: Probe, shares: Array) -> Probe:
@@ -115,10 +114,14 @@ class Box:
 
     def slopes(self, probe: Probe) -> Array:
         """Return how far each parameter moves per unit of its share of the box, (p,)."""
-        at, ratio = probe.at(self.names), np.ones(len(self.names))
-        even = self.by_logarithm
-        ratio[even] = self.high[even] / self.low[even]
-        return np.where(even, at * np.log(ratio), self.high - self.low)
+        by_logarithm = probe.at(self.names) * np.log(self._ratio)
+        return np.where(self.by_logarithm, by_logarithm, self.high - self.low)
+
+    @property
+    def _ratio(self) -> Array:
+        """Of the ends of ranges that are even in their logarithm; 1 for others."""
+        low, high = (np.where(self.by_logarithm, one, 1.0) for one in (self.low, self.high))
+        return np.asarray(high / low)
 
 
 def is_papers(probe: Probe, names: Collection[str] = ()) -> bool:

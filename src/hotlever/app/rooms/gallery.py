@@ -12,17 +12,11 @@ from nicegui import app, ui
 
 from hotlever.app.page import ROOMS, Complaint
 from hotlever.app.project import EXAMPLES
+from hotlever.app.rooms.sliders import FIRST
 from hotlever.app.session import Session
 
 _SCRIPTS, _ADDRESS = EXAMPLES / "gallery", "/gallery"
-_SIMULATE: dict[str, Any] = {
-    "probe": None,
-    "changes": {},
-    "bias": 8.0,
-    "most": 12.0,
-    "view": "rest",
-}
-
+_SIMULATE = FIRST | {"view": "rest"}
 _IN_TIME = _SIMULATE | {"view": "time"}
 
 

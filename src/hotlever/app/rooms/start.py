@@ -88,7 +88,7 @@ def _open(session: Session, to: str, room: str, key: str, name: str) -> None:
     chosen = session.chosen.setdefault(room, {})
     chosen[key] = name
     if room == "simulate":
-        session.chosen[room] = {"probe": name, "changes": {}, "bias": 8.0, "most": 12.0}
+        session.chosen[room] = {"probe": name}
     ui.navigate.to(to)
 
 

@@ -104,15 +104,13 @@ def find_waveform(
         if ohm is None:
             raise InputError(f"{table.path}: {LEVER} without R_s, expected '# R_s (kOhm): 5.6'")
         values["V_b"] = values[LEVER] + ohm / 1000.0 * values["I_h"]
-    bias = values["V_b"]
+    bias, told = values["V_b"], "V_b" if "V_b" in columns else LEVER
     wrong = np.isnan(bias) | (np.abs(bias) > MOST_BIAS)
     if wrong.any():
-        column = columns["V_b" if "V_b" in columns else LEVER]
         row = int(np.argmax(wrong))
-        cell = shown(table.rows[row][column.place])
+        cell = shown(table.rows[row][columns[told].place])
         raise InputError(
-            f"{table.where(row)}: {'V_b' if 'V_b' in columns else LEVER} is '{cell}', expected a "
-            f"bias of at most {MOST_BIAS:g} V"
+            f"{table.where(row)}: {told} is '{cell}', expected a bias of at most {MOST_BIAS:g} V"
         )
     if LEVER in columns and "I_h" not in columns:
         if not ohm:
