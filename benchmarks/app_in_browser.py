@@ -23,11 +23,14 @@ EXAMPLES = Path(__file__).parents[1] / "src" / "hotlever" / "examples"
 _START_S, _END_S = 60, 15
 #: Seconds in which a line must be said of a file.
 _SAID_S = 8.0
-_DROP = """([zone, name, content]) => {
+#: There is no input while another file is on its way.
+_DROP = """async ([zone, name, content]) => {
     const bytes = Uint8Array.from(atob(content), one => one.charCodeAt(0));
     const given = new DataTransfer();
     given.items.add(new File([bytes], name));
-    const input = document.querySelectorAll('input[type=file]')[zone];
+    const find = () => document.querySelectorAll('.q-uploader')[zone]?.querySelector('input');
+    while (!find()) { await new Promise(done => setTimeout(done, 5)); }
+    const input = find();
     input.files = given.files;
     input.dispatchEvent(new Event('change', {bubbles: true}));
 }"""
@@ -98,8 +101,13 @@ def running(folder: Path, *options: str) -> Iterator[App]:
         app.end()
 
 
+def give(page: Page, zone: int, name: str, content: bytes) -> None:
+    """Drop a file, under a name that a dialogue may not give."""
+    page.evaluate(_DROP, [zone, name, b64encode(content).decode("ascii")])
+
+
 def answer(page: Page, app: App, room: str, zone: int, name: str, content: bytes) -> str:
-    """Drop a file in a room, under a name that a dialogue may not give, and wait for the answer.
+    """Drop a file in a room, and wait for the answer.
 
     Afterwards the page shows the room again.
 
@@ -108,7 +116,7 @@ def answer(page: Page, app: App, room: str, zone: int, name: str, content: bytes
     str
         "said" if a line names the file, "moved on" if the page went to another room, or "silent".
     """
-    page.evaluate(_DROP, [zone, name, b64encode(content).decode("ascii")])
+    give(page, zone, name, content)
     # it may be kept with a number
     kept = Path(safe_name(name)).stem
     deadline = time.monotonic() + _SAID_S

@@ -61,7 +61,7 @@ def test_the_lever_that_is_fitted_is_drawn_beside_the_data(
     (tmp_path / "mine.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
     job, curves = done(["fit", "mine.csv", "-o", "mine.fit.json"], tmp_path)
     assert job.standing == "done"
-    data = showing.understood(Here(), tmp_path, "mine.csv", [], None)["data"]  # type: ignore[arg-type]
+    data = showing.understood(Here(), tmp_path, "mine.csv")["data"]  # type: ignore[arg-type]
 
     def off(curve: dict[str, list[float]]) -> float:
         model = np.interp(data["bias_V"], curve["bias_V"], curve["current_mA"])
@@ -137,6 +137,22 @@ def test_fields_leave_as_one_file(tmp_path: Path) -> None:
 def test_what_was_measured_in_time_is_drawn_against_time(tmp_path: Path) -> None:
     rows = "".join(f"{0.1 * n},9,{1.28 - 0.01 * n:.3f}\n" for n in range(20))
     (tmp_path / "mine.csv").write_text(f"t (us),V_b (V),I_h (mA)\n{rows}")
-    found = showing.understood(Here(), tmp_path, "mine.csv", [], None)  # type: ignore[arg-type]
+    found = showing.understood(Here(), tmp_path, "mine.csv")  # type: ignore[arg-type]
     assert found["data"]["time_us"] == pytest.approx([0.1 * n for n in range(20)])
     assert len(found["data"]["current_mA"]) == 20
+
+
+def test_a_pulse_is_told_where_its_file_has_no_bias(tmp_path: Path) -> None:
+    rows = "".join(f"{0.1 * n},{1.28 - 0.01 * n:.3f}\n" for n in range(20))
+    (tmp_path / "mine.csv").write_text(f"t (us),I_h (mA)\n{rows}")
+
+    async def story(user: User, session: Session) -> None:
+        session.chosen["fit"] = {"data": "mine.csv", "free": "n_d, a0"}
+        await user.open("/fit")
+        await user.should_see("--pulse 10V,5us", retries=50)  # what is missing, and how to say it
+        user.find("Pulse of a file in time (10V,20us)").type("9V, 5us")
+        await user.should_see("What was understood", retries=50)
+        words = "fit mine.csv --pulse 9V,5us --free n_d,a0 -o mine.fit.json"
+        await user.should_see(f"hotlever {words}", retries=50)
+
+    visit(tmp_path, story)

@@ -130,7 +130,6 @@ def drop_zone(
     async def taken(event: events.MultiUploadEventArguments) -> None:
         with complaint.caught():
             names = [session.project.take(f.name, await f.read(), folder) for f in event.files]
-            zone.reset()
             await then(names)
 
     zone = ui.upload(
@@ -143,6 +142,8 @@ def drop_zone(
             f"a file may have {LARGEST_FILE // 2**20} MB at most: this one was not taken"
         ),
     ).props(f'flat bordered aria-label="{label}"')
+    # others may be on their way
+    zone.on("uploaded", lambda: zone.run_method("removeUploadedFiles"), args=[])
     return zone
 
 

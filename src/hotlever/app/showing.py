@@ -22,9 +22,10 @@ from hotlever.app.child import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.calibration import TABLE_COLUMNS
 from hotlever.cli.options import load_probe
+from hotlever.cli.waveforms import pulses
 from hotlever.datasets import QUANTITIES
 from hotlever.errors import InputError
-from hotlever.fitting import Fit, Measurement, read_fit, read_measurement
+from hotlever.fitting import Fit, read_fit, read_measurement
 from hotlever.fitting.measurement import parse_columns
 from hotlever.fitting.words import parameter_rows
 from hotlever.lever.dataset import OBSERVABLES
@@ -46,11 +47,18 @@ _ROWS, _POINTS = 12, 1000
 
 
 def understood(
-    report: Report, folder: Path, name: str, columns: list[str], probe: str | None
+    report: Report, folder: Path, name: str, told: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Return what a measurement file was understood as."""
-    measurement = _measurement(folder, name, columns, probe)
-    data = measurement.dataset(_probe(folder, probe).circuit)
+    """Return what a measurement file was understood as.
+
+    Beside it may be told its columns, the file of the probe, and the pulse that was measured.
+    """
+    told = told or {}
+    circuit = _probe(folder, told.get("probe")).circuit
+    columns = parse_columns(told.get("columns") or [])
+    waveform = pulses(told["waveform"]) if told.get("waveform") else None
+    measurement = read_measurement(folder / name, columns, circuit, waveform)
+    data = measurement.dataset(circuit)
     (along,) = data.sizes
     data = data.isel({along: slice(None, None, data.sizes[along] // _POINTS + 1)})
     in_time = {"time_us": data.time.values.tolist()} if along == "time" else {}
@@ -255,11 +263,6 @@ def _impossible(values: Mapping[str, Any], said: str) -> Figure:
 
 def _probe(folder: Path, name: str | None) -> Probe:
     return load_probe(None if name is None else folder / name)
-
-
-def _measurement(folder: Path, name: str, columns: list[str], probe: str | None) -> Measurement:
-    circuit = _probe(folder, probe).circuit
-    return read_measurement(folder / name, parse_columns(columns), circuit)
 
 
 def _stamp(path: Path) -> float:

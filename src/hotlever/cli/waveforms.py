@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from typer import Option
 
 from hotlever.cli.options import File, parse_volts
 from hotlever.errors import InputError
 from hotlever.units import setting
+
+if TYPE_CHECKING:
+    from hotlever.lever.transient import Waveform
 
 #: Options of which each is a wave form; that of a table comes last.
 KINDS = ("--step", "--pulse", "--ramp", "--sine", "--waveform")
@@ -47,13 +50,19 @@ def drive(
             return transient.step(parse_volts(text, name))
         if name == "--sine":
             return transient.sine(*_sine(text))
-        volts, length = _volts_and_time(text, name)
         if name == "--ramp":
-            return transient.ramp(volts, length)
-        each = None if period is None else setting(period, "us", "--period")
-        return transient.pulse(volts, length, each, 1 if count is None else count)
+            return transient.ramp(*_volts_and_time(text, name))
+        return pulses(text, period, 1 if count is None else count)
     except InputError as error:
         raise error if str(error).startswith("--") else InputError(f"{name}: {error}") from None
+
+
+def pulses(text: str, period: str | None = None, count: int = 1) -> Waveform:
+    """Parse ``10V,5us``, and the time after which the next pulse begins."""
+    from hotlever.lever import transient
+
+    each = None if period is None else setting(period, "us", "--period")
+    return transient.pulse(*_volts_and_time(text, "--pulse"), each, count)
 
 
 def options_given(driven: partial[Any]) -> dict[str, Any]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from nicegui import ui
 
 from hotlever.app.jobs import named
@@ -44,6 +46,10 @@ class FitRoom(MeasuredRoom):
                 self._flags[name] = box
             self._medium = choice("Medium", MEDIA, chosen.get("medium", ""), self._choose)
             self._fixed = field("Hold (n_d=3.3e17, p)", chosen.get("fixed", ""), self._choose)
+            pulse = "Pulse of a file in time (10V,20us)"
+            self._pulse = field(pulse, chosen.get("waveform") or "", self._told)
+            self._pulse.props("debounce=600")
+            self._free = field("Vary too (film.tcr)", chosen.get("free", ""), self._choose)
             known = "Known beforehand (n_d=3.3e17±15%)"
             self._priors = field(known, chosen.get("priors", ""), self._choose)
 
@@ -52,8 +58,12 @@ class FitRoom(MeasuredRoom):
         self.chosen["without"] = [name for name, box in boxes if not box.value]
         self.chosen |= {name: box.value for name, box in self._flags.items()}
         self.chosen |= {"medium": self._medium.value, "fixed": self._fixed.value}
-        self.chosen["priors"] = self._priors.value
+        self.chosen |= {"free": self._free.value, "priors": self._priors.value}
         self.show_command()
+
+    async def _told(self, event: Any) -> None:
+        self.chosen["waveform"] = (event.value or "").replace(" ", "")
+        await self.read()
 
     def understood(self) -> None:
         """Offer what was measured."""
@@ -74,6 +84,10 @@ class FitRoom(MeasuredRoom):
         for column in chosen.get("columns", []):
             arguments += ["--column", column]
         arguments += several("--fix", chosen.get("fixed"))
+        if chosen.get("waveform"):
+            arguments += ["--pulse", chosen["waveform"]]
+        if chosen.get("free"):
+            arguments += ["--free", chosen["free"].replace(" ", "")]
         arguments += several("--prior", chosen.get("priors"))
         if chosen.get("medium"):
             arguments += ["--medium", chosen["medium"]]

@@ -159,9 +159,9 @@ class MeasuredRoom(Room):
         self.complaint.clear()
         if name is not None:
             call, folder = f"{SHOWING}:understood", self.session.project.folder
-            columns, probe = self.chosen.get("columns", []), self.chosen.get("probe")
+            told = {key: self.chosen.get(key) for key in ("columns", "probe", "waveform")}
             try:
-                found = await self.session.full.call(call, folder, name, columns, probe)
+                found = await self.session.full.call(call, folder, name, told)
             except HotleverError as error:
                 if this == self._reads:
                     self.complaint.say(str(error))

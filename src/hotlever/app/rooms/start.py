@@ -106,7 +106,7 @@ async def _sort(session: Session, complaint: Complaint, names: list[str]) -> Non
         folder = session.project.folder
         try:
             call = f"{SHOWING}:understood"
-            await session.full.call(call, folder, name, [], None)
+            await session.full.call(call, folder, name)
         except HotleverError as error:
             if not await session.full.call(f"{SHOWING}:is_spectrum", folder, name):
                 complaint.say(str(error))
