@@ -29,7 +29,9 @@ _DROP = """async ([zone, name, content]) => {
     const given = new DataTransfer();
     given.items.add(new File([bytes], name));
     const find = () => document.querySelectorAll('.q-uploader')[zone]?.querySelector('input');
-    while (!find()) { await new Promise(done => setTimeout(done, 5)); }
+    for (let look = 0; !find() && look < 1000; look++) {
+        await new Promise(done => setTimeout(done, 5));
+    }
     const input = find();
     input.files = given.files;
     input.dispatchEvent(new Event('change', {bubbles: true}));

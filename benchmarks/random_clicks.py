@@ -7,7 +7,7 @@ import time
 import numpy as np
 from playwright.sync_api import Error
 
-from app_in_browser import EXAMPLES, drop
+from app_in_browser import EXAMPLES, give
 from bad_files import bad_files
 
 ROOMS = ("", "lever", "simulate", "raman", "fit", "calibrate", "levers")
@@ -65,7 +65,7 @@ class RandomUser:
 
     def _drop(self):
         if self._page.locator("input[type=file]").count():
-            drop(self._page, 0, *self._files[self._rng.integers(len(self._files))])
+            give(self._page, 0, *self._files[self._rng.integers(len(self._files))])
 
     def look(self):
         """Go to Simulate, where sliders are; a page that does not, when asked twice, is dead."""
