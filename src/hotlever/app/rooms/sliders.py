@@ -102,7 +102,7 @@ class Sliders:
     async def open(self) -> None:
         """Show the sliders of the probe, and say that they have moved."""
         try:
-            found = await self._session.full.call(
+            found = await self._session.quick.call(
                 f"{LIVE}:described", self._session.project.folder, self._chosen["probe"]
             )
         except HotleverError as error:
