@@ -76,7 +76,9 @@ class RandomUser:
                 tab = self._page.get_by_role("button", name="Simulate", exact=True).first
                 tab.click(timeout=_ANSWERS)
                 self._page.wait_for_url("**/simulate", timeout=_ANSWERS)
-                self._page.get_by_role("slider").first.wait_for(timeout=_ANSWERS)
+                # a probe that cannot be read has no sliders, but a line that says so
+                there = self._page.get_by_role("slider").or_(self._page.get_by_role("alert"))
+                there.first.wait_for(timeout=_ANSWERS)
                 return
             except Error as error:
                 if not again:

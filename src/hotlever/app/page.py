@@ -147,6 +147,12 @@ def drop_zone(
     return zone
 
 
+async def hand_over(made: Awaitable[bytes], name: str) -> None:
+    """Give a file when it is made, be the button that asked for it gone by then."""
+    client = ui.context.client
+    client.download(await made, name)
+
+
 class Work:
     """The command that runs in a room, or ran last: progress, notes, its line, and cancelling.
 

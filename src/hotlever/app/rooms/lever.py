@@ -8,7 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from hotlever.app.jobs import Job, named
-from hotlever.app.page import Complaint, Work, drop_zone, two_columns
+from hotlever.app.page import Complaint, Work, drop_zone, hand_over, two_columns
 from hotlever.app.project import DRAWINGS, safe_name
 from hotlever.app.rooms.drawn import Fields, Picture
 from hotlever.app.rooms.results import FIGURE_FILES, SHOWING
@@ -217,5 +217,5 @@ class LeverRoom(Room):
                 call, folder = f"{SHOWING}:probe_file", self.session.project.folder
                 name = self._name.value
                 asked = folder, name, suffix, self.chosen["mesh"]
-                content = await self.session.quick.call(call, *asked)
-                ui.download.content(content, f"{Path(name).stem}{suffix}")
+                made = self.session.quick.call(call, *asked)
+                await hand_over(made, f"{Path(name).stem}{suffix}")

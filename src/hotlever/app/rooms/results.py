@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from hotlever.app.page import Complaint, figure, table
+from hotlever.app.page import Complaint, figure, hand_over, table
 from hotlever.app.session import Session
 
 SHOWING = "hotlever.app.showing"
@@ -55,14 +55,14 @@ def _show(
 def figure_files(session: Session, complaint: Complaint, kind: str, name: str, shown: str) -> None:
     """Offer a figure of a result as a file."""
 
-    async def give(suffix: str) -> None:
+    async def draw(suffix: str) -> None:
         with complaint.caught():
             call, folder = f"{SHOWING}:drawn", session.project.folder
-            content = await session.full.call(call, folder, kind, name, shown, suffix)
-            ui.download.content(content, f"{Path(name).name.split('.')[0]}-{shown}{suffix}")
+            drawn = session.full.call(call, folder, kind, name, shown, suffix)
+            await hand_over(drawn, f"{Path(name).name.split('.')[0]}-{shown}{suffix}")
 
     for suffix in FIGURE_FILES:
-        ui.button(suffix[1:].upper(), on_click=lambda _, to=suffix: give(to)).props(
+        ui.button(suffix[1:].upper(), on_click=lambda _, to=suffix: draw(to)).props(
             f'flat dense no-caps size=sm aria-label="{shown} as {suffix[1:].upper()}"'
         )
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from nicegui import ui
 
 from hotlever.app.jobs import Job
+from hotlever.app.page import hand_over
 from hotlever.app.rooms.results import SHOWING
 from hotlever.app.rooms.room import Room
 
@@ -73,8 +74,7 @@ class WritingRoom(Room):
             new = [one for one in path.iterdir() if one.stat().st_mtime >= job.began]
             if len(new) > 1:
                 call = f"{SHOWING}:packed"
-                content = await self.session.full.call(call, sorted(new))
-                ui.download.content(content, f"{path.name}.zip")
+                await hand_over(self.session.full.call(call, sorted(new)), f"{path.name}.zip")
                 return
             path = new[0]
         ui.download.file(path)
