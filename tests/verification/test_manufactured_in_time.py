@@ -37,7 +37,7 @@ class Loaded(DrivenLever):
         return super().rest(t, x) - loads[:, None]
 
     def rates(self, x: np.ndarray) -> np.ndarray:
-        return np.zeros(0)
+        return np.zeros((0, x.shape[1]))
 
 
 def largest_error(tolerance: float, longest: float) -> float:

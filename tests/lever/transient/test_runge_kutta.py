@@ -58,10 +58,13 @@ class Pendulum:
     It has y = sin t and z = y² + cos t.
     """
 
-    scale, step_limit = np.ones((2, 1)), np.full((2, 1), np.inf)
+    scale = np.ones((2, 1))
 
     def stored(self, x):
         return np.array([x[0] + x[0] ** 3, 0.0 * x[1]])
+
+    def stored_change(self, x, changes):
+        return np.array([1.0 + 3.0 * x[0] ** 2, 0.0 * x[1]])[..., None] * changes
 
     def rest(self, t, x):
         y, z = x
@@ -80,7 +83,7 @@ class Pendulum:
         return float(abs(change[0, 0]))
 
     def rates(self, x):
-        return np.array([x[1, 0]])
+        return x[1:]
 
 
 START = np.array([[0.0], [1.0]])

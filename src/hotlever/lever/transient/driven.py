@@ -51,10 +51,11 @@ class InCircuit:
         column, row = (self._more, self._last) if transposed else (self._last, self._more)
         if transposed not in self._moved:
             self._moved[transposed] = self._factors.solve(column, states, transposed=transposed)
-        moved = self._moved[transposed][:, 0]
+        moved = self._moved[transposed]
         solution = self._factors.solve(right_hand_side, states, transposed=transposed)
-        share = np.tensordot(row[:, 0], solution, axes=1) / (1.0 + row[:, 0] @ moved)
-        return np.asarray(solution - np.multiply.outer(moved, share))
+        columns = solution.reshape(len(solution), -1)
+        share = (row.T @ columns) / (1.0 + row.T @ moved)
+        return np.asarray((columns - moved * share).reshape(solution.shape))
 
     def replaced(self, states: Index, other: InCircuit) -> InCircuit:
         """Return the other factors: there is one state."""
@@ -80,12 +81,10 @@ class DrivenLever:
     ) -> None:
         self.equations, self._circuit, self._bias = equations, circuit, bias
         self._air, self._own = equations.heat_in_air, len(equations.scale)
-        self.scale, self.step_limit = equations.scale, equations.step_limit
+        self.scale = equations.scale
         self._latest: tuple[Array, Array] | None = None
         if self._air is not None:
-            free = np.ones((self._air.size, 1))
-            self.scale = np.vstack([self.scale, free])
-            self.step_limit = np.vstack([self.step_limit, np.inf * free])
+            self.scale = np.vstack([self.scale, np.ones((self._air.size, 1))])
 
     def parts(self, x: Array) -> tuple[Array, Array]:
         """Return the unknowns of the lever, and the temperatures in the air."""
@@ -174,9 +173,9 @@ class DrivenLever:
         return float(np.abs(self.equations.space.rises(change[: self._own])).max())
 
     def rates(self, x: Array) -> Array:
-        """Return the power, and the heat that leaves as it does at rest (mW), (2,)."""
+        """Return the power, and the heat that leaves as it does at rest (mW), (2, n)."""
         lever, _ = self.parts(x)
-        return np.array([self.equations.power(lever)[0], heat_left(self.equations, lever)[0]])
+        return np.stack([self.equations.power(lever), heat_left(self.equations, lever)])
 
 
 class InAir:

@@ -16,7 +16,6 @@ from typing import Protocol
 import numpy as np
 
 from hotlever.errors import ComputationError, NewtonError
-from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.space import Factors
 from hotlever.types import Array, Index
 
@@ -57,9 +56,11 @@ _SAFETY, _LEAST, _MOST, _FAILED = 0.9, 0.2, 6.0, 0.25
 _PROPORTIONAL, _INTEGRAL = 0.04, 0.22
 #: The first step changes so many tolerances, were it explicit.
 _FIRST = 20.0
-#: Newton's method stops at this share of the tolerance. A larger one would cost the balance of
-#: what is stored, and save no time.
-_NEWTON_SHARE = 1e-4
+#: Newton's method stops at this share of the tolerance, or at this error before the first step.
+_NEWTON_SHARE, _SETTLED = 1e-3, 1e-9
+#: With factors of an earlier stage at most this share of a correction is left by it, as a rule; from
+#: this share on new factors are cheaper; and the most corrections.
+_LEFT, _SLOW, _MOST_CORRECTIONS = 0.01, 0.5, 12
 #: A stage in the middle of a step. How far the cubic through the ends is from it counts as an error
 #: too, for that is shown; but stages are of order two, and the cubic is nearer to the solution.
 _MIDDLE, _OFF = 3, 0.07
@@ -72,15 +73,18 @@ class Problem(Protocol):
 
     Attributes
     ----------
-    scale, step_limit : ndarray, shape (size + 1, 1)
-        See `hotlever.lever.newton.Equations`.
+    scale : ndarray, shape (size + 1, 1)
+        Size of one unit of each unknown, by which kelvin and volts compare.
     """
 
     scale: Array
-    step_limit: Array
 
     def stored(self, x: Array) -> Array:
         """Return what is stored, (size + 1, 1); zero in algebraic rows."""
+        ...
+
+    def stored_change(self, x: Array, changes: Array) -> Array:
+        """Return how what is stored changes with the unknowns, (size + 1, 1, k), to first order."""
         ...
 
     def rest(self, t: float, x: Array) -> Array:
@@ -96,7 +100,7 @@ class Problem(Protocol):
         ...
 
     def rates(self, x: Array) -> Array:
-        """Return quantities (k,) that are added up over time."""
+        """Return quantities (k, n) that are added up over time, at some states (size + 1, n)."""
         ...
 
 
@@ -143,37 +147,32 @@ def hermite(start: float, end: float, values: Array, slopes: Array, t: float) ->
     return np.asarray(values @ np.array(value) + slopes @ np.array(slope))
 
 
-class _Stage:
-    """The equations of a stage; see `hotlever.lever.newton.Equations`."""
-
-    def __init__(self, problem: Problem, t: float, stored: Array, rate: float) -> None:
-        self._problem, self._t, self._stored, self._rate = problem, t, stored, rate
-        self.scale, self.step_limit = problem.scale, problem.step_limit
-
-    def residual(self, x: Array, which: Index) -> Array:
-        rest = self._problem.rest(self._t, x)
-        return rest + self._rate * (self._problem.stored(x) - self._stored)
-
-    def factorised(self, x: Array, which: Index) -> Factors:
-        return self._problem.factorised(x, self._rate)
-
-
-def _predictors() -> list[Array]:
+def _predictors() -> tuple[Array, Array]:
     """Return weights that extrapolate to each stage.
 
-    Of the start, the slope there times the step, and the stages before it: those of the polynomial
-    through all of these.
+    Of the stages before it, (stages, stages), and of the slope at the start times the step,
+    (stages,). They are those by which a stage follows from the others best if what decays does so
+    at any rate; what changes steadily is met exactly. Stages are of order two, and a polynomial
+    through them would be a hundred times as far off.
     """
-    found = []
-    for stage in range(1, len(TIMES)):
-        degree = np.arange(stage + 1)
-        known = TIMES[1:stage, None] ** degree
-        rows = np.vstack([degree == 0, degree == 1, known])
-        found.append(np.linalg.solve(rows.T, TIMES[stage] ** degree))
-    return found
+    stages, one = len(TIMES), np.ones((len(TIMES), 1))
+    z = -np.linspace(0.0, _FASTEST, 200)
+    values = np.linalg.solve(np.eye(stages) - z[:, None, None] * STAGES, one)[..., 0]
+    # what decays fast has mostly done so when steps become long
+    counted = np.exp(z) / (0.1 - z)
+    constant, straight = np.append(np.ones(stages), 0.0), np.append(TIMES, 1.0)
+    modes = np.column_stack([values, z]) * counted[:, None]
+    rows = np.vstack([modes, _EXACTLY * constant, _EXACTLY * straight])
+    weights = np.zeros((stages, stages + 1))
+    for stage in range(1, stages):
+        known = [*range(stage), stages]
+        weights[stage, known] = np.linalg.lstsq(rows[:, known], rows[:, stage])[0]
+    return weights[:, :-1], weights[:, -1]
 
 
-_PREDICTORS = _predictors()
+#: Modes are looked at that decay so often within a step, and how much more the steady ones count.
+_FASTEST, _EXACTLY = 12.0, 1e4
+_BY_STAGE, _BY_SLOPE = _predictors()
 
 
 class Stepper:
@@ -195,9 +194,7 @@ class Stepper:
 
     def __init__(self, problem: Problem, tolerance: float) -> None:
         self._problem, self._tolerance = problem, tolerance
-        self._newton = NewtonOptions(
-            tolerance=_NEWTON_SHARE * tolerance, keep_while=0.5, max_iterations=12
-        )
+        self._newton = _NEWTON_SHARE * tolerance
         self.accepted = self.rejected = 0
         self.length = 0.0
 
@@ -246,46 +243,91 @@ class Stepper:
     def _settled(self, t: float, x: Array) -> _Reached:
         """Fulfil the algebraic rows, nothing that is stored being changed; and find the slopes."""
         problem, rate = self._problem, INSTANT_RATE
-        stage = _Stage(problem, t, problem.stored(x), rate)
-        found = find_roots(stage, x, NewtonOptions(tolerance=1e-9))
-        x = found.x
-        slope = -rate * found.factors.solve(problem.rest(t + 1.0 / rate, x), _ONE)
-        return _Reached(t, x, slope, problem.stored(x), -problem.rest(t, x), problem.rates(x))
+        root = self._root(t, x, problem.stored(x), rate, None, _SETTLED)
+        x = root.x
+        slope = -rate * root.factors.solve(problem.rest(t + 1.0 / rate, x), _ONE)
+        flow, rates = -problem.rest(t, x), problem.rates(x)[:, 0]
+        return _Reached(t, x, slope, problem.stored(x), flow, rates)
 
     def _step(self, here: _Reached, then: float) -> tuple[Step, _Reached, float]:
         """Try a step; return it, what it reaches, and its error."""
         length = then - here.t
         problem, rate, factors = self._problem, 1.0 / (GAMMA * length), None
-        states, slopes, flows, rates = [here.x], [here.slope], [here.flow], [here.rates]
-        stored = here.stored
+        # one column for each stage
+        states, slopes, flows = (np.empty((len(here.x), len(TIMES))) for _ in range(3))
+        for columns, first in ((states, here.x), (slopes, here.slope), (flows, here.flow)):
+            columns[:, :1] = first
         for stage in range(1, len(TIMES)):
-            known = here.stored + length * weighted_sum(STAGES[stage], flows)
-            guess = weighted_sum(_PREDICTORS[stage - 1], [here.x, length * here.slope, *states[1:]])
-            equations = _Stage(problem, here.t + TIMES[stage] * length, known, rate)
-            found = find_roots(equations, guess, self._newton, factors)
-            x, factors = found.x, found.factors
-            stored = problem.stored(x)
-            states.append(x)
-            flows.append(rate * (stored - known))
-            rates.append(problem.rates(x))
+            before, now = slice(stage), slice(stage, stage + 1)
+            weights = length * STAGES[stage, before, None]
+            known = here.stored + flows[:, before] @ weights
+            guess = states[:, before] @ _BY_STAGE[stage, before, None]
+            guess += length * _BY_SLOPE[stage] * here.slope
+            t = here.t + TIMES[stage] * length
+            root = self._root(t, guess, known, rate, factors, self._newton)
+            factors = root.factors
+            states[:, now], flows[:, now] = root.x, rate * (root.stored - known)
             # the same method, read as one that steps the unknowns
-            slopes.append(rate * (x - here.x - length * weighted_sum(STAGES[stage], slopes)))
+            slopes[:, now] = rate * (root.x - here.x - slopes[:, before] @ weights)
         assert factors is not None
-        there = _Reached(then, states[-1], slopes[-1], stored, flows[-1], rates[-1])
+        rates = np.column_stack([here.rates, problem.rates(states[:, 1:])])
+        there = _Reached(then, states[:, -1:], slopes[:, -1:], root.stored, flows[:, -1:], rates[:, -1])
         step = Step(
             here.t,
             then,
-            np.hstack([here.x, there.x]),
-            np.hstack([here.slope, there.slope]),
-            np.stack([here.rates, there.rates], axis=1),
-            length * weighted_sum(WEIGHTS, rates),
-            np.hstack(states),
+            states[:, [0, -1]],
+            slopes[:, [0, -1]],
+            rates[:, [0, -1]],
+            length * (rates @ WEIGHTS),
+            states,
             factors,
         )
-        difference = length * rate * weighted_sum(WEIGHTS - EMBEDDED, flows)
+        difference = length * rate * (flows @ (WEIGHTS - EMBEDDED)[:, None])
         error = problem.size_of(factors.solve(difference, _ONE))
-        off = step.between(here.t + TIMES[_MIDDLE] * length) - states[_MIDDLE]
+        off = step.between(here.t + TIMES[_MIDDLE] * length) - states[:, [_MIDDLE]]
         return step, there, max(error, _OFF * problem.size_of(off))
+
+    def _root(
+        self,
+        t: float,
+        x: Array,
+        known: Array,
+        rate: float,
+        factors: Factors | None,
+        tolerance: float,
+    ) -> _Root:
+        """Solve ``rate × (stored - known) + rest = 0`` near `x`, by Newton's method.
+
+        What is left after a correction is a share of it: that of the one before, and with factors
+        of an earlier stage about the one known of levers. The last correction is one of what is
+        stored too, to first order: nothing is evaluated again.
+        """
+        problem, last, left = self._problem, np.inf, 1.0 if factors is None else _LEFT
+        for _ in range(_MOST_CORRECTIONS):
+            stored = problem.stored(x)
+            residual = problem.rest(t, x) + rate * (stored - known)
+            if factors is None:
+                factors = problem.factorised(x, rate)
+            change = -factors.solve(residual, _ONE)
+            size = float(np.abs(change / problem.scale).max())
+            left = left if last == np.inf else size / last
+            if left * size < tolerance:
+                stored = stored + problem.stored_change(x, change[..., None])[..., 0]
+                return _Root(x + change, stored, factors)
+            if left > _SLOW and last < np.inf:
+                factors, last, left = None, np.inf, 1.0
+            else:
+                x, last = x + change, size
+        raise NewtonError(f"no root at {t:.6g} µs")
+
+
+@dataclass(frozen=True)
+class _Root:
+    """The unknowns, what is stored there, and a Jacobian factorised nearby."""
+
+    x: Array
+    stored: Array
+    factors: Factors
 
 
 @dataclass(frozen=True)
