@@ -42,7 +42,7 @@ def strip():
 class Alone(DrivenLever):
     """A lever whose parts are not told apart."""
 
-    def rates(self, x):
+    def watched(self, x):
         return np.zeros((1, x.shape[1]))
 
 

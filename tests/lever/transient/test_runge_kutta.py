@@ -82,7 +82,7 @@ class Pendulum:
     def size_of(self, change):
         return float(abs(change[0, 0]))
 
-    def rates(self, x):
+    def watched(self, x):
         return x[1:]
 
 

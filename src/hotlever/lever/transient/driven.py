@@ -15,14 +15,22 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hotlever.lever.balances import heat_left
-from hotlever.lever.equations import LeverEquations
+from hotlever.lever.balances import heat_held, heat_left
+from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.space import LEVER, Factors
 from hotlever.lever.stack import GAS
 from hotlever.lever.state import State
 from hotlever.probe import Circuit
 from hotlever.types import Array, Index
+
+#: What is watched: V_l, I_h, V_r and the rise of the tip (K); the power and the heat that leaves as
+#: it does at rest (mW); the heat in the lever and in the air (nJ), and how much of both is tested
+#: at the leg ends.
+WATCHED = (
+    *(*SHOWN, "tip_rise_K"),
+    *("power_mW", "left_mW", "stored_nJ", "air_stored_nJ", "at_ends_nJ"),
+)
 
 
 class InCircuit:
@@ -172,10 +180,18 @@ class DrivenLever:
         """Return the largest change of the temperature (K)."""
         return float(np.abs(self.equations.space.rises(change[: self._own])).max())
 
-    def rates(self, x: Array) -> Array:
-        """Return the power, and the heat that leaves as it does at rest (mW), (2, n)."""
-        lever, _ = self.parts(x)
-        return np.stack([self.equations.power(lever), heat_left(self.equations, lever)])
+    def watched(self, x: Array) -> Array:
+        """Return what is `WATCHED` at states, (9, n)."""
+        equations, space = self.equations, self.equations.space
+        lever, in_air = self.parts(x)
+        held, at_ends = heat_held(equations, lever)
+        held_by_air = np.zeros_like(held)
+        if self._air is not None:
+            held_by_air, more = self._air.heat(self._air.held(lever, in_air))
+            at_ends = at_ends + more
+        shown = *equations.observed(lever), space.tip_rise(lever)
+        flows = equations.power(lever), heat_left(equations, lever)
+        return np.stack([*shown, *flows, held, held_by_air, at_ends])
 
 
 class InAir:

@@ -58,12 +58,14 @@ _PROPORTIONAL, _INTEGRAL = 0.04, 0.22
 _FIRST = 20.0
 #: Newton's method stops at this share of the tolerance, or at this error before the first step.
 _NEWTON_SHARE, _SETTLED = 1e-3, 1e-9
-#: With factors of an earlier stage at most this share of a correction is left by it, as a rule; from
-#: this share on new factors are cheaper; and the most corrections.
+#: As a rule at most this share of a correction is left by it, with factors of an earlier stage;
+#: from this share on new factors are cheaper; and the most corrections.
 _LEFT, _SLOW, _MOST_CORRECTIONS = 0.01, 0.5, 12
 #: A stage in the middle of a step. How far the cubic through the ends is from it counts as an error
 #: too, for that is shown; but stages are of order two, and the cubic is nearer to the solution.
 _MIDDLE, _OFF = 3, 0.07
+#: The slopes of what is watched are taken over a time in which the unknowns change so much (units).
+_MOMENT = 1e-4
 #: The shortest step, as a share of the time reached.
 _SHORTEST = 1e-12
 
@@ -99,8 +101,8 @@ class Problem(Protocol):
         """Return the size of a change of the unknowns, by which tolerances are meant."""
         ...
 
-    def rates(self, x: Array) -> Array:
-        """Return quantities (k, n) that are added up over time, at some states (size + 1, n)."""
+    def watched(self, x: Array) -> Array:
+        """Return quantities (k, n) that are read off or added up, at states (size + 1, n)."""
         ...
 
 
@@ -114,8 +116,8 @@ class Step:
         Times.
     x, slopes : ndarray, shape (size + 1, 2)
         The unknowns at both ends, and their derivatives by time.
-    rates : ndarray, shape (k, 2)
-        `Problem.rates` at both ends.
+    watched, watched_slopes : ndarray, shape (k, 2)
+        `Problem.watched` at both ends, and their derivatives by time.
     added : ndarray, shape (k,)
         Their integrals over the step.
     stages : ndarray, shape (size + 1, stages)
@@ -128,7 +130,8 @@ class Step:
     end: float
     x: Array
     slopes: Array
-    rates: Array
+    watched: Array
+    watched_slopes: Array
     added: Array
     stages: Array
     factors: Factors
@@ -173,6 +176,17 @@ def _predictors() -> tuple[Array, Array]:
 #: Modes are looked at that decay so often within a step, and how much more the steady ones count.
 _FASTEST, _EXACTLY = 12.0, 1e4
 _BY_STAGE, _BY_SLOPE = _predictors()
+#: By how much the slope at the end rises with each stage, times the step; see `_end_slope`.
+_TO_END = np.linalg.inv(STAGES[1:, 1:])[-1]
+
+
+def _end_slope(stages: Array, first: Array, length: float) -> Array:
+    """Return the slopes (k,) at the end of a step of what is in its stages, (k, stages).
+
+    They are those of the same method, read as one that steps these, with the slopes at the start.
+    """
+    rise = (stages[:, 1:] - stages[:, :1]) @ _TO_END
+    return np.asarray(rise / length - (_TO_END @ STAGES[1:, 0]) * first)
 
 
 class Stepper:
@@ -246,39 +260,42 @@ class Stepper:
         root = self._root(t, x, problem.stored(x), rate, None, _SETTLED)
         x = root.x
         slope = -rate * root.factors.solve(problem.rest(t + 1.0 / rate, x), _ONE)
-        flow, rates = -problem.rest(t, x), problem.rates(x)[:, 0]
-        return _Reached(t, x, slope, problem.stored(x), flow, rates)
+        flow, stored = -problem.rest(t, x), problem.stored(x)
+        speed = max(float(np.abs(slope / problem.scale).max()), 1e-300)
+        here, soon = problem.watched(np.hstack([x, x + _MOMENT / speed * slope])).T
+        return _Reached(t, x, slope, stored, flow, here, (soon - here) * (speed / _MOMENT))
 
     def _step(self, here: _Reached, then: float) -> tuple[Step, _Reached, float]:
         """Try a step; return it, what it reaches, and its error."""
         length = then - here.t
         problem, rate, factors = self._problem, 1.0 / (GAMMA * length), None
         # one column for each stage
-        states, slopes, flows = (np.empty((len(here.x), len(TIMES))) for _ in range(3))
-        for columns, first in ((states, here.x), (slopes, here.slope), (flows, here.flow)):
-            columns[:, :1] = first
+        states, flows = np.empty((2, len(here.x), len(TIMES)))
+        states[:, :1], flows[:, :1] = here.x, here.flow
         for stage in range(1, len(TIMES)):
             before, now = slice(stage), slice(stage, stage + 1)
-            weights = length * STAGES[stage, before, None]
-            known = here.stored + flows[:, before] @ weights
+            known = here.stored + flows[:, before] @ (length * STAGES[stage, before, None])
             guess = states[:, before] @ _BY_STAGE[stage, before, None]
             guess += length * _BY_SLOPE[stage] * here.slope
             t = here.t + TIMES[stage] * length
             root = self._root(t, guess, known, rate, factors, self._newton)
             factors = root.factors
             states[:, now], flows[:, now] = root.x, rate * (root.stored - known)
-            # the same method, read as one that steps the unknowns
-            slopes[:, now] = rate * (root.x - here.x - slopes[:, before] @ weights)
         assert factors is not None
-        rates = np.column_stack([here.rates, problem.rates(states[:, 1:])])
-        there = _Reached(then, states[:, -1:], slopes[:, -1:], root.stored, flows[:, -1:], rates[:, -1])
+        slope = _end_slope(states, here.slope[:, 0], length)[:, None]
+        watched = np.column_stack([here.watched, problem.watched(states[:, 1:])])
+        watched_slope = _end_slope(watched, here.watched_slope, length)
+        there = _Reached(
+            then, root.x, slope, root.stored, flows[:, -1:], watched[:, -1], watched_slope
+        )
         step = Step(
             here.t,
             then,
             states[:, [0, -1]],
-            slopes[:, [0, -1]],
-            rates[:, [0, -1]],
-            length * (rates @ WEIGHTS),
+            np.hstack([here.slope, slope]),
+            watched[:, [0, -1]],
+            np.stack([here.watched_slope, watched_slope], axis=1),
+            length * (watched @ WEIGHTS),
             states,
             factors,
         )
@@ -332,14 +349,15 @@ class _Root:
 
 @dataclass(frozen=True)
 class _Reached:
-    """A time, the unknowns there and their slopes, what is stored and its slope, the rates."""
+    """A time; the unknowns there, what is stored, and what is watched, with their slopes."""
 
     t: float
     x: Array
     slope: Array
     stored: Array
     flow: Array
-    rates: Array
+    watched: Array
+    watched_slope: Array
 
 
 _ONE: Index = np.arange(1)
