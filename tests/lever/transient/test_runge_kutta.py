@@ -108,8 +108,9 @@ def test_the_tolerance_controls_the_error():
 def test_the_error_falls_with_the_fourth_power_of_the_step():
     errors = []
     for count in (60, 120):
-        last = followed(1e-5, 6.0 / count)[-1]
-        errors.append(abs(last.x[0, 1] - np.sin(6.0)))
+        # the last step is any length, and the error passes zero here and there
+        late = [step for step in followed(1e-5, 6.0 / count) if step.end > 3.0]
+        errors.append(max(abs(step.x[0, 1] - np.sin(step.end)) for step in late))
     assert np.log2(errors[0] / errors[1]) > 3.5
 
 

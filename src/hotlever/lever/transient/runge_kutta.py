@@ -52,14 +52,15 @@ INSTANT_RATE = 1e9
 #: A step is made so much shorter than its error asks for; by these factors at least and at most;
 #: and by this one where Newton's method fails.
 _SAFETY, _LEAST, _MOST, _FAILED = 0.9, 0.2, 6.0, 0.25
-#: Exponents of a PI controller for errors of order four.
-_PROPORTIONAL, _INTEGRAL = 0.04, 0.22
+#: A step changes with this power of its error, which is of order four.
+_POWER = 0.2
 #: The first step changes so many tolerances, were it explicit.
-_FIRST = 20.0
-#: Newton's method stops at this share of the tolerance, or at this error before the first step.
-_NEWTON_SHARE, _SETTLED = 1e-3, 1e-9
-#: As a rule at most this share of a correction is left by it, with factors of an earlier stage;
-#: from this share on new factors are cheaper; and the most corrections.
+_FIRST = 30.0
+#: Newton's method stops at this share of the tolerance: a larger one would cost the balance of what
+#: is stored. But in the first stage, which has no weight in a step; and before the first step.
+_NEWTON_SHARE, _FIRST_SHARE, _SETTLED = 3e-4, 0.1, 1e-9
+#: As a rule less than this share of a correction is left by it; from another one on new factors are
+#: cheaper; and the most corrections.
 _LEFT, _SLOW, _MOST_CORRECTIONS = 0.01, 0.5, 12
 #: A stage in the middle of a step. How far the cubic through the ends is from it counts as an error
 #: too, for that is shown; but stages are of order two, and the cubic is nearer to the solution.
@@ -208,7 +209,7 @@ class Stepper:
 
     def __init__(self, problem: Problem, tolerance: float) -> None:
         self._problem, self._tolerance = problem, tolerance
-        self._newton = _NEWTON_SHARE * tolerance
+        self._newton = tolerance * np.where(WEIGHTS, _NEWTON_SHARE, _FIRST_SHARE)
         self.accepted = self.rejected = 0
         self.length = 0.0
 
@@ -232,7 +233,7 @@ class Stepper:
         ComputationError
             If no step is short enough.
         """
-        here, last = self._settled(start, x), 1.0
+        here = self._settled(start, x)
         speed = max(self._problem.size_of(here.slope), 1e-300)
         self.length = first or _FIRST * self._tolerance / speed
         while here.t < end:
@@ -241,14 +242,14 @@ class Stepper:
             try:
                 step, there, error = self._step(here, then)
                 share = max(error / self._tolerance, 1e-6)
-                change = _SAFETY * share**-_INTEGRAL * last**_PROPORTIONAL
-                change = min(max(change, _LEAST), _MOST if share <= 1.0 else _SAFETY)
+                change = max(_SAFETY * share**-_POWER, _LEAST)
+                change = min(change, _MOST if share <= 1.0 else _SAFETY)
             except NewtonError:
                 share, change = np.inf, _FAILED
             self.length = change * (then - here.t)
             if share <= 1.0:
                 yield step
-                self.accepted, here, last = self.accepted + 1, there, share
+                self.accepted, here = self.accepted + 1, there
                 continue
             self.rejected += 1
             if self.length < _SHORTEST * max(abs(here.t), 1.0):
@@ -278,7 +279,7 @@ class Stepper:
             guess = states[:, before] @ _BY_STAGE[stage, before, None]
             guess += length * _BY_SLOPE[stage] * here.slope
             t = here.t + TIMES[stage] * length
-            root = self._root(t, guess, known, rate, factors, self._newton)
+            root = self._root(t, guess, known, rate, factors, self._newton[stage])
             factors = root.factors
             states[:, now], flows[:, now] = root.x, rate * (root.stored - known)
         assert factors is not None
@@ -319,7 +320,7 @@ class Stepper:
         of an earlier stage about the one known of levers. The last correction is one of what is
         stored too, to first order: nothing is evaluated again.
         """
-        problem, last, left = self._problem, np.inf, 1.0 if factors is None else _LEFT
+        problem, last, left = self._problem, np.inf, _LEFT
         for _ in range(_MOST_CORRECTIONS):
             stored = problem.stored(x)
             residual = problem.rest(t, x) + rate * (stored - known)
@@ -332,7 +333,7 @@ class Stepper:
                 stored = stored + problem.stored_change(x, change[..., None])[..., 0]
                 return _Root(x + change, stored, factors)
             if left > _SLOW and last < np.inf:
-                factors, last, left = None, np.inf, 1.0
+                factors, last, left = None, np.inf, _LEFT
             else:
                 x, last = x + change, size
         raise NewtonError(f"no root at {t:.6g} µs")
