@@ -53,9 +53,9 @@ INSTANT_RATE = 1e9
 #: and by this one where Newton's method fails.
 _SAFETY, _LEAST, _MOST, _FAILED = 0.9, 0.2, 6.0, 0.25
 #: A step changes with this power of its error, which is of order four.
-_POWER = 0.2
+_POWER = 0.22
 #: The first step changes so many tolerances, were it explicit.
-_FIRST = 30.0
+_FIRST = 40.0
 #: Newton's method stops at this share of the tolerance: a larger one would cost the balance of what
 #: is stored. But in the first stage, which has no weight in a step; and before the first step.
 _NEWTON_SHARE, _FIRST_SHARE, _SETTLED = 3e-4, 0.1, 1e-9
@@ -64,7 +64,7 @@ _NEWTON_SHARE, _FIRST_SHARE, _SETTLED = 3e-4, 0.1, 1e-9
 _LEFT, _SLOW, _MOST_CORRECTIONS = 0.01, 0.5, 12
 #: A stage in the middle of a step. How far the cubic through the ends is from it counts as an error
 #: too, for that is shown; but stages are of order two, and the cubic is nearer to the solution.
-_MIDDLE, _OFF = 3, 0.07
+_MIDDLE, _OFF = 3, 0.15
 #: The slopes of what is watched are taken over a time in which the unknowns change so much (units).
 _MOMENT = 1e-4
 #: The shortest step, as a share of the time reached.
