@@ -316,11 +316,16 @@ class Stepper:
     ) -> _Root:
         """Solve ``rate × (stored - known) + rest = 0`` near `x`, by Newton's method.
 
-        What is left after a correction is a share of it: that of the one before, and with factors
-        of an earlier stage about the one known of levers. The last correction is one of what is
+        What is left after a correction is taken to be a share of it: that which it is of the one
+        before, and at first about the one known of levers. The last correction is one of what is
         stored too, to first order: nothing is evaluated again.
+
+        Raises
+        ------
+        NewtonError
+            If there is none.
         """
-        problem, last, left = self._problem, np.inf, _LEFT
+        problem, last = self._problem, np.inf
         for _ in range(_MOST_CORRECTIONS):
             stored = problem.stored(x)
             residual = problem.rest(t, x) + rate * (stored - known)
@@ -328,12 +333,14 @@ class Stepper:
                 factors = problem.factorised(x, rate)
             change = -factors.solve(residual, _ONE)
             size = float(np.abs(change / problem.scale).max())
-            left = left if last == np.inf else size / last
+            if not np.isfinite(size):
+                break
+            left = _LEFT if last == np.inf else size / last
             if left * size < tolerance:
                 stored = stored + problem.stored_change(x, change[..., None])[..., 0]
                 return _Root(x + change, stored, factors)
-            if left > _SLOW and last < np.inf:
-                factors, last, left = None, np.inf, _LEFT
+            if left > _SLOW:
+                factors, last = None, np.inf
             else:
                 x, last = x + change, size
         raise NewtonError(f"no root at {t:.6g} µs")
