@@ -58,10 +58,10 @@ _POWER = 0.22
 _FIRST = 40.0
 #: Newton's method stops at this share of the tolerance: a larger one would cost the balance of what
 #: is stored. But in the first stage, which has no weight in a step; and before the first step.
-_NEWTON_SHARE, _FIRST_SHARE, _SETTLED = 3e-4, 0.1, 1e-9
-#: As a rule less than this share of a correction is left by it; from another one on new factors are
-#: cheaper; and the most corrections.
-_LEFT, _SLOW, _MOST_CORRECTIONS = 0.01, 0.5, 12
+_NEWTON_SHARE, _FIRST_SHARE, _SETTLED = 1e-4, 0.1, 1e-9
+#: As a rule less than this share of a correction is left by it; from another share on new factors
+#: are cheaper; and the most corrections.
+_LEFT, _SLOW, _MOST_CORRECTIONS = 0.005, 0.5, 12
 #: A stage in the middle of a step. How far the cubic through the ends is from it counts as an error
 #: too, for that is shown; but stages are of order two, and the cubic is nearer to the solution.
 _MIDDLE, _OFF = 3, 0.15
@@ -269,7 +269,7 @@ class Stepper:
     def _step(self, here: _Reached, then: float) -> tuple[Step, _Reached, float]:
         """Try a step; return it, what it reaches, and its error."""
         length = then - here.t
-        problem, rate, factors = self._problem, 1.0 / (GAMMA * length), None
+        problem, rate, root = self._problem, 1.0 / (GAMMA * length), None
         # one column for each stage
         states, flows = np.empty((2, len(here.x), len(TIMES)))
         states[:, :1], flows[:, :1] = here.x, here.flow
@@ -279,10 +279,9 @@ class Stepper:
             guess = states[:, before] @ _BY_STAGE[stage, before, None]
             guess += length * _BY_SLOPE[stage] * here.slope
             t = here.t + TIMES[stage] * length
-            root = self._root(t, guess, known, rate, factors, self._newton[stage])
-            factors = root.factors
+            root = self._root(t, guess, known, rate, root, self._newton[stage])
             states[:, now], flows[:, now] = root.x, rate * (root.stored - known)
-        assert factors is not None
+        assert root is not None
         slope = _end_slope(states, here.slope[:, 0], length)[:, None]
         watched = np.column_stack([here.watched, problem.watched(states[:, 1:])])
         watched_slope = _end_slope(watched, here.watched_slope, length)
@@ -298,10 +297,10 @@ class Stepper:
             np.stack([here.watched_slope, watched_slope], axis=1),
             length * (watched @ WEIGHTS),
             states,
-            factors,
+            root.factors,
         )
         difference = length * rate * (flows @ (WEIGHTS - EMBEDDED)[:, None])
-        error = problem.size_of(factors.solve(difference, _ONE))
+        error = problem.size_of(root.factors.solve(difference, _ONE))
         off = step.between(here.t + TIMES[_MIDDLE] * length) - states[:, [_MIDDLE]]
         return step, there, max(error, _OFF * problem.size_of(off))
 
@@ -311,14 +310,15 @@ class Stepper:
         x: Array,
         known: Array,
         rate: float,
-        factors: Factors | None,
+        near: _Root | None,
         tolerance: float,
     ) -> _Root:
         """Solve ``rate × (stored - known) + rest = 0`` near `x`, by Newton's method.
 
         What is left after a correction is taken to be a share of it: that which it is of the one
-        before, and at first about the one known of levers. The last correction is one of what is
-        stored too, to first order: nothing is evaluated again.
+        before, and at first the largest that it was with the same factors, those of a root nearby.
+        The last correction is one of what is stored too, to first order: nothing is evaluated
+        again.
 
         Raises
         ------
@@ -326,6 +326,7 @@ class Stepper:
             If there is none.
         """
         problem, last = self._problem, np.inf
+        factors, most = (None, _LEFT) if near is None else (near.factors, near.left)
         for _ in range(_MOST_CORRECTIONS):
             stored = problem.stored(x)
             residual = problem.rest(t, x) + rate * (stored - known)
@@ -335,12 +336,13 @@ class Stepper:
             size = float(np.abs(change / problem.scale).max())
             if not np.isfinite(size):
                 break
-            left = _LEFT if last == np.inf else size / last
+            left = most if last == np.inf else size / last
+            most = max(most, left)
             if left * size < tolerance:
                 stored = stored + problem.stored_change(x, change[..., None])[..., 0]
-                return _Root(x + change, stored, factors)
+                return _Root(x + change, stored, factors, most)
             if left > _SLOW:
-                factors, last = None, np.inf
+                factors, last, most = None, np.inf, _LEFT
             else:
                 x, last = x + change, size
         raise NewtonError(f"no root at {t:.6g} µs")
@@ -348,11 +350,12 @@ class Stepper:
 
 @dataclass(frozen=True)
 class _Root:
-    """The unknowns, what is stored there, and a Jacobian factorised nearby."""
+    """The unknowns, what is stored there, and a Jacobian factorised nearby with what it leaves."""
 
     x: Array
     stored: Array
     factors: Factors
+    left: float
 
 
 @dataclass(frozen=True)
