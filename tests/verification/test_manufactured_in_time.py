@@ -36,8 +36,8 @@ class Loaded(DrivenLever):
         loads = space.from_nodal(source(space, heat), source(space, charge), 0.0)
         return super().rest(t, x) - loads[:, None]
 
-    def rates(self, x: np.ndarray) -> np.ndarray:
-        return np.zeros(0)
+    def watched(self, x: np.ndarray) -> np.ndarray:
+        return np.zeros((0, x.shape[1]))
 
 
 def largest_error(tolerance: float, longest: float) -> float:

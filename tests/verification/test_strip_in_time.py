@@ -42,8 +42,8 @@ def strip():
 class Alone(DrivenLever):
     """A lever whose parts are not told apart."""
 
-    def rates(self, x):
-        return np.zeros(1)
+    def watched(self, x):
+        return np.zeros((1, x.shape[1]))
 
 
 def rise_in_the_middle(t):

@@ -72,6 +72,13 @@ def heat_left(equations: LeverEquations, x: Array) -> Array:
     return by_ends + into_air
 
 
+def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
+    """Return the heat in states (nJ), (n,), and its part that is tested at the leg ends."""
+    space = equations.space
+    (heat,) = space.weighted(equations.heat_density(equations.at(x)[0].T)[0][None])
+    return heat.sum(axis=0), space.end_test[0] @ heat
+
+
 def _heat_out(space: Space, fluxes: Fluxes, theta: Array | None) -> tuple[Array, Array, Array]:
     """Return the heat through the leg ends and into the air, and the heat source by point."""
     heat = space.weighted(np.concatenate([fluxes.heat_source[None], fluxes.heat]))

@@ -52,7 +52,8 @@ class LeverEquations(LawsAtPoints):
     def balance(self, x: Array) -> Array:
         """Return the residuals of heat and charge, and last the current I_h (mA), (size + 1, n)."""
         weak = self.space.weak_form(self.fluxes(x))
-        weak[self.space.contacts] += self._into_contacts(x) - self.source_mA[:, None]
+        if self.space.wired:
+            weak[self.space.contacts] += self._into_contacts(x) - self.source_mA[:, None]
         if self.space.air is not None:
             weak += self.space.air.weak_form(self.kirchhoff(x)[0])
         return weak

@@ -58,10 +58,13 @@ class Pendulum:
     It has y = sin t and z = y² + cos t.
     """
 
-    scale, step_limit = np.ones((2, 1)), np.full((2, 1), np.inf)
+    scale = np.ones((2, 1))
 
     def stored(self, x):
         return np.array([x[0] + x[0] ** 3, 0.0 * x[1]])
+
+    def stored_change(self, x, changes):
+        return np.array([1.0 + 3.0 * x[0] ** 2, 0.0 * x[1]])[..., None] * changes
 
     def rest(self, t, x):
         y, z = x
@@ -79,8 +82,8 @@ class Pendulum:
     def size_of(self, change):
         return float(abs(change[0, 0]))
 
-    def rates(self, x):
-        return np.array([x[1, 0]])
+    def watched(self, x):
+        return x[1:]
 
 
 START = np.array([[0.0], [1.0]])
@@ -105,8 +108,9 @@ def test_the_tolerance_controls_the_error():
 def test_the_error_falls_with_the_fourth_power_of_the_step():
     errors = []
     for count in (60, 120):
-        last = followed(1e-5, 6.0 / count)[-1]
-        errors.append(abs(last.x[0, 1] - np.sin(6.0)))
+        # the last step is any length, and the error passes zero here and there
+        late = [step for step in followed(1e-5, 6.0 / count) if step.end > 3.0]
+        errors.append(max(abs(step.x[0, 1] - np.sin(step.end)) for step in late))
     assert np.log2(errors[0] / errors[1]) > 3.5
 
 

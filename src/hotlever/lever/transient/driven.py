@@ -15,14 +15,22 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hotlever.lever.balances import heat_left
-from hotlever.lever.equations import LeverEquations
+from hotlever.lever.balances import heat_held, heat_left
+from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.space import LEVER, Factors
 from hotlever.lever.stack import GAS
 from hotlever.lever.state import State
 from hotlever.probe import Circuit
 from hotlever.types import Array, Index
+
+#: What is watched: V_l, I_h, V_r and the rise of the tip (K); the power and the heat that leaves as
+#: it does at rest (mW); the heat in the lever and in the air (nJ), and how much of both is tested
+#: at the leg ends.
+WATCHED = (
+    *(*SHOWN, "tip_rise_K"),
+    *("power_mW", "left_mW", "stored_nJ", "air_stored_nJ", "at_ends_nJ"),
+)
 
 
 class InCircuit:
@@ -51,10 +59,11 @@ class InCircuit:
         column, row = (self._more, self._last) if transposed else (self._last, self._more)
         if transposed not in self._moved:
             self._moved[transposed] = self._factors.solve(column, states, transposed=transposed)
-        moved = self._moved[transposed][:, 0]
+        moved = self._moved[transposed]
         solution = self._factors.solve(right_hand_side, states, transposed=transposed)
-        share = np.tensordot(row[:, 0], solution, axes=1) / (1.0 + row[:, 0] @ moved)
-        return np.asarray(solution - np.multiply.outer(moved, share))
+        columns = solution.reshape(len(solution), -1)
+        share = (row.T @ columns) / (1.0 + row.T @ moved)
+        return np.asarray((columns - moved * share).reshape(solution.shape))
 
     def replaced(self, states: Index, other: InCircuit) -> InCircuit:
         """Return the other factors: there is one state."""
@@ -80,12 +89,10 @@ class DrivenLever:
     ) -> None:
         self.equations, self._circuit, self._bias = equations, circuit, bias
         self._air, self._own = equations.heat_in_air, len(equations.scale)
-        self.scale, self.step_limit = equations.scale, equations.step_limit
+        self.scale = equations.scale
         self._latest: tuple[Array, Array] | None = None
         if self._air is not None:
-            free = np.ones((self._air.size, 1))
-            self.scale = np.vstack([self.scale, free])
-            self.step_limit = np.vstack([self.step_limit, np.inf * free])
+            self.scale = np.vstack([self.scale, np.ones((self._air.size, 1))])
 
     def parts(self, x: Array) -> tuple[Array, Array]:
         """Return the unknowns of the lever, and the temperatures in the air."""
@@ -173,10 +180,18 @@ class DrivenLever:
         """Return the largest change of the temperature (K)."""
         return float(np.abs(self.equations.space.rises(change[: self._own])).max())
 
-    def rates(self, x: Array) -> Array:
-        """Return the power, and the heat that leaves as it does at rest (mW), (2,)."""
-        lever, _ = self.parts(x)
-        return np.array([self.equations.power(lever)[0], heat_left(self.equations, lever)[0]])
+    def watched(self, x: Array) -> Array:
+        """Return what is `WATCHED` at states, (9, n)."""
+        equations, space = self.equations, self.equations.space
+        lever, in_air = self.parts(x)
+        held, at_ends = heat_held(equations, lever)
+        held_by_air = np.zeros_like(held)
+        if self._air is not None:
+            held_by_air, more = self._air.heat(self._air.held(lever, in_air))
+            at_ends = at_ends + more
+        shown = *equations.observed(lever), space.tip_rise(lever)
+        flows = equations.power(lever), heat_left(equations, lever)
+        return np.stack([*shown, *flows, held, held_by_air, at_ends])
 
 
 class InAir:

@@ -15,7 +15,7 @@ from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import ComputationError, HistoryEndError, InputError
 from hotlever.lever.dataset import probe_attributes, range_notes
 from hotlever.lever.state import State
-from hotlever.lever.transient.driven import DrivenLever
+from hotlever.lever.transient.driven import WATCHED, DrivenLever
 from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.types import Array, Progress
@@ -33,6 +33,9 @@ _FOLLOWED = (
     *("lever_V", "current_mA", "reader_V", "tip_K", "max_K"),
     *("supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ"),
 )
+#: Where in `hotlever.lever.transient.driven.WATCHED` begin flows, heats, and what is at the ends.
+_PARTS_WATCHED = [WATCHED.index(name) for name in ("power_mW", "stored_nJ", "at_ends_nJ")]
+_FLOWS = slice(*_PARTS_WATCHED[:2])
 #: What is added up since the start.
 ENERGIES = ("supplied_nJ", "lost_nJ")
 #: Errors are at most this share of the rise that a lever would end with, so that a response is
@@ -62,54 +65,32 @@ class _Observer:
     """Reads off the ends of steps, one after the other, what is `_FOLLOWED`."""
 
     def __init__(self, lever: Lever) -> None:
-        space = lever.space
-        self._equations, self._space = lever.equations, space
-        # what is held there leaves without a flux at rest
-        ends = space.end_test[0]
-        self._held = np.stack([np.ones_like(ends), ends]) * space.weights[:, 0]
+        self._space, base = lever.space, lever.equations.base_temperature_K
+        self._zero = np.array([0.0, 0.0, 0.0, base, base])[:, None]
         self._at_ends: float | None = None
-        self._added = np.zeros(2)
-        self._end: tuple[Array, Array, Array] | None = None
+        self._added = np.zeros((2, 1))
 
     def read(self, step: Step) -> tuple[Array, Array]:
         """Return values and slopes (per µs) at both ends of the next step, each (9, 2)."""
-        start = self._end
-        # after a jump of the bias the potentials are others
-        if start is None or not np.array_equal(start[0], step.x[:, 0]):
-            start = self._read(step, 0)
-        self._added = self._added + step.added
-        end = self._end = self._read(step, 1)
-        return np.stack([start[1], end[1]], axis=1), np.stack([start[2], end[2]], axis=1)
-
-    def _read(self, step: Step, end: int) -> tuple[Array, Array, Array]:
-        """Return the unknowns at one end of a step, and values and slopes there."""
-        equations, space = self._equations, self._space
-        whole, rates, own = step.x[:, [end]], step.rates[:, end], space.size + 1
-        x, moving = whole[:own], step.slopes[:own, [end]]
-        density, by_T = equations.heat_density(equations.at(x)[0].T)
-        stored, at_ends = (self._held @ density)[:, 0]
-        rise = space.temperature.at_points(moving)[0]
-        stored_by, at_ends_by = (self._held @ (by_T * rise))[:, 0]
-        in_air = in_air_by = 0.0
-        if (air := equations.heat_in_air) is not None:
-            in_air, held = (float(one[0]) for one in air.heat(air.held(x, whole[own:])))
-            by_mode = air.held(moving, step.slopes[own:, [end]])
-            in_air_by, held_by = (float(one[0]) for one in air.heat(by_mode))
-            at_ends, at_ends_by = at_ends + held, at_ends_by + held_by
+        shown, flows, held, at_ends = np.split(step.watched, _PARTS_WATCHED)
+        moving, _, held_by, at_ends_by = np.split(step.watched_slopes, _PARTS_WATCHED)
         if self._at_ends is None:
-            self._at_ends = float(at_ends)
-        rises, base = space.rises(x)[:, 0], equations.base_temperature_K
-        hottest = rises.argmax()
-        supplied, left = self._added
-        values = [*equations.observed(x)[:, 0], base + space.tip_rise(x)[0], base + rises[hottest]]
-        slopes = [
-            *equations.observed_change(x, moving)[:, 0],
-            space.tip_rise(moving)[0],
-            space.rises(moving)[hottest, 0],
-        ]
-        values += [supplied, stored, in_air, left - (at_ends - self._at_ends)]
-        slopes += [rates[0], stored_by, in_air_by, rates[1] - at_ends_by]
-        return whole[:, 0], np.array(values), np.array(slopes)
+            self._at_ends = float(at_ends[0, 0])
+        added = self._added + np.outer(step.added[_FLOWS], [0.0, 1.0])
+        self._added = added[:, 1:]
+        # what is held at the leg ends leaves without a flux at rest
+        left, left_by = added[1:] - (at_ends - self._at_ends), flows[1:] - at_ends_by
+        highest, highest_by = self._highest(step)
+        values = np.concatenate([shown, highest, added[:1], held, left])
+        values[: len(self._zero)] += self._zero
+        return values, np.concatenate([moving, highest_by, flows[:1], held_by, left_by])
+
+    def _highest(self, step: Step) -> tuple[Array, Array]:
+        """Return the highest rise (K) at both ends, and its slopes, each (1, 2)."""
+        own, ends = self._space.size + 1, np.arange(2)
+        rises, slopes = self._space.rises(step.x[:own]), self._space.rises(step.slopes[:own])
+        hottest = rises.argmax(axis=0)
+        return rises[None, hottest, ends], slopes[None, hottest, ends]
 
 
 def follow(

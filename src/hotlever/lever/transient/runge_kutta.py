@@ -16,7 +16,6 @@ from typing import Protocol
 import numpy as np
 
 from hotlever.errors import ComputationError, NewtonError
-from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.space import Factors
 from hotlever.types import Array, Index
 
@@ -53,16 +52,21 @@ INSTANT_RATE = 1e9
 #: A step is made so much shorter than its error asks for; by these factors at least and at most;
 #: and by this one where Newton's method fails.
 _SAFETY, _LEAST, _MOST, _FAILED = 0.9, 0.2, 6.0, 0.25
-#: Exponents of a PI controller for errors of order four.
-_PROPORTIONAL, _INTEGRAL = 0.04, 0.22
+#: A step changes with this power of its error, which is of order four.
+_POWER = 0.22
 #: The first step changes so many tolerances, were it explicit.
-_FIRST = 20.0
-#: Newton's method stops at this share of the tolerance. A larger one would cost the balance of
-#: what is stored, and save no time.
-_NEWTON_SHARE = 1e-4
+_FIRST = 40.0
+#: Newton's method stops at this share of the tolerance: a larger one would cost the balance of what
+#: is stored. But in the first stage, which has no weight in a step; and before the first step.
+_NEWTON_SHARE, _FIRST_SHARE, _SETTLED = 1e-4, 0.1, 1e-9
+#: As a rule less than this share of a correction is left by it; from another share on new factors
+#: are cheaper; and the most corrections.
+_LEFT, _SLOW, _MOST_CORRECTIONS = 0.005, 0.5, 12
 #: A stage in the middle of a step. How far the cubic through the ends is from it counts as an error
 #: too, for that is shown; but stages are of order two, and the cubic is nearer to the solution.
-_MIDDLE, _OFF = 3, 0.07
+_MIDDLE, _OFF = 3, 0.15
+#: The slopes of what is watched are taken over a time in which the unknowns change so much (units).
+_MOMENT = 1e-4
 #: The shortest step, as a share of the time reached.
 _SHORTEST = 1e-12
 
@@ -72,15 +76,18 @@ class Problem(Protocol):
 
     Attributes
     ----------
-    scale, step_limit : ndarray, shape (size + 1, 1)
-        See `hotlever.lever.newton.Equations`.
+    scale : ndarray, shape (size + 1, 1)
+        Size of one unit of each unknown, by which kelvin and volts compare.
     """
 
     scale: Array
-    step_limit: Array
 
     def stored(self, x: Array) -> Array:
         """Return what is stored, (size + 1, 1); zero in algebraic rows."""
+        ...
+
+    def stored_change(self, x: Array, changes: Array) -> Array:
+        """Return how what is stored changes with the unknowns, (size + 1, 1, k), to first order."""
         ...
 
     def rest(self, t: float, x: Array) -> Array:
@@ -95,8 +102,8 @@ class Problem(Protocol):
         """Return the size of a change of the unknowns, by which tolerances are meant."""
         ...
 
-    def rates(self, x: Array) -> Array:
-        """Return quantities (k,) that are added up over time."""
+    def watched(self, x: Array) -> Array:
+        """Return quantities (k, n) that are read off or added up, at states (size + 1, n)."""
         ...
 
 
@@ -110,8 +117,8 @@ class Step:
         Times.
     x, slopes : ndarray, shape (size + 1, 2)
         The unknowns at both ends, and their derivatives by time.
-    rates : ndarray, shape (k, 2)
-        `Problem.rates` at both ends.
+    watched, watched_slopes : ndarray, shape (k, 2)
+        `Problem.watched` at both ends, and their derivatives by time.
     added : ndarray, shape (k,)
         Their integrals over the step.
     stages : ndarray, shape (size + 1, stages)
@@ -124,7 +131,8 @@ class Step:
     end: float
     x: Array
     slopes: Array
-    rates: Array
+    watched: Array
+    watched_slopes: Array
     added: Array
     stages: Array
     factors: Factors
@@ -143,37 +151,43 @@ def hermite(start: float, end: float, values: Array, slopes: Array, t: float) ->
     return np.asarray(values @ np.array(value) + slopes @ np.array(slope))
 
 
-class _Stage:
-    """The equations of a stage; see `hotlever.lever.newton.Equations`."""
-
-    def __init__(self, problem: Problem, t: float, stored: Array, rate: float) -> None:
-        self._problem, self._t, self._stored, self._rate = problem, t, stored, rate
-        self.scale, self.step_limit = problem.scale, problem.step_limit
-
-    def residual(self, x: Array, which: Index) -> Array:
-        rest = self._problem.rest(self._t, x)
-        return rest + self._rate * (self._problem.stored(x) - self._stored)
-
-    def factorised(self, x: Array, which: Index) -> Factors:
-        return self._problem.factorised(x, self._rate)
-
-
-def _predictors() -> list[Array]:
+def _predictors() -> tuple[Array, Array]:
     """Return weights that extrapolate to each stage.
 
-    Of the start, the slope there times the step, and the stages before it: those of the polynomial
-    through all of these.
+    Of the stages before it, (stages, stages), and of the slope at the start times the step,
+    (stages,). They are those by which a stage follows from the others best if what decays does so
+    at any rate; what changes steadily is met exactly. Stages are of order two, and a polynomial
+    through them would be a hundred times as far off.
     """
-    found = []
-    for stage in range(1, len(TIMES)):
-        degree = np.arange(stage + 1)
-        known = TIMES[1:stage, None] ** degree
-        rows = np.vstack([degree == 0, degree == 1, known])
-        found.append(np.linalg.solve(rows.T, TIMES[stage] ** degree))
-    return found
+    stages, one = len(TIMES), np.ones((len(TIMES), 1))
+    z = -np.linspace(0.0, _FASTEST, 200)
+    values = np.linalg.solve(np.eye(stages) - z[:, None, None] * STAGES, one)[..., 0]
+    # what decays fast has mostly done so when steps become long
+    counted = np.exp(z) / (0.1 - z)
+    constant, straight = np.append(np.ones(stages), 0.0), np.append(TIMES, 1.0)
+    modes = np.column_stack([values, z]) * counted[:, None]
+    rows = np.vstack([modes, _EXACTLY * constant, _EXACTLY * straight])
+    weights = np.zeros((stages, stages + 1))
+    for stage in range(1, stages):
+        known = [*range(stage), stages]
+        weights[stage, known] = np.linalg.lstsq(rows[:, known], rows[:, stage])[0]
+    return weights[:, :-1], weights[:, -1]
 
 
-_PREDICTORS = _predictors()
+#: Modes are looked at that decay so often within a step, and how much more the steady ones count.
+_FASTEST, _EXACTLY = 12.0, 1e4
+_BY_STAGE, _BY_SLOPE = _predictors()
+#: By how much the slope at the end rises with each stage, times the step; see `_end_slope`.
+_TO_END = np.linalg.inv(STAGES[1:, 1:])[-1]
+
+
+def _end_slope(stages: Array, first: Array, length: float) -> Array:
+    """Return the slopes (k,) at the end of a step of what is in its stages, (k, stages).
+
+    They are those of the same method, read as one that steps these, with the slopes at the start.
+    """
+    rise = (stages[:, 1:] - stages[:, :1]) @ _TO_END
+    return np.asarray(rise / length - (_TO_END @ STAGES[1:, 0]) * first)
 
 
 class Stepper:
@@ -195,9 +209,7 @@ class Stepper:
 
     def __init__(self, problem: Problem, tolerance: float) -> None:
         self._problem, self._tolerance = problem, tolerance
-        self._newton = NewtonOptions(
-            tolerance=_NEWTON_SHARE * tolerance, keep_while=0.5, max_iterations=12
-        )
+        self._newton = tolerance * np.where(WEIGHTS, _NEWTON_SHARE, _FIRST_SHARE)
         self.accepted = self.rejected = 0
         self.length = 0.0
 
@@ -221,7 +233,7 @@ class Stepper:
         ComputationError
             If no step is short enough.
         """
-        here, last = self._settled(start, x), 1.0
+        here = self._settled(start, x)
         speed = max(self._problem.size_of(here.slope), 1e-300)
         self.length = first or _FIRST * self._tolerance / speed
         while here.t < end:
@@ -230,14 +242,14 @@ class Stepper:
             try:
                 step, there, error = self._step(here, then)
                 share = max(error / self._tolerance, 1e-6)
-                change = _SAFETY * share**-_INTEGRAL * last**_PROPORTIONAL
-                change = min(max(change, _LEAST), _MOST if share <= 1.0 else _SAFETY)
+                change = max(_SAFETY * share**-_POWER, _LEAST)
+                change = min(change, _MOST if share <= 1.0 else _SAFETY)
             except NewtonError:
                 share, change = np.inf, _FAILED
             self.length = change * (then - here.t)
             if share <= 1.0:
                 yield step
-                self.accepted, here, last = self.accepted + 1, there, share
+                self.accepted, here = self.accepted + 1, there
                 continue
             self.rejected += 1
             if self.length < _SHORTEST * max(abs(here.t), 1.0):
@@ -246,58 +258,117 @@ class Stepper:
     def _settled(self, t: float, x: Array) -> _Reached:
         """Fulfil the algebraic rows, nothing that is stored being changed; and find the slopes."""
         problem, rate = self._problem, INSTANT_RATE
-        stage = _Stage(problem, t, problem.stored(x), rate)
-        found = find_roots(stage, x, NewtonOptions(tolerance=1e-9))
-        x = found.x
-        slope = -rate * found.factors.solve(problem.rest(t + 1.0 / rate, x), _ONE)
-        return _Reached(t, x, slope, problem.stored(x), -problem.rest(t, x), problem.rates(x))
+        root = self._root(t, x, problem.stored(x), rate, None, _SETTLED)
+        x = root.x
+        slope = -rate * root.factors.solve(problem.rest(t + 1.0 / rate, x), _ONE)
+        flow, stored = -problem.rest(t, x), problem.stored(x)
+        speed = max(float(np.abs(slope / problem.scale).max()), 1e-300)
+        here, soon = problem.watched(np.hstack([x, x + _MOMENT / speed * slope])).T
+        return _Reached(t, x, slope, stored, flow, here, (soon - here) * (speed / _MOMENT))
 
     def _step(self, here: _Reached, then: float) -> tuple[Step, _Reached, float]:
         """Try a step; return it, what it reaches, and its error."""
         length = then - here.t
-        problem, rate, factors = self._problem, 1.0 / (GAMMA * length), None
-        states, slopes, flows, rates = [here.x], [here.slope], [here.flow], [here.rates]
-        stored = here.stored
+        problem, rate, root = self._problem, 1.0 / (GAMMA * length), None
+        # one column for each stage
+        states, flows = np.empty((2, len(here.x), len(TIMES)))
+        states[:, :1], flows[:, :1] = here.x, here.flow
         for stage in range(1, len(TIMES)):
-            known = here.stored + length * weighted_sum(STAGES[stage], flows)
-            guess = weighted_sum(_PREDICTORS[stage - 1], [here.x, length * here.slope, *states[1:]])
-            equations = _Stage(problem, here.t + TIMES[stage] * length, known, rate)
-            found = find_roots(equations, guess, self._newton, factors)
-            x, factors = found.x, found.factors
-            stored = problem.stored(x)
-            states.append(x)
-            flows.append(rate * (stored - known))
-            rates.append(problem.rates(x))
-            # the same method, read as one that steps the unknowns
-            slopes.append(rate * (x - here.x - length * weighted_sum(STAGES[stage], slopes)))
-        assert factors is not None
-        there = _Reached(then, states[-1], slopes[-1], stored, flows[-1], rates[-1])
+            before, now = slice(stage), slice(stage, stage + 1)
+            known = here.stored + flows[:, before] @ (length * STAGES[stage, before, None])
+            guess = states[:, before] @ _BY_STAGE[stage, before, None]
+            guess += length * _BY_SLOPE[stage] * here.slope
+            t = here.t + TIMES[stage] * length
+            root = self._root(t, guess, known, rate, root, self._newton[stage])
+            states[:, now], flows[:, now] = root.x, rate * (root.stored - known)
+        assert root is not None
+        slope = _end_slope(states, here.slope[:, 0], length)[:, None]
+        watched = np.column_stack([here.watched, problem.watched(states[:, 1:])])
+        watched_slope = _end_slope(watched, here.watched_slope, length)
+        there = _Reached(
+            then, root.x, slope, root.stored, flows[:, -1:], watched[:, -1], watched_slope
+        )
         step = Step(
             here.t,
             then,
-            np.hstack([here.x, there.x]),
-            np.hstack([here.slope, there.slope]),
-            np.stack([here.rates, there.rates], axis=1),
-            length * weighted_sum(WEIGHTS, rates),
-            np.hstack(states),
-            factors,
+            states[:, [0, -1]],
+            np.hstack([here.slope, slope]),
+            watched[:, [0, -1]],
+            np.stack([here.watched_slope, watched_slope], axis=1),
+            length * (watched @ WEIGHTS),
+            states,
+            root.factors,
         )
-        difference = length * rate * weighted_sum(WEIGHTS - EMBEDDED, flows)
-        error = problem.size_of(factors.solve(difference, _ONE))
-        off = step.between(here.t + TIMES[_MIDDLE] * length) - states[_MIDDLE]
+        difference = length * rate * (flows @ (WEIGHTS - EMBEDDED)[:, None])
+        error = problem.size_of(root.factors.solve(difference, _ONE))
+        off = step.between(here.t + TIMES[_MIDDLE] * length) - states[:, [_MIDDLE]]
         return step, there, max(error, _OFF * problem.size_of(off))
+
+    def _root(
+        self,
+        t: float,
+        x: Array,
+        known: Array,
+        rate: float,
+        near: _Root | None,
+        tolerance: float,
+    ) -> _Root:
+        """Solve ``rate × (stored - known) + rest = 0`` near `x`, by Newton's method.
+
+        What is left after a correction is taken to be a share of it: that which it is of the one
+        before, and at first the largest that it was with the same factors, those of a root nearby.
+        The last correction is one of what is stored too, to first order: nothing is evaluated
+        again.
+
+        Raises
+        ------
+        NewtonError
+            If there is none.
+        """
+        problem, last = self._problem, np.inf
+        factors, most = (None, _LEFT) if near is None else (near.factors, near.left)
+        for _ in range(_MOST_CORRECTIONS):
+            stored = problem.stored(x)
+            residual = problem.rest(t, x) + rate * (stored - known)
+            if factors is None:
+                factors = problem.factorised(x, rate)
+            change = -factors.solve(residual, _ONE)
+            size = float(np.abs(change / problem.scale).max())
+            if not np.isfinite(size):
+                break
+            left = most if last == np.inf else size / last
+            most = max(most, left)
+            if left * size < tolerance:
+                stored = stored + problem.stored_change(x, change[..., None])[..., 0]
+                return _Root(x + change, stored, factors, most)
+            if left > _SLOW:
+                factors, last, most = None, np.inf, _LEFT
+            else:
+                x, last = x + change, size
+        raise NewtonError(f"no root at {t:.6g} µs")
+
+
+@dataclass(frozen=True)
+class _Root:
+    """The unknowns, what is stored there, and a Jacobian factorised nearby with what it leaves."""
+
+    x: Array
+    stored: Array
+    factors: Factors
+    left: float
 
 
 @dataclass(frozen=True)
 class _Reached:
-    """A time, the unknowns there and their slopes, what is stored and its slope, the rates."""
+    """A time; the unknowns there, what is stored, and what is watched, with their slopes."""
 
     t: float
     x: Array
     slope: Array
     stored: Array
     flow: Array
-    rates: Array
+    watched: Array
+    watched_slope: Array
 
 
 _ONE: Index = np.arange(1)
