@@ -94,8 +94,6 @@ def calibrate(
         raise InputError("a power law holds in vacuum; with one, leave the medium out")
     if law is not None and priors is not None:
         raise InputError("a power law takes no priors; a probe or a fit does")
-    measured = averaged(whole := Measurement.given(measurement), robust=True)
-    measured.need_rest("a calibration")
     if fit is not None:
         fit = fit if isinstance(fit, Fit) else read_fit(fit)
         fit.measurement.need_rest("a calibration with a fit")
@@ -103,6 +101,9 @@ def calibrate(
     else:
         route = "probe" if law is None else "power law"
         origin = Probe.reference() if probe is None else Probe.given(probe)
+    whole = Measurement.given(measurement, origin.circuit)
+    measured = averaged(whole, robust=True)
+    measured.need_rest("a calibration")
     # a power law holds for vacuum, whatever the lever is in
     known = measured if law is None else replace(measured, medium=None)
     probe, notes = with_measured_circuit(origin, known, medium if law is None else "vacuum")

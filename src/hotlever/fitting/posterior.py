@@ -261,8 +261,12 @@ def predictive_band(
     """
     if samples < 2:
         raise InputError(f"found samples = {samples}, expected 2 or more")
-    highest = float(fit.measurement.bias_V.max())
-    grid = np.linspace(0.0, highest, 81) if bias is None else np.unique(np.asarray(bias, float))
+    measured = fit.measurement.bias_V
+    grid = (
+        np.linspace(min(float(measured.min()), 0.0), float(measured.max()), 81)
+        if bias is None
+        else np.unique(np.asarray(bias, float))
+    )
     model = rough_model(fit.probe, fit.names, grid)
     flat = np.stack([posterior[name].values.ravel() for name in fit.names], axis=1)
     chosen = flat[np.linspace(0, len(flat) - 1, min(samples, len(flat))).round().astype(int)]

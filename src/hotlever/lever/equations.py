@@ -253,7 +253,8 @@ class LeverEquations(LawsAtPoints):
         gradient[..., 1] = self.space.weak_form(Fluxes(along, flat, laws.sigma * supply))
         if self.space.reader is not None:
             unknowns, weights = self.space.reader
-            gradient[unknowns, :, 2] = weights[:, None]
+            # the nodes of a contact share one unknown
+            np.add.at(gradient[..., 2], unknowns, weights[:, None])
         return gradient
 
 
