@@ -250,7 +250,7 @@ def predictive_band(
     xarray.Dataset
         ``tip_K`` (quantile, bias) and ``tip_at_power_K`` (quantile, power), with the coordinates
         ``quantile`` (%), ``bias_V`` and ``power_mW``. The powers reach to the highest that all
-        samples reach.
+        samples reach; they are NaN where a power does not tell the temperature.
 
     Raises
     ------
@@ -279,6 +279,9 @@ def predictive_band(
         if progress is not None:
             progress(done, len(chosen))
     power = np.linspace(np.min(powers, axis=1).max(), np.max(powers, axis=1).min(), grid.size)
+    if np.diff(powers, axis=1).min() < 0:
+        # with held supplies there may be several temperatures at one power
+        power = np.full(grid.size, np.nan)
     at_power = [_against(power, x, tip) for x, tip in zip(powers, tips, strict=True)]
     quantiles = partial(np.percentile, q=BAND_QUANTILES, axis=0)
     return labelled(

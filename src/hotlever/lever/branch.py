@@ -323,7 +323,7 @@ class Branch:
         return reading
 
     def _without_bias(self, curve: PPoly) -> float:
-        """Return where a curve of the bias by u is zero: near u = 0, where this was followed from."""
+        """Return where a curve of the bias by u is zero: near where it was followed from."""
         if self.equations.circuit.starts_cold or abs(float(curve(0.0))) < _NO_BIAS:
             return 0.0
         # a similar lever has no bias elsewhere
@@ -348,9 +348,9 @@ class Branch:
 
 
 def shifted(branch: Branch, changes: Array, slopes: Array) -> Branch:
-    """Return a branch with V_l, I_h and V_r, perhaps the rise of the tip too, changed by (k, 3 or 4).
+    """Return a branch with V_l, I_h and V_r changed by (k, 3); by (k, 4) the rise of the tip too.
 
-    The slopes are their derivatives by u.
+    The slopes are derivatives of the changes by u.
     """
     columns = [*range(len(SHOWN)), TIP_RISE][: changes.shape[1]]
     moved = branch.values.copy(), branch.value_slopes.copy()

@@ -185,14 +185,9 @@ class Lever:
             raise
         return self._branch
 
-    def branch_to(
-        self, bias: float, progress: Progress | None = None, lowest: float | None = None
-    ) -> Branch:
-        """Return a branch that reaches a bias (V), or ends below it because silicon melts.
-
-        That of a lever that does not start cold may have to reach a lowest bias too.
-        """
-        return self._followed(Reach(self.circuit, bias, lowest), progress)
+    def branch_to(self, bias: float, progress: Progress | None = None) -> Branch:
+        """Return a branch that reaches a bias (V), or ends below it because silicon melts."""
+        return self._followed(Reach(self.circuit, bias), progress)
 
     @one_blas_thread
     def branch_past_knee(self) -> Branch:
@@ -245,7 +240,7 @@ class Lever:
         failure: ComputationError | None = None
         try:
             lowest = float(bias.min()) if bias.min() < 0 else None
-            branch = self.branch_to(float(bias.max()), progress, lowest)
+            branch = self._followed(Reach(self.circuit, float(bias.max()), lowest), progress)
         except ComputationError as error:
             if error.partial is None:
                 raise
@@ -275,8 +270,8 @@ class Lever:
         Parameters
         ----------
         bias : array_like, shape (n,)
-            Biases (V) in any order; a slow ramp from zero meets them rising. Negative ones, which
-            another ramp meets falling, where held supplies make them differ.
+            Biases (V) in any order, met by a slow ramp from zero; negative ones, met by another,
+            where held supplies make them differ.
         sensitivities : bool
             Add the derivatives of I_h, V_r and T_tip, at fixed bias, by the parameters that a fit
             usually varies.
@@ -307,13 +302,15 @@ class Lever:
         branch, reading, failure = self._read(values, progress)
         here = np.flatnonzero(np.isfinite(reading.u))
         notes = reading.notes(values[here])
-        if self.circuit.starts_cold:
-            data = self._dataset(branch, reading.u[here], notes, sensitivities)
-        else:
-            places = zip(reading.u[here], values[here].tolist(), strict=True)
-            states = [self._state_at(branch, u, bias) for u, bias in places]
-            found = self._by_usual(branch, reading.u[here], states) if sensitivities else None
-            data = self.dataset(states, notes, found)
+        u, names, states = reading.u[here], usual_parameters(self.probe), []
+        if not (cold := self.circuit.starts_cold):
+            places = zip(u, values[here].tolist(), strict=True)
+            states = [self._state_at(branch, place, bias) for place, bias in places]
+        x = np.concatenate([one.x for one in states], axis=1) if states else None
+        found = sensitivities_of(branch, u, self.circuit, names, x) if sensitivities else None
+        data = (
+            self._dataset(branch, u, notes, found) if cold else self.dataset(states, notes, found)
+        )
         data = at_bias(data, values[here])
         if failure is not None:
             failure.partial = data
@@ -322,10 +319,7 @@ class Lever:
 
     @one_blas_thread
     def dataset(
-        self,
-        states: Sequence[State],
-        notes: Sequence[str] = (),
-        sensitivities: Array | None = None,
+        self, states: Sequence[State], notes: Sequence[str] = (), slopes: Array | None = None
     ) -> xr.Dataset:
         """Return what is observed of solved states, as `sweep` does."""
         space, equations = self.space, self.equations
@@ -333,17 +327,11 @@ class Lever:
         base = self.circuit.base_temperature_K
         shown = dict(zip(SHOWN, equations.observed(x), strict=True))
         shown |= {"tip_K": base + space.tip_rise(x), "max_K": base + space.rises(x).max(axis=0)}
-        balances = balance_columns(equations, x)
-        return sweep_dataset(self.probe, shown, balances, notes, sensitivities)
-
-    def _by_usual(self, branch: Branch, u: Array, states: Sequence[State] = ()) -> Array:
-        """Return derivatives by what a fit usually varies, at places of a branch or states there."""
-        x = np.concatenate([one.x for one in states], axis=1) if states else None
-        return sensitivities_of(branch, u, self.circuit, usual_parameters(self.probe), x)
+        return sweep_dataset(self.probe, shown, balance_columns(equations, x), notes, slopes)
 
     @one_blas_thread
     def _dataset(
-        self, branch: Branch, u: Array, notes: list[str], sensitivities: bool = False
+        self, branch: Branch, u: Array, notes: list[str], sensitivities: Array | None = None
     ) -> xr.Dataset:
         """Return what is observed at some places of the branch."""
         balances = balance_columns(self.equations, branch.x)
@@ -351,8 +339,9 @@ class Lever:
         base = self.circuit.base_temperature_K
         shown = branch.shown(u)
         shown |= {"tip_K": branch.tip_K(u), "max_K": base + branch.curve(u)[..., HIGHEST_RISE]}
-        found = self._by_usual(branch, u) if sensitivities else None
-        return sweep_dataset(self.probe, shown, branch.through(balances, slopes)(u), notes, found)
+        return sweep_dataset(
+            self.probe, shown, branch.through(balances, slopes)(u), notes, sensitivities
+        )
 
     @one_blas_thread
     def pulse(

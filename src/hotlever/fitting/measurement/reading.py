@@ -107,7 +107,7 @@ def read_measurement(
         if len(parts) > 1:
             notes.append(f"{path}: {len(parts)} sweeps, all of them used: {order}")
             data = {symbol: values[symbol] for symbol in OBSERVABLE_SYMBOLS.values()}
-            notes += [f"{path}: {text}" for text in disagreements(bias, parts, data)]
+            notes += [f"{path}: {text}" for text in disagreements(bias, parts, data, symmetric)]
     notes += unused
     more = len(notes) - _MOST_NOTES
     if more > 0:
