@@ -46,7 +46,7 @@ def coarse() -> Lever:
 
 @pytest.mark.parametrize("circuit", CIRCUITS)
 def test_predictions_are_states_and_their_slopes_have_taylor_order_two(circuit):
-    probe, names = wired(circuit), ("c_kappa", "base_temperature_K", "heater_width_um")
+    probe, names = wired(circuit), ("base_temperature_K", "heater_width_um")
     similar = SimilarLevers(Lever(probe, COARSE))
     between = ForwardModel(similar, None, BIAS, names).predict(probe)
     off = np.abs(between.values - shown(similar.lever(probe), BIAS)).max(axis=1)
