@@ -83,7 +83,9 @@ def test_no_power_tells_the_temperature(calibration, measured, tmp_path):
 
 def test_another_levers_resistance_is_refused(measured):
     other = replace(measured, current_mA=5.0 * measured.current_mA)
-    with pytest.raises(InputError, match="the change of V_b over that of I_h is .* expected about"):
+    with pytest.raises(
+        InputError, match=r"the change of V_b over that of I_h is .* expected about"
+    ):
         calibrate(other, probe=PROBE)
     with pytest.raises(InputError, match="a fit, a probe and a power law exclude each other"):
         calibrate(measured, probe=PROBE, law=EQ12)

@@ -185,9 +185,11 @@ class Lever:
             raise
         return self._branch
 
-    def branch_to(self, bias: float, progress: Progress | None = None) -> Branch:
-        """Return a branch that reaches a bias (V), or ends below it because silicon melts."""
-        return self._followed(Reach(self.circuit, bias), progress)
+    def branch_to(
+        self, bias: float, progress: Progress | None = None, lowest: float | None = None
+    ) -> Branch:
+        """Return a branch that reaches biases (V), or ends before because silicon melts."""
+        return self._followed(Reach(self.circuit, bias, lowest), progress)
 
     @one_blas_thread
     def branch_past_knee(self) -> Branch:
@@ -239,16 +241,15 @@ class Lever:
         """Return the branch, where a ramp finds it, and why it does not have all the biases."""
         failure: ComputationError | None = None
         try:
-            lowest = float(bias.min()) if bias.min() < 0 else None
-            branch = self._followed(Reach(self.circuit, float(bias.max()), lowest), progress)
+            below = min(float(bias.min()), 0.0) or None
+            branch = self.branch_to(float(bias.max()), progress, below)
         except ComputationError as error:
             if error.partial is None:
                 raise
             branch, failure = error.partial, error
         reading = branch.read(self.circuit, bias)
-        if np.isfinite(reading.u).all():
-            return branch, reading, None
-        return branch, reading, failure or branch.ended(reading)
+        missing = np.isnan(reading.u).any()
+        return branch, reading, (failure or branch.ended(reading)) if missing else None
 
     @one_blas_thread
     def polished(self, guess: Array, bias: float, pin: Pin = TIP) -> State:
@@ -294,23 +295,20 @@ class Lever:
 
         Notes
         -----
-        Between the states of the branch the curves are within 2e-5 in V_l and I_h and 0.02 K of
-        states solved by themselves (`solve`), a third of what the mesh is off by; 5e-5 and 0.05 K
-        where a leg gets hot faster than the tip. With held supplies each is solved by itself.
+        Between the states of the branch curves are within 2e-5 in V_l and I_h and 0.02 K of solved
+        ones (`solve`), a third of the mesh's error; 5e-5 and 0.05 K where a leg gets hot faster
+        than the tip. With held supplies each is solved by itself.
         """
         values = checked_bias(bias, self.circuit)
         branch, reading, failure = self._read(values, progress)
         here = np.flatnonzero(np.isfinite(reading.u))
-        notes = reading.notes(values[here])
-        u, names, states = reading.u[here], usual_parameters(self.probe), []
+        u, notes, states = reading.u[here], reading.notes(values[here]), []
         if not (cold := self.circuit.starts_cold):
-            places = zip(u, values[here].tolist(), strict=True)
-            states = [self._state_at(branch, place, bias) for place, bias in places]
+            states = [self._state_at(branch, *at) for at in zip(u, values[here], strict=True)]
         x = np.concatenate([one.x for one in states], axis=1) if states else None
-        found = sensitivities_of(branch, u, self.circuit, names, x) if sensitivities else None
-        data = (
-            self._dataset(branch, u, notes, found) if cold else self.dataset(states, notes, found)
-        )
+        by: Any = branch, u, self.circuit, usual_parameters(self.probe), x
+        more = notes, sensitivities_of(*by) if sensitivities else None
+        data = self._dataset(branch, u, *more) if cold else self.dataset(states, *more)
         data = at_bias(data, values[here])
         if failure is not None:
             failure.partial = data
@@ -376,8 +374,7 @@ class Lever:
             If V_l keeps rising until the silicon melts.
         """
         branch = self.branch_past_knee()
-        knee = branch.knee
-        if knee is None:
+        if branch.knee_u is None:
             end = f"{self.equations.limit[1]}, with the tip at {branch.hottest_K:.0f} K"
             raise ComputationError(f"V_l rises until {end}: there is no knee")
         return self._dataset(branch, np.array([branch.knee_u]), [])
