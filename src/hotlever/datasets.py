@@ -27,6 +27,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "reader_V": ("V", "reader voltage"),
     "tip_K": ("K", "tip temperature"),
     "power_mW": ("mW", "power dissipated in the lever"),
+    "total_power_mW": ("mW", "power into the lever by all supplies"),
     "tip_error_K": ("K", "standard error of the measured tip temperature"),
     "current_error_mA": ("mA", "standard error of the measured current"),
     "reader_error_V": ("V", "standard error of the measured reader voltage"),

@@ -124,7 +124,7 @@ class LiveLever:
             "lever_V": shown["lever_V"],
             "current_mA": shown["current_mA"],
             "power_mW": shown["lever_V"] * shown["current_mA"],
-            "tip_K": self.branch.base_temperature_K + u**2,
+            "tip_K": self.branch.tip_K(u),
             "knee": None if knee is None else vars(knee),
         }
 
@@ -142,13 +142,13 @@ class LiveLever:
         shown = {name: float(value[0]) for name, value in self.branch.shown(reading.u).items()}
         x = self.expanded(self.branch.states(reading.u))
         low = self.branch.base_temperature_K
-        drawn, T = _map_of(self.space), self.space.nodal(x[:, 0], low)[0]
+        drawn, T = _map_of(self.space), self.space.nodal(x[:, 0], low, self.circuit.end_rises())[0]
         # in steps, so that colours stay the same while the lever gets a little hotter
         high = _SCALE_K * np.ceil(max(float(T.max()), low + 1.0) / _SCALE_K)
         return {
             **shown,
             "bias_V": bias,
-            "tip_K": self.branch.base_temperature_K + float(reading.u[0]) ** 2,
+            "tip_K": float(self.branch.tip_K(reading.u)[0]),
             "power_mW": shown["lever_V"] * shown["current_mA"],
             "hottest_K": float(T.max()),
             "scale_K": (low, high),

@@ -39,6 +39,8 @@ TABLE_COLUMNS = (
     *("bias_V", "lever_V", "current_mA", "power_mW"),
     *("tip_K", "tip_stderr_K", "tip_low_K", "tip_high_K"),
 )
+#: One more with held supplies: the power of all of them together.
+TOTAL_POWER = "total_power_mW"
 
 
 @dataclass(frozen=True)
@@ -51,20 +53,22 @@ class Calibration:
         What it rests on: ``power law``, ``probe``, ``fit in vacuum`` or ``fit in air``.
     medium : str
         Of the model whose temperatures are used.
-    power_law : PowerLaw
+    power_law : PowerLaw or None
         In vacuum, of the estimated lever or as given; T_tip is the law's value at P_l / k,
-        approximately (see `law_residual_K`).
+        approximately (see `law_residual_K`). None with held supplies, since the tip then follows
+        from no single power.
     law_residual_K : float
         Largest difference of the law from the model it was fitted to; 0 for a given law.
     k, k_stderr : float
-        Power of the knee over the threshold of the power law; NaN without a knee.
+        Power of the knee over the threshold of the power law; NaN without a knee or a law.
     knee : Knee
         Of the estimated lever, or as measured; NaN where there is none, or all but its power.
     knee_tip_K : float
         Tip temperature there.
     table : xarray.Dataset
         `TABLE_COLUMNS` on the dimension ``bias``, evenly spaced over the measured range, and
-        ``budget_K``, the standard error by ``source``.
+        ``budget_K``, the standard error by ``source``. With held supplies, what is shown is of
+        the swept one, and `TOTAL_POWER` that of all.
     priors : dict of str to PriorUse
         What was known of each parameter before and after, by name.
     reason : str
@@ -80,7 +84,7 @@ class Calibration:
 
     route: str
     medium: str
-    power_law: PowerLaw
+    power_law: PowerLaw | None
     law_residual_K: float
     k: float
     k_stderr: float
@@ -116,7 +120,14 @@ class Calibration:
         return self.knee.measured and self.knee.bias_V <= float(self.table.bias_V.max())
 
     def tip_temperature(self, power_mW: ArrayLike) -> Array:
-        """Return the tip temperature (K) by power (mW); NaN outside the measured range."""
+        """Return the tip temperature (K) by power (mW); NaN outside the measured range.
+
+        Raises
+        ------
+        InputError
+            If something else than the swept supply heats the lever.
+        """
+        self.probe.circuit.need_cold_start("the tip temperature by the power of one supply")
         return self._read(power_mW, "power_mW", "tip_K")
 
     def bias_for(self, tip_K: ArrayLike, circuit: Circuit | None = None) -> Array:
@@ -131,15 +142,24 @@ class Calibration:
         Returns
         -------
         ndarray
-            NaN outside the measured range.
+            NaN outside the measured range; from the coldest tip on, if it cools at first.
         """
-        power = self._read(tip_K, "tip_K", "power_mW")
-        lever = self._read(power, "power_mW", "lever_V")
-        return np.asarray((circuit or self.probe.circuit).bias(lever, power / lever))
+        lever, current = (self._read(tip_K, "tip_K", name) for name in ("lever_V", "current_mA"))
+        return np.asarray((circuit or self.probe.circuit).bias(lever, current))
+
+    @property
+    def heating(self) -> xr.Dataset:
+        """The rows of the table that have a tip temperature, from the coldest on."""
+        known = self.table.isel(bias=np.isfinite(self.table.tip_K.values))
+        return known.isel(bias=slice(int(np.argmin(known.tip_K.values)), None))
+
+    @property
+    def columns(self) -> list[str]:
+        """The columns of the table in a file."""
+        return [name for name in (*TABLE_COLUMNS, TOTAL_POWER) if name in self.table]
 
     def _read(self, at: ArrayLike, along: str, column: str) -> Array:
-        known = np.isfinite(self.table.tip_K.values)
-        x, y = self.table[along].values[known], self.table[column].values[known]
+        x, y = self.heating[along].values, self.heating[column].values
         return np.interp(np.asarray(at, dtype=float), x, y, left=np.nan, right=np.nan)
 
     def __repr__(self) -> str:
@@ -153,12 +173,12 @@ class Calibration:
 
     def content(self) -> dict[str, Any]:
         """Return the content of the calibration file."""
-        budget = self.table.budget_K.transpose("source", "bias")
+        law, budget = self.power_law, self.table.budget_K.transpose("source", "bias")
         sources = dict(zip(budget.source.values.tolist(), budget.values.tolist(), strict=True))
         content = {
             "route": self.route,
             "medium": self.medium,
-            "power_law": self.power_law.values(self.base_temperature_K),
+            "power_law": law and law.values(self.base_temperature_K),
             "power_law_residual_K": self.law_residual_K,
             "k": self.k,
             "k_stderr": self.k_stderr,
@@ -166,7 +186,7 @@ class Calibration:
             "tip_temperature_uncertainty_K": self.tip_temperature_uncertainty_K,
             "uncertainty_budget_K": {name: float(np.nanmax(e)) for name, e in sources.items()},
             "base_temperature_K": self.base_temperature_K,
-            "table": self.table[list(TABLE_COLUMNS)].to_dataframe().to_dict("records"),
+            "table": self.table[self.columns].to_dataframe().to_dict("records"),
             "budget_K": sources,
             "measured_rms_K": self.measured_rms_K,
             "priors": {name: vars(use) for name, use in self.priors.items()},
@@ -188,12 +208,12 @@ class Calibration:
         """Return the table as CSV, to load into an instrument; that of the pulse if there is."""
         if self.pulse is not None:
             return self.pulse.table_csv()
-        frame = self.table[list(TABLE_COLUMNS)].to_dataframe()
+        frame = self.table[self.columns].to_dataframe()
         return frame_text(frame, index=False, float_format="%.6g")
 
 
 def table_of(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:
-    """Return the table of a calibration: `TABLE_COLUMNS`, and the error by source."""
+    """Return the table of a calibration: the columns of its file, and the error by source."""
     errors = (("source", "bias"), np.array(list(budget.values())))
     return labelled(
         {**columns, "budget_K": errors},
@@ -206,8 +226,8 @@ class _CalibrationFile(Section):
 
     route: str
     medium: str
-    power_law: dict[str, float]
-    power_law_residual_K: float
+    power_law: dict[str, float] | None
+    power_law_residual_K: Number
     k: Number
     k_stderr: Number
     knee: dict[str, Number]
@@ -237,9 +257,11 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     """
     found = _CalibrationFile.read(path, "calibration")
     where, rows = f"{path}: table", len(found.table)
+    probe = Probe.from_values(found.probe, f"{path}: probe")
     columns = {
         name: array([row.get(name) for row in found.table], (rows,), f"{where}: {name}")
-        for name in TABLE_COLUMNS
+        for name in (*TABLE_COLUMNS, TOTAL_POWER)
+        if name in TABLE_COLUMNS or any(name in row for row in found.table)
     }
     if not rows or not found.budget_K or not np.all(np.diff(columns["bias_V"]) > 0):
         raise InputError(f"{where}: expected rows of rising bias, and a budget of their errors")
@@ -247,12 +269,12 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
         source: array(errors, (rows,), f"{path}: budget_K: {source}")
         for source, errors in found.budget_K.items()
     }
-    law = {name: value for name, value in found.power_law.items() if name != "threshold_K"}
+    law = {name: value for name, value in (found.power_law or {}).items() if name != "threshold_K"}
     knee = {one.name: found.knee[one.name] for one in fields(Knee) if one.name in found.knee}
     return Calibration(
         route=found.route,
         medium=found.medium,
-        power_law=PowerLaw.of(law, f"{path}: power_law"),
+        power_law=None if found.power_law is None else PowerLaw.of(law, f"{path}: power_law"),
         law_residual_K=found.power_law_residual_K,
         k=found.k,
         k_stderr=found.k_stderr,
@@ -260,8 +282,8 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
         knee_tip_K=found.knee.get("tip_K", np.nan),
         table=table_of(columns, budget),
         measured_rms_K=found.measured_rms_K,
-        probe=Probe.from_values(found.probe, f"{path}: probe"),
-        measurement=found.data.measurement(f"{path}: data"),
+        probe=probe,
+        measurement=found.data.measurement(f"{path}: data", probe.circuit),
         priors=found.priors,
         reason=found.reason,
         notes=found.notes,

@@ -139,12 +139,18 @@ class Causes:
 
         The probe may be that of a fit, which another lever would not share.
         """
-        if fitted and self._explains(self._without):
+        alone = self._probe.circuit.starts_cold
+        if fitted and alone and self._explains(self._without):
             return "is it the fit of another lever?"
         return self.likeliest() or "no single cause that is known explains it"
 
     def likeliest(self) -> str:
-        """Return questions after the likeliest suspects; empty if none explains the data."""
+        """Return questions after the likeliest suspects; empty if none explains the data.
+
+        With held supplies no suspect is examined: curves of other levers are known from cold.
+        """
+        if not self._probe.circuit.starts_cold:
+            return ""
         found = []
         for suspect in suspects_of(self._rows, self._probe, self._curve.names):
             with suppress(ComputationError, InputError):  # there may be no such lever

@@ -20,6 +20,7 @@ from hotlever.fitting import Fit, FitOptions, Measurement
 from hotlever.fitting.estimation import Estimate, estimate
 from hotlever.fitting.least_squares import LeastSquares
 from hotlever.lever import Branch
+from hotlever.lever.curve import spline_through
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import Material
 from hotlever.probe import Probe
@@ -86,6 +87,15 @@ class Estimated:
     reason: str
     notes: list[str]
     _estimate: Estimate
+
+    @property
+    def held_mW(self) -> Array:
+        """Power of the held supplies at the rows (mW), within the error of a coarse mesh."""
+        branch = self.branch
+        equations, x = branch.equations, branch.x
+        own = x[-1] * equations.observed(x)[1]
+        u = branch.read(self.probe.circuit, self.bias_V).u
+        return np.asarray(spline_through(branch.u, equations.power(x) - own)(u))
 
     @property
     def branch(self) -> Branch:
@@ -241,7 +251,9 @@ def _put_together(
     progress: Progress | None,
 ) -> Estimated:
     best, residuals = found.optimum.probe, found.problem.residuals
-    present = measured.bias_V[np.isfinite(measured.current_mA) & (measured.bias_V > 0)]
+    # without a bias nothing is known of a lever that is cold then
+    heated = (measured.bias_V > 0) | (not best.circuit.starts_cold)
+    present = measured.bias_V[np.isfinite(measured.current_mA) & heated]
     highest = float(residuals.bias.max())
     bias = np.linspace(present.min(), min(present.max(), highest), _ROWS)
     predicted = found.predicted(bias)
@@ -318,8 +330,8 @@ def _limits(
 def error_of_model(medium: str, bias: Array, rise: Array) -> Array:
     """Return by how much the tip may be off since the model is (K); most where the tip is steep."""
     # a rise that grows as the square of the bias is that of a lever of constant properties
-    steepness = 0.5 * np.gradient(np.log(rise), np.log(bias))
-    return _MODEL[medium] * rise * np.maximum(steepness, 1.0)
+    square = np.abs(0.5 * bias * np.gradient(rise, bias))
+    return _MODEL[medium] * np.maximum(np.abs(rise), square)
 
 
 def _search(problem: LeastSquares) -> list[str]:

@@ -21,6 +21,8 @@ from hotlever.probe.priors import PriorUse
 _WITHIN = 2.5
 #: Rows that a calibration needs, and those that are not few.
 _FEWEST, _FEW = 3, 6
+#: Biases below this share of the largest hardly change what other supplies drive.
+_HARDLY = 0.05
 #: Currents are coarse in steps of this share of the largest, each a multiple within so much.
 _COARSE, _EVEN = 0.01, 0.02
 #: A lever is cold that was never hotter (K).
@@ -41,31 +43,39 @@ def check_plausible(measured: Measurement, probe: Probe, causes: Causes) -> None
         Saying what was compared, and the likeliest cause.
     """
     where = measured.path or "measurement"
+    alone, size = probe.circuit.starts_cold, np.abs(measured.bias_V)
     here = np.isfinite(measured.current_mA) & (measured.bias_V > 0) & (measured.current_mA > 0)
+    if not alone:
+        # other supplies drive a current as well, which is known less well than what is added
+        here = np.isfinite(measured.current_mA) & (size > _HARDLY * size.max())
     different = np.unique(measured.bias_V[here]).size
     if different < _FEWEST:
         raise InputError(
-            f"{where}: currents above 0 at {different} different biases above 0, expected "
-            f"{_FEWEST} or more"
+            f"{where}: currents{' above 0' * alone} at {different} different biases"
+            f"{' above 0' * alone}, expected {_FEWEST} or more"
         )
     _check_temperatures(measured, probe, where)
     bias, current = measured.bias_V[here], measured.current_mA[here]
-    low = np.argsort(bias)[: max(_FEWEST, bias.size // 8)]
-    found = float(np.median(bias[low] / current[low]))
+    low = np.argsort(np.abs(bias))[: max(_FEWEST, bias.size // 8)]
     # what a cold lever shows does not depend on what is around it
-    cold = Lever(probe.in_medium("vacuum"), COARSE).branch_to(0.0).values[1]
-    series = probe.circuit.series_kohm
-    lever = float(cold[0] / cold[1])
+    rest = Lever(probe.in_medium("vacuum") if alone else probe, COARSE).branch_to(0.0)
+    lever, series = (
+        float(rest.value_slopes[0, 0] / rest.value_slopes[0, 1]),
+        probe.circuit.series_kohm,
+    )
+    added = current[low] - rest.values[0, 1]
+    found = float(np.median(bias[low] / np.where(added == 0.0, np.nan, added)))
     ratio = found / (lever + series)
     if 1 / _WITHIN < ratio < _WITHIN and found > series:
         return
+    shown = "V_b / I_h" if alone else "the change of V_b over that of I_h"
     cause = causes.likeliest() or (
         "is a terminal open, or the meter at another one?"
         if ratio > 1
         else "is another part in parallel, or are columns swapped?"
     )
     raise InputError(
-        f"{where}: V_b / I_h is {found:.4g} kΩ at low bias, expected about {lever + series:.4g} kΩ "
+        f"{where}: {shown} is {found:.4g} kΩ at low bias, expected about {lever + series:.4g} kΩ "
         f"({series:g} kΩ in series and {lever:.3g} kΩ of the lever): {cause}"
     )
 

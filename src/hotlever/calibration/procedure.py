@@ -9,7 +9,12 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from hotlever.calibration.calibration import TABLE_COLUMNS, Calibration, table_of
+from hotlever.calibration.calibration import (
+    TABLE_COLUMNS,
+    TOTAL_POWER,
+    Calibration,
+    table_of,
+)
 from hotlever.calibration.causes import Causes
 from hotlever.calibration.inference import Estimated, estimated
 from hotlever.calibration.knee import IVCurve
@@ -63,7 +68,8 @@ def calibrate(
     fit : Fit or path, optional
         A fit of the measured lever itself, in vacuum or in air. Not together with `probe`.
     law : PowerLaw, optional
-        A power law in vacuum, in place of a model.
+        A power law in vacuum, in place of a model. It takes a lever that only the swept supply
+        heats.
     medium : {"vacuum", "air"}, optional
         What the lever is in; by default what the data file says, or else the fit or the probe.
         With vacuum for data from air the paper's rule is used: the temperatures that the probe has
@@ -94,8 +100,6 @@ def calibrate(
         raise InputError("a power law holds in vacuum; with one, leave the medium out")
     if law is not None and priors is not None:
         raise InputError("a power law takes no priors; a probe or a fit does")
-    measured = averaged(whole := Measurement.given(measurement), robust=True)
-    measured.need_rest("a calibration")
     if fit is not None:
         fit = fit if isinstance(fit, Fit) else read_fit(fit)
         fit.measurement.need_rest("a calibration with a fit")
@@ -103,11 +107,15 @@ def calibrate(
     else:
         route = "probe" if law is None else "power law"
         origin = Probe.reference() if probe is None else Probe.given(probe)
+    whole = Measurement.given(measurement, origin.circuit)
+    measured = averaged(whole, robust=True)
+    measured.need_rest("a calibration")
     # a power law holds for vacuum, whatever the lever is in
     known = measured if law is None else replace(measured, medium=None)
     probe, notes = with_measured_circuit(origin, known, medium if law is None else "vacuum")
     notes += note_on_averages(whole, measured)
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
+        probe.circuit.need_cold_start("a power law")
         if samples:
             raise InputError("the paper's rule has no posterior; expected a probe or a fit")
         if pulse is not None:
@@ -116,6 +124,8 @@ def calibrate(
                 "medium of the data"
             )
         return _by_rule(measured, probe, law, route, notes)
+    if pulse is not None:
+        probe.circuit.need_cold_start("a calibration for pulses")
     causes = Causes(measured, probe, priors)
     check_plausible(measured, probe, causes)
     try:
@@ -142,19 +152,20 @@ def _by_estimate(
         own = vacuum if medium == "vacuum" else lever.in_medium(medium).branch()
     knee, threshold = found.knee_of(own), vacuum.knee
     k = k_stderr = float("nan")
-    if own.knee is None or threshold is None:
+    circuit, law, residual = found.probe.circuit, None, float("nan")
+    alone = circuit.starts_cold
+    if own.knee is None or (alone and threshold is None):
         notes = [*notes, f"the model has no knee below {vacuum.hottest_K:.0f} K; none is needed"]
-    elif medium == "vacuum":
+    elif alone and medium == "vacuum":
         # the law is that of the lever itself
         k, k_stderr, threshold = 1.0, 0.0, own.knee
-    else:
+    elif alone and threshold is not None:
         k = own.knee.power_mW / threshold.power_mW
         k_stderr = k * knee.power_mW_stderr / knee.power_mW
     if not found.probe.shape.outline_moves:
         notes = [*notes, "the outline is taken to be as drawn: no error of it is in the result"]
-    law, residual = _law_of(vacuum, None if threshold is None else threshold.power_mW)
-    circuit = found.probe.circuit
-    shown = circuit.power(measured.bias_V, measured.current_mA)
+    if alone:
+        law, residual = _law_of(vacuum, None if threshold is None else threshold.power_mW)
     return Calibration(
         table=_table(circuit, found, found.parts, (found.tip_low_K, found.tip_high_K)),
         route=route,
@@ -165,7 +176,7 @@ def _by_estimate(
         k_stderr=k_stderr,
         knee=knee,
         knee_tip_K=float("nan") if own.knee is None else own.knee.tip_K,
-        measured_rms_K=_rms(measured.tip_K - measured_part.tip_temperature(shown)),
+        measured_rms_K=_rms(measured.tip_K - _tips(measured_part, measured, circuit)),
         probe=found.probe,
         measurement=measured,
         priors=found.priors,
@@ -222,8 +233,18 @@ def _table(
     total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
     low, high = limits or (tip - BAND * total, tip + BAND * total)
     lever = circuit.lever_voltage(bias, current)
-    columns = (bias, lever, current, lever * current, tip, total, low, high)
-    return table_of(dict(zip(TABLE_COLUMNS, columns, strict=True)), parts)
+    values = (bias, lever, current, lever * current, tip, total, low, high)
+    columns = dict(zip(TABLE_COLUMNS, values, strict=True))
+    if isinstance(found, Estimated) and not circuit.starts_cold:
+        columns[TOTAL_POWER] = lever * current + found.held_mW
+    return table_of(columns, parts)
+
+
+def _tips(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
+    """Return the tip temperatures of a branch at the measured power; or bias, if not that tells."""
+    if circuit.starts_cold:
+        return branch.tip_temperature(circuit.power(measured.bias_V, measured.current_mA))
+    return branch.tip_K(branch.read(circuit, measured.bias_V).u)
 
 
 def _law_of(vacuum: Branch, threshold: float | None) -> tuple[PowerLaw, float]:

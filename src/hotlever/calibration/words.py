@@ -28,17 +28,11 @@ _GOOD, _FAIR = 15.0, 40.0
 
 def calibration_text(calibration: Calibration) -> str:
     """Return the result of a calibration as lines of text."""
-    law, stated = calibration.power_law, calibration.tip_temperature_uncertainty_K
+    stated = calibration.tip_temperature_uncertainty_K
     lines = [
         f"based on {_BASIS[calibration.route]}, used in {calibration.medium}",
         *_knee_lines(calibration),
-        f"power law in vacuum: a {law.linear_K_per_mW:.1f} K/mW, b {law.nonlinear_K:.2f} K, "
-        f"m {law.exponent:.3f}, c {law.hot_K_per_mW:.1f} K/mW; jump {law.jump_K:+.0f} K"
-        + (
-            f", within {calibration.law_residual_K:.0f} K of the model"
-            if calibration.law_residual_K
-            else ""
-        ),
+        _law_line(calibration),
         "",
         *_budget_lines(calibration),
         "",
@@ -61,31 +55,45 @@ def calibration_text(calibration: Calibration) -> str:
     return "\n".join(lines)
 
 
+def _law_line(calibration: Calibration) -> str:
+    law = calibration.power_law
+    if law is None:
+        return "no power law: with held supplies the tip does not follow from the power of one"
+    within = f", within {calibration.law_residual_K:.0f} K of the model"
+    return (
+        f"power law in vacuum: a {law.linear_K_per_mW:.1f} K/mW, b {law.nonlinear_K:.2f} K, "
+        f"m {law.exponent:.3f}, c {law.hot_K_per_mW:.1f} K/mW; jump {law.jump_K:+.0f} K"
+        + within
+        * bool(calibration.law_residual_K)
+    )
+
+
 def _knee_lines(calibration: Calibration) -> list[str]:
     knee, law = calibration.knee, calibration.power_law
     if np.isnan(knee.power_mW):
         return ["no knee as far as the lever can be heated"]
-    factor = (
-        f"k = {value_with_error(calibration.k, calibration.k_stderr)} times the power of the knee "
-        f"in vacuum, {law.threshold_mW:.3f} mW"
-    )
+    factor = []
+    if law is not None:
+        times = value_with_error(calibration.k, calibration.k_stderr)
+        at_knee = f"the power of the knee in vacuum, {law.threshold_mW:.3f} mW"
+        factor = [f"k = {times} times {at_knee}"]
     if knee.measured and not calibration.knee_measured:
         return [
             f"knee, beyond the measured range: about {knee.lever_V:.2f} V, {knee.current_mA:.2f} "
             f"mA, {knee.power_mW:.2f} mW at a bias of {knee.bias_V:.1f} V, tip "
             f"{calibration.knee_tip_K:.0f} K",
-            factor,
+            *factor,
         ]
     if not knee.measured:
         power = value_with_error(knee.power_mW, knee.power_mW_stderr)
-        return [f"knee (estimated): {power} mW, tip {calibration.knee_tip_K:.0f} K", factor]
+        return [f"knee (estimated): {power} mW, tip {calibration.knee_tip_K:.0f} K", *factor]
     return [
         f"knee: {value_with_error(knee.lever_V, knee.lever_V_stderr)} V, "
         f"{value_with_error(knee.current_mA, knee.current_mA_stderr)} mA, "
         f"{value_with_error(knee.power_mW, knee.power_mW_stderr)} mW at a bias of "
         f"{value_with_error(knee.bias_V, knee.bias_V_stderr)} V, "
         f"tip {calibration.knee_tip_K:.0f} K",
-        factor,
+        *factor,
     ]
 
 
@@ -101,20 +109,22 @@ def _nearest_knee(calibration: Calibration) -> list[str]:
 
 
 def _budget_lines(calibration: Calibration) -> list[str]:
-    """Return the standard error by source at some temperatures, and the power there."""
-    table = calibration.table
-    sources = table.source.values.tolist()
-    known = np.isfinite(table.tip_K.values)
-    tip = table.tip_K.values[known]
-    rows = [[head.rjust(7) for head in ("T_tip (K)", "P_l (mW)", "± (K)", *sources)]]
+    """Return the standard error by source at some temperatures, and the power there.
+
+    With held supplies the bias tells more than the power of one.
+    """
+    table, alone = calibration.heating, calibration.probe.circuit.starts_cold
+    sources, tip = table.source.values.tolist(), table.tip_K.values
+    along, head = (table.power_mW, "P_l (mW)") if alone else (table.bias_V, "V_b (V)")
+    rows = [[head.rjust(7) for head in ("T_tip (K)", head, "± (K)", *sources)]]
     errors = [table.tip_stderr_K.values, *table.budget_K.values]
     inside = [shown for shown in _SHOWN if tip[0] <= shown <= tip[-1]]
     if len(inside) < _FEW:  # a cold lever, or a short range
         inside = np.linspace(tip[0], tip[-1], _FEW + 1)[1:].round(1).tolist()
     for shown in inside:
-        power = np.interp(shown, tip, table.power_mW.values[known])
-        kelvins = [f"{np.interp(shown, tip, error[known]):.1f}" for error in errors]
-        rows.append([f"{shown:.0f}", f"{power:.3f}", *kelvins])
+        at = np.interp(shown, tip, along.values)
+        kelvins = [f"{np.interp(shown, tip, error):.1f}" for error in errors]
+        rows.append([f"{shown:.0f}", f"{at:.3f}", *kelvins])
     return aligned(rows, right=True)
 
 

@@ -18,7 +18,7 @@ from hotlever.units import setting
 
 if TYPE_CHECKING:
     from hotlever.lever import Lever
-    from hotlever.probe import Probe
+    from hotlever.probe import Circuit, Probe
     from hotlever.types import Array
 
 #: Between these (V) a lever has a current that can be told from none, and no spark.
@@ -121,8 +121,10 @@ def column_files(columns: list[str] | None) -> list[Path]:
     return [Path(text) for text in columns or [] if "=" not in text]
 
 
-def parse_bias(text: str) -> Array:
+def parse_bias(text: str, circuit: Circuit | None = None) -> Array:
     """Parse ``START:STOP:COUNT`` in volts, ends included.
+
+    With held supplies in the circuit the start may be negative.
 
     Examples
     --------
@@ -131,8 +133,9 @@ def parse_bias(text: str) -> Array:
     """
     where = f"--bias {shown(text)}"
     start, stop, biases = _parse_range(text, where, "such as 1:11:25 (V)", MOST_BIASES)
-    if start < 0 or stop < start:
-        raise InputError(f"{where}: expected 0 <= START <= STOP")
+    signed = circuit is not None and not circuit.starts_cold
+    if (start < 0 and not signed) or stop < start:
+        raise InputError(f"{where}: expected {'' if signed else '0 <= '}START <= STOP")
     if (biases.size == 1) != (start == stop):
         raise InputError(f"{where}: COUNT 1 goes with START = STOP, more with START < STOP")
     if biases[biases > 0].min(initial=LEAST_BIAS) < LEAST_BIAS or stop > MOST_BIAS:

@@ -51,7 +51,6 @@ def sweep_command(
     """Solve a lever over a range of bias."""
     from hotlever.lever import sweep_csv, write_sweep
 
-    values = parse_bias(bias)
     if model not in MODELS:
         raise unknown_name("value", model, MODELS, "--model")
     check_medium(medium)
@@ -59,7 +58,9 @@ def sweep_command(
     outputs.file(output, ".csv", ".nc")
     check_plot(outputs, plot)
     outputs.folder(fields)
-    lever = _lever(load_probe(probe_file, settings, medium), model)
+    probe = load_probe(probe_file, settings, medium)
+    values = parse_bias(bias, probe.circuit)
+    lever = _lever(probe, model)
     states: list[State] = []
     with progress("sweep") as update:
         data, failure = _reached(lambda: lever.sweep(values, progress=update))

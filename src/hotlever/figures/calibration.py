@@ -21,6 +21,7 @@ from hotlever.figures.style import (
     SKY,
     VERMILION,
     figure,
+    from_zero,
 )
 from hotlever.fitting.misfit import usual_scatter
 from hotlever.studies.design import label_of
@@ -57,7 +58,7 @@ def calibration_curves(calibration: Calibration) -> Figure:
             axes.set(xlabel=label, ylabel="tip temperature (K)")
             if measured.tip_K.notnull().any():
                 axes.plot(measured[along], measured.tip_K, **MEASURED)
-        if np.isfinite(calibration.k):
+        if calibration.power_law is not None and np.isfinite(calibration.k):
             law = calibration.power_law.scaled(calibration.k)
             expected = law.tip_temperature(power, calibration.base_temperature_K)
             by_power.plot(power, expected, "--", color=ORANGE, label="power law at P$_l$/k")
@@ -76,7 +77,7 @@ def calibration_curves(calibration: Calibration) -> Figure:
             style: Any = {"fmt": "s", "color": VERMILION, "label": "knee, 95 %"}
             iv.errorbar(knee.lever_V, knee.current_mA, xerr=across, yerr=up, **style)
         iv.set(xlabel="lever voltage V$_l$ (V)", ylabel="heater current I$_h$ (mA)")
-        iv.set(xlim=(0, None), ylim=(0, None))
+        iv.set(xlim=from_zero(table.lever_V), ylim=from_zero(table.current_mA))
         iv.legend(loc="upper left")
         if described:
             _budget(budget, table)

@@ -23,6 +23,7 @@ from hotlever.figures.style import (
     VERMILION,
     axis_label,
     figure,
+    from_zero,
     panel_letters,
 )
 from hotlever.fitting.misfit import usual_scatter
@@ -190,12 +191,13 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
         away = ndtri(_QUANTILES)[:, None] * band.tip_stderr_K.values
         by_bias = by_power = band.tip_K.values + away
         middle_name = "prediction"
-    shape: Any = {"sharex": "col", "height_ratios": (1.8, 1.0)}
-    with figure(7.4, 5.0, 2, 2, letters=True, **shape) as (made, grid):
-        for (upper, lower), name, rows, label in (
-            (grid[:, 0], "bias", by_bias, "bias V$_b$ (V)"),
-            (grid[:, 1], "power_mW", by_power, "power P$_l$ (mW)"),
-        ):
+    shape: Any = {"sharex": "col", "height_ratios": (1.8, 1.0), "squeeze": False}
+    panels = [("bias", by_bias, "bias V$_b$ (V)")]
+    # with held supplies there may be several temperatures at one power
+    if np.all(np.diff(band.power_mW.values) >= 0):
+        panels.append(("power_mW", by_power, "power P$_l$ (mW)"))
+    with figure(3.7 * len(panels), 5.0, 2, len(panels), letters=True, **shape) as (made, grid):
+        for (upper, lower), (name, rows, label) in zip(grid.T, panels, strict=True):
             x = band[name].values
             low95, low68, middle, high68, high95 = rows
             upper.plot(x, middle, color=BLUE, label=middle_name)
@@ -208,7 +210,7 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
             if measured is not None:
                 upper.plot(measured[name], measured.tip_K, **MEASURED, ms=3.5)
             upper.set(ylabel="tip temperature (K)")
-            lower.set(xlabel=label, ylabel=f"T$_{{tip}}$ − {middle_name} (K)", xlim=(0, None))
+            lower.set(xlabel=label, ylabel=f"T$_{{tip}}$ − {middle_name} (K)", xlim=from_zero(x))
         grid[0, 0].legend(loc="upper left")
     return made
 

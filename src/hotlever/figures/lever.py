@@ -28,6 +28,7 @@ from hotlever.figures.style import (
     SKY,
     VERMILION,
     figure,
+    from_zero,
 )
 from hotlever.materials import HIGH_DOPED
 from hotlever.probe import Layout, ProbeMesh, Region
@@ -224,7 +225,12 @@ def iv_curves(
             at: Any = {"xytext": (-4, -13), "textcoords": "offset points", "ha": "right"}
             axes.annotate(point.name, (point.lever_V, point.current_mA), fontsize=8, **at)
         axes.set(xlabel="lever voltage V$_l$ (V)", ylabel="heater current I$_h$ (mA)")
-        axes.set(xlim=(0, None), ylim=(0, None))
+        shown = [*sweeps.values(), *([] if measured is None else [measured])]
+        volts, currents = (
+            np.concatenate([one[name].values for one in shown])
+            for name in ("lever_V", "current_mA")
+        )
+        axes.set(xlim=from_zero(volts), ylim=from_zero(currents))
         axes.legend(loc="upper left")
     return made
 

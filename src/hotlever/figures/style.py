@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -88,6 +89,11 @@ def save_figure(made: Figure, path: str | os.PathLike[str]) -> None:
         # no dates: the same figure gives the same file
         metadata = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
         made.savefig(temporary, metadata=metadata.get(suffix))
+
+
+def from_zero(values: Any) -> tuple[float | None, None]:
+    """Return limits of an axis that begins at zero, unless some values are below it."""
+    return (None if np.nanmin(values, initial=0.0) < 0.0 else 0.0), None
 
 
 def panel_letters(panels: Iterable[Axes]) -> None:

@@ -14,6 +14,7 @@ from hotlever.errors import InputError
 from hotlever.files import read_json
 from hotlever.fitting.measurement import COLUMNS, Measurement
 from hotlever.lever.transient.waveform import Polyline, Sine
+from hotlever.probe import Circuit
 from hotlever.probe.surroundings import Medium
 from hotlever.records import explained
 from hotlever.types import Array
@@ -64,13 +65,14 @@ class EmbeddedMeasurement(Section):
     time_us: list[float] | None = None
     waveform: Polyline | Sine | None = None
 
-    def measurement(self, where: str) -> Measurement:
-        """Return the measurement; `where` names the file in an error.
+    def measurement(self, where: str, circuit: Circuit) -> Measurement:
+        """Return the measurement, made in a circuit; `where` names the file in an error.
 
         Raises
         ------
         InputError
-            If its columns do not belong together, or a bias is missing, or negative at rest.
+            If its columns do not belong together, or a bias is missing, or negative at rest where
+            only the swept supply heats.
         """
         if "V_b" not in self.columns:
             raise InputError(f"{where}: columns: V_b is missing")
@@ -88,7 +90,7 @@ class EmbeddedMeasurement(Section):
             ):
                 raise InputError(f"{where}: waveform: expected the one that belongs to the times")
             columns["waveform"] = self.waveform
-        elif not np.all(columns["bias_V"] >= 0):
+        elif circuit.starts_cold and not np.all(columns["bias_V"] >= 0):
             raise InputError(f"{where}: V_b: expected biases of 0 or more")
         if self.rows is not None:
             columns["rows"] = array(self.rows, (rows,), f"{where}: rows")

@@ -156,9 +156,12 @@ def estimate(
     began = time.perf_counter()
     # what an earlier one used
     memory.give_back()
-    measurement = averaged(whole := Measurement.given(measurement), options.robust)
-    in_time = measurement.time_us is not None
     given = Probe.reference() if probe is None else Probe.given(probe)
+    whole = Measurement.given(measurement, given.circuit)
+    measurement = averaged(whole, options.robust)
+    in_time = measurement.time_us is not None
+    if in_time:
+        given.circuit.need_cold_start("a fit in time")
     probe, notes = with_measured_circuit(given, measurement, options.medium)
     notes += note_on_averages(whole, measurement)
     options = options.of(probe, in_time=in_time)
@@ -212,8 +215,11 @@ def estimate(
 
 
 def _below(measurement: Measurement, bias: float) -> Measurement | None:
-    """Return what was measured below a bias (V); None if that is too little to go on with."""
-    here = measurement.bias_V < bias
+    """Return what was measured below a bias (V); None if that is too little to go on with.
+
+    A negative bias is below it if it is nearer to zero.
+    """
+    here = np.abs(measurement.bias_V) < abs(bias)
     if here.all() or here.sum() < _FEWEST:
         return None
     columns: Any = {

@@ -14,9 +14,10 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import BSpline
 
-from hotlever.lever.branch import Branch, Reach
+from hotlever.lever.branch import TIP_RISE, Branch, Reach, shifted
 from hotlever.lever.curve import spline_through
-from hotlever.lever.following import Follower
+from hotlever.lever.equations import SHOWN
+from hotlever.lever.held import at_places_of, followed
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.pinned import Pinned
@@ -30,6 +31,8 @@ from hotlever.probe.parameters import parameters_of, usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
+#: How far beyond zero bias the branch of a lever goes that does not start cold: share of the range.
+_BEYOND_ZERO = 0.05
 #: States at which the full lever corrects a reduced one, whose errors are small and smooth.
 _CORRECTED_AT = 10
 
@@ -86,8 +89,9 @@ class Nearby:
     """Predictions for probes near one whose branch is known: a branch costs nothing there.
 
     At a fixed rise of the tip, voltages and currents are nearly powers of the parameters, much
-    more so than anything is at a fixed bias. What they change by at the branch's states,
-    ``by_parameter``, has the shape (k, 3, p).
+    more so than anything is at a fixed bias. With held supplies they may be of either sign, and go
+    straight. What they change by at the branch's states, ``by_parameter``, has the shape
+    (k, 3 or 4, p).
     """
 
     def __init__(
@@ -100,18 +104,25 @@ class Nearby:
     ) -> None:
         self._probe, self._names, self._branch, self.bias = probe, names, branch, bias
         self._origin = probe.at(names)
+        self._straight = not branch.equations.circuit.starts_cold
+        if self._straight:
+            self._unit, self._rates = np.ones(len(names)), by_parameter
+            self._slopes = spline_through(branch.u, by_parameter)(branch.u, 1)
+            return
         known = parameters_of(probe)
         scale = np.array([known[name].scale for name in names])
         self._unit = np.maximum(np.abs(self._origin), 0.1 * scale)
         powers = by_parameter[1:] * self._unit / branch.values[1:, :3, None]
         # without power everything is zero; its ratios are those of a barely warm lever
-        self._powers = np.concatenate([powers[:1], powers])
-        self._slopes = spline_through(branch.u, self._powers)(branch.u, 1)
+        self._rates = np.concatenate([powers[:1], powers])
+        self._slopes = spline_through(branch.u, self._rates)(branch.u, 1)
 
     def branch_at(self, values: Array) -> Branch:
         """Return the branch of some values of the parameters (p,)."""
         away = (values - self._origin) / self._unit
-        return multiplied(self._branch, np.exp(self._powers @ away), self._slopes @ away)
+        if self._straight:
+            return shifted(self._branch, self._rates @ away, self._slopes @ away)
+        return multiplied(self._branch, np.exp(self._rates @ away), self._slopes @ away)
 
     def predict(self, values: Array) -> tuple[Array, Array]:
         """Return I_h, V_r and T_tip (3, n), and their derivatives (3, n, p), for some values (p,).
@@ -122,7 +133,9 @@ class Nearby:
             If the lever has no state below the melting point at one of the biases.
         """
         branch = self.branch_at(values)
-        by_parameter = branch.values[:, :3, None] * self._powers / self._unit
+        by_parameter = self._rates
+        if not self._straight:
+            by_parameter = branch.values[:, :3, None] * self._rates / self._unit
         own = [
             (name, value)
             for name, value in zip(self._names, values.tolist(), strict=True)
@@ -155,7 +168,8 @@ def shown_at_bias(branch: Branch, circuit: Circuit, bias: Array) -> tuple[Array,
     if np.isnan(reading.u).any():
         raise branch.ended(reading)
     # the base temperature of a similar lever may be another one
-    shown, tip_K = branch.shown(reading.u), circuit.base_temperature_K + reading.u**2
+    warmer = circuit.base_temperature_K - branch.base_temperature_K
+    shown, tip_K = branch.shown(reading.u), branch.tip_K(reading.u) + warmer
     return reading.u, np.stack([shown["current_mA"], shown["reader_V"], tip_K])
 
 
@@ -167,15 +181,15 @@ def _with_slopes(
     slopes = spline_through(branch.u, by_parameter)(u)
     of_circuit = np.stack([circuit.bias_by(name, values[0]) for name in names], axis=1)
     of_base = np.array([circuit.base_by(name) for name in names])
-    return values, at_fixed_bias(branch.curve(u, 1), u, circuit, slopes, of_circuit, of_base)
+    return values, at_fixed_bias(branch.curve(u, 1), circuit, slopes, of_circuit, of_base)
 
 
 @dataclass(frozen=True)
 class Offset:
     """What a fast lever lacks, exact to first order at one place among the parameters.
 
-    `values` are those of V_l (V), I_h (mA) and V_r (V), by u; `slopes` of their derivatives by the
-    parameters.
+    `values` are those of V_l (V), I_h (mA) and V_r (V), perhaps of the rise of the tip (K) too, by
+    u; `slopes` of their derivatives by the parameters.
     """
 
     at: Array
@@ -184,22 +198,14 @@ class Offset:
 
     @classmethod
     def through(cls, at: Array, u: Array, values: Array, slopes: Array) -> Offset:
-        """Make curves through what is lacking at some u; without power nothing is."""
-        nodes = np.append(0.0, u)
-
-        def curve(known: Array) -> BSpline:
-            return spline_through(nodes, np.concatenate([np.zeros_like(known[:1]), known]))
-
-        return cls(at, curve(values), curve(slopes))
+        """Make curves through what is lacking at some u."""
+        return cls(at, spline_through(u, values), spline_through(u, slopes))
 
     def added(self, branch: Branch, at: Array) -> Branch:
         """Return a branch of the fast lever with what it lacks, for some values of parameters."""
-        moved = at - self.at
-        values, slopes = branch.values.copy(), branch.value_slopes.copy()
-        for derivative, known in enumerate((values, slopes)):
-            known[:, :3] += self.values(branch.u, derivative)
-            known[:, :3] += self.slopes(branch.u, derivative) @ moved
-        return replace(branch, values=values, value_slopes=slopes)
+        moved, u = at - self.at, branch.u
+        changes, slopes = (self.values(u, n) + self.slopes(u, n) @ moved for n in (0, 1))
+        return shifted(branch, changes, slopes)
 
 
 @dataclass(frozen=True)
@@ -219,8 +225,12 @@ class ForwardModel:
     offset: Offset | None = None
 
     def reach(self, probe: Probe) -> Reach:
-        """Return how far the branch of a probe must go."""
-        return Reach(probe.circuit, float(self.bias.max()))
+        """Return how far the branch of a probe must go: beyond zero if it does not start cold.
+
+        Similar levers have no bias elsewhere.
+        """
+        lowest, highest = min(float(self.bias.min()), 0.0), max(float(self.bias.max()), 0.0)
+        return Reach(probe.circuit, highest, lowest - _BEYOND_ZERO * (highest - lowest))
 
     @one_blas_thread
     def predict(self, probe: Probe, near: Prediction | None = None) -> Prediction:
@@ -262,13 +272,18 @@ class ForwardModel:
             found = find_roots(Pinned(equations, u**2), guess, NewtonOptions(tolerance=1e-5))
             x = found.x
         else:
-            branch = Follower(equations).until(self.reach(probe))
-            u, x = branch.u[1:], branch.x[:, 1:]
-        values = equations.observed(x).T - fast.curve(u)[:, :3]
-        lacking = np.zeros((u.size, 3, len(self.names)))
+            branch = at_places_of(fast, followed(equations, self.reach(probe)))
+            u, x = branch.u[branch.solved], branch.x[:, branch.solved]
+        known, columns = at.linearised.shown_at(u), [*range(len(SHOWN)), TIP_RISE]
+        shown = np.vstack([equations.observed(x), equations.space.tip_rise(x)])[: known.shape[1]]
+        values = shown.T - fast.curve(u)[:, columns[: known.shape[1]]]
+        lacking = np.zeros(known.shape)
         if self.first_order:
-            slopes = by_parameter(equations, x, self.names)
-            lacking = slopes - at.linearised.shown_at(u)
+            lacking = by_parameter(equations, x, self.names, pin=fast.sections.pin(u)) - known
+        if equations.circuit.starts_cold:
+            # without power nothing is lacking
+            u = np.append(0.0, u)
+            values, lacking = (np.insert(one, 0, 0.0, axis=0) for one in (values, lacking))
         return replace(self, offset=Offset.through(probe.at(self.names), u, values, lacking))
 
 

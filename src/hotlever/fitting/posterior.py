@@ -250,7 +250,7 @@ def predictive_band(
     xarray.Dataset
         ``tip_K`` (quantile, bias) and ``tip_at_power_K`` (quantile, power), with the coordinates
         ``quantile`` (%), ``bias_V`` and ``power_mW``. The powers reach to the highest that all
-        samples reach.
+        samples reach; they are NaN where a power does not tell the temperature.
 
     Raises
     ------
@@ -261,8 +261,12 @@ def predictive_band(
     """
     if samples < 2:
         raise InputError(f"found samples = {samples}, expected 2 or more")
-    highest = float(fit.measurement.bias_V.max())
-    grid = np.linspace(0.0, highest, 81) if bias is None else np.unique(np.asarray(bias, float))
+    measured = fit.measurement.bias_V
+    grid = (
+        np.linspace(min(float(measured.min()), 0.0), float(measured.max()), 81)
+        if bias is None
+        else np.unique(np.asarray(bias, float))
+    )
     model = rough_model(fit.probe, fit.names, grid)
     flat = np.stack([posterior[name].values.ravel() for name in fit.names], axis=1)
     chosen = flat[np.linspace(0, len(flat) - 1, min(samples, len(flat))).round().astype(int)]
@@ -275,6 +279,9 @@ def predictive_band(
         if progress is not None:
             progress(done, len(chosen))
     power = np.linspace(np.min(powers, axis=1).max(), np.max(powers, axis=1).min(), grid.size)
+    if np.diff(powers, axis=1).min() < 0:
+        # with held supplies there may be several temperatures at one power
+        power = np.full(grid.size, np.nan)
     at_power = [_against(power, x, tip) for x, tip in zip(powers, tips, strict=True)]
     quantiles = partial(np.percentile, q=BAND_QUANTILES, axis=0)
     return labelled(

@@ -314,7 +314,7 @@ def read_fit(path: str | os.PathLike[str]) -> Fit:
     if not found.parameters.keys() >= set(names):
         raise InputError(f"{path}: parameters and correlation do not belong together")
     probe = Probe.from_values(found.probe, f"{path}: probe")
-    measurement = found.data.measurement(f"{path}: data")
+    measurement = found.data.measurement(f"{path}: data", probe.circuit)
     in_time = measurement.time_us is not None
     for name in names:
         parameter_of(probe, name, f"{path}: correlation", in_time=in_time)

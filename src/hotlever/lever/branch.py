@@ -15,7 +15,7 @@ curve the maximum of V_l.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -26,12 +26,15 @@ from scipy.interpolate import PPoly
 from hotlever.errors import BranchEndError
 from hotlever.lever.curve import smooth_curve
 from hotlever.lever.equations import SHOWN, LeverEquations
+from hotlever.lever.ramp import Reading, crossing
+from hotlever.lever.sections import UNIT_K, UNIT_V, Across, ByTip, Sections
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 
-#: Points between two states at which a bias is first looked for, and steps of Newton's method
-#: from there.
-_SAMPLES, _NEWTON_STEPS = 8, 6
+#: A bias (V) that is none.
+_NO_BIAS = 1e-9
+#: The places of a lever that starts cold.
+BY_TIP = ByTip()
 #: Where a branch's values have the rises of the hottest place and of the tip.
 HIGHEST_RISE, TIP_RISE = len(SHOWN), len(SHOWN) + 1
 
@@ -53,44 +56,21 @@ class OperatingPoint:
 
 
 @dataclass(frozen=True)
-class Reading:
-    """Where a slow ramp of the bias finds a lever.
-
-    Attributes
-    ----------
-    u : ndarray, shape (n,)
-        Where on the branch each bias asked for is; NaN beyond the last that has a state.
-    jumps : list of tuple of float
-        Bias and tip temperature at each fold that the ramp passes.
-    last_V, last_u, last_K : float
-        The highest bias that has a state on the branch, where that is, and the tip temperature.
-    """
-
-    u: Array
-    jumps: list[tuple[float, float]]
-    last_V: float
-    last_u: float
-    last_K: float
-
-    def notes(self, bias: Array) -> list[str]:
-        """Say where a ramp through some biases (V) leaves the branch for a hotter part of it."""
-        return [
-            f"at a bias of {fold:.4f} V the lever jumps from a tip at {tip:.0f} K to a hotter "
-            "branch"
-            for fold, tip in self.jumps
-            if fold < bias.max(initial=0.0)
-        ]
-
-
-@dataclass(frozen=True)
 class Reach:
     """How far a branch must go: until a bias in a circuit, and one state beyond.
 
-    The curve between two states depends on the next one as well.
+    The curve between two states depends on the next one as well. A lever that does not start cold
+    may be asked for biases of the other polarity, down to a lowest one.
     """
 
     circuit: Circuit
     bias_V: float
+    lowest_V: float | None = None
+
+    @property
+    def mirrored(self) -> Reach:
+        """How far the branch of the other polarity must go."""
+        return Reach(self.circuit, -(self.lowest_V or 0.0))
 
     def count(self, values: Array) -> int | None:
         """Return how many states suffice, by their V_l and I_h, (k, 2 or more); None if not all."""
@@ -111,12 +91,16 @@ class Branch:
     equations : LeverEquations
     u : ndarray, shape (k,)
         √(T_tip − T_base) (K^½) of the states, the first at zero power. Of a lever that does not
-        start cold: how far along the branch they are, the first without a bias.
+        start cold: how far along the branch they are, from where it is without a bias; negative
+        on the way to biases of the other polarity.
     x, slopes : ndarray, shape (size + 1, k)
         The states, and their derivatives by u.
     values, value_slopes : ndarray, shape (k, 5)
         V_l (V), I_h (mA), V_r (V), the highest rise and that of the tip (K) of each state, and
         their derivatives by u.
+    places : Sections, optional
+        Of a lever that does not start cold: what the places u of similar levers have in common, if
+        they are not lines across this branch itself.
 
     Examples
     --------
@@ -132,6 +116,7 @@ class Branch:
     slopes: Array
     values: Array
     value_slopes: Array
+    places: Sections | None = None
 
     # --- the curves -------------------------------------------------------------------------------
 
@@ -139,6 +124,36 @@ class Branch:
     def curve(self) -> PPoly:
         """V_l (V), I_h (mA), V_r (V), the highest rise and that of the tip (K) by u."""
         return self.through(self.values, self.value_slopes)
+
+    @cached_property
+    def sections(self) -> Sections:
+        """What a place on the branch of a similar lever has in common with one on this."""
+        if self.equations.circuit.starts_cold:
+            return BY_TIP
+        if self.places is not None:
+            return self.places
+        own = self.curve.c[..., [TIP_RISE, 0]] / np.array([UNIT_K, UNIT_V])
+        return Across(PPoly(own, self.curve.x))
+
+    @property
+    def solved(self) -> slice:
+        """The states that were solved: all but the one without power."""
+        return slice(int(self.equations.circuit.starts_cold), None)
+
+    @cached_property
+    def mirrored(self) -> Branch:
+        """The same with all potentials and currents reversed, followed the other way."""
+        sign = np.where(self.equations.space.is_temperature, 1.0, -1.0)[:, None]
+        of_shown = np.ones(self.values.shape[1])
+        of_shown[: len(SHOWN)] = -1.0
+        return Branch(
+            self.equations.mirrored,
+            -self.u[::-1],
+            sign * self.x[:, ::-1],
+            -sign * self.slopes[:, ::-1],
+            of_shown * self.values[::-1],
+            -of_shown * self.value_slopes[::-1],
+        )
 
     @property
     def base_temperature_K(self) -> float:
@@ -239,11 +254,16 @@ class Branch:
         return level[(level > 0) & (level < self.end_u)]
 
     @cached_property
-    def knee(self) -> OperatingPoint | None:
-        """The knee dV_l/dI_h = 0: the highest lever voltage; None if V_l rises to the end."""
+    def knee_u(self) -> float | None:
+        """Where the knee is."""
         lever_V = PPoly(self.curve.c[..., 0], self.curve.x)
         falling = [u for u in self._turns(lever_V).tolist() if lever_V(u, 2) < 0]
-        return self.point(falling[0]) if falling else None
+        return falling[0] if falling else None
+
+    @property
+    def knee(self) -> OperatingPoint | None:
+        """The knee dV_l/dI_h = 0: the highest lever voltage; None if V_l rises to the end."""
+        return None if self.knee_u is None else self.point(self.knee_u)
 
     def point(self, u: float) -> OperatingPoint:
         """Return the operating point at u."""
@@ -270,57 +290,73 @@ class Branch:
     # --- in a circuit -----------------------------------------------------------------------------
 
     def read(self, circuit: Circuit, bias: Array) -> Reading:
-        """Find the states that a slow ramp from zero takes at some biases (V), in any order."""
+        """Find the states that a slow ramp from zero takes at some biases (V), in any order.
+
+        To negative ones another ramp leads.
+        """
+        below = bias < 0.0
+        if not below.any():
+            return self._ramp(circuit, bias)
+        up = self._ramp(circuit, bias[~below])
+        down = self.mirrored._ramp(circuit, -bias[below]).mirrored
+        u = np.empty(bias.shape)
+        u[~below], u[below] = up.u, down.u
+        ends = down if np.isnan(down.u).any() and not np.isnan(up.u).any() else up
+        return replace(ends, u=u, jumps=[*up.jumps, *down.jumps])
+
+    def _ramp(self, circuit: Circuit, bias: Array) -> Reading:
+        """Find the states that a slow ramp takes from zero upwards."""
         curve = PPoly(circuit.bias(self.curve.c[..., 0], self.curve.c[..., 1]), self.curve.x)
-        u = np.full(bias.shape, np.nan)
+        u, start = np.full(bias.shape, np.nan), self._without_bias(curve)
         # what is at no bias is found to rounding errors
-        reading = Reading(u, [], min(0.0, float(curve(0.0))), 0.0, float(self.tip_K(0.0)))
-        for low, high in pairwise([0.0, *self._turns(curve).tolist(), self.end_u]):
+        reading = Reading(u, [], min(0.0, float(curve(start))), start, float(self.tip_K(start)))
+        turns = [turn for turn in self._turns(curve).tolist() if turn > start]
+        for low, high in pairwise([start, *turns, self.end_u]):
             highest = float(curve(high))
             if highest <= reading.last_V:
                 continue  # the bias falls here, or has been as high before
             fell = float(curve(low)) < reading.last_V
             jumps = [*reading.jumps, (reading.last_V, reading.last_K)] if fell else reading.jumps
             here = np.flatnonzero(np.isnan(u) & (bias <= highest))
-            u[here] = _crossing(curve, low, high, bias[here])
+            u[here] = crossing(curve, low, high, bias[here])
             reading = Reading(u, jumps, highest, high, float(self.tip_K(high)))
         return reading
+
+    def _without_bias(self, curve: PPoly) -> float:
+        """Return where a curve of the bias by u is zero: near where it was followed from."""
+        if self.equations.circuit.starts_cold or abs(float(curve(0.0))) < _NO_BIAS:
+            return 0.0
+        # a similar lever has no bias elsewhere
+        roots = curve.roots(extrapolate=False)
+        return float(roots[np.argmin(np.abs(roots))]) if roots.size else float(self.u[0])
 
     def ended(self, reading: Reading) -> BranchEndError:
         """Return the error that says where a ramp of the bias ends."""
         bias, tip = reading.last_V, reading.last_K
         limit, end = self.equations.limit
-        if self.melts and reading.last_u == self.end_u:
+        side = self if bias >= 0 else self.mirrored
+        if side.melts and abs(reading.last_u) == side.end_u:
             text = f"{end} at a bias of {bias:.4f} V, where the tip is at {tip:.1f} K"
         else:
             at = self.point(reading.last_u)
             text = (
                 f"the branch of a slow bias ramp ends at a bias of {bias:.4f} V (lever "
-                f"{at.lever_V:.4f} V, current {at.current_mA:.4f} mA, tip {tip:.1f} K): above it "
+                f"{at.lever_V:.4f} V, current {at.current_mA:.4f} mA, tip {tip:.1f} K): beyond it "
                 f"there is no steady state below {limit:.0f} K"
             )
         return BranchEndError(text, bias_reached=bias)
 
 
-def _samples(curve: PPoly, low: float, high: float) -> Array:
-    """Return points between which a curve is smooth enough for a few steps of Newton's method."""
-    inner = curve.x[(curve.x > low) & (curve.x < high)]
-    ends = np.concatenate([[low], inner, [high]])
-    shares = np.arange(_SAMPLES) / _SAMPLES
-    return np.append((ends[:-1, None] + np.diff(ends)[:, None] * shares).ravel(), high)
+def shifted(branch: Branch, changes: Array, slopes: Array) -> Branch:
+    """Return a branch with V_l, I_h and V_r changed by (k, 3); by (k, 4) the rise of the tip too.
 
-
-def _crossing(curve: PPoly, low: float, high: float, values: Array) -> Array:
-    """Return where a curve that rises from `low` to `high` has some values, or begins above."""
-    at = _samples(curve, low, high)
-    known = np.maximum.accumulate(curve(at))
-    place = np.clip(np.searchsorted(known, values) - 1, 0, at.size - 2)
-    left, right = at[place], at[place + 1]
-    u = np.interp(values, known, at)
-    for _ in range(_NEWTON_STEPS):
-        slope = np.maximum(curve(u, 1), 1e-12)
-        u = np.clip(u - (curve(u) - values) / slope, left, right)
-    return np.where(values <= known[0], low, u)
+    The slopes are derivatives of the changes by u.
+    """
+    columns = [*range(len(SHOWN)), TIP_RISE][: changes.shape[1]]
+    moved = branch.values.copy(), branch.value_slopes.copy()
+    for known, change in zip(moved, (changes, slopes), strict=True):
+        known[:, columns] += change
+    return replace(branch, values=moved[0], value_slopes=moved[1])
 
 
 def steps_of(equations: LeverEquations) -> Array:

@@ -101,6 +101,6 @@ def estimated_error(lever: Lever, branch: Branch, u: Array) -> Array:
         axis=-1,
     )
     found, remaining = np.moveaxis(
-        np.abs(at_fixed_bias(branch.curve(u, 1), u, lever.circuit, np.swapaxes(away, 0, 1))), 2, 0
+        np.abs(at_fixed_bias(branch.curve(u, 1), lever.circuit, np.swapaxes(away, 0, 1))), 2, 0
     )
     return np.maximum(_SAFETY * found + remaining, _FLOOR[:, None])

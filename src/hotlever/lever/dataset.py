@@ -16,7 +16,7 @@ from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import InputError
 from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES, balance_names
-from hotlever.probe import Probe
+from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.probe import SECTIONS
 from hotlever.types import Array
@@ -171,18 +171,20 @@ def probe_of(data: xr.Dataset) -> Probe:
     return Probe.from_values(sections, "sweep")
 
 
-def checked_bias(bias: ArrayLike) -> Array:
+def checked_bias(bias: ArrayLike, circuit: Circuit) -> Array:
     """Return biases as an array.
 
     Raises
     ------
     InputError
-        If one is negative or not finite, or there is none.
+        If one is not finite or there is none; or one is negative, unless a held supply makes that
+        another state than the positive one.
     """
     values = np.atleast_1d(np.asarray(bias, dtype=float))
-    wrong = values[~(values >= 0) | ~np.isfinite(values)]
+    wrong = values[~np.isfinite(values) | ((values < 0) & circuit.starts_cold)]
     if wrong.size:
-        raise InputError(f"found a bias of {wrong[0]:g} V, expected finite biases of 0 or more")
+        of = " of 0 or more" if circuit.starts_cold else ""
+        raise InputError(f"found a bias of {wrong[0]:g} V, expected finite biases{of}")
     if not values.size:
         raise InputError("no bias, expected one or more")
     return values

@@ -133,6 +133,8 @@ class LeverEquations(LawsAtPoints):
         grad_T, grad_V = fields.grad_T[..., None], fields.grad_V[..., None]
         heat = -sigma * square(fields.grad_V)[..., None]
         changes = Fluxes(heat, kappa * grad_T, sigma * grad_V)
+        if self.end_rises and BASE in names:
+            self._without_ends(changes, names.index(BASE), known.kappa)
         for place in (place for place, name in enumerate(names) if name in self.motions):
             motion = self.motions[names[place]]
             moved = motion.of_fluxes(fields, self.fluxes(x), known.kappa, known.sigma)
@@ -152,6 +154,15 @@ class LeverEquations(LawsAtPoints):
             elif name == GAP:
                 weak[..., place] += air.change_with_gap(theta)
         return weak
+
+    def _without_ends(self, changes: Fluxes, place: int, kappa: Array) -> None:
+        """Correct changes with the base temperature: leg ends of their own do not move with it."""
+        tests = [self.space.end_tests[name][..., None] for name in self.end_rises]
+        value, slope = np.split(np.sum(tests, axis=0), [1])
+        changes.heat_source[..., place] *= 1.0 - value[0]
+        changes.heat[..., place] *= 1.0 - value[0]
+        changes.heat[..., place] -= kappa * slope
+        changes.charge[..., place] *= 1.0 - value[0]
 
     def tip_by_parameter(self, x: Array, names: Sequence[str]) -> Array:
         """Return how the tip's rise (K) changes with parameters, the unknowns being the same.
@@ -254,7 +265,8 @@ class LeverEquations(LawsAtPoints):
         gradient[..., 1] = self.space.weak_form(Fluxes(along, flat, laws.sigma * supply))
         if self.space.reader is not None:
             unknowns, weights = self.space.reader
-            gradient[unknowns, :, 2] = weights[:, None]
+            # the nodes of a contact share one unknown
+            np.add.at(gradient[..., 2], unknowns, weights[:, None])
         return gradient
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from hotlever.errors import ComputationError, NewtonError
-from hotlever.lever.branch import Branch, steps_of
+from hotlever.lever.branch import BY_TIP, Branch, steps_of
 from hotlever.lever.curve import hermite_weights
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
 from hotlever.lever.pinned import Pinned
+from hotlever.lever.sections import Sections
 from hotlever.types import Array
 
 #: Steps between the states of a branch: in u (K^½) where it is cold, in the tip temperature (K)
@@ -101,9 +103,14 @@ def _landing(u: float, step: float, steps: Array) -> float:
     return float(between[0]) if between.size else after
 
 
-def branch_of(equations: LeverEquations, u: Array, found: NewtonResult) -> Branch:
-    """Return the branch of states solved together at some u, after the one without power."""
-    return joined(_cold(equations, equations.cold()[0]), _part(equations, u, found))
+def branch_of(
+    equations: LeverEquations, u: Array, found: NewtonResult, sections: Sections = BY_TIP
+) -> Branch:
+    """Return the branch of states solved together at some u; from cold, if that it starts."""
+    part = _part(equations, u, found, sections)
+    if not equations.circuit.starts_cold:
+        return replace(part, places=sections)
+    return joined(_cold(equations, equations.cold()[0]), part)
 
 
 def _cold(equations: LeverEquations, slope: Array) -> Branch:
@@ -111,10 +118,13 @@ def _cold(equations: LeverEquations, slope: Array) -> Branch:
     return part_of(equations, np.zeros(1), np.zeros_like(slope), slope)
 
 
-def _part(equations: LeverEquations, u: Array, found: NewtonResult) -> Branch:
+def _part(
+    equations: LeverEquations, u: Array, found: NewtonResult, sections: Sections = BY_TIP
+) -> Branch:
     """Return a part of a branch that was solved."""
-    slopes = 2.0 * u * equations.along(found.x, found.factors)
-    return part_of(equations, u, found.x, slopes)
+    along = equations.along(found.x, found.factors, sections.pin(u))
+    rate = sections.rate(u, equations.space, found.x)
+    return part_of(equations, u, found.x, rate * along)
 
 
 def part_of(equations: LeverEquations, u: Array, x: Array, slopes: Array) -> Branch:

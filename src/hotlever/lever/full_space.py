@@ -309,11 +309,13 @@ class FullSpace(Space):
             entries = self._assembled(tangent.of(state))
             entries[self._contact_slots] += conductance
             if self.air is None or air is None:
-                solvers.append(self._lu(entries, pin))
+                solvers.append(self._lu(entries, pin.among(state)))
                 continue
             kappa = air.kappa[:, state]
             local = entries + self.air.local_entries(kappa, self._entries)
-            solvers.append(AirSolver(self._lu(local, pin), self.air, kappa, air.taken_up))
+            solvers.append(
+                AirSolver(self._lu(local, pin.among(state)), self.air, kappa, air.taken_up)
+            )
         return SparseFactors(solvers)
 
     def _assembled(self, tangent: Tangent) -> Array:

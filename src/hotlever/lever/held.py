@@ -2,7 +2,8 @@
 
 Such a lever is warm before the swept supply heats it, and may cool at first as that takes current
 from the others. So neither its tip temperature nor its voltage need rise along the branch, and it
-is followed by the length of its curve in the plane of both, in units of 60 K and 1 V.
+is followed by the length of its curve in the plane of both, in units of 60 K and 1 V. The other
+polarity of the bias is another part of the same curve.
 """
 
 from __future__ import annotations
@@ -13,16 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.errors import ComputationError, NewtonError
-from hotlever.lever.branch import Branch
+from hotlever.lever.branch import TIP_RISE, Branch, Reach
 from hotlever.lever.curve import hermite_weights
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.following import joined, part_of
+from hotlever.lever.following import Follower, branch_of, joined, part_of
 from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.pinned import Pinned, state_at_bias
+from hotlever.lever.sections import UNIT_K, UNIT_V, in_plane
 from hotlever.lever.space import LEVER, TIP, Pin, Space
 from hotlever.types import Array
 
-_UNIT_K, _UNIT_V = 60.0, 1.0
 #: Steps along the branch: the first, the largest, the smallest, and how many at most.
 _FIRST, _LARGEST, _SMALLEST, _MOST = 0.1, 1.0, 1e-4, 2000
 #: What a state may be off from where it is expected, in K, beyond which the step was too long.
@@ -31,6 +32,8 @@ _ASTRAY = 3.0
 _SMALLEST_SHARE = 1.0 / 64.0
 #: Far below what the curves between the states are off by.
 _OPTIONS = NewtonOptions(tolerance=1e-5)
+#: Points for each state at which the nearest place on another branch is looked for.
+_LOOKED_AT = 20
 #: Points of Gauss's rule and rounds by which the length of a piece of the curve is found.
 _GAUSS, _ROUNDS = np.polynomial.legendre.leggauss(5), 6
 
@@ -60,6 +63,28 @@ def at_rest(equations: LeverEquations) -> Array:
     return x
 
 
+def at_places_of(known: Branch, branch: Branch) -> Branch:
+    """Return a branch with its states at the places of a similar one, and their u.
+
+    Of a lever that starts cold it is returned as it is: its own places are as good.
+
+    Raises
+    ------
+    NewtonError
+        If a state was not found.
+    """
+    equations, sections = branch.equations, known.sections
+    if equations.circuit.starts_cold:
+        return branch
+    u = np.linspace(branch.u[0], branch.u[-1], _LOOKED_AT * branch.u.size)
+    there, here = branch.curve(u)[:, [TIP_RISE, 0]], known.values[:, [TIP_RISE, 0]]
+    away = (there - here[:, None]) / np.array([UNIT_K, UNIT_V])
+    nearest = u[np.argmin((away**2).sum(axis=-1), axis=1)]
+    pinned = Pinned(equations, sections.values(known.u), sections.pin(known.u))
+    found = find_roots(pinned, branch.states(nearest), _OPTIONS)
+    return branch_of(equations, known.u, found, sections)
+
+
 @dataclass(frozen=True)
 class Heading:
     """Where a branch goes at a state: its tangent in the plane of tip and voltage.
@@ -79,14 +104,14 @@ class Heading:
     @classmethod
     def along(cls, space: Space, slope: Array) -> Heading:
         """Return the heading of a change of a state along its branch."""
-        tip, lever = float(space.tip_rise(slope)[0]) / _UNIT_K, float(slope[-1, 0]) / _UNIT_V
+        tip, lever = in_plane(space, slope)[0].tolist()
         length = float(np.hypot(tip, lever))
         return cls(tip / length, lever / length, slope / length)
 
     @property
     def pin(self) -> Pin:
         """What grows by the length along this heading."""
-        return Pin(self.tip / _UNIT_K, self.lever / _UNIT_V)
+        return Pin(self.tip / UNIT_K, self.lever / UNIT_V)
 
     def length_to(self, other: Heading, tip: float, lever: float) -> float:
         """Return the length of the curve to a state that is elsewhere by so much (in units).
@@ -111,6 +136,41 @@ def pin_along(branch: Branch, u: float) -> Pin:
     if branch.equations.circuit.starts_cold:
         return TIP
     return Heading.along(branch.equations.space, branch.states_slope(np.array([u]))).pin
+
+
+def followed(
+    equations: LeverEquations,
+    enough: Callable[[Branch], bool],
+    start: Branch | None = None,
+    seen: Callable[[Branch], None] = lambda branch: None,
+) -> Branch:
+    """Follow a lever until its branch is long enough, or on from a branch of it.
+
+    A reach may ask for biases of the other polarity too. Each longer branch is shown to `seen`.
+
+    Raises
+    ------
+    ComputationError
+        If a state was not found; ``partial`` holds the branch up to there.
+    """
+
+    def far_enough(branch: Branch) -> bool:
+        seen(branch)
+        return enough(branch)
+
+    if equations.circuit.starts_cold:
+        return Follower(equations, start).until(far_enough)
+    branch = HeldFollower(equations, start).until(far_enough)
+    if not isinstance(enough, Reach) or enough.lowest_V is None:
+        return branch
+    other, back = enough.mirrored, branch.mirrored
+    if other(back):
+        return branch
+    try:
+        return HeldFollower(back.equations, back).until(other).mirrored
+    except ComputationError as error:
+        error.partial = error.partial.mirrored
+        raise
 
 
 class HeldFollower:
@@ -177,6 +237,5 @@ class HeldFollower:
         if not (astray <= _ASTRAY and turned > 0.5):
             return None
         moved = found.x - last
-        tip, lever = float(space.tip_rise(moved)[0]) / _UNIT_K, float(moved[-1, 0]) / _UNIT_V
-        at = np.array([u + here.length_to(there, tip, lever)])
+        at = np.array([u + here.length_to(there, *in_plane(space, moved)[0].tolist())])
         return part_of(equations, at, found.x, there.slope)

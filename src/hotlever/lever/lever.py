@@ -16,15 +16,15 @@ from hotlever.air.operator import air_operator, change_with_gap
 from hotlever.air.surface import PanelOptions
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.balances import balance_columns, balance_slopes
-from hotlever.lever.branch import HIGHEST_RISE, Branch, Reach, Reading
+from hotlever.lever.branch import HIGHEST_RISE, Branch, Reach
 from hotlever.lever.dataset import at_bias, checked_bias, sweep_dataset
 from hotlever.lever.equations import SHOWN, LeverEquations
-from hotlever.lever.following import Follower
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.heat_in_air import AroundLever
-from hotlever.lever.held import HeldFollower, pin_along
+from hotlever.lever.held import followed, pin_along
 from hotlever.lever.meshing import chosen_space, flat_space
 from hotlever.lever.pinned import state_at_bias
+from hotlever.lever.ramp import Reading
 from hotlever.lever.sensitivities import sensitivities_of
 from hotlever.lever.space import TIP, Pin
 from hotlever.lever.state import State
@@ -174,22 +174,22 @@ class Lever:
     ) -> Branch:
         """Return a branch that is long enough, going on from the one at hand."""
 
-        def told(branch: Branch) -> bool:
+        def told(branch: Branch) -> None:
             if progress is not None:
                 progress(branch.u.size, max(_USUAL_STATES, branch.u.size + 1))
-            return enough(branch)
 
         try:
-            follower = Follower if self.circuit.starts_cold else HeldFollower
-            self._branch = follower(self.equations, self._branch).until(told)
+            self._branch = followed(self.equations, enough, self._branch, told)
         except ComputationError as error:
             self._branch = error.partial
             raise
         return self._branch
 
-    def branch_to(self, bias: float, progress: Progress | None = None) -> Branch:
-        """Return a branch that reaches a bias (V), or ends below it because silicon melts."""
-        return self._followed(Reach(self.circuit, bias), progress)
+    def branch_to(
+        self, bias: float, progress: Progress | None = None, lowest: float | None = None
+    ) -> Branch:
+        """Return a branch that reaches biases (V), or ends before because silicon melts."""
+        return self._followed(Reach(self.circuit, bias, lowest), progress)
 
     @one_blas_thread
     def branch_past_knee(self) -> Branch:
@@ -203,7 +203,7 @@ class Lever:
         Parameters
         ----------
         bias : array_like, shape (n,)
-            Biases (V) in any order, not negative.
+            Biases (V) in any order; negative ones where held supplies make them differ.
         progress : callable, optional
             Called with the states done and their number.
 
@@ -215,11 +215,11 @@ class Lever:
         Raises
         ------
         InputError
-            If a bias is negative or not finite.
+            If a bias is not finite, or negative where it must not be.
         BranchEndError, ComputationError
             If not every bias is reached; ``partial`` holds the states up to there.
         """
-        values = checked_bias(bias)
+        values = checked_bias(bias, self.circuit)
         branch, reading, failure = self._read(values)
         states: list[State] = []
         for u, value in zip(reading.u, values.tolist(), strict=True):
@@ -241,15 +241,15 @@ class Lever:
         """Return the branch, where a ramp finds it, and why it does not have all the biases."""
         failure: ComputationError | None = None
         try:
-            branch = self.branch_to(float(bias.max()), progress)
+            below = min(float(bias.min()), 0.0) or None
+            branch = self.branch_to(float(bias.max()), progress, below)
         except ComputationError as error:
             if error.partial is None:
                 raise
             branch, failure = error.partial, error
         reading = branch.read(self.circuit, bias)
-        if np.isfinite(reading.u).all():
-            return branch, reading, None
-        return branch, reading, failure or branch.ended(reading)
+        missing = np.isnan(reading.u).any()
+        return branch, reading, (failure or branch.ended(reading)) if missing else None
 
     @one_blas_thread
     def polished(self, guess: Array, bias: float, pin: Pin = TIP) -> State:
@@ -271,7 +271,8 @@ class Lever:
         Parameters
         ----------
         bias : array_like, shape (n,)
-            Biases (V) in any order, not negative; a slow ramp from zero meets them rising.
+            Biases (V) in any order, met by a slow ramp from zero; negative ones, met by another,
+            where held supplies make them differ.
         sensitivities : bool
             Add the derivatives of I_h, V_r and T_tip, at fixed bias, by the parameters that a fit
             usually varies.
@@ -288,27 +289,26 @@ class Lever:
         Raises
         ------
         InputError
-            If a bias is negative or not finite.
+            If a bias is not finite, or negative where it must not be.
         BranchEndError, ComputationError
             If not every bias is reached; ``partial`` holds the dataset up to there.
 
         Notes
         -----
-        Between the states of the branch the curves are within 2e-5 in V_l and I_h and 0.02 K of
-        states solved by themselves (`solve`), a third of what the mesh is off by; 5e-5 and 0.05 K
-        where a leg gets hot faster than the tip. With held supplies each is solved by itself.
+        Between the states of the branch curves are within 2e-5 in V_l and I_h and 0.02 K of solved
+        ones (`solve`), a third of the mesh's error; 5e-5 and 0.05 K where a leg gets hot faster
+        than the tip. With held supplies each is solved by itself.
         """
-        values = checked_bias(bias)
-        if sensitivities:
-            self.circuit.need_cold_start("a sweep with sensitivities")
+        values = checked_bias(bias, self.circuit)
         branch, reading, failure = self._read(values, progress)
         here = np.flatnonzero(np.isfinite(reading.u))
-        notes = reading.notes(values[here])
-        if self.circuit.starts_cold:
-            data = self._dataset(branch, reading.u[here], notes, sensitivities)
-        else:
-            places = zip(reading.u[here], values[here].tolist(), strict=True)
-            data = self.dataset([self._state_at(branch, u, bias) for u, bias in places], notes)
+        u, notes, states = reading.u[here], reading.notes(values[here]), []
+        if not (cold := self.circuit.starts_cold):
+            states = [self._state_at(branch, *at) for at in zip(u, values[here], strict=True)]
+        x = np.concatenate([one.x for one in states], axis=1) if states else None
+        by: Any = branch, u, self.circuit, usual_parameters(self.probe), x
+        more = notes, sensitivities_of(*by) if sensitivities else None
+        data = self._dataset(branch, u, *more) if cold else self.dataset(states, *more)
         data = at_bias(data, values[here])
         if failure is not None:
             failure.partial = data
@@ -316,18 +316,20 @@ class Lever:
         return data
 
     @one_blas_thread
-    def dataset(self, states: Sequence[State], notes: Sequence[str] = ()) -> xr.Dataset:
+    def dataset(
+        self, states: Sequence[State], notes: Sequence[str] = (), slopes: Array | None = None
+    ) -> xr.Dataset:
         """Return what is observed of solved states, as `sweep` does."""
         space, equations = self.space, self.equations
         x = np.concatenate([np.zeros((space.size + 1, 0)), *(state.x for state in states)], axis=1)
         base = self.circuit.base_temperature_K
         shown = dict(zip(SHOWN, equations.observed(x), strict=True))
         shown |= {"tip_K": base + space.tip_rise(x), "max_K": base + space.rises(x).max(axis=0)}
-        return sweep_dataset(self.probe, shown, balance_columns(equations, x), notes)
+        return sweep_dataset(self.probe, shown, balance_columns(equations, x), notes, slopes)
 
     @one_blas_thread
     def _dataset(
-        self, branch: Branch, u: Array, notes: list[str], sensitivities: bool = False
+        self, branch: Branch, u: Array, notes: list[str], sensitivities: Array | None = None
     ) -> xr.Dataset:
         """Return what is observed at some places of the branch."""
         balances = balance_columns(self.equations, branch.x)
@@ -335,9 +337,9 @@ class Lever:
         base = self.circuit.base_temperature_K
         shown = branch.shown(u)
         shown |= {"tip_K": branch.tip_K(u), "max_K": base + branch.curve(u)[..., HIGHEST_RISE]}
-        names = usual_parameters(self.probe) if sensitivities else ()
-        found = sensitivities_of(branch, u, self.circuit, names) if sensitivities else None
-        return sweep_dataset(self.probe, shown, branch.through(balances, slopes)(u), notes, found)
+        return sweep_dataset(
+            self.probe, shown, branch.through(balances, slopes)(u), notes, sensitivities
+        )
 
     @one_blas_thread
     def pulse(
@@ -372,11 +374,10 @@ class Lever:
             If V_l keeps rising until the silicon melts.
         """
         branch = self.branch_past_knee()
-        knee = branch.knee
-        if knee is None:
+        if branch.knee_u is None:
             end = f"{self.equations.limit[1]}, with the tip at {branch.hottest_K:.0f} K"
             raise ComputationError(f"V_l rises until {end}: there is no knee")
-        return self._dataset(branch, branch.u_at([knee.tip_K]), [])
+        return self._dataset(branch, np.array([branch.knee_u]), [])
 
 
 def sweep(

@@ -25,12 +25,13 @@ class Pinned:
     def residual(self, x: Array, which: Index) -> Array:
         """Return the residuals of heat, charge and pin, (size + 1, n)."""
         residual = self._equations.balance(x)
-        residual[-1] = self._pin.of(self._equations.space, x) - self._values[which]
+        pin = self._pin.among(which)
+        residual[-1] = pin.of(self._equations.space, x) - self._values[which]
         return residual
 
     def factorised(self, x: Array, which: Index) -> Factors:
         """Return the factorised Jacobians."""
-        return self._equations.factorised(x, self._pin)
+        return self._equations.factorised(x, self._pin.among(which))
 
 
 def state_at_bias(

@@ -99,6 +99,13 @@ class LawsAtPoints:
         other._latest = None
         return other
 
+    @property
+    def mirrored(self) -> Self:
+        """The same with held supplies of the other polarity."""
+        other = copy(self)
+        other.source_mA = -self.source_mA
+        return other
+
     def fluxes(self, x: Array) -> Fluxes:
         """Return what the weak equations test."""
         fields, laws = self.at(x)

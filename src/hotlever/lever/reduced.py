@@ -137,7 +137,7 @@ class ReducedSpace(Space):
                 of_air = self.air.matrix(air.kappa[:, state], air.taken_up)
                 matrices[state, : self.count, : self.count] += of_air
         matrices[:, -1] = 0.0
-        matrices[:, -1, : self.count] = pin.tip * self.tip[1]
+        matrices[:, -1, : self.count] = np.multiply.outer(pin.tip, self.tip[1])
         matrices[:, -1, -1] = pin.lever
         return DenseFactors(np.asarray(np.linalg.inv(matrices), dtype=float))
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hotlever.lever.branch import Branch
+from hotlever.lever.branch import TIP_RISE, Branch
 from hotlever.lever.curve import spline_through
 from hotlever.lever.equations import SHOWN, LeverEquations
-from hotlever.lever.following import Follower
-from hotlever.lever.space import Factors
+from hotlever.lever.held import followed
+from hotlever.lever.space import TIP, Factors, Pin
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit
@@ -26,21 +26,29 @@ def by_parameter(
     x: Array,
     names: Sequence[str] = tuple(PARAMETERS),
     factors: Factors | None = None,
+    pin: Pin = TIP,
 ) -> Array:
     """Return how V_l, I_h and V_r change with parameters at fixed rises of the tip, (n, 3, k).
 
-    Beside those of the material these may be dimensions whose motions the equations know. The
-    states have power; factors are those of these very states. Adjoint: three solves for each state,
-    however many parameters there are.
+    At another fixed pin the rise of the tip changes too, (n, 4, k). Beside those of the material
+    the parameters may be dimensions whose motions the equations know. The states have power;
+    factors are those of these very states. Adjoint: one solve for each of these quantities and each
+    state, however many parameters there are.
     """
-    factors = factors or equations.factorised(x)
-    direct = equations.by_parameter(x, names)
+    factors = factors or equations.factorised(x, pin)
+    direct, of_tip = equations.by_parameter(x, names), equations.tip_by_parameter(x, names)
     missing = -direct
-    missing[-1] = -equations.tip_by_parameter(x, names)
+    missing[-1] = -np.reshape(pin.tip, (-1, 1)) * of_tip
     gradient = equations.observed_gradient(x)
+    if pin is not TIP:
+        unknowns, weights = equations.space.tip
+        tip = np.zeros((*x.shape, 1))
+        tip[unknowns, :, 0] = weights[:, None]
+        gradient = np.concatenate([gradient, tip], axis=-1)
     adjoint = factors.solve(gradient, np.arange(x.shape[1]), transposed=True)
     shown = np.einsum("sno,snk->nok", adjoint, missing)
     shown[:, 1] += direct[-1]
+    shown[:, len(SHOWN) :] += of_tip[:, None]
     if equations.space.reader is None:
         shown[:, 2] = np.nan
     return np.asarray(shown)
@@ -64,7 +72,6 @@ def with_changes(
 
 def at_fixed_bias(
     along: Array,
-    u: Array,
     circuit: Circuit,
     shown: Array,
     of_circuit: Array | float = 0.0,
@@ -72,17 +79,17 @@ def at_fixed_bias(
 ) -> Array:
     """Return derivatives of I_h, V_r and T_tip by parameters at a fixed bias.
 
-    A parameter moves the curves at fixed rises of the tip; the circuit then moves the state along
-    its branch until the bias is what it was.
+    A parameter moves the curves at fixed rises of the tip, or another fixed pin; the circuit then
+    moves the state along its branch until the bias is what it was.
 
     Parameters
     ----------
-    along : ndarray, shape (n, 3 or more)
-        Derivatives of V_l, I_h and V_r by u = √(T_tip − T_base).
-    u : ndarray, shape (n,)
+    along : ndarray, shape (n, 5)
+        Derivatives by u of what `Branch.curve` has.
     circuit : Circuit
-    shown : ndarray, shape (n, 3, p)
-        Derivatives of V_l, I_h and V_r at fixed rises of the tip, see `by_parameter`.
+    shown : ndarray, shape (n, 3, p) or (n, 4, p)
+        Derivatives of V_l, I_h and V_r, and of the rise of the tip unless that is fixed, see
+        `by_parameter`.
     of_circuit : ndarray, shape (n, p)
         Derivatives of the bias for a given state, see `Circuit.bias_by`.
     of_base : ndarray, shape (p,)
@@ -94,32 +101,43 @@ def at_fixed_bias(
         In the order of `hotlever.lever.dataset.OBSERVABLES`; mA, V and K per unit of the
         parameter.
     """
-    lever_V, current_mA, reader_V = np.moveaxis(shown, 1, 0)
-    by_u = along[:, :3, None]
+    lever_V, current_mA, reader_V, *tip = np.moveaxis(shown, 1, 0)
+    by_u = along[:, :, None]
     missing = circuit.bias(lever_V, current_mA) + of_circuit
     moved = -missing / circuit.bias(by_u[:, 0], by_u[:, 1])
     return np.stack(
         [
             current_mA + by_u[:, 1] * moved,
             reader_V + by_u[:, 2] * moved,
-            of_base + 2.0 * u[:, None] * moved,
+            of_base + sum(tip) + by_u[:, TIP_RISE] * moved,
         ]
     )
 
 
-def sensitivities_of(branch: Branch, u: Array, circuit: Circuit, names: Sequence[str]) -> Array:
-    """Return the derivatives of `at_fixed_bias` by parameters at any u of a branch, exact."""
-    shown = np.zeros((u.size, len(SHOWN), len(names)))
-    hot = np.flatnonzero(u > 0)  # without power nothing depends on the material
+def sensitivities_of(
+    branch: Branch, u: Array, circuit: Circuit, names: Sequence[str], x: Array | None = None
+) -> Array:
+    """Return the derivatives of `at_fixed_bias` by parameters at any u of a branch, exact.
+
+    The states there, (size + 1, n), may be known better than the curves do.
+    """
+    x = branch.states(u) if x is None else x
+    cold = branch.equations.circuit.starts_cold
+    shown = np.zeros((u.size, len(SHOWN) + (not cold), len(names)))
+    # without power nothing depends on the material
+    hot = np.flatnonzero(u > 0) if cold else np.arange(u.size)
     for start in range(0, hot.size, _AT_ONCE):
         some = hot[start : start + _AT_ONCE]
-        shown[some] = by_parameter(branch.equations, branch.states(u[some]), names)
-    return at_fixed_bias(branch.curve(u, 1), u, circuit, shown)
+        pin = branch.sections.pin(u[some])
+        shown[some] = by_parameter(branch.equations, x[:, some], names, pin=pin)
+    return at_fixed_bias(branch.curve(u, 1), circuit, shown)
 
 
 @dataclass(frozen=True)
 class Linearised:
-    """A branch, and how it changes with some parameters at fixed rises of the tip.
+    """A branch, and how it changes with some parameters at fixed places of it.
+
+    Places are rises of the tip, or other pins; see `hotlever.lever.sections`.
 
     Attributes
     ----------
@@ -129,11 +147,11 @@ class Linearised:
         The parameters, by their names in a probe file.
     branch : Branch
     factors : Factors or None
-        Of all its states but the first; None if they were not kept.
+        Of all its states that were solved; None if they were not kept.
     changes : ndarray, shape (size + 1, k, p)
         Derivatives of the states by the parameters; empty if they were not asked for.
-    shown : ndarray, shape (k, 3, p)
-        Derivatives of V_l, I_h and V_r.
+    shown : ndarray, shape (k, 3, p) or (k, 4, p)
+        Derivatives of V_l, I_h and V_r, and of the rise of the tip if it is not what is fixed.
     """
 
     probe: Probe
@@ -158,33 +176,39 @@ class Linearised:
         With equations for the derivatives, which may differ a little and cost less, the states are
         differentiated as well; the factors may then be those of states nearby.
         """
-        longer = Follower(branch.equations, branch).until(enough)
-        x, changes = longer.x[:, 1:], np.empty(0)
+        longer = followed(branch.equations, enough, branch)
+        x, changes = longer.x[:, longer.solved], np.empty(0)
         if derivatives is None:
-            factors = longer.equations.factorised(x)
-            shown = by_parameter(longer.equations, x, names, factors)
+            pin = longer.sections.pin(longer.u[longer.solved])
+            factors = longer.equations.factorised(x, pin)
+            shown = by_parameter(longer.equations, x, names, factors, pin)
         else:
             if factors is None or longer is not branch:
                 factors = derivatives.factorised(x)
             changes, shown = with_changes(derivatives, x, names, factors)
             changes = np.insert(changes, 0, 0.0, axis=1)
-        # without power nothing depends on the parameters
-        return cls(probe, names, longer, factors, changes, np.insert(shown, 0, 0.0, axis=0))
+        if longer.u.size > len(shown):
+            # without power nothing depends on the parameters
+            shown = np.insert(shown, 0, 0.0, axis=0)
+        return cls(probe, names, longer, factors, changes, shown)
 
     def states(self, probe: Probe) -> Array:
         """Return the states of a similar probe, (size + 1, k), to first order or roughly.
 
-        Roughly: with the same temperatures, and potentials in proportion to the lever voltage.
+        Roughly: with the same temperatures, and potentials in proportion to the lever voltage; the
+        same states if there are other supplies.
         """
         moved, x = probe.at(self.names) - self.probe.at(self.names), self.branch.x
         if self.changes.size:
             return np.asarray(x + self.changes @ moved)
+        if not self.branch.equations.circuit.starts_cold:
+            return x
         factor = np.ones(x.shape[1])
         factor[1:] += self.shown[1:, 0] @ moved / x[-1, 1:]
         return np.where(self.branch.equations.space.is_temperature[:, None], x, factor * x)
 
     def shown_at(self, u: Array) -> Array:
-        """Return the derivatives of V_l, I_h and V_r at any u, (n, 3, p).
+        """Return the derivatives of ``shown`` at any u, (n, 3, p) or (n, 4, p).
 
         Between the states they are within some 1e-3 of the largest.
         """

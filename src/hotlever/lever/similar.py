@@ -7,8 +7,9 @@ from copy import copy
 from hotlever.lever.air_loss import AirLoss
 from hotlever.lever.branch import Reach
 from hotlever.lever.equations import GAP, LeverEquations
-from hotlever.lever.following import Follower, branch_of
+from hotlever.lever.following import branch_of
 from hotlever.lever.full_space import FullSpace
+from hotlever.lever.held import followed
 from hotlever.lever.lever import Lever
 from hotlever.lever.motion import motion_of
 from hotlever.lever.newton import NewtonOptions, find_roots
@@ -104,9 +105,11 @@ class SimilarLevers:
         names = usual_parameters(probe) if names is None else names
         equations = self.equations(probe, names)
         if near is None:
-            branch = Follower(equations).until(reach)
+            branch = followed(equations, reach)
         else:
-            u, guess = near.branch.u[1:], near.states(probe)[:, 1:]
-            found = find_roots(Pinned(equations, u**2), guess, NewtonOptions(), near.factors)
-            branch = branch_of(equations, u, found)
+            known, sections = near.branch, near.branch.sections
+            u, guess = known.u[known.solved], near.states(probe)[:, known.solved]
+            pinned = Pinned(equations, sections.values(u), sections.pin(u))
+            found = find_roots(pinned, guess, NewtonOptions(), near.factors)
+            branch = branch_of(equations, u, found, sections)
         return Linearised.of(probe, names, branch, reach)

@@ -200,14 +200,24 @@ class AirTangent:
 
 @dataclass(frozen=True)
 class Pin:
-    """The condition that selects a state: ``tip × rise of the tip + lever × V_l = value``."""
+    """The condition that selects a state: ``tip × rise of the tip + lever × V_l = value``.
 
-    tip: float
-    lever: float
+    All states have the same pin, or each has its own: numbers, or arrays of shape (n,).
+    """
+
+    tip: float | Array
+    lever: float | Array
 
     def of(self, space: Space, x: Array) -> Array:
-        """Return the left side for states or for changes of them, shape (n,)."""
-        return self.tip * space.tip_rise(x) + self.lever * x[-1]
+        """Return the left side for states or for changes of them, shape (n, ...)."""
+        tip, lever = (np.reshape(one, (-1, *(1,) * (x.ndim - 2))) for one in (self.tip, self.lever))
+        return np.asarray(tip * space.tip_rise(x) + lever * x[-1])
+
+    def among(self, states: Index | int) -> Pin:
+        """Return that of some of the states."""
+        if np.ndim(self.tip) == 0:
+            return self
+        return Pin(np.asarray(self.tip)[states], np.asarray(self.lever)[states])
 
 
 #: A given tip temperature, which selects one state wherever there is power; and a given lever

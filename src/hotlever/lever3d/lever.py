@@ -111,7 +111,7 @@ class SolidLever(Lever):
 
     def solve(self, bias: ArrayLike, progress: Progress | None = None) -> list[State]:
         """Find the states that a slow ramp of the bias takes; see `Lever.solve`."""
-        values = checked_bias(bias)
+        values = checked_bias(bias, self.circuit)
         try:
             guesses = self._flat.solve(values)
         except ComputationError as error:
@@ -144,7 +144,7 @@ class SolidLever(Lever):
         """Solve the lever at each of some biases; see `Lever.sweep`."""
         if sensitivities:
             raise InputError("sensitivities are known of the flat lever only")
-        values = checked_bias(bias)
+        values = checked_bias(bias, self.circuit)
         try:
             states = self.solve(values, progress)
         except ComputationError as error:

@@ -68,6 +68,8 @@ def add_fit(page: Page, fit: Fit) -> None:
         figures.iv_curves({"model": curve}, measured=measured),
         "Heater current against lever voltage.",
     )
+    if not fit.probe.circuit.starts_cold:
+        return
     base = fit.probe.circuit.base_temperature_K
     page.figure(
         "fit_temperature_power",

@@ -117,10 +117,17 @@ def compare_voltages(
 
 
 def mirror(
-    table: Table, columns: dict[str, Column], values: dict[str, Array], notes: list[str]
+    table: Table,
+    columns: dict[str, Column],
+    values: dict[str, Array],
+    symmetric: bool,
+    notes: list[str],
 ) -> Array:
-    """Turn rows of negative bias into those of the other polarity; return the signs of all."""
-    sign = np.where(values["V_b"] < 0.0, -1.0, 1.0)
+    """Turn rows of negative bias into those of the other polarity; return the signs of all.
+
+    They stay as they are if the circuit is not symmetric.
+    """
+    sign = np.where((values["V_b"] < 0.0) & symmetric, -1.0, 1.0)
     if not (sign < 0.0).any():
         return sign
     for symbol in ("V_b", LEVER, "I_h", "V_r"):

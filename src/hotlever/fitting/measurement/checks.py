@@ -47,11 +47,12 @@ def check(
     settings: dict[str, Any],
     notes: list[str],
     *,
-    in_time: bool = False,
+    signed: bool = False,
 ) -> None:
     """Refuse what no lever can show, and note what it hardly can.
 
-    In time a bias may be of either sign, and a current goes on or off before the bias is known to.
+    What may be of either sign is asked less: in time a current goes on or off before the bias is
+    known to, and other supplies drive a current of their own.
     """
     for symbol in (symbol for symbol in COLUMNS if symbol in columns):
         of, data = symbol.removeprefix("d"), values[symbol]
@@ -67,16 +68,16 @@ def check(
             cell = shown(table.rows[row][columns[symbol].place])
             raise InputError(f"{table.where(row)}: {symbol} is '{cell}', expected {expected}")
         if symbol == of and not np.isnan(data).all():
-            for largest in (size,) if in_time else (np.nanmax(data), size):
+            for largest in (size,) if signed else (np.nanmax(data), size):
                 plausible(f"{table.path}: the largest {symbol}", unit, largest, low, high)
-            negative = (data < -NOISE * size) & (not in_time)
+            negative = (data < -NOISE * size) & (not signed)
             note_rows(notes, table, negative, f"{symbol} is negative")
 
     base = settings.get("base_temperature_K", _COLDEST_BASE_K)
     colder = colder_than_base(values["T_tip"], values["dT_tip"], base)
     text = f"T_tip is below the base temperature ({base:g} K), perhaps in another unit"
     note_rows(notes, table, colder, text)
-    if in_time:
+    if signed:
         return
 
     bias, current = values["V_b"], values["I_h"]

@@ -24,10 +24,8 @@ def with_measured_circuit(
     Raises
     ------
     InputError
-        If the pressure matters, and the probe does not say how the temperature jumps; or if the
-        probe has held supplies.
+        If the pressure matters, and the probe does not say how the temperature jumps.
     """
-    probe.circuit.need_cold_start("a fit or a calibration")
     notes = []
     measured_in, assumed_in = measurement.medium, probe.surroundings.medium
     changes: dict[str, Any] = {"medium": medium or measured_in or assumed_in}

@@ -150,8 +150,10 @@ class Measurement:
             )
 
     @classmethod
-    def given(cls, measurement: Measurement | str | os.PathLike[str]) -> Measurement:
-        """Return a measurement as it is, or read one from a measurement file.
+    def given(
+        cls, measurement: Measurement | str | os.PathLike[str], circuit: Circuit | None = None
+    ) -> Measurement:
+        """Return a measurement as it is, or read one that was made in a circuit from its file.
 
         Raises
         ------
@@ -163,7 +165,7 @@ class Measurement:
         if isinstance(measurement, str | os.PathLike):
             from hotlever.fitting.measurement.reading import read_measurement
 
-            return read_measurement(measurement)
+            return read_measurement(measurement, circuit=circuit)
         raise InputError(
             f"found {type(measurement).__name__}, expected a Measurement or a measurement file"
         )
@@ -183,7 +185,8 @@ class Measurement:
         return cls(
             **columns,
             tip_error_K=np.full(sweep.bias_V.size, np.nan),
-            **probe.circuit.model_dump(),
+            series_resistance_ohm=probe.circuit.series_resistance_ohm,
+            base_temperature_K=probe.circuit.base_temperature_K,
             medium=probe.surroundings.medium,
         )
 

@@ -50,7 +50,7 @@ def read_measurement(
     ``R_s (kOhm): 5.6``, ``base temperature = 20 °C`` and ``medium: air``.
 
     For the voltage over the lever, ``V_l (V)``, the bias follows from R_s and I_h. Rows of
-    negative bias are mirrored: lever and circuit are symmetric.
+    negative bias are mirrored: lever and circuit are symmetric, but for held supplies.
 
     A table with a column ``time (us)``, in any unit of time, is of what was measured in time if it
     lasts `hotlever.fitting.measurement.histories.BRIEF` at most, or a wave form or the column are
@@ -63,7 +63,8 @@ def read_measurement(
         Quantities, with a unit if the file gives none, and the headings or numbers of their
         columns: ``{"I_h (uA)": "Current"}``.
     circuit : Circuit, optional
-        Its R_s makes the bias of V_l in a file that does not give R_s.
+        Its R_s makes the bias of V_l in a file that does not give R_s. With its held supplies the
+        signs of bias, current and voltage count.
     waveform : Waveform, optional
         Of the bias in time, instead of the column ``V_b``.
 
@@ -92,20 +93,21 @@ def read_measurement(
             note_rows(notes, table, written, f"{symbol} is written as missing")
     if in_time:
         history = find_waveform(table, found, values, settings, circuit, waveform, notes)
-        check(table, found, values, settings.values, notes, in_time=True)
+        check(table, found, values, settings.values, notes, signed=True)
         order = f"in time, {len(table.rows)} rows; {history['waveform'].text}"
     else:
         history = {}
         find_bias(table, found, values, settings, circuit, notes)
-        sign = mirror(table, found, values, notes)
-        check(table, found, values, settings.values, notes)
+        symmetric = circuit is None or circuit.starts_cold
+        sign = mirror(table, found, values, symmetric, notes)
+        check(table, found, values, settings.values, notes, signed=not symmetric)
         bias = sign * values["V_b"]
         parts = sweeps_of(bias)
         order = described(bias, parts)
         if len(parts) > 1:
             notes.append(f"{path}: {len(parts)} sweeps, all of them used: {order}")
             data = {symbol: values[symbol] for symbol in OBSERVABLE_SYMBOLS.values()}
-            notes += [f"{path}: {text}" for text in disagreements(bias, parts, data)]
+            notes += [f"{path}: {text}" for text in disagreements(bias, parts, data, symmetric)]
     notes += unused
     more = len(notes) - _MOST_NOTES
     if more > 0:

@@ -73,14 +73,19 @@ def described(bias: Array, parts: list[slice]) -> str:
     return ", ".join(words) if len(words) < 7 else f"{len(words)} sweeps"
 
 
-def disagreements(bias: Array, parts: list[slice], data: dict[str, Array]) -> list[str]:
-    """Say by how much sweeps differ from the first, if by more than noise."""
-    found = []
+def disagreements(
+    bias: Array, parts: list[slice], data: dict[str, Array], symmetric: bool = True
+) -> list[str]:
+    """Say by how much sweeps differ from the first, if by more than noise.
+
+    Polarities are compared if the circuit is symmetric.
+    """
+    found, along = [], np.abs(bias) if symmetric else bias
     for name, values in data.items():
         largest = np.nanmax(np.abs(values), initial=0.0)
         worst, which = 0.0, 0
         for number, part in enumerate(parts[1:], start=2):
-            difference = _difference(bias, values, parts[0], part)
+            difference = _difference(along, values, parts[0], part)
             if difference.size < _ENOUGH:
                 continue
             noise = np.sqrt(0.5 * np.mean(np.diff(difference) ** 2))
@@ -95,11 +100,11 @@ def disagreements(bias: Array, parts: list[slice], data: dict[str, Array]) -> li
     return found
 
 
-def _difference(bias: Array, values: Array, one: slice, other: slice) -> Array:
-    """Return what one sweep has beside another, rising in bias."""
+def _difference(along: Array, values: Array, one: slice, other: slice) -> Array:
+    """Return what one sweep has beside another, rising in what is along both."""
     known = np.isfinite(values)
     (x, y), (at, found) = (
-        _rising(np.abs(bias[part])[known[part]], values[part][known[part]]) for part in (one, other)
+        _rising(along[part][known[part]], values[part][known[part]]) for part in (one, other)
     )
     if x.size < _FEWEST or at.size == 0:
         return np.empty(0)

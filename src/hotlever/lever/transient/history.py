@@ -131,9 +131,8 @@ def _expected_rise(lever: Lever, bias: float) -> float:
 
 def _at_rest(lever: Lever, bias: float) -> Array:
     """Return the state at rest; the other polarity has the potentials reversed."""
-    if not lever.circuit.starts_cold and bias >= 0.0:
+    if not lever.circuit.starts_cold:
         return lever.solve([bias])[0].x
-    lever.circuit.need_cold_start("a wave form that begins at a negative bias")
     if bias == 0.0:
         return np.zeros((lever.space.size + 1, 1))
     (state,) = lever.solve([abs(bias)])
