@@ -150,7 +150,9 @@ def drop_zone(
 async def hand_over(made: Awaitable[bytes], name: str) -> None:
     """Give a file when it is made, be the button that asked for it gone by then."""
     client = ui.context.client
-    client.download(await made, name)
+    content = await made
+    with client:
+        ui.download.content(content, name)
 
 
 class Work:
