@@ -304,7 +304,7 @@ def _limits(
     if samples:
         posterior = posterior_of_tip(*near, samples=samples, progress=progress)
         return posterior.profile.limits(tip, stderr, of_model), [posterior.note]
-    profile = profile_of_tip(*near)
+    profile = profile_of_tip(objective, at, found.solved, found.covariance)
     if profile.linear:
         return (tip - away, tip + away), []
     low, high = profile.limits(tip, stderr, of_model)
