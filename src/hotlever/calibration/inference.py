@@ -300,9 +300,15 @@ def _limits(
         raise InputError("posterior: expected priors, without which it is not that of a fit")
     if not objective.informed:
         return (tip - away, tip + away), []
-    near = (objective, at, found.problem.others(at), found.covariance)
     if samples:
-        posterior = posterior_of_tip(*near, samples=samples, progress=progress)
+        posterior = posterior_of_tip(
+            objective,
+            at,
+            found.problem.others(at),
+            found.covariance,
+            samples=samples,
+            progress=progress,
+        )
         return posterior.profile.limits(tip, stderr, of_model), [posterior.note]
     profile = profile_of_tip(objective, at, found.solved, found.covariance)
     if profile.linear:

@@ -44,6 +44,8 @@ _FOUND = 1e-5
 _LEAST_RISE = 0.25
 #: A linearised error that is right within this factor holds.
 _ALIKE = 1.25
+#: Standard deviations from which on a solved lever tells of those that samples reach.
+_TELLING = 1.0
 #: R̂ from which on samples are too few.
 _SETTLED = 1.05
 
@@ -195,10 +197,11 @@ def posterior_of_tip(
 ) -> TipPosterior:
     """Sample the parameters of an estimate, and their tip temperatures.
 
-    Parameters are those of `profile_of_tip`, and those of `hotlever.fitting.ensembles.sample`. What
-    is sampled costs too little for processes of its own.
+    Parameters are those of `profile_of_tip`, with `others` than the optimum that have been solved,
+    and those of `hotlever.fitting.ensembles.sample`. What is sampled costs too little for processes
+    of its own.
     """
-    vicinity = Vicinity(objective, at, others)
+    vicinity = Vicinity(objective, at, others, least=_TELLING)
     scaled = covariance / np.outer(objective.scale, objective.scale)
     chains = sample(
         _Density(vicinity),

@@ -173,10 +173,17 @@ class Vicinity:
     objective : Objective
     at : Prediction
     others : sequence of Prediction
+    least : float
+        Standard deviations from which on the others count: what nearer ones differ by would be
+        carried too far by those who look far away.
     """
 
     def __init__(
-        self, objective: Objective, at: Prediction, others: Sequence[Prediction] = ()
+        self,
+        objective: Objective,
+        at: Prediction,
+        others: Sequence[Prediction] = (),
+        least: float = 0.0,
     ) -> None:
         self.objective, self.at = objective, at
         self.origin = objective.values(at.probe) / objective.scale
@@ -191,7 +198,7 @@ class Vicinity:
             with suppress(ComputationError):
                 missed = other.values - self._predicted(there)[0]
                 # the product with this direction is 1 at the other prediction
-                if size > 0:
+                if size > least**2:
                     self._bends.append((along / size, missed))
 
     def predict(self, scaled: Array) -> tuple[Array, Array]:
