@@ -8,7 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hotlever.calibration.inference import error_of_model
 from hotlever.calibration.limits import BAND, posterior_of_tip, profile_of_tip
+from hotlever.probe.surroundings import Surroundings
 
 TIPS, SLOPES = np.array([300.0, 500.0, 800.0]), np.array([1.0, 10.0, 20.0])
 
@@ -87,3 +89,16 @@ def test_quantiles_of_the_posterior_are_those_of_what_is_unknown(bend):
     x = BAND * np.array([[-1.0], [1.0]])
     expected = TIPS[1:] + SLOPES[1:] * (x + bend * x**2)
     np.testing.assert_allclose([low, high], expected, atol=0.12 * BAND * SLOPES[-1])
+
+
+def test_a_jump_that_is_not_stated_is_an_error_of_the_model():
+    bias = np.linspace(1.0, 10.0, 10)
+    rise = 9.0 * bias**2  # that of a lever of constant properties
+    around = [
+        Surroundings(),
+        Surroundings(medium="air", accommodation=0.9),
+        Surroundings(medium="air"),
+    ]
+    vacuum, known, unknown = (error_of_model(one, bias, rise)[5] for one in around)
+    assert vacuum < known < unknown
+    assert unknown == pytest.approx(np.hypot(known, 7e-3 * rise[5]))

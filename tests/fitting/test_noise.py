@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hotlever.fitting.measurement import Measurement
 from hotlever.fitting.noise import relative_noise
+from hotlever.fitting.residuals import Residuals
 
 SHOWN = np.linspace(0.05, 1.5, 40)
 NOTHING = np.zeros(SHOWN.size)
@@ -61,3 +63,30 @@ def test_rows_without_data_have_no_noise_of_their_own():
         found[some], relative_noise(difference[some], SHOWN[some], NOTHING[some], USUAL)
     )
     assert np.mean(found[some] ** 2) == pytest.approx(1.0)
+
+
+def residuals_of(current):
+    """Return the residuals of a measurement whose current is predicted as shown."""
+    nothing = np.full(SHOWN.size, np.nan)
+    measurement = Measurement(np.arange(1.0, 41.0), current, nothing, nothing, nothing)
+    found = Residuals(measurement, ("current",), "errors")
+    predicted = np.stack([SHOWN, SHOWN, SHOWN])
+    for _ in range(3):
+        found.take_scatter(predicted, usual=1e-3)
+    return found, predicted
+
+
+def test_noise_of_large_data_makes_no_outliers_of_them():
+    currents = [SHOWN + noise(n, 2e-3 * SHOWN) for n in range(40)]
+    found = [residuals_of(current) for current in currents]
+    assert np.mean([one.has_outliers(predicted) for one, predicted in found]) < 0.1
+    # each datum has the weight that its own noise gives it
+    weights = np.mean([one.by[0] for one, _ in found], axis=0)
+    np.testing.assert_allclose(weights[8:] * 2e-3 * SHOWN[8:], 1.0, atol=0.12)
+
+
+def test_an_outlier_is_one():
+    spoilt = SHOWN + noise(4, 2e-3 * SHOWN)
+    spoilt[30] *= 1.02
+    residuals, predicted = residuals_of(spoilt)
+    assert residuals.has_outliers(predicted)
