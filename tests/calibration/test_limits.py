@@ -91,14 +91,15 @@ def test_quantiles_of_the_posterior_are_those_of_what_is_unknown(bend):
     np.testing.assert_allclose([low, high], expected, atol=0.12 * BAND * SLOPES[-1])
 
 
-def test_a_jump_that_is_not_stated_is_an_error_of_the_model():
+def test_what_the_model_leaves_open_is_an_error_of_it():
     bias = np.linspace(1.0, 10.0, 10)
     rise = 9.0 * bias**2  # that of a lever of constant properties
-    around = [
-        Surroundings(),
-        Surroundings(medium="air", accommodation=0.9),
-        Surroundings(medium="air"),
-    ]
-    vacuum, known, unknown = (error_of_model(one, bias, rise)[5] for one in around)
-    assert vacuum < known < unknown
-    assert unknown == pytest.approx(np.hypot(known, 7e-3 * rise[5]))
+    air, jumping = Surroundings(medium="air"), Surroundings(medium="air", accommodation=0.9)
+
+    def share(around, *varied):
+        return (error_of_model(around, varied, bias, rise) / rise)[5]
+
+    assert share(Surroundings()) < share(jumping) < share(air)
+    assert share(air) == pytest.approx(np.hypot(share(jumping), 7e-3))
+    other_laws = share(Surroundings(), "p", "hot.impurity_exponent")
+    assert other_laws == pytest.approx(np.hypot(share(Surroundings(), "p"), 4e-3))

@@ -7,7 +7,7 @@ is needed: a lever that was measured below it is less certain above, and that is
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ from hotlever.lever import Branch
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import Material
 from hotlever.probe import Probe
-from hotlever.probe.parameters import usual_parameters
+from hotlever.probe.parameters import own_name, usual_parameters
 from hotlever.probe.priors import (
     SCALES,
     JointPrior,
@@ -53,6 +53,9 @@ _MODEL = {"vacuum": 3e-4, "air": 7e-4}
 #: one of 0.9 air takes up 6 % less, more where the lever is narrow, and an estimate without it is
 #: off by so much (rms of six twins from number 1000 on, of both shapes, linearised).
 _JUMP = 7e-3
+#: The same by the law of the mobility: how far two estimates of a lever are apart, with another law
+#: (MINIMOS) in place of Eq. 8 (rms of seven pairs of twins from number 1000 on).
+_MOBILITY = 4e-3
 #: Data that are enough to tell which of them are outliers.
 _ENOUGH = 15
 #: Sum of squares, which count standard deviations, that a search must not leave.
@@ -256,7 +259,8 @@ def _put_together(
         for source, share in _shares(found).items()
     }
     tip = predicted.values[2]
-    of_model = error_of_model(best.surroundings, bias, tip - best.circuit.base_temperature_K)
+    rise = tip - best.circuit.base_temperature_K
+    of_model = error_of_model(best.surroundings, found.options.varied, bias, rise)
     stderr = np.sqrt(np.sum(list(parts.values()), axis=0))
     (low, high), lopsided = _limits(found, tip, stderr, of_model, samples, progress)
     parts["model"] = of_model**2
@@ -326,13 +330,19 @@ def _limits(
     ]
 
 
-def error_of_model(around: Surroundings, bias: Array, rise: Array) -> Array:
-    """Return by how much the tip may be off since the model is (K); most where the tip is steep."""
+def error_of_model(around: Surroundings, varied: Sequence[str], bias: Array, rise: Array) -> Array:
+    """Return by how much the tip may be off since the model is (K); most where the tip is steep.
+
+    The law of the mobility counts where its exponents are estimated.
+    """
     # a rise that grows as the square of the bias is that of a lever of constant properties
     steepness = 0.5 * np.gradient(np.log(rise), np.log(bias))
-    of_model = _MODEL[around.medium] * rise * np.maximum(steepness, 1.0)
-    unstated = around.medium == "air" and around.accommodation is None
-    return np.hypot(of_model, _JUMP * rise) if unstated else of_model
+    share = _MODEL[around.medium] * np.maximum(steepness, 1.0)
+    if around.medium == "air" and around.accommodation is None:
+        share = np.hypot(share, _JUMP)
+    if any(own_name(name) == "impurity_exponent" for name in varied):
+        share = np.hypot(share, _MOBILITY)
+    return np.asarray(share * rise)
 
 
 def _search(problem: LeastSquares) -> list[str]:

@@ -88,6 +88,8 @@ def profile_of_tip(
 ) -> Profile:
     """Pull the tip temperature of an estimate away from its optimum.
 
+    On a side where the pulled lever stays unknown the linearised error is kept.
+
     Parameters
     ----------
     objective : Objective
