@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from hotlever.calibration.inference import error_of_model
 from hotlever.calibration.limits import BAND, posterior_of_tip, profile_of_tip
+from hotlever.probe.surroundings import Surroundings
 
 TIPS, SLOPES = np.array([300.0, 500.0, 800.0]), np.array([1.0, 10.0, 20.0])
 
@@ -29,34 +32,40 @@ class OneUnknown:
         return np.ones((1, 1))
 
 
-def prediction(bend):
-    """Return the prediction T = T₀ + b (x + bend x²) at three biases, at x = 0."""
+def prediction(bend, at=(0.0,)):
+    """Return the prediction T = T₀ + b (x + bend x²) at three biases, at some x."""
 
     def predict(x):
         tip, slope = TIPS + SLOPES * (x[0] + bend * x[0] ** 2), SLOPES * (1 + 2 * bend * x[0])
         return np.stack([0 * tip, 0 * tip, tip]), np.stack([0 * tip, 0 * tip, slope])[:, :, None]
 
-    values, slopes = predict(np.zeros(1))
-    probe = SimpleNamespace(at=lambda names: np.zeros(1))
+    values, slopes = predict(at)
+    probe = SimpleNamespace(at=lambda names: np.array(at))
     return SimpleNamespace(
         values=values, slopes=slopes, probe=probe, nearby=SimpleNamespace(predict=predict)
     )
 
 
+def profile(bend):
+    """Return the profile of such a lever; others are solved as they are."""
+    solved = partial(prediction, bend)
+    return profile_of_tip(OneUnknown(), prediction(bend), lambda x, _: solved(x), np.eye(1))
+
+
 def test_what_is_linear_has_the_linearised_error():
-    profile = profile_of_tip(OneUnknown(), prediction(0.0), [], np.eye(1))
-    np.testing.assert_allclose([profile.below, profile.above], 1.0, rtol=1e-3)
-    assert profile.linear
-    low, high = profile.limits(TIPS, SLOPES, np.zeros(3))
+    found = profile(0.0)
+    np.testing.assert_allclose([found.below, found.above], 1.0, rtol=1e-3)
+    assert found.linear
+    low, high = found.limits(TIPS, SLOPES, np.zeros(3))
     np.testing.assert_allclose([TIPS - low, high - TIPS], [BAND * SLOPES] * 2)
 
 
 @pytest.mark.parametrize("bend", [0.12, -0.15])
 def test_what_bends_has_other_limits_either_way(bend):
-    profile = profile_of_tip(OneUnknown(), prediction(bend), [], np.eye(1))
-    assert not profile.linear
+    found = profile(bend)
+    assert not found.linear
     # as far as x is pulled, x standard errors away the tip is b |x + bend x²| away
-    low, high = profile.limits(TIPS[1:], SLOPES[1:], np.zeros(2))
+    low, high = found.limits(TIPS[1:], SLOPES[1:], np.zeros(2))
     wide, narrow = (high - TIPS[1:], TIPS[1:] - low)[:: 1 if bend > 0 else -1]
     for away, way in ((wide, np.sign(bend)), (narrow, -np.sign(bend))):
         exact = np.abs(way + bend * BAND) * BAND * SLOPES[1:]
@@ -66,8 +75,7 @@ def test_what_bends_has_other_limits_either_way(bend):
 
 
 def test_other_errors_are_the_same_either_way():
-    profile = profile_of_tip(OneUnknown(), prediction(0.0), [], np.eye(1))
-    low, high = profile.limits(TIPS, np.zeros(3), np.full(3, 2.0))
+    low, high = profile(0.0).limits(TIPS, np.zeros(3), np.full(3, 2.0))
     np.testing.assert_allclose([TIPS - low, high - TIPS], 2.0 * BAND)
 
 
@@ -81,3 +89,17 @@ def test_quantiles_of_the_posterior_are_those_of_what_is_unknown(bend):
     x = BAND * np.array([[-1.0], [1.0]])
     expected = TIPS[1:] + SLOPES[1:] * (x + bend * x**2)
     np.testing.assert_allclose([low, high], expected, atol=0.12 * BAND * SLOPES[-1])
+
+
+def test_what_the_model_leaves_open_is_an_error_of_it():
+    bias = np.linspace(1.0, 10.0, 10)
+    rise = 9.0 * bias**2  # that of a lever of constant properties
+    air, jumping = Surroundings(medium="air"), Surroundings(medium="air", accommodation=0.9)
+
+    def share(around, *varied):
+        return (error_of_model(around, varied, bias, rise) / rise)[5]
+
+    assert share(Surroundings()) < share(jumping) < share(air)
+    assert share(air) == pytest.approx(np.hypot(share(jumping), 7e-3))
+    other_laws = share(Surroundings(), "p", "hot.impurity_exponent")
+    assert other_laws == pytest.approx(np.hypot(share(Surroundings(), "p"), 4e-3))

@@ -3,14 +3,16 @@
 The profile: all parameters are estimated anew with the tip temperature at one bias pulled away, on
 either side. The sum of squares, of which each unit is a standard deviation squared, then rises by
 the square of how many standard errors away it is. A linearised error is that for small changes.
+Levers that are pulled so far are solved.
 
 The posterior: all parameters are sampled, and the limits are quantiles of their tip temperatures.
-Both take the levers near the optimum from those that were solved (`Vicinity`).
+It takes the levers near the optimum from those that were solved in the search (`Vicinity`).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,16 +31,21 @@ from hotlever.types import Array, Index, Progress
 
 #: Standard errors that 95 % of a normal distribution lie within.
 BAND = 1.96
-#: Biases at which the tip temperature is pulled away, and by how many standard errors.
-_PLACES, _AWAY = 5, 2.0
+#: Biases, in the hotter half, at which the tip temperature is pulled away, and by how many
+#: standard errors.
+_PLACES, _AWAY = 3, 2.0
 #: Most times that it is pulled, each with the error found before, unless that changes by less.
 _ROUNDS, _NEARLY = 3, 0.1
+#: Levers that are solved on each side at most, unless the sum of squares is known as well as this.
+_MOST_SOLVED, _KNOWN = 3, 0.4
 #: Relative change of the sum of squares at which a pulled estimate is found.
 _FOUND = 1e-5
 #: A rise of the sum of squares below which a side is open.
 _LEAST_RISE = 0.25
 #: A linearised error that is right within this factor holds.
 _ALIKE = 1.25
+#: Standard deviations from which on a solved lever tells of those that samples reach.
+_TELLING = 1.0
 #: R̂ from which on samples are too few.
 _SETTLED = 1.05
 
@@ -74,9 +81,14 @@ class Profile:
 
 
 def profile_of_tip(
-    objective: Objective, at: Prediction, others: list[Prediction], covariance: Array
+    objective: Objective,
+    at: Prediction,
+    solved: Callable[[Array, Prediction], Prediction],
+    covariance: Array,
 ) -> Profile:
     """Pull the tip temperature of an estimate away from its optimum.
+
+    On a side where the pulled lever stays unknown the linearised error is kept.
 
     Parameters
     ----------
@@ -84,32 +96,70 @@ def profile_of_tip(
         Residuals with priors.
     at : Prediction
         The optimum.
-    others : list of Prediction
-        Levers near it that have been solved too.
+    solved : callable
+        Solves a lever of scaled parameters, near one that is known.
     covariance : ndarray, shape (p, p)
         Of the varied parameters, linearised.
     """
-    vicinity = Vicinity(objective, at, others)
-    least = _squares(vicinity.residual(vicinity.origin))
-    some, found = _looked_at(at), []
-    for place in some:
-        slope = at.slopes[2, place, objective.columns]
-        along = covariance @ slope
-        stderr = float(np.sqrt(slope @ along))
-        step = _AWAY * along / (stderr * objective.scale)
-        for way in (-1.0, 1.0):
-            multiple, optimum = 1.0, vicinity.origin + way * step
-            for _ in range(_ROUNDS):
-                pulled = _Pulled(vicinity, int(place), way * multiple * stderr)
-                optimum = pulled.estimate(optimum)
-                rise = _squares(vicinity.residual(optimum)) - least
-                away = abs(pulled.tip_K(optimum) - at.values[2, place]) / stderr
-                last, multiple = multiple, away / np.sqrt(max(rise, _LEAST_RISE))
-                if abs(multiple / last - 1.0) < _NEARLY:
-                    break
-            found.append(multiple)
-    below, above = np.reshape(found, (-1, 2)).T
-    return Profile(at.values[2, some], below, above)
+    optimum, some = Vicinity(objective, at), _looked_at(at)
+    sides = np.ones((2, some.size))
+    for side, way in enumerate((-1.0, 1.0)):
+        near = _pulled_lever(optimum, covariance, int(some[-1]), way, solved)
+        if near is not None:
+            sides[side] = [_pulled(optimum, near, covariance, int(one), way)[1] for one in some]
+    return Profile(at.values[2, some], *sides)
+
+
+def _pulled_lever(
+    optimum: Vicinity,
+    covariance: Array,
+    place: int,
+    way: float,
+    solved: Callable[[Array, Prediction], Prediction],
+) -> Vicinity | None:
+    """Solve the lever whose tip is pulled to one side, and return what is near it.
+
+    It is pulled again from there, until its sum of squares is known; None if that does not end.
+    What the optimum tells of levers so far away does not hold where parameters make up for each
+    other along a bent valley.
+    """
+    near = optimum
+    for _ in range(_MOST_SOLVED):
+        there, _ = _pulled(optimum, near, covariance, place, way)
+        expected = _squares(near.residual(there))
+        try:
+            near = Vicinity(optimum.objective, solved(there, near.at))
+        except ComputationError:  # it melts below the highest bias
+            break
+        if abs(_squares(near.residual(near.origin)) - expected) < _KNOWN:
+            return near
+    return None
+
+
+def _pulled(
+    optimum: Vicinity, near: Vicinity, covariance: Array, place: int, way: float
+) -> tuple[Array, float]:
+    """Return where the tip is pulled to one side at a place, and the standard error there.
+
+    As scaled parameters, and as a multiple of the linearised standard error.
+    """
+    objective, at = optimum.objective, optimum.at
+    slope = at.slopes[2, place, objective.columns]
+    along = covariance @ slope
+    stderr, here = float(np.sqrt(slope @ along)), float(at.values[2, place])
+    least, multiple, there = _squares(optimum.residual(optimum.origin)), 1.0, near.origin
+    if near is optimum:
+        there = there + way * _AWAY * along / (stderr * objective.scale)
+    for _ in range(_ROUNDS):
+        # a negative error is one to the cold side
+        pulled = _Pulled(near, place, here, way * multiple * stderr)
+        there = pulled.estimate(there)
+        rise = _squares(near.residual(there)) - least
+        away = abs(pulled.tip_K(there) - here) / stderr
+        last, multiple = multiple, away / np.sqrt(max(rise, _LEAST_RISE))
+        if abs(multiple / last - 1.0) < _NEARLY:
+            break
+    return there, multiple
 
 
 @dataclass(frozen=True)
@@ -149,10 +199,11 @@ def posterior_of_tip(
 ) -> TipPosterior:
     """Sample the parameters of an estimate, and their tip temperatures.
 
-    Parameters are those of `profile_of_tip`, and those of `hotlever.fitting.ensembles.sample`. What
-    is sampled costs too little for processes of its own.
+    Parameters are those of `profile_of_tip`, with `others` than the optimum that have been solved,
+    and those of `hotlever.fitting.ensembles.sample`. What is sampled costs too little for processes
+    of its own.
     """
-    vicinity = Vicinity(objective, at, others)
+    vicinity = Vicinity(objective, at, others, least=_TELLING)
     scaled = covariance / np.outer(objective.scale, objective.scale)
     chains = sample(
         _Density(vicinity),
@@ -177,7 +228,7 @@ def posterior_of_tip(
 def _looked_at(at: Prediction) -> Index:
     """Return the places of the data at which limits are looked for, the hottest last."""
     order = np.argsort(at.values[2])
-    return order[np.linspace(order.size / 3, order.size - 1, _PLACES).astype(int)]
+    return order[np.linspace(order.size / 2, order.size - 1, _PLACES).astype(int)]
 
 
 @dataclass(frozen=True)
@@ -194,16 +245,15 @@ class _Density:
 
 
 class _Pulled:
-    """An estimate whose tip temperature at one bias is pulled to one side.
+    """An estimate whose tip temperature at one bias is pulled away from what it is at the optimum.
 
     If it had been measured there as well, twice as far away, with the error that it is known by,
-    the estimate would move half the way: to `_AWAY` standard errors if everything is linear. A
-    negative error is one to the cold side.
+    the estimate would move half the way: to `_AWAY` standard errors if everything is linear.
     """
 
-    def __init__(self, vicinity: Vicinity, place: int, stderr: float) -> None:
+    def __init__(self, vicinity: Vicinity, place: int, tip_K: float, stderr: float) -> None:
         self._vicinity, self._place, self._stderr = vicinity, place, stderr
-        self._target = self.tip_K(vicinity.origin) + 2.0 * _AWAY * stderr
+        self._target = tip_K + 2.0 * _AWAY * stderr
 
     def tip_K(self, scaled: Array) -> float:
         return float(self._vicinity.predict(scaled)[0][2, self._place])

@@ -326,12 +326,12 @@ def _put_together(
     }
     slow = np.abs(slopes[:, -1])
     parts["heat capacity"] = slow
-    medium = found.probe.surroundings.medium
+    around = found.probe.surroundings
     base = found.probe.circuit.base_temperature_K
-    if medium == "air":
+    if around.medium == "air":
         share = _share_of_air(found.probe, timing.length_us)
         parts["heat in air"] = slow * _HEAT_IN_AIR_SPREAD * share / HEAT_CAPACITY_SPREAD
-    of_model = [error_of_model(medium, found.bias_V, column) for column in rise.T]
+    of_model = [error_of_model(around, found.varied, found.bias_V, column) for column in rise.T]
     parts["model"] = np.stack(of_model, axis=1)
     total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
     columns: dict[str, Array] = {"height_V": found.bias_V}

@@ -132,6 +132,10 @@ class Estimate:
         model = replace(self.problem.model, bias=bias)
         return model.predict(self.optimum.probe, self.optimum.prediction)
 
+    def solved(self, scaled: Array, near: Prediction) -> Prediction:
+        """Return the prediction for other scaled parameters, from that for a similar lever."""
+        return self.problem.model.predict(self.problem.objective.at(near.probe, scaled), near)
+
     def fit(self) -> Fit:
         """Return the result."""
         found = _found(self)

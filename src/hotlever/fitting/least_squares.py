@@ -152,7 +152,13 @@ class LeastSquares:
         )
 
     def _reweighted(self, found: Optimum) -> Optimum:
-        """Lessen the weight of outliers until nothing changes: gently at first."""
+        """Lessen the weight of outliers until nothing changes: gently at first.
+
+        With priors outliers stand out at once, since these hold a fit that others would pull along;
+        without any there is nothing to do.
+        """
+        if self.objective.informed and not self.residuals.has_outliers(found.prediction.values):
+            return found
         for gently, most in ((True, _GENTLE_TURNS), (False, _MOST_REWEIGHTINGS - _GENTLE_TURNS)):
             for _ in range(most):
                 self.residuals.lessen(found.prediction.values, gently)

@@ -87,13 +87,13 @@ class Objective:
         return float(residual @ residual)
 
     def used_up(self, probe: Probe, slopes: Array) -> Array:
-        """Return how many degrees of freedom of each observable a fit with priors uses up."""
+        """Return which share of each datum's noise a fit with priors uses up, (observables, n)."""
         jacobian = self.of_data(slopes)
         leverage = np.zeros(self.residuals.data.shape)
         leverage[self.residuals.present] = np.einsum(
             "ij,jk,ik->i", jacobian, self._posterior(probe, slopes), jacobian
         )
-        return np.asarray(leverage.sum(axis=1, keepdims=True))
+        return leverage
 
     def _posterior(self, probe: Probe, slopes: Array) -> Array:
         """Return the covariance of the scaled parameters that data and priors leave."""
@@ -173,12 +173,19 @@ class Vicinity:
     objective : Objective
     at : Prediction
     others : sequence of Prediction
+    least : float
+        Standard deviations from which on the others count: what nearer ones differ by would be
+        carried too far by those who look far away.
     """
 
     def __init__(
-        self, objective: Objective, at: Prediction, others: Sequence[Prediction] = ()
+        self,
+        objective: Objective,
+        at: Prediction,
+        others: Sequence[Prediction] = (),
+        least: float = 0.0,
     ) -> None:
-        self.objective, self._at = objective, at
+        self.objective, self.at = objective, at
         self.origin = objective.values(at.probe) / objective.scale
         self._parameters = at.probe.at(objective.names)
         self._bends: list[tuple[Array, Array]] = []
@@ -191,7 +198,7 @@ class Vicinity:
             with suppress(ComputationError):
                 missed = other.values - self._predicted(there)[0]
                 # the product with this direction is 1 at the other prediction
-                if size > 0:
+                if size > least**2:
                     self._bends.append((along / size, missed))
 
     def predict(self, scaled: Array) -> tuple[Array, Array]:
@@ -211,7 +218,7 @@ class Vicinity:
         objective = self.objective
         parameters = self._parameters.copy()
         parameters[objective.columns] = scaled * objective.scale
-        values, slopes = self._at.nearby.predict(parameters)
+        values, slopes = self.at.nearby.predict(parameters)
         for along, missed in self._bends:
             way = float(along @ (scaled - self.origin))
             values = values + missed * way**2

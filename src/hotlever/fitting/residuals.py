@@ -10,6 +10,7 @@ from hotlever.errors import InputError
 from hotlever.fitting.common_errors import CommonError
 from hotlever.fitting.drift import Drift
 from hotlever.fitting.measurement import Measurement
+from hotlever.fitting.noise import relative_noise
 from hotlever.fitting.options import Weights
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.types import Array
@@ -91,6 +92,8 @@ class Residuals:
         self._root = np.ones(self.bias.size) if rows is None else np.sqrt(rows[self._used])
         self._scale = self.largest / self._root
         self.down = np.ones(self.data.shape)
+        # the noise of each datum over that of its observable
+        self._relative = np.ones(self.data.shape)
         if self.errors_known:
             self._scale = self._measured_errors()
         if data_weights is not None:
@@ -202,13 +205,17 @@ class Residuals:
 
         Data may be off by their own errors, if they have some.
         """
-        difference = self.difference(values) * self._root
+        difference = self.difference(values) * self._root / self._relative
         scatter = 1.4826 * np.nanmedian(np.abs(difference), axis=1, keepdims=True)
         # data without noise have no scatter to measure against
         least = np.broadcast_to(1e-4 * self.largest, difference.shape)
         if self.errors_known:
             least = np.where(self.without_errors[:, None], least, self._scale * self._root)
         return np.nan_to_num(difference / np.maximum(scatter, least))
+
+    def has_outliers(self, values: Array) -> bool:
+        """Whether weights that forget outliers would lessen that of any datum."""
+        return bool((np.abs(self.deviations(values)) > _FULL).any())
 
     def lessen(self, values: Array, gently: bool) -> None:
         """Lessen the weight of data far from a prediction.
@@ -223,19 +230,31 @@ class Residuals:
     def take_scatter(self, values: Array, used_up: Array | float = 0.0, usual: float = 0.0) -> None:
         """Give observables without measurement errors their scatter about a prediction.
 
-        Of their degrees of freedom a fit has used up some, (observables, 1). Outliers count as
+        A fit has used up some share of each datum, (observables, n). Outliers count as
         little as they weigh. The `usual` scatter, a share of the largest value, counts as one
-        datum more: a few data say little of their own.
+        datum more: a few data say little of their own. With it the noise may go with the size of
+        what is shown (`hotlever.fitting.noise`); without it is the same everywhere.
         """
         weight = np.where(self.present, self.down**2, 0.0)
         difference = self.difference(values) * self._root
-        squares = np.nansum(weight * difference**2, axis=1, keepdims=True)
+        used_up = np.broadcast_to(used_up, difference.shape)
+        if usual:
+            for row in np.flatnonzero(self.without_errors):
+                self._relative[row] = relative_noise(
+                    difference[row],
+                    values[self.rows[row]],
+                    used_up[row],
+                    usual * float(self.largest[row, 0]),
+                )
+        squares = np.nansum(weight * (difference / self._relative) ** 2, axis=1, keepdims=True)
         count = weight.sum(axis=1, keepdims=True)
         if usual:
             squares, count = squares + (usual * self.largest) ** 2, count + 1.0
-        rms = np.sqrt(squares / np.maximum(count - used_up, 1.0))
-        scatter = np.maximum(rms, 1e-6 * self.largest)
-        self._scale = np.where(self.without_errors[:, None], scatter / self._root, self._scale)
+        free = np.maximum(count - used_up.sum(axis=1, keepdims=True), 1.0)
+        scatter = np.maximum(np.sqrt(squares / free), 1e-6 * self.largest)
+        self._scale = np.where(
+            self.without_errors[:, None], scatter * self._relative / self._root, self._scale
+        )
 
     def rms(self, values: Array) -> dict[str, float]:
         """Return the rms of data minus prediction by column, for every observable with data."""
