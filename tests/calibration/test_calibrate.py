@@ -338,6 +338,7 @@ def test_a_file_without_current_is_refused(run, tmp_path):
     assert "no values of I_h" in err
 
 
+@pytest.mark.slow
 def test_a_lever_in_air_is_estimated_in_air(lever, reference):
     air = lever.in_medium("air").branch()
     curve = measurement_of(measured_curve(air, np.random.default_rng(5), to_V=12.0))

@@ -121,6 +121,7 @@ def test_what_was_stopped_goes_on_and_bad_files_are_said(levers, run, tmp_path):
     assert again[1] == printed
 
 
+@pytest.mark.slow
 def test_changed_data_options_or_files_are_fitted_anew(levers, tmp_path):
     cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0")
     with cluster:

@@ -86,6 +86,7 @@ def test_more_or_less_may_vary(of_film):
     assert freed.parameters["nitride.kappa_exponent"].value == pytest.approx(0.33, abs=5e-3)
 
 
+@pytest.mark.slow
 def test_posterior_and_profile_work_for_what_varies(of_film):
     rng = np.random.default_rng(3)
     noise = 1.0 + 1e-3 * rng.standard_normal((2, BIAS.size))

@@ -76,6 +76,7 @@ def test_calibrate_takes_names_and_lever_voltages(run, curve):
     np.testing.assert_allclose(found, curve.tip_K, atol=15)
 
 
+@pytest.mark.slow
 def test_many_files_have_the_same_names_and_a_fit_by_other_names_is_made_anew(run, data):
     Path("other.txt").write_bytes(data.read_bytes())
     Path("other.txt").write_text(data.read_text().replace("5,6", "5,60"))
