@@ -59,13 +59,13 @@ def _law_line(calibration: Calibration) -> str:
     law = calibration.power_law
     if law is None:
         return "no power law: with held supplies the tip does not follow from the power of one"
-    within = f", within {calibration.law_residual_K:.0f} K of the model"
-    return (
+    text = (
         f"power law in vacuum: a {law.linear_K_per_mW:.1f} K/mW, b {law.nonlinear_K:.2f} K, "
         f"m {law.exponent:.3f}, c {law.hot_K_per_mW:.1f} K/mW; jump {law.jump_K:+.0f} K"
-        + within
-        * bool(calibration.law_residual_K)
     )
+    if calibration.law_residual_K:
+        text += f", within {calibration.law_residual_K:.0f} K of the model"
+    return text
 
 
 def _knee_lines(calibration: Calibration) -> list[str]:
