@@ -6,7 +6,7 @@ the square of how many standard errors away it is. A linearised error is that fo
 Levers that are pulled so far are solved.
 
 The posterior: all parameters are sampled, and the limits are quantiles of their tip temperatures.
-It takes the levers near the optimum from those that were solved in the search (`hotlever.fitting.objective.Vicinity`).
+It takes the levers near the optimum from those that were solved in the search.
 """
 
 from __future__ import annotations
