@@ -53,6 +53,12 @@ def done(arguments: list[str], folder: Path) -> tuple[Job, list[Any]]:
     return job, [content for what, content in here.sent if what == "curve"]
 
 
+def understood(folder: Path) -> dict[str, Any]:
+    """Return what a measurement is understood as, in this process."""
+    here: Any = Here()
+    return showing.understood(here, folder, "mine.csv")
+
+
 def test_the_lever_that_is_fitted_is_drawn_beside_the_data(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -61,7 +67,7 @@ def test_the_lever_that_is_fitted_is_drawn_beside_the_data(
     (tmp_path / "mine.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
     job, curves = done(["fit", "mine.csv", "-o", "mine.fit.json"], tmp_path)
     assert job.standing == "done"
-    data = showing.understood(Here(), tmp_path, "mine.csv")["data"]  # type: ignore[arg-type]
+    data = understood(tmp_path)["data"]
 
     def off(curve: dict[str, list[float]]) -> float:
         model = np.interp(data["bias_V"], curve["bias_V"], curve["current_mA"])
@@ -137,7 +143,7 @@ def test_fields_leave_as_one_file(tmp_path: Path) -> None:
 def test_what_was_measured_in_time_is_drawn_against_time(tmp_path: Path) -> None:
     rows = "".join(f"{0.1 * n},9,{1.28 - 0.01 * n:.3f}\n" for n in range(20))
     (tmp_path / "mine.csv").write_text(f"t (us),V_b (V),I_h (mA)\n{rows}")
-    found = showing.understood(Here(), tmp_path, "mine.csv")  # type: ignore[arg-type]
+    found = understood(tmp_path)
     assert found["data"]["time_us"] == pytest.approx([0.1 * n for n in range(20)])
     assert len(found["data"]["current_mA"]) == 20
 

@@ -50,19 +50,18 @@ def check_plausible(measured: Measurement, probe: Probe, causes: Causes) -> None
         here = np.isfinite(measured.current_mA) & (size > _HARDLY * size.max())
     different = np.unique(measured.bias_V[here]).size
     if different < _FEWEST:
+        above = " above 0" if alone else ""
         raise InputError(
-            f"{where}: currents{' above 0' * alone} at {different} different biases"
-            f"{' above 0' * alone}, expected {_FEWEST} or more"
+            f"{where}: currents{above} at {different} different biases{above}, expected "
+            f"{_FEWEST} or more"
         )
     _check_temperatures(measured, probe, where)
     bias, current = measured.bias_V[here], measured.current_mA[here]
     low = np.argsort(np.abs(bias))[: max(_FEWEST, bias.size // 8)]
     # what a cold lever shows does not depend on what is around it
     rest = Lever(probe.in_medium("vacuum") if alone else probe, COARSE).branch_to(0.0)
-    lever, series = (
-        float(rest.value_slopes[0, 0] / rest.value_slopes[0, 1]),
-        probe.circuit.series_kohm,
-    )
+    lever = float(rest.value_slopes[0, 0] / rest.value_slopes[0, 1])
+    series = probe.circuit.series_kohm
     added = current[low] - rest.values[0, 1]
     found = float(np.median(bias[low] / np.where(added == 0.0, np.nan, added)))
     ratio = found / (lever + series)

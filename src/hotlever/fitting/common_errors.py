@@ -38,12 +38,15 @@ class CommonError:
 
 
 def errors_of_scales(
-    measurement: Measurement, observables: Sequence[str], priors: Mapping[str, Prior]
+    measurement: Measurement,
+    observables: Sequence[str],
+    priors: Mapping[str, Prior],
+    base_temperature_K: float,
 ) -> list[CommonError]:
     """Return the errors of the meters' and the thermometer's scales, as known before.
 
-    That of a thermometer is relative to the rise. Where no prior says how large it is, it is as
-    large as what the measurement states of each temperature, or as the paper's.
+    That of a thermometer is relative to the rise above the base. Where no prior says how large it
+    is, it is as large as what the measurement states of each temperature, or as the paper's.
     """
     found = []
     for name, observable in SCALES.items():
@@ -52,7 +55,7 @@ def errors_of_scales(
         shown = np.abs(measurement.observable(observable))
         share = METERS
         if observable == "tip":
-            shown = shown - np.nanmin(shown)
+            shown = np.abs(shown - base_temperature_K)
             stated = measurement.tip_error_K / np.maximum(shown, _WARM_K)
             known = np.isfinite(stated).any()
             share = float(np.nanmedian(stated)) if known else RAMAN_ERROR_SHARE

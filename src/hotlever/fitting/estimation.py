@@ -178,7 +178,8 @@ def estimate(
     # priors are in standard deviations, so the data must be too
     known = bool(options.priors) or joint is not None
     weights = "errors" if known else options.weights
-    common = errors_of_scales(measurement, observables, priors) if known else []
+    base = probe.circuit.base_temperature_K
+    common = errors_of_scales(measurement, observables, priors, base) if known else []
     residuals = Residuals(measurement, observables, weights, options.drift, common=common)
     if not known and residuals.different < len(options.varied):
         raise InputError(

@@ -14,9 +14,8 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import BSpline
 
-from hotlever.lever.branch import TIP_RISE, Branch, Reach, shifted
+from hotlever.lever.branch import CHANGING, Branch, Reach, shifted
 from hotlever.lever.curve import spline_through
-from hotlever.lever.equations import SHOWN
 from hotlever.lever.held import at_places_of, followed
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.newton import NewtonOptions, find_roots
@@ -274,9 +273,10 @@ class ForwardModel:
         else:
             branch = at_places_of(fast, followed(equations, self.reach(probe)))
             u, x = branch.u[branch.solved], branch.x[:, branch.solved]
-        known, columns = at.linearised.shown_at(u), [*range(len(SHOWN)), TIP_RISE]
-        shown = np.vstack([equations.observed(x), equations.space.tip_rise(x)])[: known.shape[1]]
-        values = shown.T - fast.curve(u)[:, columns[: known.shape[1]]]
+        known = at.linearised.shown_at(u)
+        count = known.shape[1]
+        shown = np.vstack([equations.observed(x), equations.space.tip_rise(x)])[:count]
+        values = shown.T - fast.curve(u)[:, CHANGING[:count]]
         lacking = np.zeros(known.shape)
         if self.first_order:
             lacking = by_parameter(equations, x, self.names, pin=fast.sections.pin(u)) - known

@@ -214,8 +214,8 @@ class Fit:
 
     def residuals(self) -> Residuals:
         """Return the data with the fit's own weights, to be compared with predictions."""
-        known = self._stated
-        common = errors_of_scales(self.measurement, self.observables, known) if known else []
+        known, base = self._stated, self.probe.circuit.base_temperature_K
+        common = errors_of_scales(self.measurement, self.observables, known, base) if known else []
         return Residuals(
             self.measurement,
             self.observables,

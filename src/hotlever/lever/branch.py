@@ -37,6 +37,8 @@ _NO_BIAS = 1e-9
 BY_TIP = ByTip()
 #: Where a branch's values have the rises of the hottest place and of the tip.
 HIGHEST_RISE, TIP_RISE = len(SHOWN), len(SHOWN) + 1
+#: What may change at a place from lever to lever: V_l, I_h, V_r and the rise of the tip.
+CHANGING = (*range(len(SHOWN)), TIP_RISE)
 
 
 @dataclass(frozen=True)
@@ -132,8 +134,13 @@ class Branch:
             return BY_TIP
         if self.places is not None:
             return self.places
+        return Across(self.path)
+
+    @cached_property
+    def path(self) -> PPoly:
+        """Tip and lever voltage by u, in the units of `hotlever.lever.sections.in_plane`."""
         own = self.curve.c[..., [TIP_RISE, 0]] / np.array([UNIT_K, UNIT_V])
-        return Across(PPoly(own, self.curve.x))
+        return PPoly(own, self.curve.x)
 
     @property
     def solved(self) -> slice:
@@ -352,7 +359,7 @@ def shifted(branch: Branch, changes: Array, slopes: Array) -> Branch:
 
     The slopes are derivatives of the changes by u.
     """
-    columns = [*range(len(SHOWN)), TIP_RISE][: changes.shape[1]]
+    columns = CHANGING[: changes.shape[1]]
     moved = branch.values.copy(), branch.value_slopes.copy()
     for known, change in zip(moved, (changes, slopes), strict=True):
         known[:, columns] += change

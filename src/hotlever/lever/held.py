@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.errors import ComputationError, NewtonError
-from hotlever.lever.branch import TIP_RISE, Branch, Reach
+from hotlever.lever.branch import Branch, Reach
 from hotlever.lever.curve import hermite_weights
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.following import Follower, branch_of, joined, part_of
@@ -77,8 +77,7 @@ def at_places_of(known: Branch, branch: Branch) -> Branch:
     if equations.circuit.starts_cold:
         return branch
     u = np.linspace(branch.u[0], branch.u[-1], _LOOKED_AT * branch.u.size)
-    there, here = branch.curve(u)[:, [TIP_RISE, 0]], known.values[:, [TIP_RISE, 0]]
-    away = (there - here[:, None]) / np.array([UNIT_K, UNIT_V])
+    away = branch.path(u) - known.path(known.u)[:, None]
     nearest = u[np.argmin((away**2).sum(axis=-1), axis=1)]
     pinned = Pinned(equations, sections.values(known.u), sections.pin(known.u))
     found = find_roots(pinned, branch.states(nearest), _OPTIONS)

@@ -302,12 +302,14 @@ class Lever:
         values = checked_bias(bias, self.circuit)
         branch, reading, failure = self._read(values, progress)
         here = np.flatnonzero(np.isfinite(reading.u))
-        u, notes, states = reading.u[here], reading.notes(values[here]), []
-        if not (cold := self.circuit.starts_cold):
+        u, notes, found = reading.u[here], reading.notes(values[here]), None
+        cold, states = self.circuit.starts_cold, []
+        if not cold:
             states = [self._state_at(branch, *at) for at in zip(u, values[here], strict=True)]
-        x = np.concatenate([one.x for one in states], axis=1) if states else None
-        by: Any = branch, u, self.circuit, usual_parameters(self.probe), x
-        more = notes, sensitivities_of(*by) if sensitivities else None
+        if sensitivities:
+            names = usual_parameters(self.probe)
+            found = sensitivities_of(branch, u, self.circuit, names, states)
+        more = notes, found
         data = self._dataset(branch, u, *more) if cold else self.dataset(states, *more)
         data = at_bias(data, values[here])
         if failure is not None:
@@ -317,7 +319,7 @@ class Lever:
 
     @one_blas_thread
     def dataset(
-        self, states: Sequence[State], notes: Sequence[str] = (), slopes: Array | None = None
+        self, states: Sequence[State], notes: Sequence[str] = (), sensitivities: Array | None = None
     ) -> xr.Dataset:
         """Return what is observed of solved states, as `sweep` does."""
         space, equations = self.space, self.equations
@@ -325,7 +327,7 @@ class Lever:
         base = self.circuit.base_temperature_K
         shown = dict(zip(SHOWN, equations.observed(x), strict=True))
         shown |= {"tip_K": base + space.tip_rise(x), "max_K": base + space.rises(x).max(axis=0)}
-        return sweep_dataset(self.probe, shown, balance_columns(equations, x), notes, slopes)
+        return sweep_dataset(self.probe, shown, balance_columns(equations, x), notes, sensitivities)
 
     @one_blas_thread
     def _dataset(

@@ -12,6 +12,7 @@ from hotlever.lever.curve import spline_through
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.held import followed
 from hotlever.lever.space import TIP, Factors, Pin
+from hotlever.lever.state import State
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit
@@ -115,13 +116,12 @@ def at_fixed_bias(
 
 
 def sensitivities_of(
-    branch: Branch, u: Array, circuit: Circuit, names: Sequence[str], x: Array | None = None
+    branch: Branch, u: Array, circuit: Circuit, names: Sequence[str], states: Sequence[State] = ()
 ) -> Array:
     """Return the derivatives of `at_fixed_bias` by parameters at any u of a branch, exact.
 
-    The states there, (size + 1, n), may be known better than the curves do.
+    The states there may have been solved by themselves; else they are those of the curves.
     """
-    x = branch.states(u) if x is None else x
     cold = branch.equations.circuit.starts_cold
     shown = np.zeros((u.size, len(SHOWN) + (not cold), len(names)))
     # without power nothing depends on the material
@@ -129,7 +129,9 @@ def sensitivities_of(
     for start in range(0, hot.size, _AT_ONCE):
         some = hot[start : start + _AT_ONCE]
         pin = branch.sections.pin(u[some])
-        shown[some] = by_parameter(branch.equations, x[:, some], names, pin=pin)
+        solved = [states[one].x for one in some] if states else [branch.states(u[some])]
+        x = np.concatenate(solved, axis=1)
+        shown[some] = by_parameter(branch.equations, x, names, pin=pin)
     return at_fixed_bias(branch.curve(u, 1), circuit, shown)
 
 

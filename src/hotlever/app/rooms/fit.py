@@ -47,8 +47,7 @@ class FitRoom(MeasuredRoom):
             self._medium = choice("Medium", MEDIA, chosen.get("medium", ""), self._choose)
             self._fixed = field("Hold (n_d=3.3e17, p)", chosen.get("fixed", ""), self._choose)
             pulse = "Pulse of a file in time (10V,20us)"
-            self._pulse = field(pulse, chosen.get("waveform") or "", self._told)
-            self._pulse.props("debounce=600")
+            field(pulse, chosen.get("waveform", ""), self._told).props("debounce=600")
             self._free = field("Vary too (film.tcr)", chosen.get("free", ""), self._choose)
             known = "Known beforehand (n_d=3.3e17±15%)"
             self._priors = field(known, chosen.get("priors", ""), self._choose)

@@ -85,10 +85,9 @@ def _listed(session: Session) -> None:
 
 
 def _open(session: Session, to: str, room: str, key: str, name: str) -> None:
-    chosen = session.chosen.setdefault(room, {})
-    chosen[key] = name
-    if room == "simulate":
-        session.chosen[room] = {"probe": name}
+    if room == "simulate":  # what was moved is of another probe
+        session.chosen[room] = {}
+    session.chosen.setdefault(room, {})[key] = name
     ui.navigate.to(to)
 
 

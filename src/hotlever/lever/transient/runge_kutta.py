@@ -380,12 +380,3 @@ def _next(t: float, length: float, end: float) -> float:
     if steps <= 1.001:
         return end
     return t + (0.5 * (end - t) if steps < 2.0 else length)
-
-
-def weighted_sum(weights: Array, columns: list[Array]) -> Array:
-    """Return the sum of some columns with the first of the weights."""
-    total = np.zeros_like(columns[0])
-    for weight, column in zip(weights, columns, strict=False):
-        if weight:
-            total += weight * column
-    return total

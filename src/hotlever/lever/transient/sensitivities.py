@@ -26,7 +26,6 @@ from hotlever.lever.transient.runge_kutta import (
     STAGES,
     TIMES,
     Step,
-    weighted_sum,
 )
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.probe import Probe
@@ -181,7 +180,7 @@ class _Along:
         changes = self._changes
         for stage in range(1, len(TIMES)):
             x = step.stages[:, [stage]]
-            known = begin + length * weighted_sum(STAGES[stage], flows)
+            known = begin + length * np.tensordot(STAGES[stage, :stage], flows, axes=1)
             by_stored, by_rest = problem.by_parameter(x, self._names)
             right = rate * (known - by_stored) - by_rest
             changes = self._solved(problem, x, right, rate, step.factors)
