@@ -92,6 +92,26 @@ def test_the_shares_add_up_to_the_covariance(data):
     )
 
 
+def test_how_far_a_prior_is_pulled_is_what_the_others_gain_without_it(data):
+    """Of the linearised estimate, as nearly as a search ends at its optimum."""
+    one = estimate(data[0], NOMINAL, FitOptions(priors=default_priors(NOMINAL)))
+    objective, at = one.problem.objective, one.optimum.prediction
+    scaled = objective.values(at.probe) / objective.scale
+    residual, jacobian = (
+        objective.residual(at.values, scaled),
+        objective.jacobian(at.slopes, scaled),
+    )
+
+    def least(rows):
+        step = np.linalg.lstsq(jacobian[rows], residual[rows])[0]
+        return np.sum((residual[rows] - jacobian[rows] @ step) ** 2)
+
+    every, count = np.arange(residual.size), len(one.options.varied)
+    for row, name in enumerate(one.options.varied, start=residual.size - count):
+        gained = least(every) - least(np.delete(every, row))
+        assert one.moved[name].pull ** 2 == pytest.approx(gained, rel=0.05, abs=0.05), name
+
+
 def test_priors_of_what_does_not_exist_or_is_fixed_are_refused(data):
     with pytest.raises(InputError, match="priors: unknown prior 'heater_um'"):
         fit(data[0], NOMINAL, priors={"heater_um": Prior(1.0, 0.1)})

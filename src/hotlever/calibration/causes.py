@@ -54,6 +54,9 @@ class _Curve:
     Attributes
     ----------
     probe : Probe
+        As it is said to be.
+    at : ndarray, shape (p,)
+        Where the lever was solved: logarithms of its parameters over the probe's.
     names : tuple of str
     spreads : ndarray, shape (p,)
         Standard deviations of the logarithms of the parameters.
@@ -62,6 +65,7 @@ class _Curve:
     """
 
     probe: Probe
+    at: Array
     names: tuple[str, ...]
     spreads: Array
     logarithms: Array
@@ -87,14 +91,14 @@ class _Curve:
         u = np.linspace(float(branch.u[1]), branch.end_u, _POINTS)
         shown = np.maximum(branch.curve(u)[:, :2], 1e-12)
         powers = spline_through(branch.u[1:], powers)(u)
-        return cls(probe, names, np.array(spreads), np.log(shown), powers)
+        return cls(probe, np.zeros(len(names)), names, np.array(spreads), np.log(shown), powers)
 
     def current(self, away: Array, rows: Rows) -> Array:
         """Return I_h (mA) at the biases, for logarithms of parameters over the probe's.
 
         Beyond its end the branch stays level: no lever takes such a bias.
         """
-        lever, current = np.exp(self.logarithms + self.powers @ away).T
+        lever, current = np.exp(self.logarithms + self.powers @ (away - self.at)).T
         bias = np.maximum.accumulate(lever + rows.series_kohm * current)
         return np.interp(rows.bias_V, np.append(0.0, bias), np.append(0.0, current))
 
@@ -103,12 +107,11 @@ class _Curve:
 class _Found:
     """Where a search ended: what is left unexplained, the unknown, and the parameters.
 
-    These are logarithms over the values of the probe before.
+    These are logarithms over the values of the curve's probe.
     """
 
     suspect: Suspect
-    probe: Probe
-    names: tuple[str, ...]
+    curve: _Curve
     squares: float
     unknown: float
     away: Array
@@ -168,7 +171,7 @@ class Causes:
     @cached_property
     def _without(self) -> _Found:
         """What is left unexplained without a suspect."""
-        return self._again(self._search(Suspect(lambda _: "")))
+        return self._again(self._estimated(Suspect(lambda _: ""), 0.0, self._curve))
 
     @cached_property
     def _curve(self) -> _Curve:
@@ -184,25 +187,27 @@ class Causes:
         """Estimate the lever with a suspect, from each of its starts; return the best."""
         found = []
         for start in suspect.starts:
-            curve = self._curve
+            # as stated, and as near to the data as priors let a lever come
+            curves = [self._curve, self._without.curve]
             if suspect.probe is not None:
-                curve = self._solved(suspect.probe(self._probe, start))
-            found.append(self._estimated(suspect, start, curve, np.zeros(curve.spreads.size)))
+                curves = [self._solved(suspect.probe(self._probe, start))]
+            found += [self._estimated(suspect, start, curve) for curve in curves]
         return min(found, key=lambda one: one.squares)
 
     def _again(self, found: _Found) -> _Found:
         """Solve the lever where a search has led, and go on from there."""
-        values = found.probe.at(found.names) * np.exp(found.away)
+        curve = found.curve
+        values = curve.probe.at(curve.names) * np.exp(found.away)
         try:
-            moved = found.probe.with_(**dict(zip(found.names, values.tolist(), strict=True)))
-            curve = replace(self._solved(moved), probe=found.probe)
+            moved = curve.probe.with_(**dict(zip(curve.names, values.tolist(), strict=True)))
+            curve = replace(self._solved(moved), probe=curve.probe, at=found.away)
         except (InputError, ComputationError):
             return found
-        again = self._estimated(found.suspect, found.unknown, curve, found.away)
+        again = self._estimated(found.suspect, found.unknown, curve)
         return min(found, again, key=lambda one: one.squares)
 
-    def _estimated(self, suspect: Suspect, start: float, curve: _Curve, at: Array) -> _Found:
-        """Return the lever that priors and rows make most likely; its curve was solved `at` some.
+    def _estimated(self, suspect: Suspect, start: float, curve: _Curve) -> _Found:
+        """Return the lever that priors and rows make most likely.
 
         The search is for logarithms of parameters in units of their spreads, and for the unknown.
         """
@@ -213,13 +218,13 @@ class Causes:
             value = start + point[-1] if suspect.free else start
             rows = self._rows if suspect.rows is None else suspect.rows(self._rows, value)
             size = np.abs(rows.current_mA)
-            missing = curve.current(point[:count] * spreads - at, rows) - rows.current_mA
+            missing = curve.current(point[:count] * spreads, rows) - rows.current_mA
             missing /= _OWN * size + _LARGEST * size.max()
             soft = _SOFT * np.sqrt(np.log1p((missing / _SOFT) ** 2)) * np.sign(missing)
             kept = np.where(rows.kept, soft, np.sqrt(_LEFT_OUT))
             return np.concatenate([kept, point[:count][informed]])
 
-        begin = np.append(at / spreads, [0.0] * suspect.free)
+        begin = np.append(curve.at / spreads, [0.0] * suspect.free)
         widest = np.append(np.log(_WIDEST) / spreads, [np.inf] * suspect.free)
         found = least_squares(weighted, begin, bounds=(-widest, widest), max_nfev=_STEPS)
         away, value = found.x[:count] * spreads, start
@@ -230,4 +235,4 @@ class Causes:
             value = float(curve.probe.at([suspect.parameter])[0] * np.exp(away[place]))
         unknowns = suspect.free + bool(suspect.parameter)
         squares = 2.0 * float(found.cost) + _UNKNOWN * unknowns
-        return _Found(suspect, curve.probe, curve.names, squares, value, away)
+        return _Found(suspect, curve, squares, value, away)

@@ -286,7 +286,7 @@ def _put_together(
         tip_low_K=low,
         tip_high_K=high,
         priors=use,
-        reason=misfit(residuals, found.optimum.prediction.values, use),
+        reason=misfit(residuals, found.optimum.prediction.values, use, found.moved),
         notes=[
             *found.notes,
             *_search(found.problem),

@@ -15,7 +15,7 @@ from hotlever.fitting.misfit import off_together, undescribed
 from hotlever.fitting.residuals import Residuals
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.probe import Probe
-from hotlever.probe.priors import PriorUse
+from hotlever.probe.priors import Moved, PriorUse
 
 #: The resistance of a cold lever is within this factor of its model's.
 _WITHIN = 2.5
@@ -29,9 +29,9 @@ _COARSE, _EVEN = 0.01, 0.02
 _COLD_K = 400.0
 #: Data are not described where parameters are as far from their priors as one lever in 500 is.
 _UNLIKELY = 2e-3
-#: What is known better than this share is hardly moved by data that contradict it. How far they are
-#: from it, in standard deviations, tells that; with a least share that they must tell of it.
-_NARROW, _PULL, _LEAST = 0.01, 4.0, 1e-3
+#: The same where data and all other priors are so many standard deviations from one prior: of the
+#: nearly twenty of a lever one is, by chance, in one lever of 500.
+_PULL = 3.85
 
 
 def check_plausible(measured: Measurement, probe: Probe, causes: Causes) -> None:
@@ -116,25 +116,27 @@ def remarks(measured: Measurement, tip_K: np.ndarray) -> list[str]:
     return found
 
 
-def misfit(residuals: Residuals, values: np.ndarray, priors: Mapping[str, PriorUse]) -> str:
+def misfit(
+    residuals: Residuals,
+    values: np.ndarray,
+    priors: Mapping[str, PriorUse],
+    moved: Mapping[str, Moved],
+) -> str:
     """Return why data are not described by what was fitted to them; empty if they are."""
     reason = undescribed(residuals, values, with_priors=True) or off_together(residuals, values)
     if reason:
         return reason
-    for name, use in priors.items():
-        if use.spread < _NARROW * use.value:
-            told = 1.0 - (use.posterior_spread / use.spread) ** 2
-            pull = (use.posterior_value - use.value) / (use.spread * np.sqrt(max(told, _LEAST)))
-            if abs(pull) > _PULL:
-                return (
-                    f"{name}, known to {use.spread / use.value:.1%}, would have to be another; the "
-                    f"data are {abs(pull):.1f} σ from it"
-                )
-    away = {name: (use.posterior_value - use.value) / use.spread for name, use in priors.items()}
+    name = max(moved, key=lambda name: abs(moved[name].pull), default="")
+    if name and abs(moved[name].pull) > _PULL:
+        use = priors[name]
+        return (
+            f"{name}, known as {use.value:.4g} ± {use.spread:.2g}, would have to be another; the "
+            f"data are {abs(moved[name].pull):.1f} σ from it"
+        )
     # as many are free to be away as the data tell of
-    told = sum(1.0 - (use.posterior_spread / use.spread) ** 2 for use in priors.values())
-    if told > 0 and chdtrc(told, sum(one**2 for one in away.values())) < _UNLIKELY:
-        most = sorted(away, key=lambda name: -abs(away[name]))[:3]
-        moved = ", ".join(f"{name} by {away[name]:+.1f} σ" for name in most)
-        return f"what was known beforehand would have to be wrong by too much together, {moved}"
+    told = sum(one.told for one in moved.values())
+    if told > 0 and chdtrc(told, sum(one.size**2 for one in moved.values())) < _UNLIKELY:
+        most = sorted(moved, key=lambda name: -abs(moved[name].size))[:3]
+        away = ", ".join(f"{name} by {moved[name].size:+.1f} σ" for name in most)
+        return f"what was known beforehand would have to be wrong by too much together, {away}"
     return ""

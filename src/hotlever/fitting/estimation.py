@@ -31,7 +31,7 @@ from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.reduced import ReducedLever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
-from hotlever.probe.priors import SCALES, JointPrior, Prior, PriorUse, priors_of
+from hotlever.probe.priors import SCALES, JointPrior, Moved, Prior, PriorUse, priors_of
 from hotlever.types import Array, Progress
 
 #: Where a lever as known before melts below the highest bias: the share of what it reaches that is
@@ -113,19 +113,25 @@ class Estimate:
 
     def priors(self, known: Mapping[str, Prior]) -> dict[str, PriorUse]:
         """Return what was known before, and what the data made of it."""
-        names, at = self.options.varied, self.optimum.prediction
+        names = self.options.varied
         after = zip(self.optimum.probe.at(names), np.sqrt(np.diag(self.covariance)), strict=True)
         found = {
             name: PriorUse(known[name].value, known[name].absolute, float(value), float(spread))
             for name, (value, spread) in zip(names, after, strict=True)
             if name in known
         }
-        residuals, slopes = self.problem.residuals, self.slopes(at)
-        sizes = residuals.in_common(at.values, slopes, self.covariance)
-        for one in residuals.common:
-            size, left = sizes[one.name]
+        moved = self.moved
+        for one in self.problem.residuals.common:
+            size, left = moved[one.name]
             found[one.name] = PriorUse(1.0, one.share, 1.0 + one.share * size, one.share * left)
         return found
+
+    @cached_property
+    def moved(self) -> dict[str, Moved]:
+        """How far the data moved parameters and scales from their own priors."""
+        problem, at = self.problem, self.optimum.prediction
+        scales = problem.residuals.in_common(at.values, self.slopes(at), self.covariance)
+        return problem.objective.moved(at) | scales
 
     def predicted(self, bias: Array) -> Prediction:
         """Return what is predicted at other biases (V), as far as the measured ones reach."""

@@ -8,12 +8,12 @@ from hotlever.fitting.residuals import Residuals
 from hotlever.types import Array
 
 #: Data are not described where they scatter about the model by more than this share of the largest,
-#: and neighbours together: of white noise they differ by twice its variance.
-_SCATTER, _TOGETHER = 0.004, 0.6
+#: and neighbours together: the product of two is this share of the square, of white noise 0.
+_SCATTER, _TOGETHER = 0.004, 0.4
 #: The same of fits without priors, which hold dimensions and whatever else is fixed as they are.
 _HELD_SCATTER = 0.02
 #: Outliers stand alone: so many neighbours that are off by more than so many standard deviations
-#: are none.
+#: are none; nor are one fewer at the end, with nothing beyond.
 _NEIGHBOURS, _FAR = 3, 8.0
 #: Fewer rows tell nothing of their neighbours.
 _ROWS = 7
@@ -40,8 +40,8 @@ def undescribed(residuals: Residuals, values: Array, *, with_priors: bool) -> st
         square = float(np.mean(whole[known] ** 2))
         # a drift shows in the order of the rows, another lever in that of the bias
         rows = (whole[known], whole[in_order][known[in_order]])
-        together = min(float(np.mean(np.diff(row) ** 2)) for row in rows)
-        if square > scatter**2 and together < _TOGETHER * 2.0 * square:
+        together = max(float(row[1:] @ row[:-1]) for row in rows) / (known.sum() * square)
+        if square > scatter**2 and together > _TOGETHER:
             worst = int(np.nanargmax(np.abs(whole)))
             return (
                 f"{name} differs by {np.sqrt(square):.1%} of its largest value (rms), and not at "
@@ -55,13 +55,13 @@ def off_together(residuals: Residuals, values: Array) -> str:
     in_order = np.argsort(residuals.along, kind="stable")
     along = residuals.along[in_order]
     for name, row in zip(residuals.observables, residuals.deviations(values), strict=True):
-        far = np.abs(row[in_order]) > _FAR
-        if name == "tip" or far.size < _ROWS:
+        if name == "tip" or row.size < _ROWS:
             continue
+        far = np.append(np.abs(row[in_order]) > _FAR, True)
         together = np.lib.stride_tricks.sliding_window_view(far, _NEIGHBOURS).all(axis=1)
         if together.any():
             first = int(np.argmax(together))
-            last, unit = along[first + _NEIGHBOURS - 1], residuals.unit
-            ends = f"{along[first]:.3g} to {last:.3g} {unit}"
+            last = min(first + _NEIGHBOURS, along.size) - 1
+            ends = f"{along[first]:.3g} to {along[last]:.3g} {residuals.unit}"
             return f"{name} is off in neighbouring rows, from {ends}"
     return ""

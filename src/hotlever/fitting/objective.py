@@ -12,7 +12,7 @@ from hotlever.fitting.models import Prediction
 from hotlever.fitting.residuals import Residuals
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameters_of
-from hotlever.probe.priors import JointPrior, Prior
+from hotlever.probe.priors import JointPrior, Moved, Prior
 from hotlever.types import Array
 
 #: Scaled residual given to trial parameters for which the lever has no state: far beyond any
@@ -135,6 +135,15 @@ class Objective:
         for name, row in zip(names, prior, strict=True):
             found[name] = found.get(name, 0.0) + np.outer(left @ row, left @ row)
         return found
+
+    def moved(self, at: Prediction) -> dict[str, Moved]:
+        """Return how far a prediction is from the priors of single parameters."""
+        scaled = self.values(at.probe) / self.scale
+        own = slice(len(self._priors))
+        size, by = self.from_priors(scaled)[own], self.of_priors(scaled)[own]
+        left = np.sqrt(np.einsum("ij,jk,ik->i", by, self._posterior(at.probe, at.slopes), by))
+        names = [self.varied[place] for place in self._priors]
+        return dict(zip(names, map(Moved, size.tolist(), left.tolist()), strict=True))
 
     def from_priors(self, scaled: Array) -> Array:
         """Return how far parameters are from their priors, in standard deviations."""

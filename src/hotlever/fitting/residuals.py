@@ -13,6 +13,7 @@ from hotlever.fitting.measurement import Measurement
 from hotlever.fitting.noise import relative_noise
 from hotlever.fitting.options import Weights
 from hotlever.lever.dataset import OBSERVABLES
+from hotlever.probe.priors import Moved
 from hotlever.types import Array
 
 #: Huber's weights lessen from here on; the others are full up to, and nothing beyond, so many
@@ -184,21 +185,18 @@ class Residuals:
         kept = 1.0 / np.sqrt(1.0 + size**2) - 1.0
         return np.asarray(rows + along @ (kept * (along.T @ rows).T).T)
 
-    def in_common(
-        self, values: Array, slopes: Array, covariance: Array
-    ) -> dict[str, tuple[float, float]]:
+    def in_common(self, values: Array, slopes: Array, covariance: Array) -> dict[str, Moved]:
         """Return the errors that data have in common as the data tell them.
 
-        Each as its size and what it is uncertain by, in standard deviations of what was known
-        before; `slopes` (3, n, p) are those by parameters of which the fit leaves this covariance.
+        The slopes (3, n, p) are those by parameters of which the fit leaves this covariance.
         """
         pattern = self._pattern
         own = np.linalg.inv(np.eye(len(self.common)) + pattern.T @ pattern)
         size = -own @ pattern.T @ self._each(values)
         by = own @ pattern.T @ self._each_by(slopes)
         left = np.sqrt(np.diag(own + by @ covariance @ by.T))
-        names = [one.name for one in self.common]
-        return dict(zip(names, zip(size.tolist(), left.tolist(), strict=True), strict=True))
+        told = map(Moved, size.tolist(), left.tolist())
+        return dict(zip((one.name for one in self.common), told, strict=True))
 
     def deviations(self, values: Array) -> Array:
         """Return differences in units of the scatter of their observable; 0 where nothing is.

@@ -13,7 +13,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,8 @@ _HARMLESS = ("reader_length_um", "reader_centre_um")
 ALL_DIMENSIONS = "dimensions"
 #: Scales of what is shown, and the observable that each belongs to.
 SCALES = {"current_scale": "current", "reader_scale": "reader", "raman_scale": "tip"}
+#: The share of a prior's variance below which nothing is told of it.
+_LEAST_TOLD = 1e-3
 #: Relative spreads that mean something.
 _LEAST, _MOST, _LARGEST_SHARE = 1e-6, 10.0, 0.5
 _TEXT = re.compile(r"([^±]{0,40})±([^±]{1,40})")
@@ -135,6 +137,33 @@ class PriorUse:
     spread: float
     posterior_value: float
     posterior_spread: float
+
+
+class Moved(NamedTuple):
+    """How far data moved a parameter from its prior, in standard deviations of the prior.
+
+    Attributes
+    ----------
+    size : float
+    left : float
+        Standard deviation that data and priors leave.
+    """
+
+    size: float
+    left: float
+
+    @property
+    def told(self) -> float:
+        """Share of the prior's variance that the data take away."""
+        return 1.0 - self.left**2
+
+    @property
+    def pull(self) -> float:
+        """How far the data and all other priors are from the prior, in joint standard deviations.
+
+        Without it the sum of squares would be lower by the square of this.
+        """
+        return self.size / float(np.sqrt(max(self.told, _LEAST_TOLD)))
 
 
 @dataclass(frozen=True)
