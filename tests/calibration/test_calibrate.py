@@ -381,6 +381,18 @@ def test_priors_are_about_the_circuit_of_the_measurement(reference):
     assert own.parameters["series_resistance_ohm"].value == pytest.approx(3000.0, rel=5e-3)
 
 
+def test_edges_that_are_off_together_are_known_by_one_prior():
+    """Each dimension by itself would have to be many times its tolerance away."""
+    true = Lever(Probe.reference().with_(edge_bias_um=-0.12))
+    curve = measured_curve(true.branch(), np.random.default_rng(0))
+    found = calibrate(measurement_of(curve), priors={"dimensions": "± 1%", "edge_bias_um": "± 0.1"})
+    use = found.priors["edge_bias_um"]
+    assert use.posterior_value == pytest.approx(-0.12, abs=2 * use.posterior_spread)
+    assert use.posterior_spread < 0.7 * use.spread
+    error = np.abs(found.table.tip_K - true.branch().tip_temperature(found.table.power_mW))
+    assert float((error / found.table.tip_stderr_K).max()) < 2.0
+
+
 def test_what_was_known_before_a_fit_is_not_what_it_found(shared_fit):
     """The published levers, the probe file, what the fit was asked and what is asked now."""
     one = read_fit(shared_fit)

@@ -31,12 +31,13 @@ def orders(lever, name):
     start = similar.linearised(probe, REACH, None, names)
     shown = slice(0, 3 if "reader" in lever.space.mesh.terminal_facets else 2)
     (value,), rest = probe.at(names), []
+    unit = value or 1.0
     for step in (0.02, 0.01):
-        moved = probe.moved({name: float(value * (1 + step))})
+        moved = probe.moved({name: float(value + step * unit)})
         other = similar.linearised(moved, REACH, start, names).branch
         count = start.branch.u.size
         change = (other.values[:count] - start.branch.values)[1:, shown]
-        rest.append(np.abs(change - step * value * start.shown[1:, shown, 0]))
+        rest.append(np.abs(change - step * unit * start.shown[1:, shown, 0]))
     size = np.abs(start.branch.values[1:, shown])
     # what does not bend leaves nothing to measure an order of
     bent = rest[0] > 1e-7 * size

@@ -110,12 +110,14 @@ def corner(rng: np.random.Generator) -> Probe:
         probe = Probe.reference() if rng.random() < 0.5 else Probe.u_shape()
         values = {}
         for name, field in type(probe.shape).model_fields.items():
-            if name not in ("shape", "reader_centre_um"):
+            if name not in ("shape", "reader_centre_um", "edge_bias_um"):
                 low, high = sorted(
                     one.ge if hasattr(one, "ge") else one.le for one in field.metadata
                 )
                 between = float(np.exp(rng.uniform(np.log(low), np.log(high))))
                 values[name] = rng.choice([low, high, getattr(probe.shape, name), between])
+        narrowest = min(2.0, *values.values())
+        values["edge_bias_um"] = narrowest * float(rng.choice([0.0, 0.45, -0.45]))
         try:
             return probe.with_(**values)
         except InputError:

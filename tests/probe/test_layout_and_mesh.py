@@ -51,6 +51,32 @@ def test_reference_probe_has_the_published_parts():
     assert [region.name for region in layout.regions if region.taper] == ["heater", "reader"]
 
 
+@pytest.mark.parametrize("name", ["three-leg", "u-shape"])
+def test_etching_moves_every_edge_but_those_of_the_doping(name):
+    probe, bias = PROBES[name], 0.1
+    before, after = (one.layout() for one in (probe, probe.with_(edge_bias_um=bias)))
+    for old, new in zip(before.regions, after.regions, strict=True):
+        (low, high), (new_low, new_high) = old.box, new.box
+        if "leg" in old.name and old.name != "right leg front":
+            assert new_low[1] - low[1] == pytest.approx(-bias)
+            assert new_high[1] - high[1] == pytest.approx(bias)
+    assert after.box[1] - before.box[1] == pytest.approx([bias, bias])
+    long, wide = np.sort(before.heater.sides)[::-1]
+    assert np.sort(after.heater.sides)[::-1] == pytest.approx([long, wide + 2 * bias])
+    assert after.heater_taper.length_um == before.heater_taper.length_um
+
+
+def test_a_heater_that_fills_its_gap_does_so_after_etching():
+    probe = Probe.u_shape().with_(heater_length_um=6.0, edge_bias_um=0.25)
+    assert (probe.shape.etched.gap_um, probe.shape.etched.heater_length_um) == (5.5, 5.5)
+
+
+@pytest.mark.parametrize(("bias", "left"), [(1.7, "gap_um is -0.2"), (-0.9, "heater_width_um is")])
+def test_etching_leaves_something(bias, left):
+    with pytest.raises(InputError, match=f"edge_bias_um = {bias}, {left}.* µm, expected 0.01"):
+        Probe.reference().with_(edge_bias_um=bias)
+
+
 def test_reentrant_corners_of_the_reference_probe():
     corners = Probe.reference().layout().reentrant_corners()
     expected = [(46.58, 0.8225), (50.58, 0.8225), (50.58, 6.42)]

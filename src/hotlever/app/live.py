@@ -33,7 +33,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced import ReducedLever
 from hotlever.lever.reduction import cached_reduction, can_be_reduced, known_reduction
 from hotlever.probe import Circuit, Layout, Probe
-from hotlever.probe.parameters import of_materials
+from hotlever.probe.parameters import EDGE_BIAS, of_materials
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -237,7 +237,9 @@ def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
     for one, value in probe.shape.dimensions().items():
         if one not in probe.shape.tied():
             unit, meaning = "µm", meanings.get(one, "")
-            sliders.append(("dimensions", one, value, 0.8 * value, 1.2 * value, unit, meaning))
+            low, high = (0.8 * value, 1.2 * value) if one != EDGE_BIAS else (-0.2, 0.2)
+            ends = min(low, value), max(high, value)
+            sliders.append(("dimensions", one, value, *ends, unit, meaning))
     circuit = probe.circuit
     resistance, base = circuit.series_resistance_ohm, circuit.base_temperature_K
     top = max(2 * resistance, 1000.0)

@@ -53,7 +53,7 @@ class LayoutRate:
             If parts would come apart.
         """
         value = float(probe.at([name])[0])
-        now, step = probe.layout(), _STEP * value
+        now, step = probe.layout(), _STEP * (value or 1.0)
         later = probe.moved({name: value + step}).layout()
         if len(later.regions) != len(now.regions):
             raise InputError(

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 #: Shares of a dimension or a resistance, of a base temperature, and of what a gas conducts, within
 #: which a fit stays.
 _OF_THE_VALUE, _OF_THE_BASE, _OF_THE_GAS = (0.5, 1.5), (0.8, 1.2), (0.2, 5.0)
+#: The dimension that is the same for all edges, and how far off it is, at most and usually (µm).
+EDGE_BIAS, _MOST_BIAS, _USUAL_BIAS = "edge_bias_um", 2.0, 0.1
 #: Dimensions of a tip that matter to its lever.
 OF_THE_TIP = ("height_um", "half_angle_deg")
 
@@ -127,6 +129,10 @@ def parameters_of(
             lower=float(least * value),
             upper=float(most * value),
             meaning=meaning[name],
+        )
+    if EDGE_BIAS in found:
+        found[EDGE_BIAS] = found[EDGE_BIAS]._replace(
+            scale=_USUAL_BIAS, lower=-_MOST_BIAS, upper=_MOST_BIAS
         )
     return found
 

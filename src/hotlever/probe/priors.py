@@ -23,6 +23,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
 from hotlever.materials.parameters import Parameter
 from hotlever.probe.parameters import (
+    EDGE_BIAS,
     OF_THE_TIP,
     of_materials,
     own_name,
@@ -206,8 +207,8 @@ class JointPrior:
 
 
 def nuisances(probe: Probe) -> list[str]:
-    """Return the dimensions of the drawing that matter to the tip."""
-    held = (*_HARMLESS, *probe.shape.tied())
+    """Return the dimensions of the drawing that matter to the tip, each by itself."""
+    held = (*_HARMLESS, EDGE_BIAS, *probe.shape.tied())
     return [name for name in probe.shape.dimensions() if name not in held]
 
 

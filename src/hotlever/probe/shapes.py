@@ -67,11 +67,36 @@ class Shape(Record):
 
 
 class Parametric(Shape):
-    """A shape made of dimensions."""
+    """A shape made of dimensions, as drawn, and what etching makes of them."""
+
+    edge_bias_um: float = Field(
+        default=0.0, ge=-2, le=2, description="all etched edges lie so far outside the drawing"
+    )
 
     def dimensions(self) -> dict[str, float]:
         """Return the dimensions (µm) that are given, by name."""
         return self.model_dump(exclude={"shape"}, exclude_none=True)
+
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """Return the section of a probe file: the drawing, and what etching does to it."""
+        values = self.model_dump()
+        etching = {"edge_bias_um": values.pop("edge_bias_um")}
+        return {"probe": values | etching}
+
+    @abstractmethod
+    def _by_edge_bias(self) -> dict[str, float]:
+        """Return how dimensions change with the bias of the edges."""
+
+    @property
+    def etched(self) -> Self:
+        """The shape with its edges where etching leaves them."""
+        if self.edge_bias_um == 0.0:
+            return self
+        own = {
+            name: getattr(self, name) + share * self.edge_bias_um
+            for name, share in self._by_edge_bias().items()
+        }
+        return self.model_copy(update={**own, "edge_bias_um": 0.0})
 
     @abstractmethod
     def _parts_fit(self) -> None:
@@ -79,7 +104,14 @@ class Parametric(Shape):
 
     @model_validator(mode="after")
     def _can_be_meshed(self) -> Self:
-        self._parts_fit()
+        for name in self._by_edge_bias() if self.edge_bias_um else ():
+            left = getattr(self.etched, name)
+            _need(
+                left >= _SMALLEST,
+                f"with edge_bias_um = {self.edge_bias_um:g}, {name} is {left:.2g} µm, expected "
+                f"{_SMALLEST} µm or more",
+            )
+        self.etched._parts_fit()
         layout = self.layout()
         for region in layout.regions:
             side = region.sides.min()
@@ -142,6 +174,10 @@ class ThreeLeg(Parametric):
             f"and the bridge (0 to {front:g} µm); see reader_length_um and reader_centre_um",
         )
 
+    def _by_edge_bias(self) -> dict[str, float]:
+        widths = ("centre_leg_width_um", "outer_leg_width_um", "bridge_width_um", "heater_width_um")
+        return {"length_um": 1.0, "gap_um": -2.0, **dict.fromkeys(widths, 2.0)}
+
     @property
     def _reader_centre(self) -> float:
         return self.reader_centre_um or 2 / 3 * self.length_um
@@ -163,18 +199,19 @@ class ThreeLeg(Parametric):
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
-        front = self.length_um - self.bridge_width_um
-        heater_from = front - self.heater_length_um
-        centre, heater = self.centre_leg_width_um / 2, self.heater_width_um / 2
-        inner = centre + self.gap_um
-        outer = inner + self.outer_leg_width_um
-        reader_from = self._reader_centre - self.reader_length_um / 2
-        reader_to = reader_from + self.reader_length_um
+        here = self.etched
+        front = here.length_um - here.bridge_width_um
+        heater_from = front - here.heater_length_um
+        centre, heater = here.centre_leg_width_um / 2, here.heater_width_um / 2
+        inner = centre + here.gap_um
+        outer = inner + here.outer_leg_width_um
+        reader_from = here._reader_centre - here.reader_length_um / 2
+        reader_to = reader_from + here.reader_length_um
         along_x = (1.0, 0.0)
-        tip = (heater_from + self.heater_length_um / 2, 0.0)
-        taper = Taper(tip, along_x, self.heater_length_um)
-        reader_middle = (self._reader_centre, -(inner + outer) / 2)
-        reader_taper = Taper(reader_middle, along_x, self.reader_length_um)
+        tip = (heater_from + here.heater_length_um / 2, 0.0)
+        taper = Taper(tip, along_x, here.heater_length_um)
+        reader_middle = (here._reader_centre, -(inner + outer) / 2)
+        reader_taper = Taper(reader_middle, along_x, here.reader_length_um)
 
         def right_leg(name: str, x0: float, x1: float, taper: Taper | None = None) -> Region:
             return Region(name, "reader branch", rectangle(x0, -outer, x1, -inner), taper)
@@ -183,7 +220,7 @@ class ThreeLeg(Parametric):
             regions=(
                 Region("centre leg", "leg 1", rectangle(0, -centre, heater_from, centre)),
                 Region("heater", "heater", rectangle(heater_from, -heater, front, heater), taper),
-                Region("bridge", "leg 2", rectangle(front, -outer, self.length_um, outer)),
+                Region("bridge", "leg 2", rectangle(front, -outer, here.length_um, outer)),
                 Region("left leg", "leg 2", rectangle(0, inner, front, outer)),
                 right_leg("right leg", 0, reader_from),
                 right_leg("reader", reader_from, reader_to, reader_taper),
@@ -195,7 +232,7 @@ class ThreeLeg(Parametric):
                 Terminal("reader", (0, -outer), (0, -inner)),
             ),
             tip=tip,
-            thickness_um=self.thickness_um,
+            thickness_um=here.thickness_um,
         )
 
 
@@ -248,24 +285,34 @@ class UShape(Parametric):
             thickness_um=0.4,
         )
 
+    @property
+    def _filled(self) -> bool:
+        """Whether the heater fills the gap."""
+        return self.heater_length_um == self.gap_um
+
     def tied(self) -> tuple[str, ...]:
         """Return gap and length of a heater that fills it."""
-        filled = self.heater_length_um == self.gap_um
-        return ("heater_length_um", "gap_um") if filled else ()
+        return ("heater_length_um", "gap_um") if self._filled else ()
+
+    def _by_edge_bias(self) -> dict[str, float]:
+        widths = ("leg_width_um", "bridge_width_um", "heater_width_um")
+        narrower = ("gap_um", "heater_length_um") if self._filled else ("gap_um",)
+        return {"length_um": 1.0, **dict.fromkeys(widths, 2.0), **dict.fromkeys(narrower, -2.0)}
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
-        inner, heater = self.gap_um / 2, self.heater_length_um / 2
-        outer = inner + self.leg_width_um
-        back = self.length_um - self.bridge_width_um
-        middle, half = back + self.bridge_width_um / 2, self.heater_width_um / 2
+        here = self.etched
+        inner, heater = here.gap_um / 2, here.heater_length_um / 2
+        outer = inner + here.leg_width_um
+        back = here.length_um - here.bridge_width_um
+        middle, half = back + here.bridge_width_um / 2, here.heater_width_um / 2
         tip = (middle, 0.0)
-        taper = Taper(tip, (0.0, 1.0), self.heater_length_um)
+        taper = Taper(tip, (0.0, 1.0), here.heater_length_um)
         across = rectangle(middle - half, -heater, middle + half, heater)
 
         def side(name: str, part: Part, sign: int) -> list[Region]:
-            leg = rectangle(0, sign * inner, self.length_um, sign * outer)
-            bar = rectangle(back, sign * heater, self.length_um, sign * inner)
+            leg = rectangle(0, sign * inner, here.length_um, sign * outer)
+            bar = rectangle(back, sign * heater, here.length_um, sign * inner)
             both = [Region(f"{name} leg", part, leg), Region(f"{name} bar", part, bar)]
             return both[:1] if heater == inner else both
 
@@ -280,7 +327,7 @@ class UShape(Parametric):
                 Terminal("ground", (0, inner), (0, outer)),
             ),
             tip=tip,
-            thickness_um=self.thickness_um,
+            thickness_um=here.thickness_um,
         )
 
 
