@@ -353,11 +353,11 @@ def test_a_lever_in_air_is_estimated_in_air(lever, reference):
     assert by_rule.k == pytest.approx(found.k, rel=0.05)
 
 
-def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(lever, reference):
+def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(in_air, reference):
     """What the fit knows of material and dimensions narrows the band in air."""
     rng = np.random.default_rng(6)
     vacuum = measurement_of(measured_curve(reference, rng))
-    air = lever.in_medium("air").branch()
+    air = in_air.branch()
     other = replace(measurement_of(measured_curve(air, rng, to_V=12.0)), medium="air")
     found = fit(vacuum, Probe.reference(), fixed={"p": None})
     both = calibrate(other, fit=found)

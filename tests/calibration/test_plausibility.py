@@ -14,6 +14,7 @@ from hotlever.calibration.procedure import calibrate
 from hotlever.errors import InputError
 from hotlever.figures import calibration_curves
 from hotlever.fitting import Measurement
+from hotlever.lever import Lever
 from hotlever.probe import Probe
 from synthetic_curves import measured_curve
 
@@ -74,6 +75,10 @@ def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
             *(lambda i, n: i, {"thickness_um": 0.8}, "thickness rather 0.[34]"),
             marks=pytest.mark.slow,
         ),
+        pytest.param(
+            *(lambda i, n: i, {"heater_length_um": 2.6}, "heater length rather"),
+            marks=pytest.mark.slow,
+        ),
         (lambda i, n: i, {"series_resistance_ohm": 5000.0}, r"resistance, .* rather 5\.[56]"),
         (lambda i, n: np.minimum(i, 0.8 * i.max()), {}, "is the current clipped"),
         (lambda i, n: np.where(n < 0.5, i, 0.9 * i), {}, "two sweeps, a new one from row"),
@@ -108,6 +113,16 @@ def test_data_that_no_such_lever_shows_are_said_and_shown_to_be(curve):
     assert clipped.size > 3
     assert set(clipped) <= set(drawn["off"].get_xdata())
     assert drawn["measured"].get_xdata().size == curve.bias_V.size
+
+
+@pytest.mark.slow
+def test_a_hot_plate_that_was_not_stated_is_noticed():
+    """No parameter by itself is far from its prior, but no base is so warm."""
+    warm = Lever(Probe.reference().with_(base_temperature_K=353.0)).branch()
+    wrong = shown(measured_curve(warm, np.random.default_rng(0)))
+    found = calibrate(wrong, probe=Probe.reference())
+    assert "would have to be another" in found.reason
+    assert "is the base temperature rather about 353 K?" in found.reason
 
 
 def test_temperatures_in_degrees_celsius_are_refused(curve):

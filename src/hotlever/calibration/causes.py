@@ -40,7 +40,7 @@ _BETTER, _EACH, _ALTOGETHER = 0.5, 2.0, 10.0
 #: Suspects within a factor or a difference of the best are as likely; so many are named.
 _AS_LIKELY, _AS_LIKELY_BY, _NAMED = 1.3, 4.0, 2
 #: The most promising are solved anew where they lead.
-_AGAIN = 6
+_AGAIN = 4
 #: Points along a branch, and steps of a search.
 _POINTS, _STEPS = 240, 40
 #: A parameter of which nothing is known is within this factor of what was stated.
