@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -34,6 +34,11 @@ def _length(meaning: str, least: float = 0.05, most: float = 1000.0, **default: 
 def thickness(meaning: str = "of the silicon") -> Any:
     """Return the bounds of a lever's thickness (µm), and what it is."""
     return _length(meaning, 0.01, 20)
+
+
+def _edge_bias() -> Any:
+    meaning = "all etched edges lie so far outside the drawing"
+    return Field(default=0.0, ge=-2, le=2, description=meaning)
 
 
 class Shape(Record):
@@ -69,19 +74,13 @@ class Shape(Record):
 class Parametric(Shape):
     """A shape made of dimensions, as drawn, and what etching makes of them."""
 
-    edge_bias_um: float = Field(
-        default=0.0, ge=-2, le=2, description="all etched edges lie so far outside the drawing"
-    )
+    if TYPE_CHECKING:
+        # a field of each shape, after its drawing: fields stand in probe files as they come
+        edge_bias_um: float
 
     def dimensions(self) -> dict[str, float]:
         """Return the dimensions (µm) that are given, by name."""
         return self.model_dump(exclude={"shape"}, exclude_none=True)
-
-    def sections(self) -> dict[str, dict[str, Any]]:
-        """Return the section of a probe file: the drawing, and what etching does to it."""
-        values = self.model_dump()
-        etching = {"edge_bias_um": values.pop("edge_bias_um")}
-        return {"probe": values | etching}
 
     @abstractmethod
     def _by_edge_bias(self) -> dict[str, float]:
@@ -153,6 +152,7 @@ class ThreeLeg(Parametric):
     reader_centre_um: float | None = _length(
         "base to the reader's centre; left out: 2/3 of the length", 0.05, 2000, default=None
     )
+    edge_bias_um: float = _edge_bias()
 
     def _parts_fit(self) -> None:
         front = self.length_um - self.bridge_width_um
@@ -254,6 +254,7 @@ class UShape(Parametric):
     )
     heater_width_um: float = _length("along the lever")
     thickness_um: float = thickness()
+    edge_bias_um: float = _edge_bias()
 
     def _parts_fit(self) -> None:
         _need(
