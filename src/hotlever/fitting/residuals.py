@@ -19,6 +19,9 @@ from hotlever.types import Array
 #: Huber's weights lessen from here on; the others are full up to, and nothing beyond, so many
 #: standard deviations: data without outliers keep nearly all of theirs, and their scatter.
 _HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
+#: What is smooth is no noise: data scatter by no more than so many times what neighbours differ by,
+#: or a search would be content with a wrong lever and noisy data.
+_OF_NOISE = 4.0
 #: A point is named as suspicious beyond this many standard deviations.
 _SUSPICIOUS = 8.0
 #: So many of them are named, those furthest off.
@@ -231,7 +234,8 @@ class Residuals:
         A fit has used up some share of each datum, (observables, n). Outliers count as
         little as they weigh. The `usual` scatter, a share of the largest value, counts as one
         datum more: a few data say little of their own. With it the noise may go with the size of
-        what is shown (`hotlever.fitting.noise`); without it is the same everywhere.
+        what is shown (`hotlever.fitting.noise`), and is not what is smooth; without it is the same
+        everywhere.
         """
         weight = np.where(self.present, self.down**2, 0.0)
         difference = self.difference(values) * self._root
@@ -250,9 +254,22 @@ class Residuals:
             squares, count = squares + (usual * self.largest) ** 2, count + 1.0
         free = np.maximum(count - used_up.sum(axis=1, keepdims=True), 1.0)
         scatter = np.maximum(np.sqrt(squares / free), 1e-6 * self.largest)
+        if usual:
+            least = usual * self.largest
+            scatter = np.minimum(scatter, np.maximum(_OF_NOISE * self._noise(difference), least))
         self._scale = np.where(
             self.without_errors[:, None], scatter * self._relative / self._root, self._scale
         )
+
+    def _noise(self, difference: Array) -> Array:
+        """Return by how much neighbours differ without being smooth, (observables, 1)."""
+        ordered = (difference / self._relative)[:, np.argsort(self.along, kind="stable")]
+        rows = [np.diff(row[np.isfinite(row)]) for row in ordered]
+        # of white noise, two that are subtracted
+        found = [
+            np.median(np.abs(row)) / (0.6745 * np.sqrt(2.0)) if row.size else 0 for row in rows
+        ]
+        return np.array(found)[:, None]
 
     def rms(self, values: Array) -> dict[str, float]:
         """Return the rms of data minus prediction by column, for every observable with data."""
