@@ -19,9 +19,9 @@ from hotlever.types import Array
 #: Huber's weights lessen from here on; the others are full up to, and nothing beyond, so many
 #: standard deviations: data without outliers keep nearly all of theirs, and their scatter.
 _HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
-#: What is smooth is no noise: data scatter by no more than so many times what neighbours differ by,
-#: or a search would be content with a wrong lever and noisy data.
-_OF_NOISE = 4.0
+#: What is smooth is no noise: data scatter by so many times as much as about their neighbours at
+#: most, or a search would be content with a wrong lever and noisy data.
+_OF_NOISE, _BENDS = 4.0, 5
 #: A point is named as suspicious beyond this many standard deviations.
 _SUSPICIOUS = 8.0
 #: So many of them are named, those furthest off.
@@ -262,13 +262,15 @@ class Residuals:
         )
 
     def _noise(self, difference: Array) -> Array:
-        """Return by how much neighbours differ without being smooth, (observables, 1)."""
+        """Return how much data scatter about their neighbours, (observables, 1).
+
+        Infinite where few data do not tell.
+        """
         ordered = (difference / self._relative)[:, np.argsort(self.along, kind="stable")]
-        rows = [np.diff(row[np.isfinite(row)]) for row in ordered]
-        # of white noise, two that are subtracted
-        found = [
-            np.median(np.abs(row)) / (0.6745 * np.sqrt(2.0)) if row.size else 0 for row in rows
-        ]
+        bends = [np.diff(row[np.isfinite(row)], n=2) for row in ordered]
+        # the median of white noise, and the variance of this combination of three data
+        share = 0.6745 * np.sqrt(6.0)
+        found = [np.median(np.abs(b)) / share if b.size >= _BENDS else np.inf for b in bends]
         return np.array(found)[:, None]
 
     def rms(self, values: Array) -> dict[str, float]:
