@@ -20,7 +20,7 @@ from hotlever.types import Array
 #: standard deviations: data without outliers keep nearly all of theirs, and their scatter.
 _HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
 #: What is smooth is no noise: data scatter by so many times as much as about their neighbours at
-#: most, or a search would be content with a wrong lever and noisy data.
+#: most, or a search would be content with a wrong lever and noisy data. So many neighbours tell.
 _OF_NOISE, _BENDS = 4.0, 5
 #: A point is named as suspicious beyond this many standard deviations.
 _SUSPICIOUS = 8.0
