@@ -41,6 +41,11 @@ def test_an_outlier_is_at_random_wherever_it_is(row):
     assert undescribed(compared(off), MODEL, with_priors=True) == ""
 
 
+def test_perfect_data_are_described():
+    data = Measurement(BIAS, MODEL[0], *np.full((3, COUNT), np.nan))
+    assert undescribed(Residuals(data, ["current"]), MODEL, with_priors=True) == ""
+
+
 def test_what_is_off_smoothly_is_not_and_the_worst_place_is_named():
     text = undescribed(compared(0.05 * ALONG**3), MODEL, with_priors=True)
     assert text.startswith("current differs by 1.8%")

@@ -37,14 +37,15 @@ def undescribed(residuals: Residuals, values: Array, *, with_priors: bool) -> st
         known = np.isfinite(whole)
         if name == "tip" or known.sum() < _ROWS:
             continue
-        square = float(np.mean(whole[known] ** 2))
+        squares = float(np.sum(whole[known] ** 2))
+        rms = np.sqrt(squares / known.sum())
         # a drift shows in the order of the rows, another lever in that of the bias
         rows = (whole[known], whole[in_order][known[in_order]])
-        together = max(float(row[1:] @ row[:-1]) for row in rows) / (known.sum() * square)
-        if square > scatter**2 and together > _TOGETHER:
+        together = max(float(row[1:] @ row[:-1]) for row in rows)
+        if rms > scatter and together > _TOGETHER * squares:
             worst = int(np.nanargmax(np.abs(whole)))
             return (
-                f"{name} differs by {np.sqrt(square):.1%} of its largest value (rms), and not at "
+                f"{name} differs by {rms:.1%} of its largest value (rms), and not at "
                 f"random; most at {residuals.along[worst]:.3g} {residuals.unit}"
             )
     return ""
