@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from hotlever.calibration.knee import IVCurve
 from hotlever.errors import InputError
+from hotlever.fitting import Measurement
 from hotlever.lever import Branch
 from hotlever.probe import Circuit
 from hotlever.types import Array
@@ -67,3 +68,9 @@ def current_at(known: Branch, bias_V: ArrayLike, circuit: Circuit) -> Array:
             "the lever belong to one bias"
         )
     return known.shown(reading.u)["current_mA"].reshape(bias.shape)
+
+
+def measurement_of(curve: IVCurve) -> Measurement:
+    """Return a curve as a measurement of the current alone."""
+    nothing = np.full(curve.bias_V.size, np.nan)
+    return Measurement(curve.bias_V, curve.current_mA, nothing, nothing, nothing)

@@ -16,7 +16,7 @@ from hotlever.figures import calibration_curves
 from hotlever.fitting import Measurement
 from hotlever.lever import Lever
 from hotlever.probe import Probe
-from synthetic_curves import measured_curve
+from synthetic_curves import measured_curve, measurement_of
 
 
 @pytest.fixture(scope="module")
@@ -27,9 +27,7 @@ def curve(reference) -> IVCurve:
 
 def shown(curve: IVCurve, rows: slice = slice(None), **changed: np.ndarray) -> Measurement:
     """Return some rows of a curve as a measurement, with other values in some columns."""
-    nothing = np.full(curve.bias_V.size, np.nan)
-    data = Measurement(curve.bias_V, curve.current_mA, nothing, nothing, nothing)
-    data = replace(data, **changed)
+    data = replace(measurement_of(curve), **changed)
     some = {name: values[rows] for name, values in vars(data).items() if np.ndim(values)}
     return replace(data, **some)
 

@@ -12,18 +12,15 @@ from hotlever.calibration import pulses as module
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.pulses import PULSE_COLUMNS, PulseTiming
 from hotlever.errors import InputError
-from hotlever.fitting import Measurement
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import pulse
-from synthetic_curves import measured_curve
+from synthetic_curves import measured_curve, measurement_of
 
 
 @pytest.fixture(scope="module")
 def measured(reference):
-    curve = measured_curve(reference, np.random.default_rng(0))
-    nothing = np.full(curve.bias_V.size, np.nan)
-    return Measurement(curve.bias_V, curve.current_mA, nothing, nothing, nothing)
+    return measurement_of(measured_curve(reference, np.random.default_rng(0)))
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,8 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced import ReducedLever
 from hotlever.lever.reduction import cached_reduction, can_be_reduced, known_reduction
 from hotlever.probe import Circuit, Layout, Probe
-from hotlever.probe.parameters import EDGE_BIAS, of_materials
+from hotlever.probe.parameters import of_materials
+from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 

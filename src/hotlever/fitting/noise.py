@@ -22,6 +22,15 @@ _TAILS, _ROUNDS = 4.0, 20
 _LEAST_FREE = 0.05
 
 
+def noise_about_neighbours(values: Array) -> float:
+    """Return by how much three data or more in a row, (n,), scatter about their neighbours.
+
+    Neither a slope nor a gentle bend counts.
+    """
+    # the variance of one datum twice less its neighbours is six times that of white noise
+    return 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / float(np.sqrt(6.0))
+
+
 def relative_noise(difference: Array, shown: Array, used_up: Array, usual: float) -> Array:
     """Return the noise of data relative to its root mean square, (n,); one where there is none.
 

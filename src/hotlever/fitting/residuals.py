@@ -10,7 +10,7 @@ from hotlever.errors import InputError
 from hotlever.fitting.common_errors import CommonError
 from hotlever.fitting.drift import Drift
 from hotlever.fitting.measurement import Measurement
-from hotlever.fitting.noise import relative_noise
+from hotlever.fitting.noise import noise_about_neighbours, relative_noise
 from hotlever.fitting.options import Weights
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.probe.priors import Moved
@@ -20,8 +20,8 @@ from hotlever.types import Array
 #: standard deviations: data without outliers keep nearly all of theirs, and their scatter.
 _HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
 #: What is smooth is no noise: data scatter by so many times as much as about their neighbours at
-#: most, or a search would be content with a wrong lever and noisy data. So many neighbours tell.
-_OF_NOISE, _BENDS = 4.0, 5
+#: most, or a search would be content with a wrong lever and noisy data. So many data tell.
+_OF_NOISE, _TELLING = 4.0, 7
 #: A point is named as suspicious beyond this many standard deviations.
 _SUSPICIOUS = 8.0
 #: So many of them are named, those furthest off.
@@ -267,10 +267,8 @@ class Residuals:
         Infinite where few data do not tell.
         """
         ordered = (difference / self._relative)[:, np.argsort(self.along, kind="stable")]
-        bends = [np.diff(row[np.isfinite(row)], n=2) for row in ordered]
-        # the median of white noise, and the variance of this combination of three data
-        share = 0.6745 * np.sqrt(6.0)
-        found = [np.median(np.abs(b)) / share if b.size >= _BENDS else np.inf for b in bends]
+        known = [row[np.isfinite(row)] for row in ordered]
+        found = [noise_about_neighbours(row) if row.size >= _TELLING else np.inf for row in known]
         return np.array(found)[:, None]
 
     def rms(self, values: Array) -> dict[str, float]:

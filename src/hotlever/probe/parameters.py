@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from hotlever.errors import unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, full_name
 from hotlever.materials.parameters import IN_TIME, Parameter
+from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
 from hotlever.text import parameter_named
 
 if TYPE_CHECKING:
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
 #: Shares of a dimension or a resistance, of a base temperature, and of what a gas conducts, within
 #: which a fit stays.
 _OF_THE_VALUE, _OF_THE_BASE, _OF_THE_GAS = (0.5, 1.5), (0.8, 1.2), (0.2, 5.0)
-#: The dimension that is the same for all edges, and how far off it is, at most and usually (µm).
-EDGE_BIAS, _MOST_BIAS, _USUAL_BIAS = "edge_bias_um", 2.0, 0.1
+#: How far off all edges usually are (µm).
+_USUAL_BIAS = 0.1
 #: Dimensions of a tip that matter to its lever.
 OF_THE_TIP = ("height_um", "half_angle_deg")
 
@@ -132,7 +133,7 @@ def parameters_of(
         )
     if EDGE_BIAS in found:
         found[EDGE_BIAS] = found[EDGE_BIAS]._replace(
-            scale=_USUAL_BIAS, lower=-_MOST_BIAS, upper=_MOST_BIAS
+            scale=_USUAL_BIAS, lower=-MOST_EDGE_BIAS, upper=MOST_EDGE_BIAS
         )
     return found
 

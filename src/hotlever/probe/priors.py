@@ -23,13 +23,13 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
 from hotlever.materials.parameters import Parameter
 from hotlever.probe.parameters import (
-    EDGE_BIAS,
     OF_THE_TIP,
     of_materials,
     own_name,
     parameters_of,
     usual_parameters,
 )
+from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.records import Record
 from hotlever.spieser2017 import published
 from hotlever.types import Array

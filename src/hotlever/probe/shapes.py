@@ -24,6 +24,8 @@ _SMALLEST = 0.01
 #: A heater is at most as many times as long as it is wide, or as wide as long: it is meshed in
 #: steps of its narrow side.
 _SLENDER = 30.0
+#: The dimension that is the same for all edges, and how far off it is at most (µm).
+EDGE_BIAS, MOST_EDGE_BIAS = "edge_bias_um", 2.0
 
 
 def _length(meaning: str, least: float = 0.05, most: float = 1000.0, **default: Any) -> Any:
@@ -38,7 +40,7 @@ def thickness(meaning: str = "of the silicon") -> Any:
 
 def _edge_bias() -> Any:
     meaning = "all etched edges lie so far outside the drawing"
-    return Field(default=0.0, ge=-2, le=2, description=meaning)
+    return Field(default=0.0, ge=-MOST_EDGE_BIAS, le=MOST_EDGE_BIAS, description=meaning)
 
 
 class Shape(Record):
@@ -95,7 +97,7 @@ class Parametric(Shape):
             name: getattr(self, name) + share * self.edge_bias_um
             for name, share in self._by_edge_bias().items()
         }
-        return self.model_copy(update={**own, "edge_bias_um": 0.0})
+        return self.model_copy(update={**own, EDGE_BIAS: 0.0})
 
     @abstractmethod
     def _parts_fit(self) -> None:
@@ -103,14 +105,15 @@ class Parametric(Shape):
 
     @model_validator(mode="after")
     def _can_be_meshed(self) -> Self:
+        etched = self.etched
         for name in self._by_edge_bias() if self.edge_bias_um else ():
-            left = getattr(self.etched, name)
+            left = getattr(etched, name)
             _need(
                 left >= _SMALLEST,
                 f"with edge_bias_um = {self.edge_bias_um:g}, {name} is {left:.2g} µm, expected "
                 f"{_SMALLEST} µm or more",
             )
-        self.etched._parts_fit()
+        etched._parts_fit()
         layout = self.layout()
         for region in layout.regions:
             side = region.sides.min()

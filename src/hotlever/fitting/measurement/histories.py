@@ -13,6 +13,7 @@ from hotlever.fitting.measurement.checks import note_rows
 from hotlever.fitting.measurement.columns import LEVER, Column
 from hotlever.fitting.measurement.data import OBSERVABLE_SYMBOLS, TIME
 from hotlever.fitting.measurement.settings import Settings
+from hotlever.fitting.noise import noise_about_neighbours
 from hotlever.lever.transient.waveform import MOST_BIAS, Polyline, Waveform
 from hotlever.probe import Circuit
 from hotlever.tables import Table, number
@@ -164,9 +165,7 @@ def _straight_lines(
 ) -> tuple[Waveform, Array]:
     """Return the straight lines that biases lie on within their noise, and the times from 0 on."""
     largest = float(np.abs(bias).max())
-    noise = (
-        1.4826 * float(np.median(np.abs(np.diff(bias, 2)))) / np.sqrt(6.0) if bias.size > 4 else 0
-    )
+    noise = noise_about_neighbours(bias) if bias.size > 4 else 0.0
     tolerance = max(_STRAIGHT * largest, min(_NOISE * noise, _MOST_NOISE * largest))
     on = abs(float(bias[0])) > tolerance
     if on and times[0] < 0.0:
