@@ -20,7 +20,7 @@ import numpy as np
 from hotlever.air.operator import PanelledAir
 from hotlever.air.surface import PanelOptions
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.fitting.models import reduced_model
+from hotlever.estimation.experiment import reduced_experiment
 from hotlever.lever import Lever
 from hotlever.lever.box import PAPER, Box
 from hotlever.lever.reduction import cached_reduction
@@ -66,7 +66,8 @@ def speed(vacuum, air):
     """Print the times of sweeps; return the reduced model in air."""
     levers = {"vacuum": vacuum, "air": air}
     models = {
-        name: reduced_model(lever, cached_reduction(lever), BIAS) for name, lever in levers.items()
+        name: reduced_experiment(lever, cached_reduction(lever), BIAS)
+        for name, lever in levers.items()
     }
     material = vacuum.probe.material
     kinds = {

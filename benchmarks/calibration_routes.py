@@ -21,7 +21,7 @@ from hotlever.calibration.knee import IVCurve, find_knee
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.transfer import curve_of_law, curve_of_model, knee_of
 from hotlever.errors import HotleverError
-from hotlever.fitting import Measurement, fit
+from hotlever.estimation import Measurement, fit
 from hotlever.lever import Branch, Lever
 from hotlever.materials import Material
 from hotlever.materials.silicon import inversion_temperature

@@ -16,7 +16,7 @@ from resource import RUSAGE_CHILDREN, getrusage
 from hotlever.cache import CACHE_VARIABLE
 from problems import table
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+EXAMPLES = Path(__file__).parents[1] / "src" / "hotlever" / "examples"
 COMMANDS = """
 probe new -o probe.toml
 probe show probe.toml --plot probe.png

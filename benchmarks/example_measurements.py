@@ -1,6 +1,6 @@
 """The measurements of the worked examples: made with legacy FEniCS, and compared with the truth.
 
-    python benchmarks/example_measurements.py make [EXAMPLE ...]      writes examples/EXAMPLE.csv
+    python benchmarks/example_measurements.py make [EXAMPLE ...]      writes their CSV files
     python benchmarks/example_measurements.py compare [EXAMPLE ...]
 
 make needs benchmarks/fenics/install.sh. Each lever differs from its probe file in the values of its

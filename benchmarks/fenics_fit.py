@@ -1,4 +1,4 @@
-"""The option-III fit of examples/lever-a.csv: the paper's stack beside ours, in the same run.
+"""The option-III fit of the shipped lever-a.csv: the paper's stack beside ours, in the same run.
 
     python benchmarks/fenics_fit.py [RUNS] [plain] [tuned]
 
@@ -29,12 +29,12 @@ import lmfit
 import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.fitting import fit, read_measurement
-from hotlever.fitting.measurement import with_measured_circuit
+from hotlever.estimation import fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.reduction import cached_reduction
 from hotlever.materials import PARAMETERS
+from hotlever.measurement import with_measured_circuit
 from hotlever.probe import Probe
 from problems import EXAMPLE, fit_command, peer_problem, peer_server, processor_time, table
 

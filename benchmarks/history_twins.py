@@ -18,8 +18,8 @@ from functools import partial
 import numpy as np
 
 from hotlever.errors import HotleverError
-from hotlever.fitting import Measurement, fit
-from hotlever.fitting.in_time import HistoryModel
+from hotlever.estimation import Measurement, fit
+from hotlever.estimation.experiment_in_time import ExperimentInTime
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.transient import pulse
 from hotlever.materials import PARAMETERS
@@ -41,7 +41,7 @@ def main() -> None:
     usual = default_priors(probe)
     priors = {name: usual[name] for name in NAMES[:-1]}
     priors["heat_capacity_scale"] = Prior(1.0, HEAT_CAPACITY)
-    model = partial(HistoryModel.of, waveform=wave, names=list(priors), lever=lever)
+    model = partial(ExperimentInTime.of, waveform=wave, names=list(priors), lever=lever)
     rng = np.random.default_rng(SEED)
     rows, off, sure = [], {}, {}
     guess = lever.pulse(wave, at=TIMES).tip_K.values[-1]

@@ -27,8 +27,8 @@ from statistics import median
 import numpy as np
 import psutil
 
-from hotlever.fitting.batch import fit_many
-from hotlever.fitting.models import forward_model
+from hotlever.estimation.batch import fit_many
+from hotlever.estimation.experiment import experiment_of
 from hotlever.probe import Probe
 from hotlever.spieser2017 import PUBLISHED
 from problems import BIAS, processor_time, table
@@ -43,7 +43,7 @@ def write_levers(folder: Path, count: int, seed: int = 0) -> list[Path]:
     """Write measurement files of levers that differ, and are measured with noise."""
     rng = np.random.default_rng(seed)
     probe = Probe.reference().model_copy(update={"material": PUBLISHED["option III"].material})
-    model = forward_model(probe, BIAS, reduce=True)
+    model = experiment_of(probe, BIAS, reduce=True)
     paths = []
     for number in range(count):
         changed = {

@@ -29,7 +29,7 @@ import numpy as np
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.calibration.procedure import calibrate
 from hotlever.errors import HotleverError
-from hotlever.fitting import Measurement
+from hotlever.estimation import Measurement
 from hotlever.probe import Probe
 from hotlever.studies.twins import ALL, drawn, measured
 from hotlever.types import Array

@@ -8,8 +8,8 @@ from __future__ import annotations
 import sys
 import time
 
-from hotlever.fitting import fit, read_measurement
-from hotlever.fitting.posterior import predictive_band, sample_posterior
+from hotlever.estimation import fit, read_measurement
+from hotlever.estimation.posterior import predictive_band, sample_posterior
 from problems import EXAMPLE, table
 
 

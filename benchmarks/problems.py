@@ -23,7 +23,7 @@ from hotlever.probe.layout import BorderTaper, Region
 from hotlever.spieser2017 import RAMP
 
 BIAS = RAMP
-EXAMPLE = Path(__file__).parents[1] / "examples" / "lever-a.csv"
+EXAMPLE = Path(__file__).parents[1] / "src" / "hotlever" / "examples" / "lever-a.csv"
 PEER = Path(__file__).parent / "fenics" / "peer.py"
 DEBIAN_PYTHON = "/usr/bin/python3"
 

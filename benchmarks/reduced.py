@@ -13,8 +13,8 @@ from statistics import median
 import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.fitting import fit, read_measurement
-from hotlever.fitting.models import full_model, reduced_model, shown_at_bias
+from hotlever.estimation import fit, read_measurement
+from hotlever.estimation.experiment import full_experiment, reduced_experiment, shown_at_bias
 from hotlever.lever import Lever
 from hotlever.lever.box import PAPER, Box
 from hotlever.lever.branch import Reach
@@ -91,7 +91,7 @@ def main():
         warm_fit = processor_seconds(lambda: fit(data), RUNS)
         warm_command = processor_seconds(lambda: fit_command(folder), 3)
     accuracy(lever, reduced, cases)
-    rng, model = np.random.default_rng(5), reduced_model(lever, reduced, BIAS)
+    rng, model = np.random.default_rng(5), reduced_experiment(lever, reduced, BIAS)
     anywhere = processor_seconds(
         lambda: model.predict(lever.with_material(random_material(lever, rng)).probe), 25
     )
@@ -104,7 +104,7 @@ def main():
         RUNS,
     )
     full_fit = processor_seconds(
-        lambda: fit(data, model=lambda probe, bias: full_model(Lever(probe), bias))
+        lambda: fit(data, model=lambda probe, bias: full_experiment(Lever(probe), bias))
     )
     problem = peer_problem(probe, lever.space.mesh, degree=3, quadrature=5, bias=BIAS)
     peer = median(solve_with_peer(problem, plain=True)["processor_seconds"] for _ in range(RUNS))

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from hotlever.calibration.knee import IVCurve
 from hotlever.errors import InputError
-from hotlever.fitting import Measurement
+from hotlever.estimation import Measurement
 from hotlever.lever import Branch
 from hotlever.probe import Circuit
 from hotlever.types import Array

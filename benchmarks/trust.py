@@ -11,8 +11,8 @@ from functools import partial
 import numpy as np
 
 from hotlever.errors import ComputationError
-from hotlever.fitting import Measurement, fit, read_measurement
-from hotlever.fitting.models import ForwardModel, forward_model
+from hotlever.estimation import Measurement, fit, read_measurement
+from hotlever.estimation.experiment import Experiment, experiment_of
 from hotlever.lever import Lever
 from hotlever.lever.box import PAPER, Box
 from hotlever.lever.lever import COARSE
@@ -23,7 +23,7 @@ from problems import BIAS, EXAMPLE, table
 #: Noise of a twin: of its own value, or of the largest; K for the temperature.
 ELECTRICAL, KELVIN = 0.002, 6.0
 #: The geometry is reduced once, for all fits.
-REDUCED = partial(forward_model, reduce=True)
+REDUCED = partial(experiment_of, reduce=True)
 
 
 def twin(sweep, rng, proportional):
@@ -87,7 +87,7 @@ def coverage(probe, twins, proportional):
 
 def coarse(probe, bias):
     """Return the model of a geometry never reduced, whose fits start at the probe's material."""
-    return ForwardModel(Lever(probe, COARSE), Lever(probe), probe.circuit, bias)
+    return Experiment(Lever(probe, COARSE), Lever(probe), probe.circuit, bias)
 
 
 def starts(count, model, name):

@@ -5,15 +5,29 @@ the one that calibrates it, and measured in 40 points, the current with 0.2 % of
 
 Run: python benchmarks/twins.py [TWINS] [vacuum|air] [iv|reader|raman] [--without DEPARTURE ...]
      python benchmarks/twins.py [TWINS] all      every medium and kind of data
+
+With --wild, levers of which the owner knows little, and says so (`hotlever.studies.wild`):
+
+     python benchmarks/twins.py --wild [--count N] [--first K] [--medium vacuum|air]
+                                [--results FILE] [--write DIR]
+
+With --results a line for each twin is appended to a file, and an interrupted run goes on with those
+that are not in it. With --write each twin's data and probe file, and the true lever's, are written
+instead, to try the command line: hotlever calibrate DIR/wild-3.csv --probe DIR/wild-3.toml
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
-from concurrent.futures import ProcessPoolExecutor
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -23,9 +37,19 @@ from hotlever.studies.twins import (
     DEPARTURES,
     HIGHEST_V,
     KINDS,
+    LEVELS,
+    held_by_decile,
     judge,
     summary,
     together,
+)
+from hotlever.studies.wild import (
+    CONTRADICTED,
+    DESCRIBED,
+    FAILED,
+    NOT_CONVERGED,
+    judge_wild,
+    wild_twin,
 )
 from problems import table
 
@@ -55,24 +79,130 @@ def report(results: list[xr.Dataset | str], title: str) -> None:
     table(("largest error above 400 K (K)", "median", "90 %", "worst"), rows)
     print(f"\npooled rms of error / stated: {total.rms:.2f}")
     print(f"twins within 2 stated errors everywhere: {total.everywhere:.0%}")
-    for level in total.level.values:
-        shares = total.held.sel(level=level).values
-        by_decile = " ".join(f"{share:.0%}" for share in shares)
-        print(f"the {level:.0%} band holds {shares.mean():.0%}, by decile of bias: {by_decile}")
+    print_held(total.held.values)
     seconds = found.seconds.values
     print(f"seconds of processor: median {np.median(seconds):.1f}, worst {seconds.max():.1f}")
 
 
+def print_held(held: np.ndarray) -> None:
+    """Print what the bands hold, (levels, deciles)."""
+    for level, shares in zip(LEVELS, held, strict=True):
+        by_decile = " ".join(f"{share:.0%}" for share in shares)
+        print(f"the {level:.0%} band holds {shares.mean():.0%}, by decile of bias: {by_decile}")
+
+
+def two_at_a_time(judged: Callable[[int], Any], numbers: list[int]) -> Iterator[Any]:
+    """Judge twins on two processes; give each when it is done."""
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        running = [pool.submit(judged, number) for number in numbers]
+        for done, future in enumerate(as_completed(running), start=1):
+            print(f"{done} of {len(numbers)}", file=sys.stderr)
+            yield future.result()
+
+
 def main(count: int, medium: str, what: str, departures: list[str]) -> None:
     one = partial(judged, medium=medium, what=what, departures=departures)
-    results = []
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        for done, found in enumerate(pool.map(one, range(count)), start=1):
-            results.append(found)
-            print(f"{done} of {count}", file=sys.stderr)
+    results = list(two_at_a_time(one, [*range(count)]))
     without = [name for name in DEPARTURES if name not in departures]
     ending = f", without {', '.join(without)}" if without else ""
     report(results, f"{medium}, {what}{ending}")
+
+
+# --- wild twins ----------------------------------------------------------------------------------
+
+
+def judged_wild(number: int, medium: str | None) -> dict[str, Any]:
+    """Judge a wild twin; without one of that number, say why."""
+    try:
+        record = judge_wild(number, medium)
+    except HotleverError as error:
+        record = {"twin": number, "outcome": "no twin", "reason": str(error)}
+    return record | {"asked_for": medium}
+
+
+def wild(numbers: list[int], medium: str | None, results: Path | None) -> None:
+    """Judge wild twins, those that are in the file of results excepted, and sum all up."""
+    lines = results.read_text().splitlines() if results and results.exists() else []
+    records = {
+        record["twin"]: record
+        for record in map(json.loads, lines)
+        if record["twin"] in numbers and record["asked_for"] == medium
+    }
+    missing = [number for number in numbers if number not in records]
+    for record in two_at_a_time(partial(judged_wild, medium=medium), missing):
+        records[record["twin"]] = record
+        if results:
+            with results.open("a") as file:
+                file.write(json.dumps(record) + "\n")
+    report_wild([records[number] for number in numbers], f"wild, {medium or 'vacuum and air'}")
+
+
+def report_wild(records: list[dict[str, Any]], title: str) -> None:
+    of = {
+        outcome: [record for record in records if record["outcome"] == outcome]
+        for outcome in (DESCRIBED, CONTRADICTED, NOT_CONVERGED, FAILED, "no twin")
+    }
+    print(f"\n## {title}\n")
+    rows = []
+    for record in records:
+        answer = ["", "", ""]
+        if record.get("off_K"):
+            off, stated = np.abs([record["off_K"], record["stated_K"]])
+            at = int(np.argmax(off))
+            # of data that are not described no error may be stated
+            most = [stated[at], np.max(off / stated)] if np.isfinite(stated).all() else []
+            answer[: 1 + len(most)] = [f"{value:.1f}" for value in (off[at], *most)]
+        if record in of["no twin"]:
+            rows.append([record["twin"], *[""] * 10, record["reason"][:60]])
+            continue
+        own = [record[name] for name in ("twin", "shape", "medium", "rows")]
+        data = "picture" if record["digitised"] else "noise"
+        end = f"{record['end_K']:.0f}{' <' * record['below_knee']}{' J' * record['jumps']}"
+        what = f"{record['exception'] or record['outcome']}: {record['reason']}"[:90].rstrip(": ")
+        doping, seconds = f"{record['n_d']:.1e}", f"{record['seconds']:.1f}"
+        rows.append([*own, doping, data, end, *answer, seconds, what])
+    heads = ["twin", "shape", "medium", "rows", "n_d", "data", "end (K)"]
+    table([*heads, "off (K)", "stated (K)", "most stated errors", "s", "what happened"], rows)
+    print("<: stops below the knee; J: beyond a jump of the ramp\n")
+    judged = [record for record in records if record not in of["no twin"]]
+    if not judged:
+        return
+    rows = [
+        (outcome, f"{len(of[outcome])} of {len(judged)}", f"{len(of[outcome]) / len(judged):.1%}")
+        for outcome in (DESCRIBED, CONTRADICTED, NOT_CONVERGED, FAILED)
+    ]
+    table(("what happened", "twins", "share"), rows)
+    kinds = Counter(record["exception"] for record in of[FAILED])
+    print("\nerrors by type:", ", ".join(f"{n} {kind}" for kind, n in kinds.items()) or "none")
+    repeated = sum(record["repeated"] for record in judged)
+    print(f"levers drawn anew because they could not be drawn, meshed or solved: {repeated}")
+    seconds = [record["seconds"] for record in judged]
+    print(f"seconds of processor: median {np.median(seconds):.1f}, worst {max(seconds):.1f}")
+    if not of[DESCRIBED]:
+        return
+    print(f"\nof the {len(of[DESCRIBED])} described:")
+    off = [np.abs(record["off_K"]) for record in of[DESCRIBED]]
+    stated = [np.array(record["stated_K"]) for record in of[DESCRIBED]]
+    ratios = [one / other for one, other in zip(off, stated, strict=True)]
+    print_held(held_by_decile(ratios))
+    largest = [float(one.max()) for one in off]
+    there = [float(other[np.argmax(one)]) for one, other in zip(off, stated, strict=True)]
+    print(f"largest error: median {np.median(largest):.1f} K, worst {max(largest):.1f} K")
+    print(f"stated there: median {np.median(there):.1f} K")
+    most = [float(one.max()) for one in ratios]
+    print(f"largest error in stated errors: median {np.median(most):.1f}, worst {max(most):.1f}")
+
+
+def write(numbers: list[int], medium: str | None, folder: Path) -> None:
+    """Write wild twins as files: measurement, the owner's probe, and the true one."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for number in numbers:
+        twin = wild_twin(number, medium)
+        name = f"wild-{number}"
+        (folder / f"{name}.csv").write_text(twin.measurement_csv())
+        twin.nominal.to_file(folder / f"{name}.toml")
+        twin.true.to_file(folder / f"{name}-true.toml")
+        print(folder / f"{name}.csv")
 
 
 if __name__ == "__main__":
@@ -85,7 +215,20 @@ if __name__ == "__main__":
     listed = "\n".join(f"{name}: {meaning}" for name, meaning in DEPARTURES.items())
     listed = listed.replace("%", "%%")  # argparse formats its help
     parser.add_argument("--without", nargs="+", choices=DEPARTURES, default=[], help=listed)
+    parser.add_argument("--wild", action="store_true", help="twins of which little is known")
+    parser.add_argument("--count", type=int, default=200, help="of wild twins")
+    parser.add_argument("--first", type=int, default=0, help="number of the first of them")
+    parser.add_argument("--medium", dest="around", choices=[*HIGHEST_V], help="of all of them")
+    parser.add_argument("--results", type=Path, metavar="FILE", help="one line for each of them")
+    parser.add_argument("--write", type=Path, metavar="DIR", help="their data, not judged")
     given = parser.parse_args()
+    if given.wild:
+        numbers = [*range(given.first, given.first + given.count)]
+        if given.write:
+            write(numbers, given.around, given.write)
+        else:
+            wild(numbers, given.around, given.results)
+        sys.exit()
     chosen = [name for name in DEPARTURES if name not in given.without]
     everything = [(medium, what) for medium in HIGHEST_V for what in KINDS]
     for medium, what in everything if given.medium == "all" else [(given.medium, given.what)]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "src" / "hotlever" / "examples"
 
 _FENCE = re.compile(
     r"^```(?P<language>\{?[\w-]*\}?)[^\n]*\n(?P<content>.*?)^```\n(?P<after>\s*)",
@@ -29,6 +31,12 @@ class Block:
     language: str
     content: str
     shown: str | None
+
+
+def beside_examples(folder: Path) -> Path:
+    """Return a folder in which the paths of the shipped examples are those of a checkout."""
+    shutil.copytree(EXAMPLES, folder / EXAMPLES.relative_to(ROOT))
+    return folder
 
 
 def blocks(text: str, *languages: str) -> list[Block]:

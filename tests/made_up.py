@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from hotlever.datasets import labelled
-from hotlever.fitting.levers import compare_levers
+from hotlever.estimation.levers import compare_levers
 from hotlever.materials import PARAMETERS
 from hotlever.studies.twins import WAYS, together
 

@@ -17,7 +17,7 @@ from hotlever.errors import ComputationError
 from hotlever.probe import Probe
 from of_materials import p_type_probe
 
-EXAMPLE = Path(__file__).parents[1] / "examples" / "lever-a.csv"
+EXAMPLE = Path(__file__).parents[1] / "src" / "hotlever" / "examples" / "lever-a.csv"
 
 
 def test_the_module_is_the_command():
@@ -133,7 +133,7 @@ def test_a_fit_is_written_even_if_its_posterior_cannot_be_sampled(run, tmp_path,
     def fails(*_, **__):
         raise ComputationError("no start found")
 
-    monkeypatch.setattr("hotlever.fitting.uncertainty.sample_posterior", fails)
+    monkeypatch.setattr("hotlever.estimation.uncertainty.sample_posterior", fails)
     options = ("--observables", "current", "--fix", "delta", "--fix", "p", "--fix", "a0")
     status, out, err = run(
         "fit", EXAMPLE, *options, "--posterior", "-o", "fit.json", "--report", "report"

@@ -13,7 +13,16 @@ from pathlib import Path
 import pytest
 import typer
 
-from documents import ROOT, blocks, commands, missing_lines, run_commands, without_blocks
+from documents import (
+    EXAMPLES,
+    ROOT,
+    beside_examples,
+    blocks,
+    commands,
+    missing_lines,
+    run_commands,
+    without_blocks,
+)
 from hotlever.cli.commands import app
 
 DOCS = ROOT / "docs"
@@ -25,6 +34,7 @@ PAGES = {
 #: Pages whose examples take minutes.
 SLOW = {
     *("how-to/calibrate", "how-to/design", "how-to/fit", "how-to/levers", "how-to/uncertainty"),
+    "how-to/unknown-lever",
     *("examples/reference-probe", "examples/boron-lever", "examples/palladium-on-nitride"),
 }
 #: Modules whose numbers the theory page states.
@@ -34,8 +44,8 @@ LAWS = (
     "probe/tip.py",
     "calibration",
     "lever/certificate.py",
-    "fitting/least_squares.py",
-    "fitting/residuals.py",
+    "estimation/optimiser.py",
+    "estimation/residuals.py",
 )
 
 with_examples = [
@@ -48,7 +58,7 @@ each_page = pytest.mark.parametrize("name", PAGES)
 
 @pytest.mark.parametrize("name", with_examples)
 def test_examples_run_and_print_what_the_page_shows(name, run, tmp_path, capsys):
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    beside_examples(tmp_path)
     names = {}
     for block in blocks(PAGES[name], "sh", "python"):
         if block.language == "sh":
@@ -69,7 +79,7 @@ def test_a_line_that_was_not_printed_is_noticed():
 def test_the_head_of_the_data_file_is_shown_as_it_is():
     heads = [b.content for b in blocks(PAGES["tutorial"], "text") if b.content.startswith("#")]
     assert len(heads) == 1
-    assert heads[0] in (ROOT / "examples" / "lever-a.csv").read_text(encoding="utf-8")
+    assert heads[0] in (EXAMPLES / "lever-a.csv").read_text(encoding="utf-8")
 
 
 def found_command(words):

@@ -26,7 +26,8 @@ LAYERS = (
     ("materials", "probe", "drawing"),
     ("air",),
     ("lever",),
-    ("lever3d", "raman", "fitting"),
+    ("lever3d", "measurement"),
+    ("raman", "estimation"),
     ("calibration",),
     ("studies",),
     ("figures",),
@@ -60,7 +61,7 @@ def test_importing_the_package_loads_nothing_heavy():
 
 @pytest.mark.parametrize("name", MODULES)
 def test_no_module_has_the_name_of_something_in_it(name):
-    """`import hotlever.fitting.fit` would give a function in its place."""
+    """`import hotlever.estimation.fit` would give a function in its place."""
     package, _, last = name.rpartition(".")
     module = import_module(name)
     assert not hasattr(module, last)

@@ -6,19 +6,18 @@ import re
 
 import pytest
 
-from documents import ROOT, blocks, commands, run_commands
+from documents import ROOT, beside_examples, blocks, commands, run_commands
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture
-def beside_examples(tmp_path):
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    return tmp_path
+def folder(tmp_path):
+    return beside_examples(tmp_path)
 
 
-def test_python_example(beside_examples, monkeypatch, capsys):
-    monkeypatch.chdir(beside_examples)
+def test_python_example(folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
     (example,) = blocks(README, "python")
     assert len(example.content.splitlines()) <= 12
     exec(compile(example.content, "README.md", "exec"), {})
@@ -27,11 +26,11 @@ def test_python_example(beside_examples, monkeypatch, capsys):
     assert printed.count("±") == 6
 
 
-def test_command_line_example(run, beside_examples):
+def test_command_line_example(run, folder):
     (example,) = blocks(README, "sh")
     assert 0 < len(commands(example.content)) == len(example.content.splitlines()) <= 10
     run_commands(example.content, run)
-    made = {path.name for path in beside_examples.iterdir()}
+    made = {path.name for path in folder.iterdir()}
     assert {"probe.toml", "probe.png", "sweep.csv", "one.nc", "fields", "fit.json"} <= made
 
 
@@ -48,3 +47,22 @@ def test_every_benchmark_is_listed():
     listed = set(re.findall(r"`(\w+\.py)`", (folder / "README.md").read_text(encoding="utf-8")))
     scripts = {path.name for path in folder.glob("*.py") if "__main__" in path.read_text()}
     assert listed == scripts
+
+
+def test_examples_are_one_real_folder_named_by_its_path():
+    """Links of a repository are small text files in many a clone on Windows."""
+    folders = [ROOT / name for name in ("benchmarks", "docs", "src", "tests", "tools")]
+    inside = [path for folder in folders for path in folder.rglob("*")]
+    assert [path for path in (*ROOT.iterdir(), *inside) if path.is_symlink()] == []
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    named = {
+        name.rstrip(".")
+        for page in pages
+        for name in re.findall(r"src/hotlever/examples[\w./-]*", page.read_text(encoding="utf-8"))
+    }
+    assert len(named) > 20
+    assert {name for name in named if not (ROOT / name).exists()} == set()
+    # no page names a folder of examples that is not there
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        assert re.findall(r"(?:^|[ `])examples/[\w-]+\.(?:csv|gds|dxf|toml)", text) == [], page

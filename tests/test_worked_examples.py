@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import numpy as np
@@ -12,6 +13,9 @@ from documents import ROOT, missing_lines
 from example_measurements import EXAMPLES, compare
 from hotlever.drawing.shape import TOLERANCE_UM
 from hotlever.drawing.sheet import read_sheet
+from hotlever.measurement import read_measurement
+from hotlever.probe import Probe
+from hotlever.probe.priors import Prior, default_priors
 
 #: The others take longer, and show no more of the code.
 QUICK = "palladium-on-nitride"
@@ -33,11 +37,36 @@ def test_a_calibration_is_as_near_to_the_truth_as_it_says_and_the_page_too(name,
     assert missing_lines("\n".join(shown), printed, within=0.05) == [], printed
 
 
+def test_the_real_curve_agrees_with_itself_and_its_probe_says_how_little_is_known():
+    """Resistance and power were read from the same picture as voltages and currents."""
+    path = ROOT / "src" / "hotlever" / "examples" / "uiuc-lever.csv"
+    data, probe = read_measurement(path), Probe.from_file(path.with_suffix(".toml"))
+    assert (data.bias_V.size, data.series_resistance_ohm) == (19, 1970.0)
+    assert "ssomnath/cantilever_temperature_control" in path.read_text(encoding="utf-8")
+    rows = [
+        line for line in path.read_text(encoding="utf-8").splitlines() if line[0] in "0123456789"
+    ]
+    bias, lever_V, current, kohm, power = np.loadtxt(rows, delimiter=",").T
+    np.testing.assert_array_equal(data.bias_V, bias)
+    np.testing.assert_array_equal(data.current_mA, current)
+    np.testing.assert_allclose(bias - lever_V, 1.97 * current, atol=0.03)
+    np.testing.assert_allclose(lever_V / current, kohm, atol=0.12)
+    np.testing.assert_allclose(lever_V * current, power, atol=0.04)
+    known = default_priors(probe)
+    assert known["n_d"] == Prior(3e16, math.log(3.0))
+    assert known["length_um"] == Prior(120.0, 0.15)
+    assert known["thickness_um"] == Prior(1.0, 0.3)
+    assert (probe.surroundings.medium, probe.circuit.series_resistance_ohm) == ("air", 1970.0)
+
+
 def test_the_drawing_is_that_of_its_tool(tmp_path):
     boron_lever().saveas(tmp_path / "made.dxf")
     made, shipped = (
         read_sheet(path, None, tolerance_um=TOLERANCE_UM)
-        for path in (tmp_path / "made.dxf", ROOT / "examples" / "boron-lever.dxf")
+        for path in (
+            tmp_path / "made.dxf",
+            ROOT / "src" / "hotlever" / "examples" / "boron-lever.dxf",
+        )
     )
     assert made.layers.keys() == shipped.layers.keys()
     for name, layer in made.layers.items():

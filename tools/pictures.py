@@ -2,7 +2,7 @@
 
     PYTHONPATH=tests python tools/pictures.py [NAME ...]
 
-Runs the scripts of examples/gallery, and the commands of the tutorial and of the pages in
+Runs the scripts of the gallery, and the commands of the tutorial and of the pages in
 docs/examples, in an empty folder, and puts the figures that the pages show beside them, small.
 """
 
@@ -17,7 +17,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from documents import ROOT, blocks, commands
+from documents import EXAMPLES, ROOT, beside_examples, blocks, commands
 from hotlever.cli import main
 
 DOCS = ROOT / "docs"
@@ -47,7 +47,7 @@ def run_page(page: Path) -> None:
 
 def make(names: list[str]) -> None:
     """Make pictures in the present folder, and those of some names only if there are any."""
-    for script in sorted((ROOT / "examples" / "gallery").glob("*.py")):
+    for script in sorted((EXAMPLES / "gallery").glob("*.py")):
         if not names or script.stem in names:
             runpy.run_path(str(script))
             # beside its script: the app shows both
@@ -62,5 +62,5 @@ def make(names: list[str]) -> None:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        Path("examples").symlink_to(ROOT / "examples")
+        beside_examples(Path(folder))
         make(sys.argv[1:])

@@ -1,4 +1,7 @@
-"""Draw the reference probe: python tools/reference_drawing.py examples/reference-probe.gds"""
+"""Draw the reference probe.
+
+python tools/reference_drawing.py src/hotlever/examples/reference-probe.gds
+"""
 
 from __future__ import annotations
 

@@ -11,16 +11,42 @@ from hotlever.materials import KINDS, PARAMETERS
 from hotlever.materials.parameters import Parameter
 
 INVERSION = "inversion_temperature"
+#: What is written of a quantity whose error says that it may be anything.
+NOT_DETERMINED = "not determined"
 #: Numbers between these are written without a power of ten.
-_PLAIN = 1e-4, 1e6
+_PLAIN = 1e-4, 1e5
+#: Standard errors that 95 % of a normal distribution lie within.
+_BAND = 1.96
+#: A bound this many times as large as the value is none.
+_FAR = 10.0
 #: Characters beyond which a list takes several lines.
 _LONG = 100
 #: Units by the endings of names in probe files.
 _UNITS = {"um": "µm", "ohm": "Ω", "K": "K", "deg": "°"}
 
 
-def value_with_error(value: float, stderr: float | None, scale: float = 1.0) -> str:
+def value_with_error(
+    value: float,
+    stderr: float | None,
+    scale: float = 1.0,
+    bounds: tuple[float, float] = (0.0, math.inf),
+) -> str:
     """Return a value with its standard error in the last digits, such as ``0.686(5)``.
+
+    Two digits of the value are written at least, and all before the decimal point. Where the error
+    is no smaller than the value, the ends of the 95 % interval are written that are within what the
+    quantity may be; that it is not determined, if none is.
+
+    Parameters
+    ----------
+    value : float
+    stderr : float or None
+        None or 0 of what is exact, which stands alone; NaN if it is not known: three digits then.
+    scale : float
+        The unit, of its own, that the quantity is written in.
+    bounds : tuple of float
+        What the quantity may be at all; most are positive. Without a highest value, an end at ten
+        times the value tells nothing.
 
     Examples
     --------
@@ -28,27 +54,57 @@ def value_with_error(value: float, stderr: float | None, scale: float = 1.0) -> 
     '0.686(5)'
     >>> value_with_error(5.75e17, None, 1e17)
     '5.75'
-    >>> value_with_error(771.3, 28.0), value_with_error(897.24, 1.31), value_with_error(12.0, 53.0)
-    ('770(30)', '897.2(1.3)', '10(50)')
+    >>> value_with_error(771.3, 28.0), value_with_error(897.24, 1.31)
+    ('771(28)', '897.2(1.3)')
+    >>> value_with_error(1.9e17, 2.1e17), value_with_error(0.02, 0.07, bounds=(-1.0, 1.0))
+    ('below 6.0e17', '-0.12 to 0.16')
+    >>> value_with_error(0.719, 300.0)
+    'not determined'
     """
-    value = value / scale
-    if not stderr or not math.isfinite(stderr):
-        return f"{value:.6g}"
-    error = stderr / scale
-    largest = max(abs(value), error)
-    if not _PLAIN[0] <= largest < _PLAIN[1]:
-        if error >= abs(value):
-            return f"{value:.2g} ± {error:.1g}"
-        power = math.floor(math.log10(largest))
-        return f"{value_with_error(value / 10.0**power, error / 10.0**power)}e{power:+03d}"
-    # one digit of the error, two where the first is a 1
-    first = f"{error:.0e}"
-    place = int(first[2:]) - (f"{error:.1e}"[0] == "1")
-    if place >= 0:
-        return f"{round(value, -place):.0f}({round(error, -place):.0f})"
-    if error >= 1.0:
-        return f"{value:.{-place}f}({error:.{-place}f})"
-    return f"{value:.{-place}f}({round(error * 10.0**-place)})"
+    if not stderr or not math.isfinite(value):
+        return f"{value / scale:.6g}"
+    if math.isnan(stderr):
+        return f"{value / scale:.3g}"
+    if stderr >= abs(value):
+        return _interval(value, stderr, scale, bounds)
+    value, error = value / scale, stderr / scale
+    if not _PLAIN[0] <= abs(value) < _PLAIN[1]:
+        power = math.floor(math.log10(abs(value)))
+        return f"{value_with_error(value / 10.0**power, error / 10.0**power)}e{power}"
+    # one digit of the error, two where the first is a 1, and two of the value
+    first = f"{error:.1e}"
+    finest = int(first[4:]) - (first[0] == "1")
+    digits = max(0, -min(finest, math.floor(math.log10(abs(value))) - 1))
+    last = f"{error:.{digits}f}" if error >= 1.0 else f"{error * 10.0**digits:.0f}"
+    return f"{value:.{digits}f}({last})"
+
+
+def _interval(value: float, stderr: float, scale: float, bounds: tuple[float, float]) -> str:
+    """Return what 95 % lie between, where an error is larger than its value."""
+    low, high = value - _BAND * stderr, value + _BAND * stderr
+    told_low, told_high = low > bounds[0], high < bounds[1]
+    if told_low and told_high:
+        return f"{significant(low / scale)} to {significant(high / scale)}"
+    if told_high and (math.isfinite(bounds[1]) or high < _FAR * value):
+        return f"below {significant(high / scale)}"
+    if told_low:
+        return f"above {significant(low / scale)}"
+    return NOT_DETERMINED
+
+
+def significant(value: float) -> str:
+    """Return a number to two digits, or all before the decimal point.
+
+    Examples
+    --------
+    >>> significant(0.01234), significant(4.0), significant(123.4), significant(4e17)
+    ('0.012', '4.0', '123', '4.0e17')
+    """
+    rounded = f"{value:.1e}"
+    mantissa, _, power = rounded.partition("e")
+    if value and not _PLAIN[0] <= abs(float(rounded)) < _PLAIN[1]:
+        return f"{mantissa}e{int(power)}"
+    return f"{value:.{max(0, 1 - int(power))}f}"
 
 
 def parameter_named(name: str) -> Parameter:

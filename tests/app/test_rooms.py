@@ -23,7 +23,9 @@ from hotlever.app.jobs import Jobs, command_line
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.server import add_pages
 from hotlever.app.session import Session
-from hotlever.errors import HotleverError
+from hotlever.errors import BranchEndError, HotleverError
+from hotlever.lever import Lever
+from hotlever.lever.reduced import ReducedLever
 from hotlever.probe import Probe
 
 Run = Callable[..., tuple[int, str, str]]
@@ -142,6 +144,55 @@ def test_simulate_shows_the_numbers_of_the_sweep(tmp_path: Path, run: Run) -> No
             assert f"{answer['now'][key]:.10g}" == row[key]
         line = "hotlever sweep --bias 0:12:49 --set n_d=5e+17 -o reference.sweep.csv"
         await user.should_see(line)
+
+    visit(tmp_path, story)
+
+
+def test_simulate_goes_as_far_as_the_lever(tmp_path: Path) -> None:
+    """Beyond the slider's end too, where only the curves shown at first ended."""
+    changes, ask = {"series_resistance_ohm": 8000.0}, {"most": 12.0, "quick": False}
+    here: Any = Here()
+    found = live.answer(here, tmp_path, None, changes, {**ask, "bias": 14.0})
+    tip_K = Lever(Probe.reference().with_(**changes)).sweep([14.0]).tip_K.item()
+    assert found["now"]["tip_K"] == pytest.approx(tip_K, abs=1e-6)
+    with pytest.raises(BranchEndError, match=r"^silicon melts at a bias of 13\.2"):
+        live.answer(here, tmp_path, None, {}, {**ask, "bias": 14.0})
+
+
+def test_where_the_reduced_lever_ends_another_answers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coarse: Lever, reduced: ReducedLever
+) -> None:
+    monkeypatch.setattr(live, "_reduced", lambda probe: (coarse, reduced))
+    live._quick.cache_clear()
+    here: Any = Here()
+    ask = {"most": 12.0, "quick": True, "reduced": True}
+    for bias, model in ((8.0, "reduced lever"), (13.0, "coarse lever")):
+        found = live.answer(here, tmp_path, None, {}, {**ask, "bias": bias})
+        assert found["model"] == model
+        assert found["now"]["tip_K"] == pytest.approx(coarse.sweep([bias]).tip_K.item(), abs=0.2)
+    live._quick.cache_clear()
+
+
+def test_numbers_of_another_bias_are_not_shown(tmp_path: Path) -> None:
+    async def story(user: User, session: Session) -> None:
+        session.chosen["simulate"] = {"probe": None, "changes": {}, "bias": 8.0, "most": 12.0}
+        session.reduced[None, ()] = False
+        await user.open("/simulate")
+        await until(lambda: "full lever" in shown(user, "aria-live=polite"))
+        assert "K" in shown(user, "data-number=tip_K")
+        (number,) = (
+            one
+            for one in user.client.elements.values()
+            if one.props.get("aria-label") == "Bias in volts"
+        )
+        number.set_value(14.0)
+        await until(lambda: "silicon melts" in shown(user, "role=alert"))
+        for key in ("tip_K", "current_mA", "lever_V", "power_mW", "reader_V", "knee"):
+            assert shown(user, f"data-number={key}") == "–"
+        assert "full lever" not in shown(user, "aria-live=polite")
+        number.set_value(13.0)
+        await until(lambda: "full lever" in shown(user, "aria-live=polite"))
+        assert "silicon melts" not in shown(user, "role=alert")
 
     visit(tmp_path, story)
 

@@ -6,6 +6,7 @@ import csv
 import io
 import os
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,13 @@ from hotlever.app import showing
 from hotlever.app.child import run_command
 from hotlever.app.jobs import Job
 from hotlever.app.page import Complaint
-from hotlever.app.project import EXAMPLES
+from hotlever.app.project import CALIBRATION, EXAMPLES
 from hotlever.app.rooms.pulses import Pulses
 from hotlever.app.rooms.sliders import FIRST
 from hotlever.app.session import Session
 from hotlever.cache import CACHE_VARIABLE
+from hotlever.calibration.power_law import EQ12
+from hotlever.calibration.procedure import calibrate
 
 
 class Hearing(Here):
@@ -162,3 +165,29 @@ def test_a_pulse_is_told_where_its_file_has_no_bias(tmp_path: Path) -> None:
         await user.should_see(f"hotlever {words}", retries=50)
 
     visit(tmp_path, story)
+
+
+def test_a_refused_calibration_says_nothing_of_what_to_set(tmp_path: Path) -> None:
+    """It showed 600 K ± 5 K below the line that no such lever shows the data."""
+    (tmp_path / "mine.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
+    calibrated = calibrate(tmp_path / "mine.csv", law=EQ12)
+    answered: dict[str, str] = {}
+    for reason in ("", "current differs by 7%"):
+        replace(calibrated, reason=reason).write(tmp_path / f"mine{CALIBRATION}")
+
+        async def story(user: User, _: Session, reason: str = reason) -> None:
+            await user.open("/calibrate")
+            mark = "data-answer=none" if reason else "data-answer=tip_K"
+            await until(lambda: len(shown(user, mark)) > 10)
+            answered[reason] = " ".join(
+                shown(user, f"data-answer={along}")
+                for along in ("none", "tip_K", "bias_V", "power_mW")
+            )
+
+        visit(tmp_path, story)
+    assert answered[""].count("set a bias of") == 3
+    assert "This calibration does not tell. No lever like this one shows these data: current " in (
+        said := answered["current differs by 7%"]
+    )
+    assert "set a bias" not in said
+    assert "±" not in said

@@ -18,10 +18,11 @@ from hotlever.calibration.power_law import EQ12, read_power_law
 from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import InputError
-from hotlever.fitting import fit, read_fit
+from hotlever.estimation import fit, read_fit
 from hotlever.lever import Lever
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.priors import Prior, PriorTexts, default_priors, published_material
+from hotlever.probe.prior_texts import PriorTexts
+from hotlever.probe.priors import Prior, default_priors, published_material
 from made_up import GONE, damaged
 from synthetic_curves import measured_curve, measurement_of
 
@@ -35,7 +36,7 @@ def calibrated(reference):
 
 @pytest.fixture(scope="module")
 def example():
-    return Path(__file__).parents[2] / "examples" / "lever-a.csv"
+    return Path(__file__).parents[2] / "src" / "hotlever" / "examples" / "lever-a.csv"
 
 
 @pytest.fixture(scope="module")
@@ -314,6 +315,8 @@ def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
         (("--table", "t.txt"), "unknown file type '.txt'"),
         (("--prior", "n_d"), "--prior n_d: expected NAME=VALUE±SPREAD"),
         (("--prior", "n_d=3e17"), "expected a value and its spread"),
+        (("--prior", "n_d=3e17×/0.5"), "--prior: n_d = '3e17×/0.5': a factor of 0.5, expected"),
+        (("--prior", "edge_bias_um=0.1x/2"), "edge_bias_um may be negative: expected a spread"),
         (("--prior", "heater=±3%"), "unknown prior 'heater'"),
         (("--fit", "none.json"), "none.json: no such file"),
     ],

@@ -12,7 +12,7 @@ from hotlever.calibration import Calibration, calibrate, read_calibration, read_
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.pulses import PulseTiming
 from hotlever.errors import InputError
-from hotlever.fitting import Measurement
+from hotlever.estimation import Measurement
 from hotlever.lever.lever import COARSE
 
 HELD = {"kind": "supply", "bias_V": 2.0, "series_resistance_ohm": 500.0}

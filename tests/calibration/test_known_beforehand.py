@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hotlever.calibration.calibration import read_calibration
 from hotlever.calibration.procedure import calibrate
-from hotlever.fitting import fit
+from hotlever.estimation import fit
 from hotlever.lever import Lever
 from hotlever.probe import Circuit, Probe
 from synthetic_curves import measured_curve, measurement_of
@@ -37,3 +38,26 @@ def test_edges_that_are_off_together_are_known_by_one_prior():
     assert use.posterior_spread < 0.7 * use.spread
     error = np.abs(found.table.tip_K - true.branch().tip_temperature(found.table.power_mW))
     assert float((error / found.table.tip_stderr_K).max()) < 2.0
+
+
+def test_doping_known_to_a_factor_is_calibrated_and_written_with_its_distribution(run, tmp_path):
+    """The lever that is stated has a third of the doping."""
+    true = Lever(Probe.reference()).branch()
+    curve = measured_curve(true, np.random.default_rng(4), to_V=9.0)
+    rows = zip(curve.bias_V, curve.current_mA, strict=True)
+    lines = ["V_b (V),I_h (mA)", *(f"{bias:.6f},{current:.6f}" for bias, current in rows)]
+    (tmp_path / "iv.csv").write_text("\n".join(lines))
+    status, out, err = run("calibrate", "iv.csv", "--prior", "n_d=1.9e17×/3", "-o", "cal.json")
+    assert status == 0, err
+    assert "no lever like this one" not in out + err
+    use = read_calibration(tmp_path / "cal.json").priors["n_d"]
+    assert use.distribution == "log-normal"
+    assert (use.value, use.spread / use.value) == pytest.approx((1.9e17, np.log(3.0)))
+    off = abs(np.log(use.posterior_value / 5.75e17))
+    assert off < 3.0 * use.posterior_spread / use.posterior_value
+    assert use.moved == pytest.approx(1.0, abs=0.3)
+    if use.moved > 1.0:
+        assert f"n_d by {use.moved:+.1f} σ" in out
+    found = read_calibration(tmp_path / "cal.json").table
+    error = np.abs(found.tip_K - true.tip_temperature(found.power_mW))
+    assert float((error / found.tip_stderr_K).max()) < 3.0

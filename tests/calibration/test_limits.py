@@ -19,11 +19,18 @@ class OneUnknown:
     """An objective with one unknown x, of which is known that it is 0 ± 1, and nothing else."""
 
     names, columns = ("x",), [0]
-    scale, bounds = np.ones(1), np.array([[-9.0], [9.0]])
+    bounds = np.array([[-9.0], [9.0]])
+    coordinates = SimpleNamespace(values=np.copy, rates=np.ones_like)
     residuals = SimpleNamespace(size=0)
 
-    def values(self, probe):
+    def point(self, probe):
         return probe.at(["x"])
+
+    def rates(self, probe):
+        return np.ones(1)
+
+    def log_volume(self, point):
+        return 0.0
 
     def residual(self, values, scaled):
         return scaled.copy()

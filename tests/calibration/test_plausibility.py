@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hotlever.calibration.causes import Causes
 from hotlever.calibration.knee import IVCurve
 from hotlever.calibration.procedure import calibrate
 from hotlever.errors import InputError
+from hotlever.estimation import Measurement
+from hotlever.estimation.diagnosis import Diagnosis
 from hotlever.figures import calibration_curves
-from hotlever.fitting import Measurement
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 from synthetic_curves import measured_curve, measurement_of
@@ -42,13 +42,13 @@ def test_equal_rows_are_no_curve(curve):
 @pytest.mark.parametrize(
     ("bias", "current", "probe", "message"),
     [
-        (lambda v, i: v, lambda v, i: 1e3 * i, {}, r"kΩ at low bias, expected about 6\.9.*in µA"),
-        (lambda v, i: v, lambda v, i: 1e-3 * i, {}, r"is the current given in A"),
+        (lambda v, i: v, lambda v, i: 1e3 * i, {}, r"kΩ at low bias, expected about 6\.9.*large"),
+        (lambda v, i: v, lambda v, i: 1e-3 * i, {}, r"1000 times too small"),
         (lambda v, i: v, lambda v, i: 5.0 * i, {}, r"is the current (5|4.99|5.01) times"),
         (lambda v, i: i, lambda v, i: v, {}, r"are bias and current swapped"),
         (lambda v, i: v - 5.6 * i, lambda v, i: i, {}, r"is V_b the lever's own voltage"),
         (lambda v, i: v, lambda v, i: i, {"series_resistance_ohm": 0.0}, r"rather 5\.[56]\d* than"),
-        (lambda v, i: v, lambda v, i: 1e-5 + 0.0 * i, {}, r"is a terminal open"),
+        (lambda v, i: v, lambda v, i: 1e-5 + 0.0 * i, {}, r"no single cause that is known"),
     ],
 )  # fmt: skip
 def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
@@ -84,16 +84,16 @@ def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
 )  # fmt: skip
 def test_the_likeliest_cause_is_found_by_the_model(curve, current, probe, question):
     wrong = current(curve.current_mA, np.linspace(0.0, 1.0, curve.bias_V.size))
-    causes = Causes(shown(curve, current_mA=wrong), Probe.reference().with_(**probe))
+    causes = Diagnosis(shown(curve, current_mA=wrong), Probe.reference().with_(**probe))
     assert re.search(question, causes.likeliest())
 
 
 def test_good_data_have_no_cause(curve):
-    assert Causes(shown(curve), Probe.reference()).likeliest() == ""
+    assert Diagnosis(shown(curve), Probe.reference()).likeliest() == ""
 
 
 def test_a_fit_that_is_another_lever_s_is_said_to_be(curve):
-    assert Causes(shown(curve), Probe.reference()).named(fitted=True) == (
+    assert Diagnosis(shown(curve), Probe.reference()).named(fitted=True) == (
         "is it the fit of another lever?"
     )
 

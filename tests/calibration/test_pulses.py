@@ -107,7 +107,7 @@ def test_the_rule_knows_no_pulse(measured):
     ],
 )
 def test_a_wrong_timing_is_one_line(run, text, said):
-    status, _, err = run("calibrate", "examples/lever-a.csv", "--pulse", text)
+    status, _, err = run("calibrate", "src/hotlever/examples/lever-a.csv", "--pulse", text)
     assert status == 2
     assert said in err
     assert len(err.splitlines()) == 1

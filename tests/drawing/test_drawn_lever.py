@@ -224,9 +224,9 @@ def test_several_heaters_and_further_terminals():
 
 @pytest.mark.slow
 def test_a_fit_of_a_drawn_lever_finds_what_that_of_the_parametric_one_does(file):
-    from hotlever.fitting import fit, read_measurement
+    from hotlever.estimation import fit, read_measurement
 
-    data = read_measurement("examples/lever-a.csv")
+    data = read_measurement("src/hotlever/examples/lever-a.csv")
     found, expected = fit(data, drawn(file)), fit(data, Probe.reference())
     for name, parameter in expected.parameters.items():
         assert found.parameters[name].value == pytest.approx(parameter.value, rel=2e-3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ezdxf
 import gdstk
+import numpy as np
 import pytest
 from reference_drawing import reference_library
 
@@ -165,6 +166,26 @@ def test_in_a_file_an_error_names_the_layer_and_the_place_is_drawn(run, tmp_path
     assert err.count("\n") == 1
     assert (tmp_path / "fault.png").stat().st_size > 10_000
     assert run("sweep", "probe.toml")[0] == 2
+
+
+def test_a_border_tangent_to_an_arc_names_the_layer_that_is_to_be_moved():
+    """The silicon's own outline is sound; the heater's border cuts a needle off it."""
+
+    def arc(radius, first, last):
+        angles = np.radians(np.linspace(first, last, 60))
+        return np.stack([50 + radius * np.cos(angles), radius * np.sin(angles)], axis=1).tolist()
+
+    ring = [[0, -10], *arc(10, -90, 90), [0, 10], [0, 4], *arc(4, 90, -90), [0, -4]]
+    values = {
+        "probe": {"shape": "drawing", "thickness_um": 0.4, "tip_um": [56.0, 0.0]},
+        "layers": {"silicon": ring, "heater": box(54.004, -20, 70, 20)},
+        "terminals": {"supply": [[0, -10], [0, -4]], "ground": [[0, 4], [0, 10]]},
+    }
+    with pytest.raises(DrawingError, match=r"^p: heater, polygon 1, at \(5.*move it$") as caught:
+        Probe.from_values(values, "p")
+    assert "its border leaves the silicon with a corner" in str(caught.value)
+    values["layers"]["heater"] = box(53.5, -20, 70, 20)
+    assert Probe.from_values(values, "p").layout().regions
 
 
 def damaged() -> dict[str, bytes]:

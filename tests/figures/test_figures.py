@@ -9,8 +9,8 @@ import xarray as xr
 import made_up
 from hotlever import figures
 from hotlever.errors import InputError
+from hotlever.estimation import Measurement
 from hotlever.figures import save_figure
-from hotlever.fitting import Measurement
 from hotlever.lever.fields import FieldMapper, heater_profile
 from hotlever.probe import Probe
 from hotlever.report.page import Page

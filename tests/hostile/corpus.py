@@ -15,12 +15,12 @@ import numpy as np
 
 from hotlever.calibration import calibrate, read_calibration
 from hotlever.calibration.power_law import EQ12, read_power_law
-from hotlever.fitting import fit, read_fit, read_measurement
-from hotlever.fitting.measurement import Measurement, parse_columns
-from hotlever.fitting.models import full_model
+from hotlever.estimation import fit, read_fit, read_measurement
+from hotlever.estimation.experiment import full_experiment
 from hotlever.lever import Lever, read_sweep, write_sweep
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient.waveform import read_waveform
+from hotlever.measurement import Measurement, parse_columns
 from hotlever.probe import Probe
 from hotlever.raman.bias_log import read_bias_log
 from hotlever.raman.calibration import published_raman_calibration, read_raman_calibration
@@ -30,7 +30,7 @@ from hotlever.raman.spectrum import read_file
 from hotlever.spieser2017 import published
 from spectrometer_files import jcamp_bytes, spc_bytes, wdf_bytes
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = Path(__file__).parents[2] / "src" / "hotlever" / "examples"
 
 #: What stands in for a number, a word, or anything else.
 NUMBERS = [
@@ -84,7 +84,7 @@ def families(folder: Path) -> dict[str, Family]:
     text = "".join(f"{a:.3f}\t{b:.1f}\n" for a, b in zip(x, y, strict=True))
     lever = Lever(Probe.reference(), COARSE)
     data = Measurement.of_sweep(lever.sweep(np.linspace(2.0, 10.0, 9)))
-    fitted = fit(data, model=lambda probe, at: full_model(lever.with_probe(probe), at))
+    fitted = fit(data, model=lambda probe, at: full_experiment(lever.with_probe(probe), at))
     fitted.write(folder / "fit.json")
     write_sweep(lever.sweep([1.0, 2.0]), folder / "sweep.nc")
     law = {"linear_K_per_mW": 110, "nonlinear_K": 4, "exponent": 3, "hot_K_per_mW": 200}

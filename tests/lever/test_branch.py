@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from hotlever.errors import BranchEndError, ComputationError, InputError
 from hotlever.lever import Branch, Lever
 from hotlever.lever.following import Follower
+from hotlever.lever.lever import COARSE
+from hotlever.probe import Probe
+
+EXAMPLES = Path(__file__).parents[2] / "src/hotlever/examples"
 
 
 def with_series(lever: Lever, ohm: float) -> Lever:
@@ -28,6 +34,47 @@ def test_what_is_read_between_states_is_what_is_solved_there(lever):
     np.testing.assert_allclose(read.max_K, solved.max_K, rtol=0, atol=0.05)
     np.testing.assert_allclose(read.end_heat_mW, solved.end_heat_mW, rtol=5e-5, atol=1e-6)
     np.testing.assert_allclose(solved.bias_V, bias, rtol=1e-10)
+
+
+def highest_in(state):
+    """The highest temperature (K) of a state, by points far closer than the nodes."""
+    elements = state.lever.space.elements
+    steps = 30
+    points = [(i, j) for i in range(steps + 1) for j in range(steps + 1 - i)]
+    points = np.array(points).T / steps
+    shape = [elements.basis.elem.lbasis(points, node)[0] for node in range(10)]
+    return float((state.nodal[0][elements.dofs] @ np.stack(shape)).max())
+
+
+HOT = [Probe.reference(), Probe.reference().in_medium("air"), Probe.u_shape(), "boron", "palladium"]
+HIGHEST_V = [13.2, 18.2, 12.3, 6.6, 1.06]
+
+
+@pytest.mark.parametrize(("probe", "highest_V"), list(zip(HOT, HIGHEST_V, strict=True)))
+def test_the_highest_temperature_is_as_exact_as_that_of_the_tip(probe, highest_V):
+    """In the reference probe a leg overtakes the heater, between two states of the branch."""
+    files = {"boron": "boron-lever.toml", "palladium": "palladium-on-nitride.toml"}
+    lever = Lever(EXAMPLES / files[probe] if isinstance(probe, str) else probe)
+    bias = np.append(highest_V * np.array([0.1, 0.5, 0.8, 0.9, 1.0]), highest_V - 0.38)
+    read = lever.sweep(bias)
+    np.testing.assert_allclose(
+        read.max_K, [highest_in(state) for state in lever.solve(bias)], rtol=0, atol=0.05
+    )
+
+
+def test_a_warm_leg_end_may_be_the_hottest():
+    ends = {"circuit.ground.kind": "ground", "circuit.ground.base_temperature_K": 350.0}
+    lever = Lever(Probe.reference().with_(**ends), COARSE)
+    assert lever.sweep([0.0]).max_K.item() == pytest.approx(350.0, abs=1e-9)
+
+
+def test_a_branch_ends_where_its_hottest_place_melts(lever):
+    branch = lever.branch(1550.0)
+    assert branch.melts
+    highest = branch.base_temperature_K + branch.highest_rise_at(np.array([branch.end_u]))[0]
+    assert highest == pytest.approx(lever.equations.limit[0], abs=1e-3)
+    # the heater, where the tip is, is far from melting
+    assert branch.hottest_K < highest - 150.0
 
 
 def test_the_curve_converges_with_the_spacing_of_the_states(coarse):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.fitting.models import full_model
+from hotlever.estimation.experiment import full_experiment
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
@@ -100,7 +100,7 @@ def test_derivatives_at_a_fixed_bias(coarse, name):
     """Circuit and dimensions together, as a fit takes them."""
     bias = np.array([2.0, 5.0, 7.0])
     names = (name,)
-    model = replace(full_model(coarse, bias), names=names)
+    model = replace(full_experiment(coarse, bias), names=names)
     probe, rest = coarse.probe, []
     start = model.predict(probe)
     for step in (0.02, 0.01):
@@ -117,7 +117,7 @@ def test_predictions_nearby_agree_with_a_new_branch(coarse):
     """To second order, at four per cent."""
     bias = np.array([2.0, 5.0, 7.0])
     names = ("n_d", "heater_length_um", "series_resistance_ohm", "base_temperature_K")
-    model = replace(full_model(coarse, bias), names=names)
+    model = replace(full_experiment(coarse, bias), names=names)
     start = model.predict(coarse.probe)
     values = coarse.probe.at(names) * np.array([1.04, 0.96, 1.01, 1.02])
     nearby, slopes = start.nearby.predict(values)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from hotlever.cache import CACHE_VARIABLE, store_arrays, stored
-from hotlever.fitting import Measurement, fit
-from hotlever.fitting.models import reduced_model
+from hotlever.estimation import Measurement, fit
+from hotlever.estimation.experiment import reduced_experiment
 from hotlever.lever import Lever
 from hotlever.lever.box import Box
 from hotlever.lever.branch import Reach
@@ -24,7 +24,7 @@ BIAS = np.linspace(0.0, 11.0, 12)
 
 def predicted(reduced, lever, material, bias=BIAS):
     """What the reduced lever alone shows, and its derivatives."""
-    model = reduced_model(lever, reduced, bias)
+    model = reduced_experiment(lever, reduced, bias)
     return model.predict(lever.with_material(material).probe)
 
 
@@ -69,7 +69,10 @@ def test_corrected_by_the_full_lever_it_is_exact_to_first_order(coarse, reduced)
     """Beside the box, where it is wrong by more than it should be."""
     shares = np.array([1.3, 0.5, -0.2, 1.2, 0.5])
     material = Box.of(coarse.probe).probe(coarse.probe, shares).material
-    model, probe = reduced_model(coarse, reduced, BIAS), coarse.with_material(material).probe
+    model, probe = (
+        reduced_experiment(coarse, reduced, BIAS),
+        coarse.with_material(material).probe,
+    )
     first = model.predict(probe)
     exact = as_array(coarse.with_material(material).sweep(BIAS))
     better = model.confirmed(first)
@@ -189,3 +192,17 @@ def test_two_processes_may_write_the_same_file(coarse, reduced, tmp_path):
     )
     assert loaded is not None
     assert [path.name for path in tmp_path.iterdir()] == ["one.npz"]
+
+
+def test_where_a_reduced_lever_ends_is_not_said_of_the_lever(coarse, reduced):
+    """The reference probe melts at 13.2 V; the reduced lever was made for less."""
+    circuit = coarse.circuit
+    branch = reduced.branch(coarse.probe, Reach(circuit, 13.0))
+    reading = branch.read(circuit, np.array([13.0]))
+    assert np.isnan(reading.u).all()
+    text = str(branch.ended(reading))
+    assert text.startswith("the reduced lever ends at a bias of 12.2")
+    assert "no steady state" not in text
+    # nor is it where a branch was not followed further
+    short = coarse.with_probe(coarse.probe).branch(1000.0)
+    assert "no steady state" not in str(short.ended(short.read(circuit, np.array([13.0]))))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.fitting import FitOptions, Measurement, batch
-from hotlever.fitting.models import shown_at_bias
+from hotlever.estimation import FitOptions, Measurement, batch
+from hotlever.estimation.experiment import shown_at_bias
 from hotlever.lever import Lever
 from hotlever.lever.box import PAPER, Box, is_papers
 from hotlever.lever.branch import Reach

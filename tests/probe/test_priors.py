@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -20,6 +22,7 @@ from hotlever.probe.priors import (
 )
 
 PROBE = Probe.reference()
+LOG_3 = math.log(3.0)
 
 
 @pytest.mark.parametrize(
@@ -30,6 +33,11 @@ PROBE = Probe.reference()
         ("± 5 %", Prior(5.75e17, 0.05)),
         ("4e17 +- 2e16", Prior(4e17, 2e16, relative=False)),
         ("4e17 +/- 2e16", Prior(4e17, 2e16, relative=False)),
+        ("1e17 ×/ 3", Prior(1e17, LOG_3)),
+        ("1e17×/3", Prior(1e17, LOG_3)),
+        ("1e17 x/ 3", Prior(1e17, LOG_3)),
+        ("1e17*/3", Prior(1e17, LOG_3)),
+        ("×/ 3", Prior(5.75e17, LOG_3)),
     ],
 )
 def test_priors_are_read_as_they_are_written(text, prior):
@@ -63,6 +71,20 @@ def test_dimensions_are_all_that_are_not_named():
         ({"thickness_um": "4e19 ± 5%"}, "thickness_um = 4e.19, expected a value from 0.2 to 0.6"),
         ({"thickness_um": "0.4 ± 1e-300"}, "a spread of 2.5e-300 times the value"),
         ({"n_d": "± 1e300%"}, "a spread of inf times the value"),
+        ({"n_d": "1e17 ×/ 1"}, r"here: n_d = '1e17 ×/ 1': a factor of 1, expected one above 1"),
+        ({"n_d": "×/ 0.3"}, "a factor of 0.3, expected one above 1 and at most 1000"),
+        ({"n_d": "×/ -3"}, "a factor of -3, expected one above 1"),
+        ({"n_d": "×/ nan"}, "a factor of nan, expected one above 1"),
+        ({"n_d": "×/ 1e9"}, r"a factor of 1e\+09, expected one above 1 and at most 1000"),
+        ({"n_d": "×/ 3%"}, "or '1e17 ×/ 3'"),
+        ({"n_d": "×/"}, "expected a value and its spread"),
+        ({"n_d": "1e17 / 3"}, "expected a value and its spread"),
+        ({"n_d": "0 ×/ 3"}, "n_d = 0, expected a value from 1e.16"),
+        ({"a1": "0 ×/ 3"}, "a relative spread needs a value above 0"),
+        ({"impurity_exponent": "1 ×/ 3"}, "may be negative: .* such as '± 0.4', found a factor"),
+        ({"edge_bias_um": "0.1 ×/ 2"}, "may be negative: expected a spread in its unit"),
+        ({"raman_scale": "×/ 1.1"}, "expected a share such as '± 5%'"),
+        ({"dimensions": "×/ 2"}, "expected a share such as '± 5%', at most 50%"),
     ],
 )
 def test_what_is_no_prior_gets_one_line(texts, message):
@@ -91,6 +113,41 @@ def test_a_probe_file_states_priors_which_win_over_the_usual_ones(tmp_path):
     path.write_text(path.read_text().replace('n_d = "3', 'n_q = "3'))
     with pytest.raises(InputError, match=r"probe.toml: \[prior\]: unknown prior 'n_q'"):
         Probe.from_file(path)
+
+
+def test_a_factor_is_one_standard_deviation_of_the_logarithm_either_way():
+    prior = priors_of({"n_d": "1e17 ×/ 3"}, PROBE, "here")["n_d"]
+    for deviation in (-2.0, -1.0, 0.0, 1.0, 1.5):
+        assert prior.at(deviation) == pytest.approx(1e17 * 3.0**deviation, rel=1e-14)
+        assert prior.deviation(1e17 * 3.0**deviation) == pytest.approx(deviation, abs=1e-14)
+    assert prior.slope(3e17) == pytest.approx(1.0 / (3e17 * LOG_3), rel=1e-14)
+    assert prior.absolute == pytest.approx(1e17 * LOG_3)
+    drawn = [prior.at(one) for one in np.random.default_rng(0).standard_normal(20_000)]
+    expected = [1e17 / 9.0, 1e17 / 3.0, 1e17, 3e17, 9e17]
+    quantiles = np.percentile(drawn, [2.275, 15.866, 50.0, 84.134, 97.725])
+    np.testing.assert_allclose(quantiles, expected, rtol=0.1)
+
+
+def test_all_dimensions_may_be_known_to_a_factor():
+    found = priors_of({"dimensions": "×/ 1.2"}, PROBE, "here")
+    assert set(found) == set(nuisances(PROBE))
+    assert found["length_um"] == Prior(54.4, math.log(1.2))
+
+
+def test_what_data_made_of_a_factor_is_counted_in_logarithms():
+    to_a_factor, in_its_unit = Prior(1e17, LOG_3), Prior(293.0, 1.0, relative=False)
+    use = to_a_factor.used(9e17, 9e16)
+    assert use.distribution == "log-normal"
+    assert use.spread / use.value == pytest.approx(LOG_3)
+    assert use.moved == pytest.approx(to_a_factor.deviation(9e17)) == pytest.approx(2.0)
+    assert use.left == pytest.approx(0.1 / LOG_3)
+    assert use.stated == "1e+17 ×/ 3"
+    assert Prior(4e17, 0.05).used(4.2e17, 1e16).stated == "4e+17 ± 2e+16"
+    base = in_its_unit.used(295.0, 0.5)
+    assert (base.distribution, base.moved, base.left) == ("normal", 2.0, 0.5)
+    assert base.stated == "293 ± 1"
+    # of a parameter that ended at zero there is no logarithm
+    assert Prior(1e-6, 0.5).used(0.0, 1e-7).moved == pytest.approx(-2.0)
 
 
 @given(st.floats(0.1, 10.0), st.floats(0.01, 1.0), st.booleans())

@@ -37,7 +37,7 @@ def tip_files(shared: Callable[..., list[Path]]) -> list[Path]:
 
 @pytest.fixture
 def examples() -> Path:
-    return REPO / "examples" / "raman"
+    return REPO / "src" / "hotlever" / "examples" / "raman"
 
 
 @pytest.fixture(scope="session")

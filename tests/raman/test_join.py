@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from hotlever.errors import InputError
-from hotlever.fitting.measurement import read_measurement
+from hotlever.measurement import read_measurement
 from hotlever.raman.bias_log import join, read_bias_log
 
 

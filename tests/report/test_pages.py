@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import made_up
-from hotlever.fitting import Measurement, fit
-from hotlever.fitting.models import full_model
-from hotlever.fitting.uncertainty import examine
+from hotlever.estimation import Measurement, fit
+from hotlever.estimation.experiment import full_experiment
+from hotlever.estimation.uncertainty import examine
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.reproduce import LONG_SECTIONS, SECTIONS, TWINS, twins
 from hotlever.report.reproduce.findings import Findings
@@ -20,7 +20,7 @@ def result(lever):
     data = Measurement.of_sweep(lever.sweep([2.0, 5.0, 7.0, 8.0, 9.0, 11.0]))
     data.tip_K[:] += np.random.default_rng(0).normal(0.0, 3.0, data.tip_K.size)
     held = dict.fromkeys(("delta", "n_d", "a0", "a1"))
-    return fit(data, fixed=held, model=lambda probe, bias: full_model(lever, bias))
+    return fit(data, fixed=held, model=lambda probe, bias: full_experiment(lever, bias))
 
 
 def test_a_fit_s_page_tells_what_was_found_and_how_sure_it_is(result):

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import hotlever
+from drawn import reference_points
 from hotlever.errors import InputError
 from hotlever.probe import Probe
 from hotlever.spieser2017 import ANNEALING_K
 from hotlever.studies.design import Design, quantities, sensitivities, vary
+
+EXAMPLES = Path(hotlever.__file__).parent / "examples"
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +56,78 @@ def test_annealing_changes_the_diffusion_length_only(start):
     assert longer.material.delta == pytest.approx(2 * delta)
     assert longer.shape == start.probe.shape
     assert start.changed("annealing_K", ANNEALING_K).material.delta == pytest.approx(delta)
+
+
+@pytest.fixture(scope="module")
+def drawn() -> Design:
+    return Design(Probe.from_values(reference_points(), "drawn"))
+
+
+@pytest.mark.parametrize(
+    ("example", "usual"),
+    [
+        (
+            "palladium-on-nitride.toml",
+            ("scale", "thickness_um", "layers.track.thickness_um", "film.resistivity"),
+        ),
+        ("boron-lever.toml", ("scale", "thickness_um", "hot.n_d")),
+    ],
+)
+def test_what_is_varied_of_a_drawing(example, usual):
+    design = Design(Probe.from_file(EXAMPLES / example))
+    assert design.usual == usual
+    for name, value in design.numbers.items():
+        if name == "pressure_mbar":  # means nothing without accommodation, as its error says
+            continue
+        factor = 1.02 if value else 1.0
+        assert isinstance(design.changed(name, value * factor), Probe)
+
+
+def test_a_film_of_a_drawing_is_varied_exactly():
+    design = Design(Probe.from_file(EXAMPLES / "palladium-on-nitride.toml"))
+    data = vary(design, "layers.track.thickness_um", [0.05, 0.1], air=False)
+    first, second = data.cold_ohm.values
+    assert first / second == pytest.approx(2.0, rel=1e-3)
+    data = vary(design, "film.resistivity", [2e-5, 3e-5], air=False)
+    assert data.cold_ohm.values[1] / data.cold_ohm.values[0] == pytest.approx(1.5, rel=1e-3)
+
+
+def test_the_numbers_of_a_drawing_are_those_it_has(drawn):
+    assert drawn.usual == ("scale", "thickness_um", "n_d", "annealing_K", "annealing_min")
+    assert {"edge_bias_um", "series_resistance_ohm", "c_kappa"} <= set(drawn.numbers)
+    for name in ("unit_um", "tolerance_um", "heater_length_um"):
+        with pytest.raises(InputError, match="expected one of: thickness_um, scale"):
+            drawn.value(name)
+
+
+def test_scale_and_edges_of_a_drawing_are_varied(drawn):
+    larger = vary(drawn, "scale", [1.0, 1.1], air=False)
+    assert larger.tip_K.diff("scale").item() > 0
+    wider = vary(drawn, "edge_bias_um", [-0.05, 0.0, 0.05], air=False)
+    assert (wider.cold_ohm.diff("edge_bias_um") < 0).all()
+    assert wider.cold_ohm.values[1] == pytest.approx(larger.cold_ohm.values[0], rel=1e-9)
+
+
+def test_design_command_of_a_drawing(run, tmp_path):
+    Probe.from_values(reference_points(), "drawn").to_file(tmp_path / "own.toml")
+    status, out, err = run("design", "own.toml", "--no-air")
+    assert status == 0, err
+    rows = [line.split()[0] for line in out.splitlines()[4:]]
+    assert rows == ["scale", "thickness_um", "n_d", "annealing_K", "annealing_min"]
+    assert "--vary NAME=START:STOP:COUNT of thickness_um, scale, edge_bias_um" in err
+    status, out, err = run(
+        "design", "own.toml", "--no-air", "--vary", "edge_bias_um=-0.05:0.05:2", "--plot", "d.png"
+    )
+    assert status == 0, err
+    assert len(out.splitlines()) == 3
+    assert (tmp_path / "d.png").stat().st_size > 10_000
+
+
+def test_a_drawing_without_a_knee_has_a_table_too(run):
+    status, out, err = run("design", EXAMPLES / "palladium-on-nitride.toml", "--no-air")
+    assert status == 0, err
+    assert out.startswith("no knee: the lever voltage rises until something melts; tip at ")
+    assert "layers.track.thickness_um" in out
 
 
 def test_names_that_do_not_exist_are_refused(start):

@@ -10,6 +10,7 @@ import importlib
 import io
 import os
 import queue
+import shlex
 import signal
 import sys
 import threading
@@ -20,6 +21,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from hotlever.app.changes import Changes
 from hotlever.cli.output import heard_by
 from hotlever.errors import HotleverError
 from hotlever.memory import give_back
@@ -29,7 +31,7 @@ from hotlever.types import Progress
 _REST_S = 1.0
 #: Modules that a process imports before it is asked for anything, so that it then answers at once.
 _READY = (
-    *("hotlever.cli.commands", "hotlever.fitting", "hotlever.calibration"),
+    *("hotlever.cli.commands", "hotlever.estimation", "hotlever.calibration"),
     *("hotlever.figures", "hotlever.lever", "hotlever.report.fit_pages", "hotlever.raman"),
 )
 
@@ -111,12 +113,16 @@ def _next(calls: queue.Queue[_Call]) -> _Call:
 
 
 def run_command(report: Report, arguments: list[str], folder: Path) -> tuple[int, str]:
-    """Run a command in a folder as the command line does; return exit status and result."""
+    """Run a command in a folder as the command line does; return exit status and result.
+
+    What it writes there can be undone.
+    """
     from hotlever.cli import main
 
     os.chdir(folder)
     result = io.StringIO()
-    with heard_by(report), redirect_stdout(result):
+    what = shlex.join(["hotlever", *arguments])
+    with heard_by(report), redirect_stdout(result), Changes(folder).recorded(what):
         try:
             main(arguments)
         except SystemExit as ended:

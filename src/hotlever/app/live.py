@@ -129,6 +129,10 @@ class LiveLever:
             "knee": None if knee is None else vars(knee),
         }
 
+    def reaches(self, bias: float) -> bool:
+        """Whether its branch has a state at a bias (V)."""
+        return bool(np.isfinite(self.branch.read(self.circuit, np.array([bias])).u).all())
+
     def at(self, bias: float) -> dict[str, Any]:
         """Return what the lever shows at a bias (V): numbers, map and profile.
 
@@ -191,14 +195,20 @@ def answer(
     changes : dict
         Values by the names of a probe file.
     ask : dict
-        ``bias`` and ``most`` (V), whether it must be ``quick``, and whether the ``reduced`` lever
-        of the geometry has been made.
+        ``bias`` and ``most`` (V), how far the curves go at least; whether it must be ``quick``, and
+        whether the ``reduced`` lever of the geometry has been made.
+
+    Raises
+    ------
+    BranchEndError
+        If the lever has no state at this bias; a reduced lever that ends below leaves the answer to
+        a coarse one.
     """
     probe = _probe(folder, name, _stamp(folder, name), tuple(sorted(changes.items())))
-    if ask["quick"]:
-        live = _quick(probe, ask["most"], ask["reduced"])
-    else:
-        live = _full(report, probe, ask["most"])
+    most = max(ask["most"], ask["bias"])
+    live = _quick(probe, most, ask["reduced"]) if ask["quick"] else _full(report, probe, most)
+    if live.model == REDUCED and not live.reaches(ask["bias"]):
+        live = _quick(probe, most, False)
     drawn = _map_of(live.space)
     return {
         "model": live.model,

@@ -10,8 +10,9 @@ from typing import Any
 from nicegui import events, ui
 
 from hotlever.app.jobs import Job, command_line
-from hotlever.app.project import LARGEST_FILE
+from hotlever.app.project import LARGEST_FILE, safe_name
 from hotlever.app.session import Session
+from hotlever.app.undo import undo_button
 from hotlever.errors import HotleverError
 
 #: Rooms by their address: title and what is done there.
@@ -73,9 +74,14 @@ def framed(session: Session, address: str) -> Iterator[Complaint]:
                 link.classes("q-px-sm" + (" bg-white/25" if here else ""))
         ui.space()
         ui.label(str(session.project.folder)).classes("text-xs ellipsis gt-sm")
+        undo_button(session)
         ui.button(icon="contrast", on_click=switch).props(
             'flat dense color=white aria-label="Light or dark"'
         )
+    if session.remark:
+        remark = session.remark.replace(f"{session.project.folder}/", "")
+        ui.label(remark).classes("text-sm remark w-full").props("role=status")
+        session.remark = ""
     yield Complaint(str(session.project.folder))
 
 
@@ -129,7 +135,10 @@ def drop_zone(
 
     async def taken(event: events.MultiUploadEventArguments) -> None:
         with complaint.caught():
-            names = [session.project.take(f.name, await f.read(), folder) for f in event.files]
+            names = []
+            with session.project.changes.recorded(f"dropped {_several(event.files)}"):
+                for file in event.files:
+                    names.append(session.project.take(file.name, await file.read(), folder))
             await then(names)
 
     zone = ui.upload(
@@ -145,6 +154,23 @@ def drop_zone(
     # others may be on their way
     zone.on("uploaded", lambda: zone.run_method("removeUploadedFiles"), args=[])
     return zone
+
+
+def _several(files: Sequence[Any]) -> str:
+    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+    return f"{safe_name(files[0].name)}{more}" if files else ""
+
+
+async def asked(question: str, yes: str, no: str) -> bool:
+    """Ask something, and wait for the answer; whoever closes the question says no."""
+    with ui.dialog() as dialog, ui.card():
+        ui.label(question).classes("remark")
+        with ui.row().classes("w-full justify-end"):
+            ui.button(no, on_click=lambda: dialog.submit(False)).props("no-caps autofocus")
+            ui.button(yes, on_click=lambda: dialog.submit(True)).props("outline no-caps")
+    answer = bool(await dialog)
+    dialog.delete()
+    return answer
 
 
 async def hand_over(made: Awaitable[bytes], name: str) -> None:
@@ -181,6 +207,7 @@ class Work:
     ) -> None:
         self._session, self._room, self._then, self._during = session, room, then, during
         self._seen: tuple[int, int] = (0, -1)
+        self._hidden: Job | None = None
         with ui.column().classes("w-full gap-1") as self._all:
             with ui.row().classes("w-full items-center no-wrap") as self._running:
                 self._bar = ui.linear_progress(show_value=False, size="10px").props("rounded")
@@ -198,6 +225,12 @@ class Work:
     def _job(self) -> Job | None:
         return self._session.jobs.by_room.get(self._room)
 
+    def hide(self) -> None:
+        """Show nothing more of a command that has ended: something else is shown now."""
+        if self._job is not None and self._job.standing != "running":
+            self._hidden = self._job
+            self._look()
+
     async def _cancel(self) -> None:
         await self._session.jobs.cancel(self._room)
         self._look()
@@ -211,7 +244,7 @@ class Work:
 
     def _look(self) -> None:
         job = self._job
-        self._all.set_visibility(job is not None)
+        self._all.set_visibility(job is not None and job is not self._hidden)
         if job is None:
             return
         running = job.standing == "running"

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
+import tomllib
 import unicodedata
-from collections.abc import Iterable
 from pathlib import Path
 
+from hotlever.app.changes import HIDDEN, Changes
 from hotlever.errors import InputError
-from hotlever.files import output_folder, whole_file
+from hotlever.files import output_folder, read_text, whole_file, write_text
 
 #: Bytes that a dropped file may have.
 LARGEST_FILE = 64 * 2**20
@@ -18,6 +18,8 @@ LARGEST_FILE = 64 * 2**20
 _LONGEST = 100
 #: Files that are listed of a kind, and bytes read of one to tell what it is.
 _MOST, _BEGINNING = 500, 2**22
+#: Bytes that a probe file may have.
+LARGEST_PROBE = 1_000_000
 
 DATA = (".csv", ".txt", ".tsv", ".dat", ".lvm", ".asc")
 DRAWINGS = (".gds", ".gds2", ".gdsii", ".oas", ".oasis", ".dxf")
@@ -55,6 +57,11 @@ class Project:
     folder : path
         Made if it does not exist.
 
+    Attributes
+    ----------
+    changes : Changes
+        What the app wrote here, and what was there before.
+
     Raises
     ------
     InputError
@@ -65,6 +72,12 @@ class Project:
         if Path(folder).is_file():
             raise InputError(f"{folder}: is a file, expected a folder")
         self.folder = output_folder(folder).resolve()
+        self.changes = Changes(self.folder)
+
+    @property
+    def hidden(self) -> Path:
+        """Folder for what is the app's own; it may not exist yet."""
+        return self.folder / HIDDEN
 
     def path(self, name: str) -> Path:
         """Return the path of a file of the project.
@@ -154,7 +167,48 @@ class Project:
         except OSError:
             return 0.0
 
-    # --- what comes in ----------------------------------------------------------------------------
+    def probe_of_drawing(self, drawing: str) -> tuple[str, bool]:
+        """Return the name of the probe file of a drawing, and whether it is there already.
+
+        A file of that name that is a probe of something else is none of the drawing's: the name
+        then has a number. One that cannot be read is taken to be: somebody is editing it.
+        """
+        stem, number = Path(drawing).stem, 1
+        name = f"{stem}.toml"
+        while self.path(name).exists():
+            if self._is_of_drawing(name, drawing):
+                return name, True
+            number += 1
+            name = f"{stem}-{number}.toml"
+        return name, False
+
+    def _is_of_drawing(self, name: str, drawing: str) -> bool:
+        try:
+            content = tomllib.loads(read_text(self.path(name), largest=LARGEST_PROBE))
+        except (InputError, ValueError, RecursionError):
+            return True
+        section = content.get("probe")
+        file = section.get("file") if isinstance(section, dict) else None
+        if not isinstance(file, str):
+            return False
+        try:
+            return (self.folder / file).resolve() == self.path(drawing)
+        except (OSError, ValueError):
+            return False
+
+    # --- what is written --------------------------------------------------------------------------
+
+    def write(self, name: str, text: str, what: str) -> None:
+        """Write a text file, which can be undone; `what` says what for.
+
+        Raises
+        ------
+        InputError
+            If it is not in the folder, or cannot be written.
+        """
+        path = self.path(name)
+        with self.changes.recorded(what):
+            write_text(path, text)
 
     def take(self, name: str, content: bytes, folder: str = "") -> str:
         """Keep a dropped file, beside others of the same name; return its name in the project.
@@ -176,7 +230,7 @@ class Project:
             number += 1
             kept = f"{stem}-{number}{suffix}"
         else:
-            with whole_file(path) as temporary:
+            with self.changes.recorded(f"took in {kept}"), whole_file(path) as temporary:
                 temporary.write_bytes(content)
         path.touch()
         return f"{folder}/{kept}" if folder else kept
@@ -185,9 +239,25 @@ class Project:
         """Copy a file that comes with hotlever into the project; return its name."""
         return self.take(Path(name).name, (EXAMPLES / name).read_bytes())
 
-    def take_example_folder(self, name: str, folder: str) -> Iterable[str]:
-        """Copy a folder that comes with hotlever."""
-        target = output_folder(self.path(folder))
-        for path in sorted((EXAMPLES / name).iterdir()):
-            shutil.copyfile(path, target / path.name)
-            yield f"{folder}/{path.name}"
+    def take_example_folders(self, name: str, *folders: str) -> None:
+        """Copy folders that come with hotlever.
+
+        Raises
+        ------
+        InputError
+            If one of them is there and holds something else: examples among the user's own files
+            would be measured with them.
+        """
+        source = EXAMPLES / name
+        for folder in folders:
+            for own in self.spectra(folder):
+                example, there = source / folder / own, self.path(f"{folder}/{own}")
+                if not example.is_file() or example.read_bytes() != there.read_bytes():
+                    raise InputError(
+                        f"{folder}/{own}: is no file of the example, which needs the folder "
+                        f"{folder} for itself; try it in another project"
+                    )
+        with self.changes.recorded(f"took in the example {name}"):
+            for folder in folders:
+                for path in sorted((source / folder).iterdir()):
+                    self.take(path.name, path.read_bytes(), folder)

@@ -28,6 +28,8 @@ from hotlever.memory import give_back
 
 #: Seconds after which the memory of pages that were closed is given back, again and again.
 _GIVE_BACK_S = 20.0
+#: Seconds after which what was chosen is kept, if it has changed.
+_KEEP_S = 1.0
 #: Messages kept for a page whose connection was lost, pictures of the map among them; with more it
 #: is opened anew.
 _MESSAGES = 100
@@ -89,6 +91,8 @@ def serve(
     app.on_startup(session.start)
     app.on_startup(lambda: say(address))
     app.on_startup(lambda: app.timer(_GIVE_BACK_S, forget_pages))
+    app.on_startup(lambda: app.timer(_KEEP_S, session.keep))
+    app.on_shutdown(session.keep)
     # told in one line, and kept in a file, as by any command
     logging.getLogger("nicegui").setLevel(logging.CRITICAL + 1)
     app.on_exception(failed)

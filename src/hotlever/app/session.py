@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
+from hotlever.app.choices import Keeper, read_choices
 from hotlever.app.jobs import Jobs
 from hotlever.app.project import Project
 from hotlever.app.workers import Desk
@@ -26,15 +27,25 @@ class Session:
     reduced : dict
         Whether the reduced lever of a geometry has been made, or is only asked for.
     chosen : dict
-        What was chosen last in each room, by names such as ``fit.data``.
+        What was chosen last in each room, by names such as ``fit.data``, be it before the app was
+        started.
+    remark : str
+        Why what was chosen before cannot be read, until a page has said it.
     """
 
     def __init__(self, project: Project) -> None:
         self.project, self.jobs = project, Jobs(project.folder)
-        self.chosen: dict[str, Any] = {}
+        self.chosen: dict[str, Any]
+        self.chosen, self.remark = read_choices(project.hidden)
+        self.keep = Keeper(project.hidden, self.chosen).keep
         self.reduced: dict[Any, bool] = {}
         self._desks: dict[str, Desk] = {}
         self._preparing: asyncio.Task[None] | None = None
+
+    def told_of(self, file: str | None) -> dict[str, Any]:
+        """Return what was told of a measurement file: its columns, the pulse that was measured."""
+        told: dict[str, Any] = self.chosen.setdefault("files", {})
+        return told.setdefault(file, {}) if file else {}
 
     @property
     def quick(self) -> Desk:

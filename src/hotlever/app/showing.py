@@ -20,16 +20,16 @@ from matplotlib.figure import Figure
 from hotlever import figures
 from hotlever.app.child import Report
 from hotlever.calibration import Calibration, read_calibration
-from hotlever.calibration.calibration import TABLE_COLUMNS
+from hotlever.calibration.calibration import STATED, TABLE_COLUMNS
 from hotlever.cli.options import load_probe
 from hotlever.cli.waveforms import pulses
 from hotlever.datasets import QUANTITIES
 from hotlever.errors import InputError
-from hotlever.fitting import Fit, read_fit, read_measurement
-from hotlever.fitting.measurement import parse_columns
-from hotlever.fitting.words import parameter_rows
+from hotlever.estimation import Fit, read_fit, read_measurement
+from hotlever.estimation.words import parameter_rows
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.meshing import chosen_space
+from hotlever.measurement import parse_columns
 from hotlever.probe import Layout, Probe
 from hotlever.probe.sections import read_sections
 from hotlever.probe.shapes import PARAMETRIC
@@ -90,15 +90,27 @@ def drawn(report: Report, folder: Path, kind: str, name: str, figure: str, suffi
     return _file(made, suffix)
 
 
+def doubted(report: Report, folder: Path, name: str) -> str:
+    """Return why a calibration does not say what to set; empty if it does."""
+    path = folder / name
+    return _calibration(path, _stamp(path)).doubt
+
+
 def settings(
     report: Report, folder: Path, name: str, along: str, value: float
 ) -> dict[str, float] | None:
     """Return what to set, and what follows, for a tip temperature, a bias or a power.
 
     None outside the calibrated range.
+
+    Raises
+    ------
+    InputError
+        If the data of the calibration are not described.
     """
     path = folder / name
     calibration = _calibration(path, _stamp(path))
+    calibration.need_described("what to set")
     table = calibration.table
     if along == "tip_K":
         bias = float(calibration.bias_for(value))
@@ -184,8 +196,8 @@ def levers(report: Report, folder: Path, names: list[str]) -> dict[str, Any]:
             continue  # being written, or another kind of file
         cells = parameter_rows(fit)
         head = ["lever", *(f"{one} ({unit})" if unit else one for one, _, unit, _ in cells)]
-        said = "" if fit.describes_data else fit.reason
-        rows.append([Path(name).name.split(".")[0], *(value for _, value, _, _ in cells), said])
+        lever = Path(name).name.split(".")[0]
+        rows.append([lever, *(value for _, value, _, _ in cells), fit.doubt])
     return {"head": [*head, "remark"], "rows": rows}
 
 
@@ -304,20 +316,26 @@ def _calibration_page(
     made.text(calibration.text())
     for note in calibration.notes:
         made.text(sentence(note))
+    described = calibration.describes_data
     made.figure(
         "calibration",
         figures.calibration_curves(calibration),
         "Tip temperature against power and bias with its 95 % band, the I-V curve with its knee, "
-        "and the standard error by source.",
+        "and the standard error by source."
+        if described
+        else "The nearest lever, which is no estimate: tip temperature against power and bias, the "
+        "I-V curve, and what the data differ by.",
     )
     table = calibration.table
     step = max(1, table.sizes["bias"] // _ROWS)
-    columns = [f"{QUANTITIES[name][1]} ({QUANTITIES[name][0]})" for name in TABLE_COLUMNS[:-2]]
+    names = [name for name in TABLE_COLUMNS[:-2] if described or name not in STATED]
+    columns = [f"{QUANTITIES[name][1]} ({QUANTITIES[name][0]})" for name in names]
     rows = [
-        [f"{float(table[name][place]):.4g}" for name in TABLE_COLUMNS[:-2]]
+        [f"{float(table[name][place]):.4g}" for name in names]
         for place in range(0, table.sizes["bias"], step)
     ]
-    made.table(columns, rows, "Some rows of the table for the instrument.")
+    said = "for the instrument." if described else "of the nearest lever, not for an instrument."
+    made.table(columns, rows, f"Some rows of the table {said}")
     return made
 
 

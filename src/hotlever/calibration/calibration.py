@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 from pydantic import Field
 
@@ -17,28 +18,26 @@ from hotlever.calibration.pulses import PulseCalibration, PulseSection
 from hotlever.calibration.words import calibration_text
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
-from hotlever.files import json_text, without_nan, write_text
-from hotlever.fitting.embedded import (
+from hotlever.estimation.embedded import (
     EmbeddedMeasurement,
     Number,
-    Section,
+    UsedPrior,
+    Verdict,
     array,
     embed,
+    prior_uses,
+    without_spread,
 )
-from hotlever.fitting.measurement import Measurement
+from hotlever.estimation.words import doubt
+from hotlever.files import json_text, without_nan, write_text
+from hotlever.measurement import Measurement
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import PriorUse
 from hotlever.types import Array
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-
-#: Columns of a calibration's table.
-TABLE_COLUMNS = (
-    *("bias_V", "lever_V", "current_mA", "power_mW"),
-    *("tip_K", "tip_stderr_K", "tip_low_K", "tip_high_K"),
-)
+#: Columns of a calibration's table; the last say how sure it is.
+STATED = ("tip_stderr_K", "tip_low_K", "tip_high_K")
+TABLE_COLUMNS = ("bias_V", "lever_V", "current_mA", "power_mW", "tip_K", *STATED)
 #: One more with held supplies: the power of all of them together.
 TOTAL_POWER = "total_power_mW"
 
@@ -46,6 +45,9 @@ TOTAL_POWER = "total_power_mW"
 @dataclass(frozen=True)
 class Calibration:
     """The tip temperature of one lever against what its instrument shows.
+
+    Where the data are not described by any such lever, the numbers are those of the nearest one and
+    no estimates: standard errors, limits and budget are NaN, and there is no pulse.
 
     Attributes
     ----------
@@ -55,8 +57,8 @@ class Calibration:
         Of the model whose temperatures are used.
     power_law : PowerLaw or None
         In vacuum, of the estimated lever or as given; T_tip is the law's value at P_l / k,
-        approximately (see `law_residual_K`). None with held supplies, since the tip then follows
-        from no single power.
+        approximately (see `law_residual_K`). None with held supplies, or where the power turns
+        along the branch: the tip then follows from no single power.
     law_residual_K : float
         Largest difference of the law from the model it was fitted to; 0 for a given law.
     k, k_stderr : float
@@ -72,7 +74,8 @@ class Calibration:
     priors : dict of str to PriorUse
         What was known of each parameter before and after, by name.
     reason : str
-        Why the data are not described by any such lever; empty if they are.
+        Why the data are not described by any such lever, or why that is not known; empty if they
+        are.
     measured_rms_K : float
         Rms of the measurement's own tip temperatures about the calibration; NaN if it has none.
     probe : Probe
@@ -80,6 +83,8 @@ class Calibration:
     notes : list of str
     pulse : PulseCalibration, optional
         Of the same lever in a pulse.
+    converged : bool
+        Whether the search for the lever came to its end.
     """
 
     route: str
@@ -98,11 +103,32 @@ class Calibration:
     reason: str = ""
     notes: list[str] = field(default_factory=list)
     pulse: PulseCalibration | None = None
+    converged: bool = True
+
+    def __post_init__(self) -> None:
+        if self.describes_data:
+            return
+        # errors about a lever that does not show the data would not hold
+        errors = (*STATED, "budget_K")
+        unknown = {name: xr.full_like(self.table[name], np.nan) for name in errors}
+        for name, value in {
+            "table": self.table.assign(unknown),
+            "knee": self.knee.without_errors,
+            "k_stderr": np.nan,
+            "priors": without_spread(self.priors),
+            "pulse": None,
+        }.items():
+            object.__setattr__(self, name, value)
 
     @property
-    def describes_data(self) -> bool:
-        """Whether such a lever shows what was measured."""
-        return not self.reason
+    def describes_data(self) -> bool | None:
+        """Whether such a lever shows what was measured; None if the search did not converge."""
+        return not self.reason if self.converged else None
+
+    @property
+    def doubt(self) -> str:
+        """That no such lever shows the data, or that the search did not converge; else empty."""
+        return doubt(self.describes_data, self.reason, "lever like this one")
 
     @property
     def base_temperature_K(self) -> float:
@@ -125,9 +151,16 @@ class Calibration:
         Raises
         ------
         InputError
-            If something else than the swept supply heats the lever.
+            If something else than the swept supply heats the lever, its power turns, or the data
+            are not described.
         """
+        self.need_described("the tip temperature by power")
         self.probe.circuit.need_cold_start("the tip temperature by the power of one supply")
+        if self.power_law is None:
+            raise InputError(
+                "the tip temperature by power: the power of this lever falls while the tip gets "
+                "hotter; expected to be read by bias"
+            )
         return self._read(power_mW, "power_mW", "tip_K")
 
     def bias_for(self, tip_K: ArrayLike, circuit: Circuit | None = None) -> Array:
@@ -143,9 +176,26 @@ class Calibration:
         -------
         ndarray
             NaN outside the measured range; from the coldest tip on, if it cools at first.
+
+        Raises
+        ------
+        InputError
+            If the data are not described: what is set would not follow.
         """
+        self.need_described("the bias for a tip temperature")
         lever, current = (self._read(tip_K, "tip_K", name) for name in ("lever_V", "current_mA"))
         return np.asarray((circuit or self.probe.circuit).bias(lever, current))
+
+    def need_described(self, what: str) -> None:
+        """Raise an error unless the data are described, for what has no meaning otherwise.
+
+        Raises
+        ------
+        InputError
+            If they are not.
+        """
+        if not self.describes_data:
+            raise InputError(f"{what}: expected data that the lever shows; {self.doubt}")
 
     @property
     def heating(self) -> xr.Dataset:
@@ -184,7 +234,9 @@ class Calibration:
             "k_stderr": self.k_stderr,
             "knee": vars(self.knee) | {"tip_K": self.knee_tip_K, "measured": self.knee_measured},
             "tip_temperature_uncertainty_K": self.tip_temperature_uncertainty_K,
-            "uncertainty_budget_K": {name: float(np.nanmax(e)) for name, e in sources.items()},
+            "uncertainty_budget_K": dict(
+                zip(sources, budget.max("bias").values.tolist(), strict=True)
+            ),
             "base_temperature_K": self.base_temperature_K,
             "table": self.table[self.columns].to_dataframe().to_dict("records"),
             "budget_K": sources,
@@ -221,7 +273,7 @@ def table_of(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:
     )
 
 
-class _CalibrationFile(Section):
+class _CalibrationFile(Verdict):
     """What a calibration file must hold; see `Calibration.content`."""
 
     route: str
@@ -234,8 +286,7 @@ class _CalibrationFile(Section):
     table: list[dict[str, Number]]
     budget_K: dict[str, list[Number]]
     measured_rms_K: Number = np.nan
-    priors: dict[str, PriorUse] = Field(default_factory=dict)
-    reason: str = ""
+    priors: dict[str, UsedPrior] = Field(default_factory=dict)
     probe: dict[str, dict[str, Any]]
     data: EmbeddedMeasurement
     notes: list[str]
@@ -284,8 +335,8 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
         measured_rms_K=found.measured_rms_K,
         probe=probe,
         measurement=found.data.measurement(f"{path}: data", probe.circuit),
-        priors=found.priors,
-        reason=found.reason,
+        priors=prior_uses(found.priors),
+        **found.verdict,
         notes=found.notes,
         pulse=None if found.pulse is None else found.pulse.calibration(f"{path}: pulse"),
     )

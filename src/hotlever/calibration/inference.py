@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hotlever.calibration.jumps import jumps_of, not_of_a_ramp
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.limits import BAND, posterior_of_tip, profile_of_tip
 from hotlever.calibration.plausibility import misfit
 from hotlever.errors import ComputationError, InputError
-from hotlever.fitting import Fit, FitOptions, Measurement
-from hotlever.fitting.estimation import Estimate, estimate
-from hotlever.fitting.least_squares import LeastSquares
+from hotlever.estimation import Fit, FitOptions, Measurement
+from hotlever.estimation.estimator import Estimate, estimate
 from hotlever.lever import Branch
 from hotlever.lever.curve import spline_through
 from hotlever.lever.dataset import OBSERVABLES
@@ -57,10 +57,8 @@ _JUMP = 7e-3
 #: The same by the law of the mobility: how far two estimates of a lever are apart, with another law
 #: (MINIMOS) in place of Eq. 8 (rms of seven pairs of twins from number 1000 on).
 _MOBILITY = 4e-3
-#: Data that are enough to tell which of them are outliers.
-_ENOUGH = 15
-#: Sum of squares, which count standard deviations, that a search must not leave.
-_UNSETTLED = 3.0
+#: Share of the measured biases that a lever must reach to show the data.
+_REACHED = 0.98
 #: How far (standard errors) along each axis of the estimate the knee is looked at.
 _ASIDE = 0.5
 
@@ -80,7 +78,9 @@ class Estimated:
         What 95 % lie between; they are as far away as the errors say, unless these do not hold.
     priors : dict of str to PriorUse
     reason : str
-        Why the data are not described; empty if they are.
+        Why the data are not described, or why that is not known; empty if they are.
+    converged : bool
+        Whether the search came to its end.
     notes : list of str
     """
 
@@ -95,6 +95,7 @@ class Estimated:
     reason: str
     notes: list[str]
     _estimate: Estimate
+    converged: bool = True
 
     @property
     def held_mW(self) -> Array:
@@ -108,8 +109,7 @@ class Estimated:
     @property
     def branch(self) -> Branch:
         """The lever as far as it was measured, corrected by the full model."""
-        at = self._estimate.optimum.prediction
-        return at.nearby.branch_at(at.probe.at(self._estimate.problem.model.names))
+        return self._estimate.branch
 
     def knee_of(self, branch: Branch) -> Knee:
         """Return the knee of a branch of this lever, with standard errors; NaN without one."""
@@ -192,7 +192,7 @@ def estimated(
     """
     known = known_beforehand(probe, priors)
     if fit is None:
-        options = FitOptions(priors=known, robust=_robust(measured))
+        options = FitOptions(priors=known)
         found = estimate(measured, probe, options, progress=progress)
         return _put_together(found, measured, known, samples, progress)
     held = _before(fit, priors)
@@ -200,7 +200,6 @@ def estimated(
         observables=fit.observables,
         fixed=dict.fromkeys(fit.options.fixed),
         priors=held,
-        robust=_robust(fit.measurement),
     )
     found = estimate(fit.measurement, fit.probe, options, progress=progress)
     if _same_data(fit.measurement, measured):
@@ -217,7 +216,6 @@ def estimated(
     again = FitOptions(
         fixed=options.fixed,
         priors=theirs,
-        robust=_robust(measured),
         free=tuple(name for name in own if name not in usual_parameters(probe)),
     )
     try:
@@ -241,11 +239,6 @@ def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Pri
     return {name: prior for name, prior in known.items() if name not in fit.options.fixed}
 
 
-def _robust(measured: Measurement) -> bool:
-    """Whether there are enough data to tell which of them are outliers."""
-    return int(np.isfinite(measured.current_mA).sum()) >= _ENOUGH
-
-
 def _same_data(one: Measurement, other: Measurement) -> bool:
     same = np.array_equal(one.bias_V, other.bias_V, equal_nan=True)
     return same and np.array_equal(one.current_mA, other.current_mA, equal_nan=True)
@@ -262,7 +255,8 @@ def _put_together(
     # without a bias nothing is known of a lever that is cold then
     heated = (measured.bias_V > 0) | (not best.circuit.starts_cold)
     present = measured.bias_V[np.isfinite(measured.current_mA) & heated]
-    highest = float(residuals.bias.max())
+    at, branch = found.optimum.prediction, found.branch
+    highest = branch.highest_bias(best.circuit, float(residuals.bias.max()))
     bias = np.linspace(present.min(), min(present.max(), highest), _ROWS)
     predicted = found.predicted(bias)
     slopes = found.slopes(predicted)[list(OBSERVABLES).index("tip")]
@@ -276,7 +270,19 @@ def _put_together(
     stderr = np.sqrt(np.sum(list(parts.values()), axis=0))
     (low, high), lopsided = _limits(found, tip, stderr, of_model, samples, progress)
     parts["model"] = of_model**2
+    jumps = jumps_of(branch, best.circuit, residuals.bias, at.values[2])
+    for jump in jumps:
+        here = jump.unknown(bias)
+        low, high = (
+            np.where(here, np.minimum(low, jump.cold_K), low),
+            np.where(here, np.maximum(high, jump.hot_K), high),
+        )
+        parts["jump"] = here * ((jump.hot_K - jump.cold_K) / (2.0 * BAND)) ** 2
     use = found.priors(known)
+    converged, reason = found.verdict(misfit(residuals, at.values, use, found.moved))
+    reason = reason or not_of_a_ramp(branch, best.circuit, residuals.bias, at.values[2])
+    if not reason and highest < _REACHED * float(residuals.bias.max()):
+        reason = f"the lever that comes nearest has no steady state above {highest:.4g} V"
     return Estimated(
         probe=best,
         bias_V=bias,
@@ -286,14 +292,15 @@ def _put_together(
         tip_low_K=low,
         tip_high_K=high,
         priors=use,
-        reason=misfit(residuals, found.optimum.prediction.values, use, found.moved),
+        reason=reason,
         notes=[
             *found.notes,
-            *_search(found.problem),
-            *lopsided,
-            *residuals.suspicious(found.optimum.prediction.values, robust=True),
+            *([] if reason else lopsided),
+            *(jump.note for jump in jumps),
+            *residuals.suspicious(at.values, robust=True),
         ],
         _estimate=found,
+        converged=converged,
     )
 
 
@@ -355,16 +362,6 @@ def error_of_model(around: Surroundings, varied: Sequence[str], bias: Array, ris
     if any(own_name(name) == "impurity_exponent" for name in varied):
         error = np.hypot(error, _MOBILITY * size)
     return np.asarray(error)
-
-
-def _search(problem: LeastSquares) -> list[str]:
-    """Say that a search was ended far from where it led to."""
-    if problem.left < _UNSETTLED:
-        return []
-    return [
-        f"the search was ended after {problem.evaluations} levers; the next would still have "
-        f"lowered the sum of squares by {problem.left:.1f}, so errors may be larger than stated"
-    ]
 
 
 def _source(name: str) -> str:

@@ -121,6 +121,11 @@ class Knee:
         """Whether the points show it."""
         return bool(np.isfinite(self.lever_V))
 
+    @property
+    def without_errors(self) -> Knee:
+        """The same knee, of which it is not known how far it may be off."""
+        return Knee(self.lever_V, self.current_mA, self.power_mW, self.bias_V)
+
 
 class KneeOutsideError(InputError):
     """The measured range does not include the knee; the text says which way to go."""

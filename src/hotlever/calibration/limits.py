@@ -19,14 +19,14 @@ import numpy as np
 from scipy import optimize
 
 from hotlever.errors import ComputationError
-from hotlever.fitting.ensembles import (
+from hotlever.estimation.ensembles import (
     Gaussian,
     independent_samples,
     rhat_of_ensembles,
     sample,
 )
-from hotlever.fitting.models import Prediction
-from hotlever.fitting.objective import UNSOLVED, Objective, Vicinity, inside
+from hotlever.estimation.experiment import Prediction
+from hotlever.estimation.objective import UNSOLVED, Objective, Vicinity, inside
 from hotlever.types import Array, Index, Progress
 
 #: Standard errors that 95 % of a normal distribution lie within.
@@ -149,7 +149,7 @@ def _pulled(
     stderr, here = float(np.sqrt(slope @ along)), float(at.values[2, place])
     least, multiple, there = _squares(optimum.residual(optimum.origin)), 1.0, near.origin
     if near is optimum:
-        there = there + way * _AWAY * along / (stderr * objective.scale)
+        there = there + way * _AWAY * along / (stderr * objective.rates(near.at.probe))
     for _ in range(_ROUNDS):
         # a negative error is one to the cold side
         pulled = _Pulled(near, place, here, way * multiple * stderr)
@@ -200,11 +200,12 @@ def posterior_of_tip(
     """Sample the parameters of an estimate, and their tip temperatures.
 
     Parameters are those of `profile_of_tip`, with `others` than the optimum that have been solved,
-    and those of `hotlever.fitting.ensembles.sample`. What is sampled costs too little for processes
-    of its own.
+    and those of `hotlever.estimation.ensembles.sample`. What is sampled costs too little for
+    processes of its own.
     """
     vicinity = Vicinity(objective, at, others, least=_TELLING)
-    scaled = covariance / np.outer(objective.scale, objective.scale)
+    rates = objective.rates(at.probe)
+    scaled = covariance / np.outer(rates, rates)
     chains = sample(
         _Density(vicinity),
         Gaussian(vicinity.origin, scaled),
@@ -241,7 +242,8 @@ class _Density:
         low, high = self.vicinity.objective.bounds
         if np.any(scaled <= low) or np.any(scaled >= high):
             return -math.inf
-        return -0.5 * _squares(self.vicinity.residual(scaled))
+        squares = _squares(self.vicinity.residual(scaled))
+        return -0.5 * squares + self.vicinity.objective.log_volume(scaled)
 
 
 class _Pulled:
@@ -288,7 +290,7 @@ class _Pulled:
     def _jacobian(self, scaled: Array) -> Array:
         objective = self._vicinity.objective
         slope = self._vicinity.predict(scaled)[1][2, self._place, objective.columns]
-        row = slope * objective.scale / self._stderr
+        row = slope * objective.coordinates.rates(scaled) / self._stderr
         return np.vstack([self._vicinity.jacobian(scaled), row])
 
 

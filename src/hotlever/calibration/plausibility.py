@@ -7,15 +7,18 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import chdtrc
 
-from hotlever.calibration.causes import Causes
 from hotlever.errors import InputError
-from hotlever.fitting.measurement import Measurement
-from hotlever.fitting.measurement.checks import colder_than_base
-from hotlever.fitting.misfit import off_together, undescribed
-from hotlever.fitting.residuals import Residuals
+from hotlever.estimation.diagnosis import Diagnosis
+from hotlever.estimation.lack_of_fit import off_together, undescribed
+from hotlever.estimation.residuals import Residuals
+from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.similar import SimilarLevers
+from hotlever.measurement import Measurement
+from hotlever.measurement.checks import colder_than_base
 from hotlever.probe import Probe
-from hotlever.probe.priors import Moved, PriorUse
+from hotlever.probe.parameters import parameters_of
+from hotlever.probe.priors import Moved, Prior, PriorUse
 
 #: The resistance of a cold lever is within this factor of its model's.
 _WITHIN = 2.5
@@ -34,7 +37,9 @@ _UNLIKELY = 2e-3
 _PULL = 3.85
 
 
-def check_plausible(measured: Measurement, probe: Probe, causes: Causes) -> None:
+def check_plausible(
+    measured: Measurement, probe: Probe, causes: Diagnosis, priors: Mapping[str, Prior]
+) -> None:
     """Refuse data whose resistance at low bias, or whose temperatures, are far from the lever's.
 
     Raises
@@ -59,24 +64,36 @@ def check_plausible(measured: Measurement, probe: Probe, causes: Causes) -> None
     bias, current = measured.bias_V[here], measured.current_mA[here]
     low = np.argsort(np.abs(bias))[: max(_FEWEST, bias.size // 8)]
     # what a cold lever shows does not depend on what is around it
-    rest = Lever(probe.in_medium("vacuum") if alone else probe, COARSE).branch_to(0.0)
+    cold = probe.in_medium("vacuum") if alone else probe
+    rest = Lever(cold, COARSE).branch_to(0.0)
     lever = float(rest.value_slopes[0, 0] / rest.value_slopes[0, 1])
     series = probe.circuit.series_kohm
     added = current[low] - rest.values[0, 1]
     found = float(np.median(bias[low] / np.where(added == 0.0, np.nan, added)))
     ratio = found / (lever + series)
-    if 1 / _WITHIN < ratio < _WITHIN and found > series:
+    if found > series and abs(np.log(ratio)) < np.log(_WITHIN):
+        return
+    # an owner who knows little of a lever expects no less of it
+    spread = cold_resistance_spread(cold, priors) if alone else 0.0
+    if found > series and abs(np.log((found - series) / lever)) < _PULL * spread:
         return
     shown = "V_b / I_h" if alone else "the change of V_b over that of I_h"
-    cause = causes.likeliest() or (
-        "is a terminal open, or the meter at another one?"
-        if ratio > 1
-        else "is another part in parallel, or are columns swapped?"
-    )
+    cause = causes.likeliest() or "no single cause that is known explains it"
     raise InputError(
         f"{where}: {shown} is {found:.4g} kΩ at low bias, expected about {lever + series:.4g} kΩ "
         f"({series:g} kΩ in series and {lever:.3g} kΩ of the lever): {cause}"
     )
+
+
+def cold_resistance_spread(probe: Probe, priors: Mapping[str, Prior]) -> float:
+    """Return the standard deviation of the logarithm of a cold lever's resistance by its priors."""
+    lever = SimilarLevers(Lever(probe, COARSE))
+    names = tuple(name for name in priors if name in parameters_of(probe))
+    branch = lever.linearised(probe, Reach(probe.circuit, 0.0), names=names)
+    first = int(branch.branch.solved.start)
+    by = branch.shown[first, :2] / branch.branch.values[first, :2, None]
+    spreads = np.array([priors[name].absolute for name in names])
+    return float(np.linalg.norm((by[0] - by[1]) * spreads))
 
 
 def _check_temperatures(measured: Measurement, probe: Probe, where: str) -> None:
@@ -123,14 +140,14 @@ def misfit(
     moved: Mapping[str, Moved],
 ) -> str:
     """Return why data are not described by what was fitted to them; empty if they are."""
-    reason = undescribed(residuals, values, with_priors=True) or off_together(residuals, values)
+    reason = undescribed(residuals, values) or off_together(residuals, values)
     if reason:
         return reason
     name = max(moved, key=lambda name: abs(moved[name].pull), default="")
     if name and abs(moved[name].pull) > _PULL:
         use = priors[name]
         return (
-            f"{name}, known as {use.value:.4g} ± {use.spread:.2g}, would have to be another; the "
+            f"{name}, known as {use.stated}, would have to be another; the "
             f"data are {abs(moved[name].pull):.1f} σ from it"
         )
     # as many are free to be away as the data tell of

@@ -15,7 +15,6 @@ from hotlever.calibration.calibration import (
     Calibration,
     table_of,
 )
-from hotlever.calibration.causes import Causes
 from hotlever.calibration.inference import Estimated, estimated
 from hotlever.calibration.knee import IVCurve
 from hotlever.calibration.limits import BAND
@@ -26,13 +25,14 @@ from hotlever.calibration.pulses import PulseTiming, pulse_calibration
 from hotlever.calibration.rule import ByRule, by_rule
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import ComputationError, InputError
-from hotlever.fitting import Fit, Measurement, read_fit
-from hotlever.fitting.measurement import with_measured_circuit
-from hotlever.fitting.measurement.averages import averaged, note_on_averages
+from hotlever.estimation import Fit, Measurement, read_fit
+from hotlever.estimation.diagnosis import Diagnosis
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
+from hotlever.measurement import with_measured_circuit
+from hotlever.measurement.averages import averaged, note_on_averages
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.priors import Prior
+from hotlever.probe.priors import Prior, known_beforehand
 from hotlever.types import Array, Progress
 
 #: A vacuum model that needs this factor is told that its lever is probably in air.
@@ -126,8 +126,8 @@ def calibrate(
         return _by_rule(measured, probe, law, route, notes)
     if pulse is not None:
         probe.circuit.need_cold_start("a calibration for pulses")
-    causes = Causes(measured, probe, priors)
-    check_plausible(measured, probe, causes)
+    causes = Diagnosis(measured, probe, priors)
+    check_plausible(measured, probe, causes, known_beforehand(probe, priors))
     try:
         found = estimated(measured, probe, fit, priors, samples, progress)
     except ComputationError as error:
@@ -137,6 +137,9 @@ def calibrate(
     result = _by_estimate(measured, found, route, [*notes, *remarks(measured, found.tip_K)])
     if pulse is None:
         return result
+    if not result.describes_data:
+        said = "the pulse was not followed, since it would be that of another lever"
+        return replace(result, notes=[*result.notes, said])
     pulsed = pulse_calibration(found, pulse, progress)
     return replace(result, pulse=pulsed)
 
@@ -153,7 +156,9 @@ def _by_estimate(
     knee, threshold = found.knee_of(own), vacuum.knee
     k = k_stderr = float("nan")
     circuit, law, residual = found.probe.circuit, None, float("nan")
-    alone = circuit.starts_cold
+    # with held supplies, or where the power turns, the tip does not follow from a power
+    turns = [] if not circuit.starts_cold else _turns(own, medium) or _turns(vacuum, "vacuum")
+    alone = circuit.starts_cold and not turns
     if own.knee is None or (alone and threshold is None):
         notes = [*notes, f"the model has no knee below {vacuum.hottest_K:.0f} K; none is needed"]
     elif alone and medium == "vacuum":
@@ -162,6 +167,8 @@ def _by_estimate(
     elif alone and threshold is not None:
         k = own.knee.power_mW / threshold.power_mW
         k_stderr = k * knee.power_mW_stderr / knee.power_mW
+    if turns:
+        notes = [*notes, f"{turns[0]}; there is no power law, and the table is read by bias"]
     if not found.probe.shape.outline_moves:
         notes = [*notes, "the outline is taken to be as drawn: no error of it is in the result"]
     if alone:
@@ -181,8 +188,20 @@ def _by_estimate(
         measurement=measured,
         priors=found.priors,
         reason=found.reason,
+        converged=found.converged,
         notes=[*notes, *found.notes],
     )
+
+
+def _turns(branch: Branch, medium: str) -> list[str]:
+    """Say where the power of a lever turns in a medium, if it does."""
+    turn = branch.power_turns_K
+    if turn is None:
+        return []
+    return [
+        f"in {medium} the power of the lever falls from a tip of {turn:.0f} K on, so that the tip "
+        "temperature is no function of it"
+    ]
 
 
 def _by_rule(
@@ -190,6 +209,8 @@ def _by_rule(
 ) -> Calibration:
     lever = Lever(probe)
     vacuum, circuit = lever.branch(), probe.circuit
+    if turns := _turns(vacuum, "vacuum"):
+        raise InputError(f"the paper's rule: {turns[0]}; expected a lever of which it is")
     of_model = curve_of_model(vacuum)
     curve = IVCurve.of(measured.bias_V, measured.current_mA, circuit)
     reference = of_model if law is None else curve_of_law(law, circuit.base_temperature_K)
@@ -242,7 +263,7 @@ def _table(
 
 def _tips(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
     """Return the tip temperatures of a branch at the measured power; or bias, if not that tells."""
-    if circuit.starts_cold:
+    if circuit.starts_cold and branch.power_turns_K is None:
         return branch.tip_temperature(circuit.power(measured.bias_V, measured.current_mA))
     return branch.tip_K(branch.read(circuit, measured.bias_V).u)
 

@@ -22,7 +22,7 @@ from hotlever.calibration.inference import Estimated, error_of_model
 from hotlever.calibration.limits import BAND
 from hotlever.datasets import csv_text, labelled
 from hotlever.errors import ComputationError, InputError, unknown_name
-from hotlever.fitting.embedded import Number, Section, array
+from hotlever.estimation.embedded import Number, Section, array
 from hotlever.lever import Lever
 from hotlever.lever.equations import BASE
 from hotlever.lever.lever import COARSE

@@ -21,7 +21,7 @@ from hotlever.calibration.knee import (
 )
 from hotlever.calibration.transfer import TemperatureCurve, knee_of
 from hotlever.errors import InputError
-from hotlever.fitting.common_errors import METERS
+from hotlever.estimation.scales import METERS
 from hotlever.lever import Branch
 from hotlever.lever.branch import Reach
 from hotlever.lever.curve import spline_through
@@ -29,6 +29,7 @@ from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
 from hotlever.probe.priors import RESISTANCE, default_priors
+from hotlever.text import value_with_error
 from hotlever.types import Array
 
 #: Largest relative error of a knee estimated from the points below it, to go on with.
@@ -85,7 +86,7 @@ def by_rule(
         knee = _estimated_knee(curve, like, reference, scatter.of_knee, f"{where}: {outside}")
         notes.append(
             f"{outside}; until then the power of the knee is estimated from the points below it, "
-            f"as {knee.power_mW:.2f} ± {knee.power_mW_stderr:.2f} mW"
+            f"as {value_with_error(knee.power_mW, knee.power_mW_stderr)} mW"
         )
     bias, current = smooth_rows(curve, knee.power_mW, like)
     power = curve.circuit.power(bias, current)

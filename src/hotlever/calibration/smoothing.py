@@ -7,6 +7,8 @@ round off a sharp bend as smoother covariances do.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
@@ -16,7 +18,8 @@ from hotlever.types import Array
 
 #: Ranges of length, amplitude and noise, for coordinates and values of the order of one.
 _BOUNDS = ((0.03, 5.0), (1e-3, 20.0), (1e-6, 0.3))
-_START = (0.25, 0.5, 2e-3)
+#: The likelihood may have two optima: a bent curve with little noise, a smooth one with more.
+_STARTS = ((0.25, 0.5, 2e-3), (0.5, 0.5, 2e-2))
 #: Prior variance of the mean.
 _MEAN_VARIANCE = 1.0
 
@@ -50,11 +53,13 @@ class SmoothCurve:
                 0.5 * values @ cho_solve(factor, values) + np.log(np.diag(factor[0])).sum()
             )
 
-        first = _START if start is None else (start.length, start.amplitude, start.noise_factor)
-        found = minimize(
-            cost, np.log(first), method="L-BFGS-B", bounds=[tuple(np.log(b)) for b in _BOUNDS]
-        )
-        self.length, self.amplitude, self.noise_factor = np.exp(found.x).tolist()
+        starts: Sequence[tuple[float, float, float]] = _STARTS
+        if start is not None:
+            starts = [(start.length, start.amplitude, start.noise_factor)]
+        bounds = [tuple(np.log(ends)) for ends in _BOUNDS]
+        optima = [minimize(cost, np.log(one), method="L-BFGS-B", bounds=bounds) for one in starts]
+        best = min(optima, key=lambda optimum: optimum.fun)
+        self.length, self.amplitude, self.noise_factor = np.exp(best.x).tolist()
         self._factor = self._factorised(self.length, self.amplitude, self.noise_factor)
         self._weights = cho_solve(self._factor, values)
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hotlever.fitting.words import prior_lines
-from hotlever.text import aligned, value_with_error
+from hotlever.estimation.words import NEAREST, prior_lines
+from hotlever.text import aligned, significant, value_with_error
 
 if TYPE_CHECKING:
     from hotlever.calibration.calibration import Calibration
@@ -28,25 +28,27 @@ _GOOD, _FAIR = 15.0, 40.0
 
 def calibration_text(calibration: Calibration) -> str:
     """Return the result of a calibration as lines of text."""
-    stated = calibration.tip_temperature_uncertainty_K
-    lines = [
-        f"based on {_BASIS[calibration.route]}, used in {calibration.medium}",
-        *_knee_lines(calibration),
-        _law_line(calibration),
-        "",
-        *_budget_lines(calibration),
-        "",
-        *([] if calibration.pulse is None else [*_pulse_lines(calibration.pulse), ""]),
-        *prior_lines(calibration.priors),
-        f"sure to ± {stated:.0f} K (standard error, largest in the table): {_verdict(calibration)}",
-    ]
-    if not calibration.describes_data:
-        # no errors are shown, since they would not hold
+    basis = f"based on {_BASIS[calibration.route]}, used in {calibration.medium}"
+    if calibration.describes_data:
+        stated = calibration.tip_temperature_uncertainty_K
         lines = [
-            f"no lever like this one shows these data: {calibration.reason}",
-            f"what comes nearest is {lines[0]}:",
+            basis,
+            *_knee_lines(calibration),
+            _law_line(calibration),
+            "",
+            *_budget_lines(calibration),
+            "",
+            *([] if calibration.pulse is None else [*_pulse_lines(calibration.pulse), ""]),
+            *prior_lines(calibration.priors),
+            f"sure to ± {significant(stated)} K (standard error, largest in the table): "
+            f"{_verdict(calibration)}",
+        ]
+    else:
+        lines = [
+            calibration.doubt,
+            f"{NEAREST}; it is {basis}",
             *_nearest_knee(calibration),
-            *prior_lines(calibration.priors)[:1],
+            *prior_lines(calibration.priors),
         ]
     if np.isfinite(calibration.measured_rms_K):
         lines.append(
@@ -57,8 +59,12 @@ def calibration_text(calibration: Calibration) -> str:
 
 def _law_line(calibration: Calibration) -> str:
     law = calibration.power_law
-    if law is None:
+    if law is None and not calibration.probe.circuit.starts_cold:
         return "no power law: with held supplies the tip does not follow from the power of one"
+    if law is None:
+        return (
+            "no power law: the power falls while the tip gets hotter; the bias tells how hot it is"
+        )
     text = (
         f"power law in vacuum: a {law.linear_K_per_mW:.1f} K/mW, b {law.nonlinear_K:.2f} K, "
         f"m {law.exponent:.3f}, c {law.hot_K_per_mW:.1f} K/mW; jump {law.jump_K:+.0f} K"
@@ -111,11 +117,11 @@ def _nearest_knee(calibration: Calibration) -> list[str]:
 def _budget_lines(calibration: Calibration) -> list[str]:
     """Return the standard error by source at some temperatures, and the power there.
 
-    With held supplies the bias tells more than the power of one.
+    Without a power law the bias tells more.
     """
-    table, alone = calibration.heating, calibration.probe.circuit.starts_cold
+    table, by_power = calibration.heating, calibration.power_law is not None
     sources, tip = table.source.values.tolist(), table.tip_K.values
-    along, head = (table.power_mW, "P_l (mW)") if alone else (table.bias_V, "V_b (V)")
+    along, head = (table.power_mW, "P_l (mW)") if by_power else (table.bias_V, "V_b (V)")
     rows = [[head.rjust(7) for head in ("T_tip (K)", head, "± (K)", *sources)]]
     errors = [table.tip_stderr_K.values, *table.budget_K.values]
     inside = [shown for shown in _SHOWN if tip[0] <= shown <= tip[-1]]

@@ -56,8 +56,8 @@ def calibrate_command(
     """Find the tip temperature of a lever from its I-V curve, with its error."""
     from hotlever.calibration.power_law import read_power_law
     from hotlever.calibration.procedure import calibrate
-    from hotlever.fitting import read_fit, read_measurement
-    from hotlever.fitting.measurement import parse_columns
+    from hotlever.estimation import read_fit, read_measurement
+    from hotlever.measurement import parse_columns
 
     given = {"--fit": fit_file, "--probe": probe_file, "--power-law": power_law}
     several = [name for name, path in given.items() if path is not None]
@@ -102,7 +102,7 @@ def calibrate_command(
             figures.save_figure(figures.calibration_curves(result), plot)
     give(result.text() + "\n")
     if not result.describes_data:
-        raise ComputationError(f"{data}: no lever like this one shows these data: {result.reason}")
+        raise ComputationError(f"{data}: {result.doubt}")
 
 
 def _timing(text: str) -> PulseTiming:

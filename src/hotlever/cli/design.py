@@ -26,7 +26,7 @@ def design_command(
     vary: str | None = Option(
         None,
         metavar="NAME=START:STOP:COUNT",
-        help="Sweep a key of the probe file, annealing_K or annealing_min; "
+        help="Sweep a number of the probe file, annealing_K or annealing_min; "
         "a table of sensitivities if left out.",
     ),
     power: float = Option(2.0, help="Power (mW) in vacuum at which the tip temperature is given."),
@@ -39,6 +39,7 @@ def design_command(
     plot: SweepPlot = None,
 ) -> None:
     """Show how knee, tip temperature and loss to air depend on a probe's design."""
+    from hotlever.probe.shapes import DRAWING
     from hotlever.studies import design as study
 
     outputs = Outputs(probe_file)
@@ -54,6 +55,9 @@ def design_command(
         with progress("design") as update:
             found = study.sensitivities(start, power_mW=power, air=air, progress=update)
         give(study.sensitivity_text(found) + "\n")
+        if start.probe.shape.shape == DRAWING:
+            names = ", ".join(start.numbers)
+            note(f"a drawing has no dimensions but these; --vary NAME=START:STOP:COUNT of {names}")
         return
     name, values = parse_vary(vary)
     start.value(name)

@@ -11,6 +11,7 @@ from typer import Argument, Option
 
 from hotlever.cli.application import app
 from hotlever.cli.options import (
+    USUAL,
     ColumnOption,
     File,
     MediumOption,
@@ -28,10 +29,10 @@ from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.files import Outputs, write_text
 
 if TYPE_CHECKING:
-    from hotlever.fitting import FitOptions, Measurement
-    from hotlever.fitting.in_time import HistoryPrediction
-    from hotlever.fitting.models import Prediction
-    from hotlever.fitting.uncertainty import Uncertainty
+    from hotlever.estimation import FitOptions, Measurement
+    from hotlever.estimation.experiment import Prediction
+    from hotlever.estimation.experiment_in_time import HistoryPrediction
+    from hotlever.estimation.uncertainty import Uncertainty
     from hotlever.lever.transient import Waveform
     from hotlever.probe import Probe
 
@@ -95,8 +96,8 @@ def fit_command(
     With several data files: of each lever, in parallel, and how the levers scatter. The same
     command again goes on where it was stopped.
     """
-    from hotlever.fitting import FitOptions
-    from hotlever.fitting.measurement import parse_columns
+    from hotlever.estimation import FitOptions
+    from hotlever.measurement import parse_columns
 
     check_number("--samples", samples, 1, 1_000_000)
     check_number("--processes", processes, 1, 256)
@@ -111,12 +112,14 @@ def fit_command(
         raise InputError("--scheduler: expected several data files")
     chosen: Any = {"weights": weights, "medium": medium, "robust": robust, "drift": drift}
     probe = load_probe(probe_file)
+    usual = USUAL in (prior or [])
     given = parse_priors(prior, probe)
     stated = probe.stated_priors
     options = FitOptions(
         observables=None if observables is None else observables.split(","),
         fixed=parse_values("--fix", fix, bare=True),
-        priors=stated if given is None else {**stated, **given} if given else {},
+        priors=stated if given is None else {**stated, **given} if given or usual else {},
+        usual_priors=usual,
         free=() if free is None else tuple(name.strip() for name in free.split(",")),
         **chosen,
     )
@@ -149,8 +152,8 @@ def _fit_one(
     examined: dict[str, Any],
     to: Destination,
 ) -> None:
-    from hotlever.fitting import fit, read_measurement
-    from hotlever.fitting.words import fit_text, uncertainty_text
+    from hotlever.estimation import fit, read_measurement
+    from hotlever.estimation.words import fit_text, uncertainty_text
 
     to.outputs.file(to.output)
     to.outputs.folder(to.report)
@@ -165,8 +168,10 @@ def _fit_one(
     texts = [fit_text(result)]
     found: Uncertainty | None = None
     failure: HotleverError | KeyboardInterrupt | None = None
-    if examined["samples"] or examined["profiles"]:
-        from hotlever.fitting.uncertainty import examine
+    if not result.describes_data and (examined["samples"] or examined["profiles"]):
+        note("no posterior and no profiles of a lever that does not show these data")
+    elif examined["samples"] or examined["profiles"]:
+        from hotlever.estimation.uncertainty import examine
 
         try:
             with progress_bars("profiles", "posterior", "band") as (profiling, sampling, banding):
@@ -188,7 +193,7 @@ def _fit_one(
     if failure is not None:
         raise failure
     if not result.describes_data:
-        raise ComputationError(f"{data}: no such lever shows these data: {result.reason}")
+        raise ComputationError(f"{data}: {result.doubt}")
 
 
 def _show_curve(found: Prediction | HistoryPrediction) -> None:
@@ -203,9 +208,9 @@ def _fit_several(
     data: list[Path], probe: Probe, options: FitOptions, where: dict[str, Any], to: Destination
 ) -> None:
     from hotlever.cluster import is_open
-    from hotlever.fitting.batch import fit_many
-    from hotlever.fitting.levers import compare_levers, levers_csv
-    from hotlever.fitting.words import levers_text
+    from hotlever.estimation.batch import fit_many
+    from hotlever.estimation.levers import compare_levers, levers_csv
+    from hotlever.estimation.words import levers_text
 
     outputs, output, report = to
     scheduler = where["scheduler"]
@@ -257,6 +262,6 @@ def _fit_several(
 
                 texts.append(f"report: {levers_page(batch).write(report)}")
         give("\n".join([*texts, ""]))
-    for error in batch.failures.values():
-        fail(str(error))
+    for said in (*map(str, batch.failures.values()), *batch.undescribed.values()):
+        fail(said)
     raise typer.Exit(batch.exit_status)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from typer import Argument, Option
 
-from hotlever.cli.output import progress
+from hotlever.cli.output import note, progress
 from hotlever.errors import InputError, quoted, shown
 from hotlever.files import Outputs
 from hotlever.units import setting
@@ -43,12 +43,15 @@ ColumnOption = Annotated[
         "or a file of such lines; repeated.",
     ),
 ]
+#: Of priors: those of a calibration, where none is stated.
+USUAL = "usual"
 PriorOption = Annotated[
     list[str] | None,
     Option(
         "--prior",
         metavar="NAME=VALUE±SPREAD",
-        help="What is known beforehand, as n_d=3.3e17±15%, dimensions=±2% or none; repeated.",
+        help="What is known beforehand, as n_d=3.3e17±15%, n_d=1e17×/3 (to a factor), "
+        "dimensions=±2%, usual (what a calibration takes) or none; repeated.",
     ),
 ]
 SettingsOption = Annotated[
@@ -84,11 +87,15 @@ def options_of(function: Callable[..., Any], name: str) -> Callable[[Callable[..
 def load_probe(
     path: Path | None, settings: list[str] | None = None, medium: str | None = None
 ) -> Probe:
-    """Read a probe file, or take the reference probe, and change some of its values."""
+    """Read a probe file, or take the reference probe, and change some of its values.
+
+    What should be known of its shape is told.
+    """
     from hotlever.probe import Probe
 
     probe = Probe.reference() if path is None else Probe.from_file(path)
     probe = probe.with_(**parse_settings(settings, probe)) if settings else probe
+    note(*probe.shape.notes())
     return probe if medium is None else probe.in_medium(medium)
 
 
@@ -222,11 +229,15 @@ def parse_priors(texts: list[str] | None, probe: Probe) -> dict[str, str] | None
         return None
     if texts == ["none"]:
         return {}
+    texts = [text for text in texts if text != USUAL]
     pairs: dict[str, str] = {}
     for text in texts:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals:
-            raise InputError(f"--prior {shown(text)}: expected NAME=VALUE±SPREAD, or none alone")
+            raise InputError(
+                f"--prior {shown(text)}: expected NAME=VALUE±SPREAD, "
+                "NAME=VALUE×/FACTOR, usual, or none alone"
+            )
         if name in pairs:
             raise InputError(f"--prior {name}: given twice, expected once")
         pairs[name] = value

@@ -78,17 +78,25 @@ def import_command(
         None, "-o", "--output", help="Probe file to write; standard output if left out."
     ),
     cell: str | None = Option(None, help="Of GDSII or OASIS; the top cell if left out."),
+    unit: str | None = Option(
+        None, help="Of the drawing's numbers, as mm; what the file says if left out."
+    ),
     plot: PlotFile = None,
 ) -> None:
     """Say what a drawing holds, and propose a probe file for it."""
+    from hotlever.drawing.extent import UNITS
     from hotlever.drawing.fault import DrawingError
     from hotlever.drawing.importing import import_drawing
     from hotlever.files import write_text
 
+    name = None if unit is None else unit.replace("µ", "u").replace("μ", "u")
+    if name is not None and name not in UNITS:
+        raise unknown_name("unit", name, UNITS, "--unit")
+
     outputs = Outputs(drawing)
     outputs.file(output, ".toml")
     check_plot(outputs, plot)
-    found = import_drawing(drawing, cell, Path() if output is None else output.parent)
+    found = import_drawing(drawing, cell, Path() if output is None else output.parent, name)
     fault = found.fault
     with outputs.together():
         if output is not None:
@@ -104,6 +112,7 @@ def import_command(
             )
             figures.save_figure(made, plot)
     give(found.text if output is None else "\n".join([*found.listing, ""]))
+    note(*found.notes)
     if fault is not None:
         note(f"the probe file needs an edit before it can be solved: {fault}")
 

@@ -1,22 +1,44 @@
-"""Where the terminals of a drawing touch the silicon."""
+"""Where the terminals of a drawing touch the silicon.
+
+A terminal is the edges of the silicon inside its polygons or along its lines. One that is stated
+by *area* holds all silicon below its polygons at the contact's potential and the base temperature:
+that is cut away from the lever, and the border it leaves is the terminal.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import shapely
 from shapely import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from hotlever.drawing.fault import DrawingError, Ring
-from hotlever.drawing.healing import polygons
-from hotlever.probe.layout import Point, Terminal
+from hotlever.drawing.healing import parts_of, polygons
+from hotlever.probe.layout import Layout, Point, Terminal
 
 #: Terminals that a lever must have.
 REQUIRED = ("supply", "ground")
 #: Share of its length by which an edge may stick out of a terminal that names a line.
 _ENDS = 2.0
+#: How far (µm) from the outline an edge is none of it.
+_OFF = 1e-6
+#: Share of a leg that a contact may cover without a word.
+_COVERED = 0.1
+#: Share of what a contact covers that a film below it must take up to be that contact's metal.
+_IS_FILM = 0.9
+
+
+@dataclass(frozen=True)
+class DrawnTerminal:
+    """Outlines and lines of one terminal, and whether what lies below them is all contact."""
+
+    name: str
+    rings: tuple[Ring, ...]
+    by_area: bool = False
 
 
 def terminal_edges(
@@ -41,13 +63,112 @@ def terminal_edges(
         wider = [area.buffer(tolerance) for area in areas]
         own = [edge for area in wider for edge in edges if area.covers(LineString(edge))]
         for line in lines:
-            own += [some for edge in edges if (some := _along(edge, line, tolerance)) is not None]
+            own += [some for edge in edges if (some := along(edge, line, tolerance)) is not None]
         if not own:
             raise _touches_nothing(name, rings, silicon, edges, bool(areas))
         for start, end in dict.fromkeys(own):
             found.append(Terminal(name, start, end))
-    _check_apart(found)
+    check_apart(found)
     return found
+
+
+def cut_away(
+    body: str,
+    outline: Polygon,
+    areas: Mapping[str, BaseGeometry],
+    ends: Iterable[Terminal],
+    tip: Point,
+) -> tuple[Polygon, list[Terminal]]:
+    """Return the body without what lies below terminals stated by area, and all its terminals.
+
+    What is left is the piece with the tip on it: pieces behind a contact carry no current.
+
+    Parameters
+    ----------
+    body : str
+        Its name.
+    outline : Polygon
+    areas : mapping of str to geometry
+        By the terminals' names, on the outline where they reach it.
+    ends : iterable of Terminal
+        Edges of the outline that belong to other terminals.
+    tip : tuple of float
+
+    Raises
+    ------
+    DrawingError
+        If a terminal covers the tip, leaves no border, or another lies behind it.
+    """
+    for name, area in areas.items():
+        if area.covers(shapely.Point(tip)):
+            raise DrawingError("it covers the tip", terminal_part(name), None, tip)
+    pieces = parts_of(outline.difference(shapely.union_all(list(areas.values()))))
+    rest = next((one for one in pieces if one.covers(shapely.Point(tip))), None)
+    if rest is None:
+        raise DrawingError(f"it lies outside the {body}", "tip_um", None, tip)
+    found = []
+    for start, end in outline_edges(rest):
+        middle = LineString([start, end]).interpolate(0.5, normalized=True)
+        if outline.boundary.distance(middle) > _OFF:
+            name = min(areas, key=lambda one: areas[one].boundary.distance(middle))
+            found.append(Terminal(name, start, end))
+    left = [
+        end
+        for end in ends
+        if rest.boundary.distance(shapely.Point(np.mean([end.start, end.end], axis=0))) < _OFF
+    ]
+    names = {end.name for end in (*left, *found)}
+    for name in (*areas, *(end.name for end in ends)):
+        if name not in names:
+            at = shapely.union_all([areas.get(name, outline)]).representative_point()
+            what = "between it and the tip another terminal, stated by area, takes all of the "
+            raise DrawingError(f"{what}{body}", terminal_part(name), None, (at.x, at.y))
+    return rest, [*left, *found]
+
+
+def covered(layout: Layout, terminals: Iterable[DrawnTerminal], films: Iterable[Ring]) -> list[str]:
+    """Say which contacts cover more of a leg than they count for, and how to make them count.
+
+    Parameters
+    ----------
+    layout : Layout
+    terminals : iterable of DrawnTerminal
+    films : iterable of rings
+        Outlines of all films: what these cover does not count as bare silicon.
+    """
+    regions = [Polygon(one.outline, one.holes) for one in layout.regions]
+    body = shapely.union_all(regions)
+    heaters = shapely.union_all(
+        [shape for shape, one in zip(regions, layout.regions, strict=True) if one.part == "heater"]
+    )
+    metal = shapely.union_all([Polygon(ring).buffer(0) for ring in films if len(ring) > 2])
+    notes = []
+    for terminal in terminals:
+        ends = [end for end in layout.terminals if end.name == terminal.name]
+        areas = [Polygon(ring).buffer(0) for ring in terminal.rings if len(ring) > 2]
+        below = body.intersection(shapely.union_all(areas))
+        if terminal.by_area or not areas or below.area == 0:
+            continue
+        if below.intersection(metal).area > _IS_FILM * below.area:
+            continue
+        edge = shapely.union_all([LineString([end.start, end.end]) for end in ends])
+        reach, leg = _farthest(edge, below), edge.distance(heaters)
+        # where a film heats all along, all of it is the leg
+        leg = leg if leg > 0 else _farthest(edge, body)
+        if reach > _COVERED * leg:
+            notes.append(
+                f"{terminal_part(terminal.name)} covers {reach:.3g} µm of a leg of {leg:.3g} µm "
+                "but counts as its end only, the rest as bare silicon; to make all of it a "
+                f'contact: {terminal.name} = {{ area = "LAYER" }} in [terminals]; a film: '
+                "[layers.NAME] with drawn, material and thickness_um"
+            )
+    return notes
+
+
+def _farthest(edge: BaseGeometry, shape: BaseGeometry) -> float:
+    """Return how far the corner of a shape that is farthest from an edge is (µm)."""
+    corners = shapely.points(shapely.get_coordinates(shape))
+    return float(shapely.distance(corners, edge).max())
 
 
 def terminal_part(name: str) -> str:
@@ -64,7 +185,7 @@ def outline_edges(silicon: Polygon) -> list[tuple[Point, Point]]:
     ]
 
 
-def _along(edge: tuple[Point, Point], line: Ring, tolerance: float) -> tuple[Point, Point] | None:
+def along(edge: tuple[Point, Point], line: Ring, tolerance: float) -> tuple[Point, Point] | None:
     """Return the part of an edge that lies along a line, None if there is none."""
     start, end = np.array(edge)
     length = float(np.linalg.norm(end - start))
@@ -106,7 +227,14 @@ def _touches_nothing(
     return DrawingError(what, terminal_part(name), nearest + 1, (place[0], place[1]))
 
 
-def _check_apart(terminals: list[Terminal]) -> None:
+def check_apart(terminals: list[Terminal]) -> None:
+    """Refuse terminals that touch each other.
+
+    Raises
+    ------
+    DrawingError
+        With the place where they do.
+    """
     for place, one in enumerate(terminals):
         for other in terminals[:place]:
             a, b = LineString([one.start, one.end]), LineString([other.start, other.end])

@@ -48,6 +48,11 @@ class DrawingError(InputError):
         start = f"{where}: " if where else ""
         super().__init__(f"{start}{', '.join(words)}: {what}")
 
+    def drawn_at(self, scale: float) -> DrawingError:
+        """Return the same with its place on the drawing, of which the lever is `scale` times."""
+        place = None if self.place is None else (self.place[0] / scale, self.place[1] / scale)
+        return DrawingError(self.what, self.part, self.polygon, place)
+
     def of_file(
         self, where: str, drawn: Mapping[str, str], outlines: Mapping[str, tuple[Ring, ...]]
     ) -> DrawingError:

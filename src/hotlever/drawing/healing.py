@@ -26,7 +26,7 @@ NARROWEST = 5.0
 #: Corners of a healed outline beyond which its mesh takes minutes.
 _MOST_CORNERS = 2000
 #: Share of the tolerance by which a corner must stand out.
-_STANDS_OUT = 0.25
+STANDS_OUT = 0.25
 
 
 def polygons(part: str, rings: Iterable[Ring], tolerance: float) -> list[Polygon]:
@@ -112,7 +112,7 @@ def healed(part: str, found: list[Polygon], tolerance: float) -> BaseGeometry:
         whole = shapely.union_all(
             [whole, *(one.buffer(GRID, **style) for one in added)], grid_size=GRID
         )
-    whole = whole.simplify(_STANDS_OUT * tolerance)
+    whole = whole.simplify(STANDS_OUT * tolerance)
     corners = shapely.count_coordinates(whole)
     if corners > _MOST_CORNERS:
         raise DrawingError(
@@ -217,8 +217,8 @@ def check_widths(part: str, shape: Polygon, found: list[Polygon], narrowest: flo
             worst = int(distance.argmin())
             place = (float(points[worst].x), float(points[worst].y))
             raise DrawingError(
-                f"only {distance[worst]:.3g} µm from another edge of its outline, expected "
-                f"{narrowest:g} µm or more",
+                f"a corner only {distance[worst]:.3g} µm from another edge of its outline, "
+                f"expected {narrowest:g} µm or more",
                 part,
                 nearest_polygon(found, place),
                 place,

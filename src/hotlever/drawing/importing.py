@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from hotlever.drawing.contacts import REQUIRED, terminal_part
+from hotlever.drawing.extent import UNITS, doubt, extent_of, is_lever, sensible_unit
 from hotlever.drawing.fault import Ring
 from hotlever.drawing.layers import HEATER, SILICON
 from hotlever.drawing.proposal import Drawn, Proposal, proposed
@@ -39,6 +40,8 @@ class Imported:
         The probe file.
     fault : InputError or None
         Why the probe file cannot be solved as it stands.
+    notes : list of str
+        What else a user should hear of it.
     """
 
     sheet: Sheet
@@ -46,6 +49,7 @@ class Imported:
     listing: list[str]
     text: str
     fault: InputError | None
+    notes: list[str]
 
     @property
     def outlines(self) -> dict[str, tuple[Ring, ...]]:
@@ -60,7 +64,7 @@ class Imported:
         return found | {role: one for role, one in roles.items() if not isinstance(one, str)}
 
 
-def import_drawing(path: Path, cell: str | None, folder: Path) -> Imported:
+def import_drawing(path: Path, cell: str | None, folder: Path, unit: str | None = None) -> Imported:
     """Read a drawing file and propose a probe file.
 
     Parameters
@@ -70,23 +74,64 @@ def import_drawing(path: Path, cell: str | None, folder: Path) -> Imported:
         Of a GDSII or OASIS file.
     folder : path
         Where the probe file will stand: the name of the drawing is relative to it.
+    unit : str, optional
+        Of the file's numbers, as ``mm`` (`hotlever.drawing.extent`); what it says if left out.
 
     Raises
     ------
     InputError
-        If the file cannot be read.
+        If the file cannot be read, or what it holds is no lever in its unit.
     """
-    sheet = read_sheet(path, cell, tolerance_um=TOLERANCE_UM)
+    unit_um = None if unit is None else UNITS[unit]
+    sheet = read_sheet(path, cell, unit_um=unit_um, tolerance_um=TOLERANCE_UM)
     proposal = proposed(sheet, TOLERANCE_UM)
+    _check_unit(sheet, proposal, unit)
     listing = _listing(sheet, proposal)
     name = _relative(path, folder)
-    text = _probe_file(sheet, proposal, listing, name)
+    text = _probe_file(sheet, proposal, listing, name, unit)
     fault: InputError | None = None
+    notes: list[str] = []
     try:
-        Probe.from_values(tomllib.loads(text), str(path), folder)
+        notes = Probe.from_values(tomllib.loads(text), str(path), folder).shape.notes()
     except InputError as error:
         fault = error
-    return Imported(sheet, proposal, listing, text, fault)
+    return Imported(sheet, proposal, listing, text, fault, notes)
+
+
+def _check_unit(sheet: Sheet, proposal: Proposal, unit: str | None) -> None:
+    """Refuse a drawing that is a lever in another unit only.
+
+    One without a heater is read in other units, since its parts may be lost in the tolerance of
+    this one; frames and marks beside a lever may be as large as a lever.
+    """
+    extents = {name: extent_of((*one.rings, *one.lines)) for name, one in sheet.layers.items()}
+    name, better = max(extents, key=lambda one: extents[one]), None
+    if HEATER in proposal.layers:
+        name = str(proposal.layers[SILICON])
+        if is_lever(extents[name]):
+            return
+    elif unit is None and not sheet.unit_stated:
+        tried = ((one, _silicon_in(sheet, one)) for one in UNITS)
+        better, name = next(((one, layer) for one, layer in tried if layer), (None, name))
+    if better is None:
+        if HEATER not in proposal.layers and any(map(is_lever, extents.values())):
+            return
+        better = sensible_unit(extents[name], sheet.unit_um)
+    words = doubt(extents[name], sheet.unit_um, better, "--unit {unit}")
+    raise InputError(f"{sheet.file}: layer {name}: {words}")
+
+
+def _silicon_in(sheet: Sheet, unit: str) -> str | None:
+    """Return the layer that is the silicon of a lever with a heater in some unit, if there is."""
+    try:
+        other = read_sheet(sheet.file, sheet.cell, unit_um=UNITS[unit], tolerance_um=TOLERANCE_UM)
+    except InputError:  # it would be larger than any wafer
+        return None
+    layers = proposed(other, TOLERANCE_UM).layers
+    silicon = layers.get(SILICON)
+    if HEATER not in layers or not isinstance(silicon, str):
+        return None
+    return silicon if is_lever(extent_of(other.layers[silicon].rings)) else None
 
 
 def _by_part(proposal: Proposal) -> dict[str, Drawn]:
@@ -109,9 +154,9 @@ def _listing(sheet: Sheet, proposal: Proposal) -> list[str]:
         others = [name for name in sheet.cells if name != sheet.cell]
         more = f"; others: {', '.join(others[:20])}" if others else ""
         lines.append(f"cell {sheet.cell}{more}")
-    elif not sheet.unit_stated:
-        lines.append("the file states no unit: taken to be in µm; see unit_um")
-    else:
+    if not sheet.unit_stated:
+        lines.append("the file states no unit: taken to be in µm; see --unit and unit_um")
+    elif sheet.cell is None:
         lines.append(f"one unit of the file is {sheet.unit_um:g} µm")
     roles = _by_part(proposal)
     of_layer = {one: role for role, one in roles.items() if isinstance(one, str)}
@@ -133,15 +178,18 @@ def _listing(sheet: Sheet, proposal: Proposal) -> list[str]:
     return lines + [f"to be checked: {doubt}" for doubt in proposal.doubts]
 
 
-def _probe_file(sheet: Sheet, proposal: Proposal, listing: list[str], name: str) -> str:
+def _probe_file(
+    sheet: Sheet, proposal: Proposal, listing: list[str], name: str, unit: str | None
+) -> str:
     reference = Probe.reference()
     lines = ["# A hotlever probe file: lengths in µm, temperatures in K.", "#"]
     lines += [f"# {line}" for line in listing]
     lines += ["", "[probe]", 'shape = "drawing"', f"file = {as_toml(name)}"]
     if sheet.cell is not None:
         lines.append(f"cell = {as_toml(sheet.cell)}")
-    if sheet.kind == "DXF" and not sheet.unit_stated:
-        lines.append("unit_um = 1.0                   # the file does not say")
+    if unit is not None or not sheet.unit_stated:
+        why = "the file does not say" if unit is None else f"as the import was told: {unit}"
+        lines.append(commented(f"unit_um = {sheet.unit_um}", why))
     lines.append(
         f"thickness_um = {reference.layout().thickness_um:<17g}# that of the reference probe: a "
         "drawing does not say"

@@ -10,8 +10,17 @@ import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.drawing.contacts import REQUIRED, terminal_edges, terminal_part
-from hotlever.drawing.cutting import Cut, cut, taper_of
+from hotlever.drawing.contacts import (
+    REQUIRED,
+    DrawnTerminal,
+    check_apart,
+    cut_away,
+    terminal_edges,
+    terminal_part,
+)
+from hotlever.drawing.cutting import Cut, Piece, cut, taper_of
+from hotlever.drawing.etching import Etching
+from hotlever.drawing.extent import LARGEST_UM, SMALLEST_UM, extent_of
 from hotlever.drawing.fault import DrawingError, Ring
 from hotlever.drawing.healing import (
     NARROWEST,
@@ -36,29 +45,31 @@ from hotlever.probe.layout import (
 )
 from hotlever.probe.mesh import MOST_SQUARES
 
-#: Extent of a lever (µm).
-_SMALLEST, _LARGEST = 2.0, 2000.0
 #: Outlines nearer than so many tolerances to that of the body are the same.
 _SNAP = 1.5
-
-Outlines = tuple[tuple[str, tuple[Ring, ...]], ...]
 
 
 @lru_cache(maxsize=32)
 def layout_of(
-    layers: tuple[DrawnLayer, ...], terminals: Outlines, tip: Point, tolerance_um: float
+    layers: tuple[DrawnLayer, ...],
+    terminals: tuple[DrawnTerminal, ...],
+    tip: Point,
+    tolerance_um: float,
+    edge_bias_um: float = 0.0,
 ) -> Layout:
     """Return the layout of a drawing, its body 1 µm thick.
 
     Parameters
     ----------
     layers : tuple of DrawnLayer
-        Among them the body.
-    terminals : tuple of (str, tuple of rings)
-        Outlines by name, µm; a ring of two points is a line.
+        Among them the body; µm.
+    terminals : tuple of DrawnTerminal
+        µm; a ring of two points is a line.
     tip : tuple of float
     tolerance_um : float
         What is nearer is the same.
+    edge_bias_um : float
+        How far outside the drawing the edges of the body are.
 
     Raises
     ------
@@ -68,29 +79,57 @@ def layout_of(
     """
     known = {layer.name: layer for layer in layers}
     narrowest = NARROWEST * tolerance_um
-    found = {name: polygons(name, one.rings, tolerance_um) for name, one in known.items()}
     body = next(layer.name for layer in layers if layer.is_body)
+    _check_extent(body, known[body].rings)
+    found = {name: polygons(name, one.rings, tolerance_um) for name, one in known.items()}
     outline = one_piece(body, healed(body, found[body], tolerance_um), found[body])
-    _check_extent(body, outline)
     check_widths(body, outline, found[body], narrowest)
-    near, shapes = [outline], dict[str, BaseGeometry]()
+    shapes = dict[str, BaseGeometry]()
     for name, areas in found.items():
         if name != body:
-            shape = healed(name, areas, tolerance_um)
+            shapes[name] = healed(name, areas, tolerance_um)
             _check_on_body(name, areas, body, outline, tolerance_um)
-            for one in near:
-                shape = snapped(shape, one, _SNAP * tolerance_um)
-            shapes[name] = shape
-            # parts lie apart from each other, films on all that is below
-            if known[name].is_film:
-                near.append(shape)
-    ends = terminal_edges(outline, dict(terminals), tolerance_um)
+    contacts = dict[str, BaseGeometry]()
+    for terminal in terminals:
+        if terminal.by_area:
+            name = terminal_part(terminal.name)
+            found[name] = polygons(name, terminal.rings, tolerance_um)
+            contacts[terminal.name] = healed(name, found[name], tolerance_um)
+            _check_on_body(name, found[name], body, outline, tolerance_um)
+    edges = {one.name: one.rings for one in terminals if not one.by_area}
+    ends = terminal_edges(outline, edges, tolerance_um)
+    if edge_bias_um:
+        etching = Etching(body, outline, ends, edge_bias_um, tolerance_um)
+        shapes, contacts = (
+            {
+                name: etching.layer(snapped(one, outline, _SNAP * tolerance_um))
+                for name, one in group
+            }
+            for group in (shapes.items(), contacts.items())
+        )
+        outline, ends = etching.outline, etching.ends
+        check_widths(body, outline, found[body], narrowest)
+    near = [outline]
+    for name, shape in shapes.items():
+        for one in near:
+            shape = snapped(shape, one, _SNAP * tolerance_um)
+        shapes[name] = shape
+        # parts lie apart from each other, films on all that is below
+        if known[name].is_film:
+            near.append(shape)
+    borders = {name: shape.boundary for name, shape in shapes.items()}
+    if contacts:
+        contacts = {
+            name: snapped(area, outline, _SNAP * tolerance_um) for name, area in contacts.items()
+        }
+        borders |= {terminal_part(name): area.boundary for name, area in contacts.items()}
+        outline, ends = cut_away(body, outline, contacts, ends, tip)
+        check_apart(ends)
     films = {name: shape for name, shape in shapes.items() if known[name].is_film}
     parts = {name: shape for name, shape in shapes.items() if name not in films}
     whole = cut((body, _with_corners(outline, ends)), parts, films)
     for piece in whole.pieces:
-        name = piece.layers[-1]
-        check_widths(name, piece.shape, found[name], narrowest)
+        _check_piece(piece, borders, found, narrowest)
     regions = _regions(whole, known, ends, tolerance_um)
     for region, piece in zip(regions, whole.pieces, strict=True):
         squares = region.area / region.narrow_um**2
@@ -108,16 +147,42 @@ def layout_of(
     return Layout(tuple(regions), tuple(ends), tip, 1.0)
 
 
-def _check_extent(body: str, outline: Polygon) -> None:
-    x0, y0, x1, y1 = outline.bounds
-    extent = max(x1 - x0, y1 - y0)
-    if not _SMALLEST <= extent <= _LARGEST:
+def _check_extent(body: str, rings: tuple[Ring, ...]) -> None:
+    extent = extent_of(rings)
+    if not SMALLEST_UM <= extent <= LARGEST_UM:
         raise DrawingError(
-            f"{extent:.4g} µm long, expected {_SMALLEST:g} to {_LARGEST:g} µm; is the unit right?",
+            f"{extent:.4g} µm long, expected {SMALLEST_UM:g} to {LARGEST_UM:g} µm; are unit and "
+            "scale right?",
             body,
             None,
-            (x0, y0),
+            rings[0][0],
         )
+
+
+def _check_piece(
+    piece: Piece,
+    borders: dict[str, BaseGeometry],
+    found: dict[str, list[Polygon]],
+    narrowest: float,
+) -> None:
+    """Refuse a piece that is narrow somewhere, and name the layer whose border makes it so.
+
+    The outline of the body itself is wide enough: a piece is not where a border cuts it badly.
+    """
+    owner = piece.layers[-1]
+    try:
+        check_widths(owner, piece.shape, found[owner], narrowest)
+    except DrawingError as error:
+        at = shapely.Point(error.place)
+        nearest = min(borders, key=lambda name: borders[name].distance(at), default=owner)
+        if nearest == owner or borders[nearest].distance(at) > 2 * narrowest:
+            raise
+        raise DrawingError(
+            f"its border leaves the {owner} with {error.what}: move it",
+            nearest,
+            nearest_polygon(found[nearest], (at.x, at.y)),
+            error.place,
+        ) from None
 
 
 def _check_on_body(

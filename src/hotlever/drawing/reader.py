@@ -40,14 +40,18 @@ def kind_of(content: bytes) -> str:
 # --- GDSII and OASIS ----------------------------------------------------------------------------
 
 
-def read_stream(path: str, kind: str, cell: str | None) -> dict[str, Any]:
+def read_stream(path: str, kind: str, cell: str | None, unit_um: float | None) -> dict[str, Any]:
     """Return what a cell of a GDSII or OASIS file holds, in µm."""
     import gdstk
 
+    # OASIS files know no unit but the µm
+    stated_um = 1e6 * gdstk.gds_units(path)[0] if kind == "GDSII" else 1.0
+    scale = 1.0 if unit_um is None else unit_um / stated_um
     library = (gdstk.read_gds if kind == "GDSII" else gdstk.read_oas)(path, unit=1e-6)
     cells: dict[str, Any] = {one.name: one for one in library.cells}
     top = [one.name for one in library.top_level()]
     sheet: dict[str, Any] = {"kind": kind, "cells": sorted(cells), "top": sorted(top)}
+    sheet["unit_um"] = unit_um or stated_um
     counts: dict[str, int] = {}
     for one in library.cells:
         _count(one, counts, ())
@@ -65,9 +69,11 @@ def read_stream(path: str, kind: str, cell: str | None) -> dict[str, Any]:
     layers: dict[str, dict[str, list[Ring]]] = {}
     for polygon in cells[cell].get_polygons():
         name = f"{polygon.layer}/{polygon.datatype}"
-        layers.setdefault(name, {"rings": [], "lines": []})["rings"].append(polygon.points.tolist())
+        layers.setdefault(name, {"rings": [], "lines": []})["rings"].append(
+            (scale * polygon.points).tolist()
+        )
     labels = [
-        (f"{label.layer}/{label.texttype}", label.text, *map(float, label.origin))
+        (f"{label.layer}/{label.texttype}", label.text, *(scale * at for at in label.origin))
         for label in cells[cell].get_labels()
     ]
     return sheet | {"cell": cell, "layers": layers, "labels": labels[:1000]}
@@ -190,7 +196,7 @@ def main() -> None:
         if kind == "DXF":
             sheet = read_dxf(path, content, options["unit_um"], options["tolerance_um"])
         else:
-            sheet = read_stream(path, kind, options["cell"])
+            sheet = read_stream(path, kind, options["cell"], options["unit_um"])
     except Refusal as error:
         sheet = {"error": str(error)}
     except Exception as error:

@@ -11,21 +11,26 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hotlever.drawing.contacts import REQUIRED, terminal_part
+from hotlever.drawing.contacts import REQUIRED, DrawnTerminal, covered, terminal_part
+from hotlever.drawing.extent import doubt, extent_of, is_lever, sensible_unit
 from hotlever.drawing.fault import DrawingError, Ring
 from hotlever.drawing.healing import without_nested
-from hotlever.drawing.layers import DRAWN, DrawnLayer, Made, made_of
+from hotlever.drawing.layers import BODY, DRAWN, SILICON, DrawnLayer, Made, made_of
 from hotlever.drawing.making import layout_of
 from hotlever.drawing.sheet import Layer, Sheet, read_sheet
-from hotlever.errors import InputError, quoted
+from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.materials import Kind
 from hotlever.probe.layout import Layout, Point
-from hotlever.probe.shapes import SHAPE_SECTIONS, Shape, thickness
+from hotlever.probe.shapes import SHAPE_SECTIONS, Shape, edge_bias, thickness
+from hotlever.records import Record
 
 #: What is nearer is the same (µm), unless a probe file says otherwise.
 TOLERANCE_UM = 0.002
 #: What it may be.
 _FINEST_UM, _COARSEST_UM = 1e-4, 0.1
+
+#: Key of a terminal's outlines where all below them is contact.
+AREA = "area"
 
 Rings = tuple[Ring, ...]
 
@@ -39,6 +44,7 @@ class Drawing(Shape):
     """
 
     outline_moves: ClassVar[bool] = False
+    read_with: ClassVar[tuple[str, ...]] = ("file", "cell", "unit_um")
 
     shape: Literal["drawing"] = "drawing"
     file: str | None = Field(default=None, description="GDSII, OASIS or DXF, relative to this file")
@@ -49,7 +55,7 @@ class Drawing(Shape):
         default=None,
         gt=0,
         le=1e6,
-        description="of a DXF file's numbers; left out: what it says, 1 if it says nothing",
+        description="of the file's numbers; left out: what it says, 1 if it says nothing",
     )
     tolerance_um: float = Field(
         default=TOLERANCE_UM,
@@ -58,11 +64,20 @@ class Drawing(Shape):
         description="curves become lines within it, what is nearer is the same",
     )
     thickness_um: float = thickness("of the lever, without films on it")
-    tip_um: Point = Field(description="place of the tip")
+    scale: float = Field(
+        default=1.0,
+        ge=0.01,
+        le=100,
+        description="outlines and the tip's place are so many times what is drawn",
+    )
+    edge_bias_um: float = edge_bias()
+    tip_um: Point = Field(description="place of the tip, as drawn")
     layers: dict[str, Rings]
     terminals: dict[str, Rings]
     #: Of those layers that say so; part of ``[layers]`` in a probe file.
     made: dict[str, Made] = Field(default_factory=dict)
+    #: Terminals that hold all below their outlines; part of ``[terminals]`` in a probe file.
+    by_area: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _can_be_meshed(self) -> Self:
@@ -71,7 +86,8 @@ class Drawing(Shape):
 
     def __hash__(self) -> int:
         parts = (*self.layers.items(), *self.terminals.items(), *self.made.items())
-        return hash((parts, self.tip_um, self.tolerance_um, self.thickness_um))
+        sizes = (self.tip_um, self.tolerance_um, self.thickness_um, self.scale, self.edge_bias_um)
+        return hash((parts, self.by_area, sizes))
 
     def dimensions(self) -> dict[str, float]:
         """Return the thickness: the outline is as it is drawn."""
@@ -79,15 +95,22 @@ class Drawing(Shape):
 
     def sections(self) -> dict[str, dict[str, Any]]:
         """Return the sections of a probe file that describe it."""
-        values = self.model_dump(exclude={"made"})
+        values = self.model_dump(exclude={"made", "by_area"})
         layers = dict(values["layers"])
         for name, made in self.made.items():
             layers[name] = {DRAWN: layers[name], **made.model_dump(exclude={"kind"})}
         return {
             "probe": {name: one for name, one in values.items() if name not in SHAPE_SECTIONS},
             "layers": layers,
-            "terminals": values["terminals"],
+            "terminals": {
+                name: {AREA: rings} if name in self.by_area else rings
+                for name, rings in values["terminals"].items()
+            },
         }
+
+    def layer_records(self) -> dict[str, type[Record]]:
+        """Return what the sections ``[layers.NAME]`` hold, by the names of the layers."""
+        return dict.fromkeys(self.made, Made)
 
     @property
     def materials(self) -> tuple[str, ...]:
@@ -96,15 +119,34 @@ class Drawing(Shape):
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
-        made = layout_of(
-            tuple(
-                DrawnLayer(name, rings, self.made.get(name)) for name, rings in self.layers.items()
-            ),
-            tuple(self.terminals.items()),
-            self.tip_um,
-            self.tolerance_um,
+        x, y = self.tip_um
+        layers = tuple(
+            DrawnLayer(name, _scaled(rings, self.scale), self.made.get(name))
+            for name, rings in self.layers.items()
         )
+        tip, terminals = (self.scale * x, self.scale * y), tuple(self._terminals)
+        try:
+            made = layout_of(layers, terminals, tip, self.tolerance_um, self.edge_bias_um)
+        except DrawingError as error:
+            raise error.drawn_at(self.scale) from None
         return replace(made, thickness_um=self.thickness_um)
+
+    @property
+    def _terminals(self) -> list[DrawnTerminal]:
+        return [
+            DrawnTerminal(name, _scaled(rings, self.scale), name in self.by_area)
+            for name, rings in self.terminals.items()
+        ]
+
+    def notes(self) -> list[str]:
+        """Say which contacts cover more of a leg than they count for."""
+        films = [
+            ring
+            for name, made in self.made.items()
+            if made.thickness_um is not None
+            for ring in _scaled(self.layers[name], self.scale)
+        ]
+        return covered(self.layout(), self._terminals, films)
 
     @classmethod
     def read(
@@ -143,6 +185,7 @@ class Drawing(Shape):
             values["tip_um"] = (float(tip[0]), float(tip[1]))
         given = {name: _section(sections, name, where) for name in ("layers", "terminals")}
         given["layers"], made = made_of(given["layers"], materials or {}, f"{where}: [layers]")
+        given["terminals"], by_area = _by_area(given["terminals"], f"{where}: [terminals")
         named = {part: layer for part, layer in _by_part(given).items() if isinstance(layer, str)}
         sheet = None
         if named:
@@ -155,10 +198,48 @@ class Drawing(Shape):
             for section, drawn in given.items()
         }
         try:
-            return cls.of({**values, **outlines, "made": made}, f"{where}: [probe]")
+            if sheet is not None:
+                _check_unit(sheet, outlines["layers"])
+            parts = {**outlines, "made": made, "by_area": by_area}
+            return cls.of({**values, **parts}, f"{where}: [probe]")
         except DrawingError as error:
             file = where if sheet is None else sheet.file
             raise error.of_file(file, named, _by_part(outlines)) from None
+
+
+def _scaled(rings: Rings, scale: float) -> Rings:
+    if scale == 1.0:
+        return rings
+    return tuple(tuple((scale * x, scale * y) for x, y in ring) for ring in rings)
+
+
+def _by_area(terminals: dict[str, Any], where: str) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return what is drawn of each terminal, and the names of those stated by area."""
+    drawn = {}
+    for name, given in terminals.items():
+        if isinstance(given, Mapping):
+            for key in given:
+                if key != AREA:
+                    raise unknown_name("key", key, (AREA,), f"{where}.{name}]")
+            if AREA not in given:
+                raise InputError(f"{where}.{name}]: {AREA} is missing")
+        drawn[name] = given[AREA] if isinstance(given, Mapping) else given
+    return drawn, tuple(name for name, given in terminals.items() if isinstance(given, Mapping))
+
+
+def _check_unit(sheet: Sheet, layers: Mapping[str, Rings]) -> None:
+    """Refuse a lever of a file that is far too large or too small.
+
+    Raises
+    ------
+    DrawingError
+        With the unit in which it would be a lever.
+    """
+    body = SILICON if SILICON in layers else BODY
+    extent, unit_um = extent_of(layers[body]), sheet.unit_um
+    if not is_lever(extent):
+        unit = sensible_unit(extent, unit_um)
+        raise DrawingError(doubt(extent, unit_um, unit, "unit_um = {unit_um:g} in [probe]"), body)
 
 
 def _by_part(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:

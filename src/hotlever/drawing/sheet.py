@@ -62,7 +62,7 @@ class Sheet:
     unit_um : float
         Of the file's numbers.
     unit_stated : bool
-        Whether somebody said so; a DXF file need not.
+        Whether somebody said so: a DXF file need not.
     left_out : dict of str to int
         How many entities of a DXF file draw nothing.
     """
@@ -106,7 +106,7 @@ def read_sheet(
     cell : str, optional
         Of a GDSII or OASIS file; its top cell if left out.
     unit_um : float, optional
-        What one unit of a DXF file is; what it says if left out, and µm if it says nothing.
+        What one unit of the file is; what it says if left out, and µm if it says nothing.
     tolerance_um : float
         How far the straight lines that stand for a curve may be from it.
 
@@ -186,7 +186,8 @@ def _points(rings: list[list[list[float]]], path: str) -> tuple[Ring, ...]:
         for x, y in ring:
             if not (abs(x) < _FARTHEST and abs(y) < _FARTHEST):
                 raise InputError(
-                    f"{path}: a corner at ({x:g}, {y:g}) µm, expected less than {_FARTHEST:g} µm"
+                    f"{path}: a corner at ({x:g}, {y:g}) µm, expected less than {_FARTHEST:g} µm; "
+                    "is the unit right?"
                 )
     return tuple(tuple((x, y) for x, y in ring) for ring in rings)
 

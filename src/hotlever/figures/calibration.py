@@ -10,12 +10,14 @@ from matplotlib.figure import Figure
 
 from hotlever.calibration.calibration import Calibration
 from hotlever.calibration.pulses import PulseCalibration
+from hotlever.estimation.lack_of_fit import USUAL_SCATTER
 from hotlever.figures.style import (
     BLACK,
     BLUE,
     COLOURS,
     GREEN,
     MEASURED,
+    NOT_DESCRIBED,
     ORANGE,
     PURPLE,
     SKY,
@@ -23,7 +25,6 @@ from hotlever.figures.style import (
     figure,
     from_zero,
 )
-from hotlever.fitting.misfit import usual_scatter
 from hotlever.studies.design import label_of
 from hotlever.studies.twins import ESTIMATE, LEVELS, WAYS
 
@@ -38,14 +39,16 @@ def calibration_curves(calibration: Calibration) -> Figure:
     """Draw the tip temperature against power and bias with its band, the knee and the budget.
 
     Where the lever does not show what was measured, the difference stands in place of the budget,
-    with the rows marked that are off, and no band is drawn. The peak of a pulse, if calibrated,
-    stands beside the static curve.
+    with the rows marked that are off, no band is drawn, and the title says so. The peak of a pulse,
+    if calibrated, stands beside the static curve.
     """
     table, knee, described = calibration.table, calibration.knee, calibration.describes_data
     power, tip = table.power_mW, table.tip_K
     measured = calibration.measurement.dataset(calibration.probe.circuit)
     with figure(8.0, 6.0, 2, 2, letters=True) as (made, grid):
         by_power, by_bias, iv, budget = grid.ravel()
+        if not described:
+            made.suptitle(NOT_DESCRIBED, color=VERMILION)
         for axes, along, label in (
             (by_power, "power_mW", "power P$_l$ (mW)"),
             (by_bias, "bias_V", "bias V$_b$ (V)"),
@@ -74,7 +77,8 @@ def calibration_curves(calibration: Calibration) -> Figure:
         iv.plot(table.lever_V, table.current_mA, color=BLUE, label=text)
         if calibration.knee_measured:
             across, up = 1.96 * knee.lever_V_stderr, 1.96 * knee.current_mA_stderr
-            style: Any = {"fmt": "s", "color": VERMILION, "label": "knee, 95 %"}
+            label = "knee, 95 %" if described else "its knee"
+            style: Any = {"fmt": "s", "color": VERMILION, "label": label}
             iv.errorbar(knee.lever_V, knee.current_mA, xerr=across, yerr=up, **style)
         iv.set(xlabel="lever voltage V$_l$ (V)", ylabel="heater current I$_h$ (mA)")
         iv.set(xlim=from_zero(table.lever_V), ylim=from_zero(table.current_mA))
@@ -156,7 +160,7 @@ def _difference(axes: Axes, calibration: Calibration, measured: xr.Dataset) -> N
     largest = float(np.abs(known.current_mA).max())
     shown = np.interp(known.bias_V, table.bias_V, table.current_mA)
     share = (known.current_mA - shown) / largest
-    usual = usual_scatter(with_priors=True)
+    usual = USUAL_SCATTER
     off = np.abs(share) > usual
     axes.axhspan(-100 * usual, 100 * usual, color="0.9", lw=0, label="as usual")
     axes.plot(known.bias_V, 100 * share, "o", color=BLACK, ms=3.0, label="measured")

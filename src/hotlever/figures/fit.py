@@ -14,10 +14,12 @@ from matplotlib.ticker import MaxNLocator
 from scipy.ndimage import gaussian_filter
 from scipy.special import chdtri, ndtri
 
+from hotlever.estimation.lack_of_fit import USUAL_SCATTER
 from hotlever.figures.style import (
     BLACK,
     BLUE,
     MEASURED,
+    NOT_DESCRIBED,
     ORANGE,
     SKY,
     VERMILION,
@@ -26,8 +28,7 @@ from hotlever.figures.style import (
     from_zero,
     panel_letters,
 )
-from hotlever.fitting.misfit import usual_scatter
-from hotlever.text import parameter_named
+from hotlever.text import parameter_named, value_with_error
 from hotlever.types import Array
 
 if TYPE_CHECKING:
@@ -49,9 +50,7 @@ _PANELS = (
 )
 
 
-def data_and_model(
-    measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str], *, with_priors: bool = False
-) -> Figure:
+def data_and_model(measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str]) -> Figure:
     """Draw measured and modelled observables, and their difference (paper's Figs. 3 and 4).
 
     Parameters
@@ -62,10 +61,8 @@ def data_and_model(
         The sweep of the fitted lever at the measured biases, in the same order.
     fitted : sequence of str
         The observables that entered the fit.
-    with_priors : bool
-        Whether it had priors: its data scatter less, or are marked.
     """
-    usual = usual_scatter(with_priors)
+    usual = USUAL_SCATTER
     # a lever without a reader shows no voltage of it
     panels = [panel for panel in _PANELS if model[panel[2]].notnull().any()]
     bias, shape = measured.bias.values, (2, len(panels))
@@ -117,20 +114,22 @@ def fitted_history(
     # the tip is always drawn, others where they were measured
     panels = [one for one in _PANELS if one[0] == "tip" or measured[one[2]].notnull().any()]
     settles = float(measured.bias_V.max()) == float(measured.bias_V.min())
-    time = measured.time.values
+    time, width = measured.time.values, 1.96 * band.tip_stderr_K
+    stated = bool(width.notnull().any())
     with figure(3.4 * len(panels), 4.6, 2, len(panels), sharex=True, height_ratios=(1.8, 1.0)) as (
         made,
         grid,
     ):
+        if not stated:
+            made.suptitle(NOT_DESCRIBED, color=VERMILION)
         for (upper, lower), (name, label, column, unit, factor) in zip(grid.T, panels, strict=True):
             data, values = measured[column].values, model[column].values
             if np.isfinite(data).any():
                 upper.plot(time, data, **{**MEASURED, "ms": 2.5})
             if name == "tip":
-                width = 1.96 * band.tip_stderr_K
-                upper.fill_between(
-                    band.time, band.tip_K - width, band.tip_K + width, color=SKY, label="95 %"
-                )
+                if stated:
+                    low, high = band.tip_K - width, band.tip_K + width
+                    upper.fill_between(band.time, low, high, color=SKY, label="95 %")
                 upper.plot(band.time, band.tip_K, "-", color=BLUE, label="model")
                 upper.legend()
             else:
@@ -142,7 +141,7 @@ def fitted_history(
                 lower.set(ylabel=f"data − model ({unit})")
                 if name not in fitted:
                     _not_fitted(upper)
-            else:
+            elif stated:
                 lower.plot(band.time, band.tip_stderr_K, color=VERMILION)
                 lower.set(ylabel="standard error (K)", ylim=(0, None))
             lower.set(xlabel="time (µs)")
@@ -178,41 +177,61 @@ def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
 def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
     """Draw the band of predicted tip temperature against bias and power, and its width.
 
+    Of a lever that does not show its data the tip temperature alone is drawn, and the title says
+    so.
+
     Parameters
     ----------
     band : xarray.Dataset
-        `Fit.band`, or from `hotlever.fitting.posterior.predictive_band`.
+        `Fit.band`, or from `hotlever.estimation.posterior.predictive_band`.
     measured : xarray.Dataset, optional
         From `Measurement.dataset`; drawn as points.
     """
+    stated = True
     if "quantile" in band.coords:
         by_bias, by_power, middle_name = band.tip_K.values, band.tip_at_power_K.values, "median"
     else:
-        away = ndtri(_QUANTILES)[:, None] * band.tip_stderr_K.values
+        stated = bool(band.tip_stderr_K.notnull().any())
+        away = ndtri(_QUANTILES)[:, None] * band.tip_stderr_K.fillna(0.0).values
         by_bias = by_power = band.tip_K.values + away
-        middle_name = "prediction"
-    shape: Any = {"sharex": "col", "height_ratios": (1.8, 1.0), "squeeze": False}
+        middle_name = "prediction" if stated else "the nearest lever"
     panels = [("bias", by_bias, "bias V$_b$ (V)")]
     # with held supplies there may be several temperatures at one power
     if np.all(np.diff(band.power_mW.values) >= 0):
         panels.append(("power_mW", by_power, "power P$_l$ (mW)"))
-    with figure(3.7 * len(panels), 5.0, 2, len(panels), letters=True, **shape) as (made, grid):
-        for (upper, lower), (name, rows, label) in zip(grid.T, panels, strict=True):
+    ratios = (1.8, 1.0) if stated else (1.0,)
+    shape: Any = {"sharex": "col", "height_ratios": ratios, "squeeze": False}
+    height = 5.0 if stated else 3.6
+    with figure(3.7 * len(panels), height, len(ratios), len(panels), letters=True, **shape) as (
+        made,
+        grid,
+    ):
+        if not stated:
+            made.suptitle(NOT_DESCRIBED, color=VERMILION)
+        for (upper, *lower), (name, rows, label) in zip(grid.T, panels, strict=True):
             x = band[name].values
-            low95, low68, middle, high68, high95 = rows
-            upper.plot(x, middle, color=BLUE, label=middle_name)
-            for axes, zero in ((upper, 0.0), (lower, middle)):
-                axes.fill_between(x, low95 - zero, high95 - zero, color=BLUE, alpha=0.25, lw=0)
-                axes.fill_between(x, low68 - zero, high68 - zero, color=BLUE, alpha=0.45, lw=0)
-            upper.fill_between([], [], color=BLUE, alpha=0.55, label="68 %")
-            upper.fill_between([], [], color=BLUE, alpha=0.25, label="95 %")
-            lower.axhline(0, color=BLUE, lw=0.8)
+            upper.plot(x, rows[2], color=BLUE, label=middle_name)
+            if stated:
+                _band(upper, x, rows, 0.0)
+                upper.fill_between([], [], color=BLUE, alpha=0.55, label="68 %")
+                upper.fill_between([], [], color=BLUE, alpha=0.25, label="95 %")
+            for axes in lower:
+                _band(axes, x, rows, rows[2])
+                axes.axhline(0, color=BLUE, lw=0.8)
+                axes.set(ylabel=f"T$_{{tip}}$ − {middle_name} (K)")
             if measured is not None:
                 upper.plot(measured[name], measured.tip_K, **MEASURED, ms=3.5)
             upper.set(ylabel="tip temperature (K)")
-            lower.set(xlabel=label, ylabel=f"T$_{{tip}}$ − {middle_name} (K)", xlim=from_zero(x))
+            [upper, *lower][-1].set(xlabel=label, xlim=from_zero(x))
         grid[0, 0].legend(loc="upper left")
     return made
+
+
+def _band(axes: Axes, x: Array, rows: Array, zero: Array | float) -> None:
+    """Fill what 68 and 95 % lie between, of five quantiles (5, n), beside a line or as they are."""
+    low95, low68, _, high68, high95 = rows - zero
+    axes.fill_between(x, low95, high95, color=BLUE, alpha=0.25, lw=0)
+    axes.fill_between(x, low68, high68, color=BLUE, alpha=0.45, lw=0)
 
 
 def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
@@ -221,7 +240,7 @@ def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
     Parameters
     ----------
     profiles : sequence of xarray.Dataset
-        From `hotlever.fitting.profile.profile_likelihood`.
+        From `hotlever.estimation.profile.profile_likelihood`.
     """
     columns = min(3, len(profiles))
     rows = math.ceil(len(profiles) / columns)
@@ -265,7 +284,7 @@ def posterior_corner(posterior: xr.Dataset, optimum: Mapping[str, float] | None 
     Parameters
     ----------
     posterior : xarray.Dataset
-        From `hotlever.fitting.posterior.sample_posterior`.
+        From `hotlever.estimation.posterior.sample_posterior`.
     optimum : mapping of str to float, optional
         Value of each quantity to mark.
     """
@@ -311,8 +330,7 @@ def _histogram(axes: Axes, values: Array) -> None:
     axes.hist(values, bins=30, color=SKY)
     low, middle, high = np.percentile(values, (16, 50, 84))
     axes.axvspan(low, high, color="0.9", zorder=0)
-    digits = max(0, 1 - math.floor(math.log10(max(high - low, 1e-12))))
-    axes.set_title(f"{middle:.{digits}f} ± {(high - low) / 2:.{digits}f}")
+    axes.set_title(value_with_error(middle, (high - low) / 2.0, bounds=(-math.inf, math.inf)))
     axes.set(yticks=[], xlim=_range(values))
 
 
@@ -341,12 +359,13 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
     Parameters
     ----------
     levers : xarray.Dataset
-        From `hotlever.fitting.levers.compare_levers`. Quantities that were held are left out.
+        From `hotlever.estimation.levers.compare_levers`; without what was held or does not count.
     """
     count = levers.sizes["lever"]
     place = np.arange(1, count + 1)
     many = count > _MOST_NAMES
-    known = np.isfinite(levers.stderr).any("lever")
+    levers = levers.assign(value=levers.value.where(levers.counts))
+    known = (np.isfinite(levers.stderr) & levers.counts).any("lever")
     free = levers.quantity.values[known.values].tolist()
     height, shape = 1.2 * len(free) + (0.8 if many else 1.2), {"sharex": True, "squeeze": False}
     with figure(7.4, height, len(free), 1, letters=True, **shape) as (made, grid):

@@ -24,6 +24,9 @@ COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 #: How measured points look.
 MEASURED: Any = {"ls": "none", "marker": "o", "mfc": "none", "color": BLACK, "label": "measured"}
 
+#: Title of what is drawn of a lever that does not show its data.
+NOT_DESCRIBED = "the data are not described: the nearest lever, without errors"
+
 FIGURE_TYPES = (".png", ".svg", ".pdf")
 
 _STYLE: Any = {

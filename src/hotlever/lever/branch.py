@@ -24,8 +24,10 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PPoly
 
 from hotlever.errors import BranchEndError
+from hotlever.lever.by_power import ByPower
 from hotlever.lever.curve import smooth_curve
-from hotlever.lever.equations import SHOWN, LeverEquations
+from hotlever.lever.equations import SHOWN, LeverEquations, steps_of
+from hotlever.lever.hottest import highest_rises, where_it_reaches
 from hotlever.lever.ramp import Reading, crossing
 from hotlever.lever.sections import UNIT_K, UNIT_V, Across, ByTip, Sections
 from hotlever.probe.circuit import Circuit
@@ -35,10 +37,8 @@ from hotlever.types import Array
 _NO_BIAS = 1e-9
 #: The places of a lever that starts cold.
 BY_TIP = ByTip()
-#: Where a branch's values have the rises of the hottest place and of the tip.
-HIGHEST_RISE, TIP_RISE = len(SHOWN), len(SHOWN) + 1
-#: What may change at a place from lever to lever: V_l, I_h, V_r and the rise of the tip.
-CHANGING = (*range(len(SHOWN)), TIP_RISE)
+#: Where a branch's values have the rise of the tip.
+TIP_RISE = len(SHOWN)
 
 
 @dataclass(frozen=True)
@@ -97,9 +97,11 @@ class Branch:
         on the way to biases of the other polarity.
     x, slopes : ndarray, shape (size + 1, k)
         The states, and their derivatives by u.
-    values, value_slopes : ndarray, shape (k, 5)
-        V_l (V), I_h (mA), V_r (V), the highest rise and that of the tip (K) of each state, and
-        their derivatives by u.
+    values, value_slopes : ndarray, shape (k, 4)
+        V_l (V), I_h (mA), V_r (V) and the rise of the tip (K) of each state, and their derivatives
+        by u.
+    highest_rise : ndarray, shape (k,)
+        The highest rise (K) anywhere in the lever.
     places : Sections, optional
         Of a lever that does not start cold: what the places u of similar levers have in common, if
         they are not lines across this branch itself.
@@ -118,13 +120,14 @@ class Branch:
     slopes: Array
     values: Array
     value_slopes: Array
+    highest_rise: Array
     places: Sections | None = None
 
     # --- the curves -------------------------------------------------------------------------------
 
     @cached_property
     def curve(self) -> PPoly:
-        """V_l (V), I_h (mA), V_r (V), the highest rise and that of the tip (K) by u."""
+        """V_l (V), I_h (mA), V_r (V) and the rise of the tip (K) by u."""
         return self.through(self.values, self.value_slopes)
 
     @cached_property
@@ -160,6 +163,7 @@ class Branch:
             -sign * self.slopes[:, ::-1],
             of_shown * self.values[::-1],
             -of_shown * self.value_slopes[::-1],
+            self.highest_rise[::-1],
         )
 
     @property
@@ -172,14 +176,17 @@ class Branch:
         """Where the branch ends: at its last state, or where something begins to melt."""
         if not self.melts:
             return float(self.u[-1])
-        highest = PPoly(self.curve.c[..., 3], self.curve.x)
-        melting = self.equations.limit[0] - self.base_temperature_K
-        return float(highest.solve(melting, extrapolate=False).min())
+        return where_it_reaches(self, self._melting_rise)
 
     @property
     def melts(self) -> bool:
         """Whether the branch ends because something melts: silicon, or another material."""
-        return bool(self.base_temperature_K + self.values[-1, 3] >= self.equations.limit[0])
+        return bool(self.highest_rise[-1] >= self._melting_rise)
+
+    @property
+    def _melting_rise(self) -> float:
+        """Rise (K) beyond which no state is meaningful."""
+        return self.equations.limit[0] - self.base_temperature_K
 
     @property
     def hottest_K(self) -> float:
@@ -192,6 +199,10 @@ class Branch:
         if self.equations.circuit.starts_cold:
             return np.asarray(self.base_temperature_K + u**2)
         return np.asarray(self.base_temperature_K + self.curve(u)[..., TIP_RISE])
+
+    def highest_rise_at(self, u: Array) -> Array:
+        """Return the highest rise (K) anywhere in the lever at some places of the branch, (n,)."""
+        return highest_rises(self, u)
 
     def u_at(self, tip_K: ArrayLike) -> Array:
         """Return u at tip temperatures (K) of a lever that starts cold; NaN outside the branch."""
@@ -226,36 +237,31 @@ class Branch:
         return bias
 
     @cached_property
-    def _u_by_root(self) -> PPoly:
-        """u by the root of the power, which is nearly a straight line."""
-        values, slopes = self.values, self.value_slopes
-        power = values[:, 0] * values[:, 1]
-        slope = slopes[:, 0] * values[:, 1] + values[:, 0] * slopes[:, 1]
-        root = np.sqrt(power)
-        # at zero power both begin as u
-        by_u = np.append(np.sqrt(slopes[0, 0] * slopes[0, 1]), slope[1:] / (2.0 * root[1:]))
-        bent = root[np.isin(self.u, steps_of(self.equations))]
-        return smooth_curve(root, self.u, 1.0 / by_u, bent)
+    def by_power(self) -> ByPower:
+        """The tip temperature by power, as far as that is a function."""
+        return ByPower(self)
 
     @property
     def highest_power_mW(self) -> float:
-        """Power at the end of the branch (mW)."""
-        return float(self.power(self.hottest_K))
+        """Power at the end of the branch, or up to which each has one temperature (mW)."""
+        return self.by_power.highest_mW
+
+    @property
+    def power_turns_K(self) -> float | None:
+        """Tip temperature from which on the power falls (K); None if it rises to the end."""
+        turn = self.by_power.turn_u
+        return None if turn is None else float(self.tip_K(turn))
 
     def tip_temperature(self, power_mW: ArrayLike) -> Array:
-        """Return the tip temperature (K) by power (mW); NaN beyond the branch."""
-        power = np.asarray(power_mW, dtype=float)
-        u = self._u_by_root(np.sqrt(np.maximum(power, 0.0)))
-        inside = (power >= 0) & (power <= self.highest_power_mW)
-        return np.where(inside, self.base_temperature_K + u**2, np.nan)
+        """Return the tip temperature (K) by power (mW); NaN where there is none, or several."""
+        u = self.by_power.u(np.asarray(power_mW, dtype=float))
+        return np.asarray(self.base_temperature_K + u**2)
 
     def tip_slope(self, power_mW: ArrayLike) -> Array:
         """Return dT_tip/dP_l (K/mW) by power (mW), which is not zero."""
-        root = np.sqrt(np.asarray(power_mW, dtype=float))
-        slope: Array = self._u_by_root(root) * self._u_by_root(root, 1) / root
-        return slope
+        return self.by_power.slope(np.asarray(power_mW, dtype=float))
 
-    def _turns(self, quantity: PPoly) -> Array:
+    def turns(self, quantity: PPoly) -> Array:
         """Return u where a curve over u is level."""
         level = np.sort(quantity.derivative().roots(extrapolate=False))
         return level[(level > 0) & (level < self.end_u)]
@@ -264,7 +270,7 @@ class Branch:
     def knee_u(self) -> float | None:
         """Where the knee is."""
         lever_V = PPoly(self.curve.c[..., 0], self.curve.x)
-        falling = [u for u in self._turns(lever_V).tolist() if lever_V(u, 2) < 0]
+        falling = [u for u in self.turns(lever_V).tolist() if lever_V(u, 2) < 0]
         return falling[0] if falling else None
 
     @property
@@ -291,8 +297,12 @@ class Branch:
 
     def through(self, values: Array, slopes: Array) -> PPoly:
         """Return the curve through some quantities of the states and their slopes, (k, ...)."""
-        steps = steps_of(self.equations) if self.equations.circuit.starts_cold else ()
-        return smooth_curve(self.u, values, slopes, steps)
+        return smooth_curve(self.u, values, slopes, self.steps)
+
+    @cached_property
+    def steps(self) -> Array:
+        """Where higher derivatives by u step."""
+        return steps_of(self.equations) if self.equations.circuit.starts_cold else np.empty(0)
 
     # --- in a circuit -----------------------------------------------------------------------------
 
@@ -311,13 +321,18 @@ class Branch:
         ends = down if np.isnan(down.u).any() and not np.isnan(up.u).any() else up
         return replace(ends, u=u, jumps=[*up.jumps, *down.jumps])
 
+    def highest_bias(self, circuit: Circuit, bias_V: float) -> float:
+        """Return the highest bias (V) up to some one at which a slow ramp finds a state."""
+        reading = self.read(circuit, np.array([bias_V]))
+        return bias_V if np.isfinite(reading.u[0]) else reading.last_V
+
     def _ramp(self, circuit: Circuit, bias: Array) -> Reading:
         """Find the states that a slow ramp takes from zero upwards."""
         curve = PPoly(circuit.bias(self.curve.c[..., 0], self.curve.c[..., 1]), self.curve.x)
         u, start = np.full(bias.shape, np.nan), self._without_bias(curve)
         # what is at no bias is found to rounding errors
         reading = Reading(u, [], min(0.0, float(curve(start))), start, float(self.tip_K(start)))
-        turns = [turn for turn in self._turns(curve).tolist() if turn > start]
+        turns = [turn for turn in self.turns(curve).tolist() if turn > start]
         for low, high in pairwise([start, *turns, self.end_u]):
             highest = float(curve(high))
             if highest <= reading.last_V:
@@ -338,12 +353,24 @@ class Branch:
         return float(roots[np.argmin(np.abs(roots))]) if roots.size else float(self.u[0])
 
     def ended(self, reading: Reading) -> BranchEndError:
-        """Return the error that says where a ramp of the bias ends."""
+        """Return the error that says where a ramp of the bias ends.
+
+        The lever itself ends there only if it was followed until something melts, and is no reduced
+        one, which goes as far as it was made for.
+        """
         bias, tip = reading.last_V, reading.last_K
         limit, end = self.equations.limit
         side = self if bias >= 0 else self.mirrored
-        if side.melts and abs(reading.last_u) == side.end_u:
-            text = f"{end} at a bias of {bias:.4f} V, where the tip is at {tip:.1f} K"
+        at_end = f"at a bias of {bias:.4f} V, where the tip is at {tip:.1f} K"
+        if self.equations.space.is_reduced:
+            text = f"the reduced lever ends {at_end}: beyond it the full lever has to be solved"
+        elif not side.melts:
+            text = (
+                f"the branch was solved up to a state {at_end}; how far the lever itself goes is "
+                "not known from it"
+            )
+        elif abs(reading.last_u) == side.end_u:
+            text = f"{end} {at_end}"
         else:
             at = self.point(reading.last_u)
             text = (
@@ -359,16 +386,8 @@ def shifted(branch: Branch, changes: Array, slopes: Array) -> Branch:
 
     The slopes are derivatives of the changes by u.
     """
-    columns = CHANGING[: changes.shape[1]]
+    columns = slice(changes.shape[1])
     moved = branch.values.copy(), branch.value_slopes.copy()
     for known, change in zip(moved, (changes, slopes), strict=True):
         known[:, columns] += change
     return replace(branch, values=moved[0], value_slopes=moved[1])
-
-
-def steps_of(equations: LeverEquations) -> Array:
-    """Return u where the tip passes a step of a law, at which the curves bend sharply."""
-    laws = [law for kind in equations.made_of.values() for law in kind.laws]
-    steps = sorted({T for law in laws for T in law.steps})
-    rises = np.array(steps) - equations.base_temperature_K
-    return np.sqrt(rises[rises > 0])

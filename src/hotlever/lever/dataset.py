@@ -6,20 +6,24 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import csv_text, labelled, write_dataset
+from hotlever.datasets import QUANTITIES, csv_text, labelled, write_dataset
 from hotlever.errors import InputError
 from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES, balance_names
+from hotlever.materials.foreign_laws import LAWS, own_laws
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.probe import SECTIONS
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from hotlever.lever.lever import Lever
 
 #: Columns of a sweep file.
 SWEEP_COLUMNS = (
@@ -36,7 +40,7 @@ OBSERVABLES = {"current": "current_mA", "reader": "reader_V", "tip": "tip_K"}
 
 
 def sweep_dataset(
-    probe: Probe,
+    lever: Lever,
     shown: Mapping[str, Array],
     balances: Array,
     notes: Sequence[str],
@@ -48,6 +52,7 @@ def sweep_dataset(
     (n, k), are `balance_columns`; sensitivities, (3, n, p), are of `OBSERVABLES` by what a fit
     usually varies.
     """
+    probe = lever.probe
     names = balance_names(probe.wiring)
     columns = {**shown, **dict(zip(names, balances.T, strict=True))}
     at_terminals = names[len(BALANCES) :]
@@ -71,9 +76,9 @@ def sweep_dataset(
     data = labelled(
         variables,
         coordinates=coordinates,
-        **probe_attributes(probe),
+        **probe_attributes(lever),
         notes="\n".join(
-            [*notes, *range_notes(probe, "a bias of {} V", columns["bias_V"], columns["max_K"])]
+            [*notes, *range_notes(lever, "a bias of {} V", columns["bias_V"], columns["max_K"])]
         ),
     )
     for column in at_terminals:
@@ -99,12 +104,13 @@ def _resistance(heat_mW: Array, current_mA: Array) -> Array:
     return np.divide(1000.0 * heat_mW, current_mA**2, out=nothing, where=current_mA != 0)
 
 
-def range_notes(probe: Probe, where: str, along: Array, max_K: Array) -> list[str]:
+def range_notes(lever: Lever, where: str, along: Array, max_K: Array) -> list[str]:
     """Say from where on the laws are used beyond the temperatures they are meant for.
 
     `where` has the place of a number in it, the least of those of `along` that it is true of.
     """
-    limit = min(law.temperature_range[1] for kind in probe.made_of.values() for law in kind.laws)
+    made_of = lever.equations.made_of.values()
+    limit = min(law.temperature_range[1] for kind in made_of for law in kind.laws)
     beyond = along[max_K > limit]
     if not beyond.size:
         return []
@@ -115,10 +121,16 @@ def range_notes(probe: Probe, where: str, along: Array, max_K: Array) -> list[st
     ]
 
 
-def probe_attributes(probe: Probe) -> dict[str, str]:
-    """Return what a dataset says of its probe, which `probe_of` reads."""
-    sections = {name: json.dumps(section) for name, section in probe.values().items()}
-    return {**sections, "medium": probe.surroundings.medium}
+def probe_attributes(lever: Lever) -> dict[str, str]:
+    """Return what a dataset says of the probe of a lever, which `probe_of` reads.
+
+    The lever may follow other laws than its probe.
+    """
+    values: dict[str, Any] = lever.probe.values()
+    if laws := own_laws(lever.equations.made_of):
+        values[LAWS] = laws
+    sections = {name: json.dumps(section) for name, section in values.items()}
+    return {**sections, "medium": lever.medium}
 
 
 def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -139,7 +151,7 @@ def sweep_csv(data: xr.Dataset) -> str:
 
 def _in_a_file(data: xr.Dataset) -> list[str]:
     """Return the columns of a sweep's file: the usual ones, and those of other terminals."""
-    own = balance_names(probe_of(data).wiring)[len(BALANCES) :]
+    own = [str(name) for name in data.data_vars if name not in QUANTITIES]
     return [*SWEEP_COLUMNS, *own]
 
 
@@ -166,9 +178,20 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
 
 
 def probe_of(data: xr.Dataset) -> Probe:
-    """Return the probe that a sweep was made of."""
-    sections = {name: json.loads(data.attrs[name]) for name in SECTIONS if name in data.attrs}
-    return Probe.from_values(sections, "sweep")
+    """Return the probe that a sweep was made of.
+
+    Raises
+    ------
+    InputError
+        If it has a material with laws of its own, which no file holds.
+    """
+    names = [name for name in (*SECTIONS, LAWS) if name in data.attrs]
+    return Probe.from_values({name: json.loads(data.attrs[name]) for name in names}, "sweep")
+
+
+def circuit_of(data: xr.Dataset) -> Circuit:
+    """Return the circuit in which a sweep was made."""
+    return Circuit.of(json.loads(data.attrs["circuit"]), "sweep: [circuit]")
 
 
 def checked_bias(bias: ArrayLike, circuit: Circuit) -> Array:

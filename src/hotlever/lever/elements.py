@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,10 @@ def sums_by_index(index: Index, values: Array, size: int) -> Array:
 
 #: A point this share of an element's size outside it is taken to lie on its edge.
 _BY_ROUNDING = 1e-3
+#: Steps along an edge at which the highest value between the nodes is looked for: four times as
+#: many as a cubic element has. And how far above its nodes an element may reach, as a share of the
+#: difference between its nodes.
+_STEPS, _ABOVE_NODES = 12, 0.25
 
 
 class FiniteElements:
@@ -126,6 +132,35 @@ class FiniteElements:
                 tables.append(np.concatenate(table))
         together = np.concatenate(factors).transpose(1, 0, 2).reshape(elements, -1)
         return np.asarray(together @ np.concatenate(tables)).reshape(elements, nodes, nodes)
+
+    @cached_property
+    def _lattice(self) -> Array:
+        """The basis functions on a lattice over an element, (nodes, points)."""
+        steps = product(range(_STEPS + 1), repeat=len(self.positions))
+        points = np.array([one for one in steps if sum(one) <= _STEPS]).T / _STEPS
+        nodes = range(self.dofs.shape[1])
+        return np.stack([self.basis.elem.lbasis(points, node)[0] for node in nodes])
+
+    def near_highest(self, values: Array, share: float) -> Index:
+        """Return the elements in which one of n fields (size, n) has a share of its highest value.
+
+        The fields are not negative.
+        """
+        most = values[self.dofs].max(axis=1)
+        return np.flatnonzero((most >= share * most.max(axis=0)).any(axis=1))
+
+    def highest(self, values: Array, dofs: Index | None = None) -> Array:
+        """Return the highest values of fields (size, n), those between the nodes too, (n,).
+
+        The fields may be given on some elements alone, with the nodes of these among them.
+        """
+        each = values[self.dofs if dofs is None else dofs]
+        most = each.max(axis=1)
+        highest = most.max(axis=0)
+        reached = most + _ABOVE_NODES * (most - each.min(axis=1))
+        element, field = np.nonzero(reached >= highest)
+        np.maximum.at(highest, field, (each[element, :, field] @ self._lattice).max(axis=1))
+        return np.asarray(highest)
 
     def on_reference(self, point: Array, element: Any = slice(None)) -> Array:
         """Return where a point lies on the reference element, seen from each or one element."""

@@ -273,3 +273,11 @@ class LeverEquations(LawsAtPoints):
 def _length(columns: Array) -> Array:
     """Return the largest entry of each column; never zero."""
     return np.maximum(np.abs(columns).max(axis=0), 1e-300)
+
+
+def steps_of(equations: LeverEquations) -> Array:
+    """Return u where the tip passes a step of a law, at which the curves bend sharply."""
+    laws = [law for kind in equations.made_of.values() for law in kind.laws]
+    steps = sorted({T for law in laws for T in law.steps})
+    rises = np.array(steps) - equations.base_temperature_K
+    return np.sqrt(rises[rises > 0])

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from hotlever.errors import ComputationError, NewtonError
-from hotlever.lever.branch import BY_TIP, Branch, steps_of
+from hotlever.lever.branch import BY_TIP, Branch
 from hotlever.lever.curve import hermite_weights
-from hotlever.lever.equations import LeverEquations
+from hotlever.lever.equations import LeverEquations, steps_of
 from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
 from hotlever.lever.pinned import Pinned
 from hotlever.lever.sections import Sections
@@ -19,9 +19,9 @@ from hotlever.types import Array
 #: Steps between the states of a branch: in u (K^½) where it is cold, in the tip temperature (K)
 #: where it is hot. The smallest step (K) that is tried where those lead nowhere.
 _STEP_U, _STEP_K, _SMALLEST_K = 4.0, 60.0, 0.5
-#: Half the step (K) after a step of a law; and by how much the hottest point must get hotter per
-#: kelvin of the tip, twice over, to shorten the steps.
-_AFTER_STEP_K, _MUCH_FASTER = 5.0, 4.0
+#: Half the step (K) after a step of a law; and by how much some place must get hotter per kelvin of
+#: the tip to halve the steps.
+_AFTER_STEP_K, _MUCH_FASTER = 5.0, 2.0
 #: A state further than this share of the step from where it was expected (K) may lie elsewhere.
 _ASTRAY = 0.5
 #: Far below what the curves between the states are off by.
@@ -60,9 +60,7 @@ class Follower:
         """
         while not (self._branch.melts or enough(self._branch)):
             here = float(self._branch.u[-1])
-            # a leg may get hotter faster than the tip
-            faster = max(1.0, float(self._branch.value_slopes[-1, 3]) / (_MUCH_FASTER * here))
-            step = min((here + _STEP_U) ** 2 - here**2, _STEP_K / faster, 2.0 * self._step)
+            step = min((here + _STEP_U) ** 2 - here**2, self._longest(here), 2.0 * self._step)
             while (found := self._next(_landing(here, step, self._steps), step)) is None:
                 step /= 2.0
                 if step < _SMALLEST_K:
@@ -75,6 +73,16 @@ class Follower:
             if self._branch.u[-1] in self._steps:
                 self._step = _AFTER_STEP_K  # where the law settles, the curve bends
         return self._branch
+
+    def _longest(self, u: float) -> float:
+        """Return the longest step (K) from the last state, at u.
+
+        A leg may get hotter faster than the tip. Steps are halved then, so that branches of similar
+        levers still have most of their places in common.
+        """
+        slopes = self._equations.space.rises(self._branch.slopes[:, -1:])
+        faster = float(slopes.max()) / (2.0 * u)
+        return _STEP_K / 2.0 ** np.ceil(np.log2(max(1.0, faster / _MUCH_FASTER)))
 
     def _next(self, u: float, step: float) -> Branch | None:
         """Find the state at u; None if it could lie on another branch."""
@@ -129,12 +137,10 @@ def _part(
 
 def part_of(equations: LeverEquations, u: Array, x: Array, slopes: Array) -> Branch:
     """Return the part of a branch with some states and their slopes, (size + 1, k)."""
-    rises, by_u = equations.space.rises(x), equations.space.rises(slopes)
-    hottest = rises.argmax(axis=0), np.arange(u.size)
-    tip, tip_by = equations.space.tip_rise(x), equations.space.tip_rise(slopes)
-    values = np.vstack([equations.observed(x), rises[hottest], tip])
-    value_slopes = np.vstack([equations.observed_change(x, slopes), by_u[hottest], tip_by])
-    return Branch(equations, u, x, slopes, values.T, value_slopes.T)
+    values = np.vstack([equations.observed(x), equations.space.tip_rise(x)])
+    by_u = equations.observed_change(x, slopes), equations.space.tip_rise(slopes)
+    highest = equations.highest_rise(x)
+    return Branch(equations, u, x, slopes, values.T, np.vstack(by_u).T, highest)
 
 
 def joined(branch: Branch, after: Branch) -> Branch:
@@ -146,4 +152,5 @@ def joined(branch: Branch, after: Branch) -> Branch:
         np.hstack([branch.slopes, after.slopes]),
         np.vstack([branch.values, after.values]),
         np.vstack([branch.value_slopes, after.value_slopes]),
+        np.append(branch.highest_rise, after.highest_rise),
     )

@@ -214,10 +214,15 @@ class FullSpace(Space):
 
         Some leg ends may be warmer than the base temperature.
         """
-        T = base_temperature_K + np.where(self._T >= 0, x[self._T], 0.0)
+        rises = self.nodal_rises(x[:, None], end_rises)[:, 0]
+        return base_temperature_K + rises, np.where(self._V >= 0, x[self._V], 0.0)
+
+    def nodal_rises(self, x: Array, end_rises: Mapping[str, float] | None = None) -> Array:
+        """Return the rises of the temperature (K) of states at all nodes, (nodes, n)."""
+        rises = np.where((self._T >= 0)[:, None], x[self._T], 0.0)
         for name, rise in (end_rises or {}).items():
-            T[self.end_nodes[name]] += rise
-        return T, np.where(self._V >= 0, x[self._V], 0.0)
+            rises[self.end_nodes[name]] += rise
+        return rises
 
     def from_nodal(self, rise: Array, potential: Array, lever_V: float) -> Array:
         """Return the state with these nodal rises (K) and potentials (V)."""
@@ -229,7 +234,7 @@ class FullSpace(Space):
         return x
 
     def rises(self, x: Array) -> Array:
-        """Return the nodal rises of the temperature (K), (places, n), of states."""
+        """Return the free rises of the temperature (K), (places, n), of states."""
         return x[self.is_temperature]
 
     def rise_at(self, places: Array, x: Array) -> Array:

@@ -16,7 +16,7 @@ from hotlever.air.operator import air_operator, change_with_gap
 from hotlever.air.surface import PanelOptions
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.balances import balance_columns, balance_slopes
-from hotlever.lever.branch import HIGHEST_RISE, Branch, Reach
+from hotlever.lever.branch import Branch, Reach
 from hotlever.lever.dataset import at_bias, checked_bias, sweep_dataset
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.full_space import FullSpace
@@ -296,8 +296,8 @@ class Lever:
         Notes
         -----
         Between the states of the branch curves are within 2e-5 in V_l and I_h and 0.02 K of solved
-        ones (`solve`), a third of the mesh's error; 5e-5 and 0.05 K where a leg gets hot faster
-        than the tip. With held supplies each is solved by itself.
+        ones (`solve`), a third of the mesh's error, the highest temperature too; 5e-5 and 0.05 K
+        where a leg gets hot faster than the tip. With held supplies each is solved by itself.
         """
         values = checked_bias(bias, self.circuit)
         branch, reading, failure = self._read(values, progress)
@@ -326,8 +326,8 @@ class Lever:
         x = np.concatenate([np.zeros((space.size + 1, 0)), *(state.x for state in states)], axis=1)
         base = self.circuit.base_temperature_K
         shown = dict(zip(SHOWN, equations.observed(x), strict=True))
-        shown |= {"tip_K": base + space.tip_rise(x), "max_K": base + space.rises(x).max(axis=0)}
-        return sweep_dataset(self.probe, shown, balance_columns(equations, x), notes, sensitivities)
+        shown |= {"tip_K": base + space.tip_rise(x), "max_K": base + equations.highest_rise(x)}
+        return sweep_dataset(self, shown, balance_columns(equations, x), notes, sensitivities)
 
     @one_blas_thread
     def _dataset(
@@ -338,10 +338,8 @@ class Lever:
         slopes = balance_slopes(self.equations, branch.x, branch.slopes)
         base = self.circuit.base_temperature_K
         shown = branch.shown(u)
-        shown |= {"tip_K": branch.tip_K(u), "max_K": base + branch.curve(u)[..., HIGHEST_RISE]}
-        return sweep_dataset(
-            self.probe, shown, branch.through(balances, slopes)(u), notes, sensitivities
-        )
+        shown |= {"tip_K": branch.tip_K(u), "max_K": base + branch.highest_rise_at(u)}
+        return sweep_dataset(self, shown, branch.through(balances, slopes)(u), notes, sensitivities)
 
     @one_blas_thread
     def pulse(

@@ -91,6 +91,14 @@ class LawsAtPoints:
             self._latest = (x, (fields, self.conductivities(fields.T)))
         return self._latest[1]
 
+    def nodal_rises(self, x: Array) -> Array:
+        """Return the rises of the temperature (K) of states at all nodes, (nodes, n)."""
+        return self.space.nodal_rises(x, self.end_rises)
+
+    def highest_rise(self, x: Array) -> Array:
+        """Return the highest rise of the temperature (K) in states, between the nodes too, (n,)."""
+        return self.space.elements.highest(self.nodal_rises(x))
+
     def driven(self, share: float) -> Self:
         """Return the same with held supplies and warmer leg ends at a share of their values."""
         other = copy(self)

@@ -57,13 +57,14 @@ class ReducedSpace(Space):
     lift : ndarray, shape (full.size,)
         Potentials of a state with V_l = 1 V.
     hot : ndarray of int, optional
-        Unknowns among which the highest temperature is; by default those where the first, largest
-        mode is largest.
+        Unknowns among which the highest temperature is; all by default.
 
     Attributes
     ----------
     modes : ndarray, shape (size, full.size)
     """
+
+    is_reduced = True
 
     def __init__(
         self, full: FullSpace, modes_T: Array, modes_V: Array, lift: Array, hot: Index | None = None
@@ -93,9 +94,8 @@ class ReducedSpace(Space):
             unknowns, weights = full.reader
             values = np.vstack([modes_V, lift])[:, unknowns] @ weights
             self.reader = (np.arange(self.count, self.size + 1), values)
-        if hot is None:
-            hot = np.argsort(-np.abs(modes_T[0]))[:60]
-        self._hot = modes_T[:, hot]
+        self.elements = full.elements
+        self._hot = modes_T if hot is None else modes_T[:, hot]
         self.air = None if full.air is None else ReducedAir(full.air, modes_T, self.size)
 
     def at_points(self, points: Index, weights: Array) -> ReducedSpace:
@@ -112,6 +112,10 @@ class ReducedSpace(Space):
     def rises(self, x: Array) -> Array:
         """Return the rises of the temperature (K) at the hottest nodes, (places, n), of states."""
         return np.asarray(self._hot.T @ x[: self.count])
+
+    def nodal_rises(self, x: Array, end_rises: Mapping[str, float] | None = None) -> Array:
+        """Return the rises of the temperature (K) at the nodes of the full lever, (nodes, n)."""
+        return self.full.nodal_rises(self.expanded(x), end_rises)
 
     def expanded(self, x: Array) -> Array:
         """Return the full states of reduced ones, (full.size + 1, n)."""

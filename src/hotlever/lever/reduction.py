@@ -17,6 +17,7 @@ from hotlever.lever.lever import Lever
 from hotlever.lever.reduced import ReducedLever, ReducedSpace
 from hotlever.lever.sensitivities import Linearised
 from hotlever.materials import full_name
+from hotlever.materials.foreign_laws import own_laws
 from hotlever.probe import Probe
 from hotlever.probe.parameters import of_materials
 from hotlever.threads import one_blas_thread
@@ -143,6 +144,7 @@ def _file(lever: Lever, box: Box) -> Path | None:
         "base_temperature_K": lever.circuit.base_temperature_K,
         "gas_conductivity": probe.surroundings.gas_conductivity,
         "held": held,
+        "laws": own_laws(probe.made_of),
         "parameters": list(box.parameters),
         "options": asdict(ReductionOptions()),
         # a change of Netgen's mesh makes a new file instead of a wrong answer

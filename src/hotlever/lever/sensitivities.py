@@ -85,7 +85,7 @@ def at_fixed_bias(
 
     Parameters
     ----------
-    along : ndarray, shape (n, 5)
+    along : ndarray, shape (n, 4)
         Derivatives by u of what `Branch.curve` has.
     circuit : Circuit
     shown : ndarray, shape (n, 3, p) or (n, 4, p)

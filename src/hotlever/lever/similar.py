@@ -39,6 +39,11 @@ class SimilarLevers:
         self._moving = MovingMesh(lever.space.mesh, lever.probe)
         self._by_inverse_gap: Array | None = None
 
+    @property
+    def drawn(self) -> Probe:
+        """The probe whose drawing has the mesh."""
+        return self._lever.probe
+
     def lever(self, probe: Probe) -> Lever:
         """Return the lever of a similar probe, on the same mesh moved."""
         return Lever(probe, space=self._space(probe))

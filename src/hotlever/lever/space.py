@@ -12,11 +12,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hotlever.lever.elements import FiniteElements
 from hotlever.types import Array, Index
 
 #: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
@@ -254,9 +255,14 @@ class Space(ABC):
         Values and slopes of the function that is one at the leg ends.
     end_tests : dict of str to ndarray
         The same of each terminal by itself, where leg ends may differ.
+    elements : FiniteElements
+        Of the nodes; see `hotlever.lever.elements`.
     air : AirLoss, ReducedAir or None
         The air around the lever; see `hotlever.lever.air_loss`.
     """
+
+    #: Whether its states are combinations of modes, which are good so far as they were made for.
+    is_reduced: ClassVar[bool] = False
 
     size: int
     temperature: LinearMap
@@ -272,6 +278,7 @@ class Space(ABC):
     wired: tuple[str, ...] = ()
     end_test: Array
     end_tests: Mapping[str, Array]
+    elements: FiniteElements
     air: Any
 
     def fields(self, x: Array) -> Fields:
@@ -310,6 +317,13 @@ class Space(ABC):
     @abstractmethod
     def rises(self, x: Array) -> Array:
         """Return rises of the temperature (K), the highest among them, (places, n), of states."""
+
+    @abstractmethod
+    def nodal_rises(self, x: Array, end_rises: Mapping[str, float] | None = None) -> Array:
+        """Return the rises of the temperature (K) of states at all nodes, (nodes, n).
+
+        Some leg ends may be warmer than the base temperature.
+        """
 
     @abstractmethod
     def factorised(

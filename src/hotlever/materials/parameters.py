@@ -22,6 +22,11 @@ class Parameter(NamedTuple):
     upper: float
     meaning: str
 
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The lowest and the highest value."""
+        return self.lower, self.upper
+
 
 #: All parameters of silicon: first the six that the paper fits, in its order.
 OF_SILICON: dict[str, Parameter] = {

@@ -1,23 +1,20 @@
 """What is known of a lever before it is measured: a value and a spread for each parameter.
 
-Written as text, in the section ``[prior]`` of a probe file or on the command line:
-``3.3e17 ± 15%``, ``± 5%`` (about the probe's own value), ``0.40 ± 0.02``. ``+-`` stands for ``±``.
-The name ``dimensions`` means all of the drawing and the thickness. The scales of meters and of the
-Raman thermometer have priors too, shares such as ``± 2%``: by so much all that they show may be
-wrong together.
+How it is written: `hotlever.probe.prior_texts`. The name ``dimensions`` means all of the drawing
+and the thickness. The scales of meters and of the Raman thermometer have priors too, shares such as
+``± 2%``: by so much all that they show may be wrong together.
 """
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
@@ -29,8 +26,8 @@ from hotlever.probe.parameters import (
     parameters_of,
     usual_parameters,
 )
+from hotlever.probe.prior_texts import Written, parsed
 from hotlever.probe.shapes import EDGE_BIAS
-from hotlever.records import Record
 from hotlever.spieser2017 import published
 from hotlever.types import Array
 
@@ -66,19 +63,9 @@ SCALES = {"current_scale": "current", "reader_scale": "reader", "raman_scale": "
 _LEAST_TOLD = 1e-3
 #: Relative spreads that mean something.
 _LEAST, _MOST, _LARGEST_SHARE = 1e-6, 10.0, 0.5
-_TEXT = re.compile(r"([^±]{0,40})±([^±]{1,40})")
-
-
-class PriorTexts(Record):
-    """What is known of a lever beforehand (section ``[prior]`` of a probe file), as text."""
-
-    model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, str]
-
-    @property
-    def by_name(self) -> dict[str, str]:
-        """The text for each parameter."""
-        return self.model_extra or {}
+#: The standard deviation of a logarithm from which on it is said as a factor: up and down are as
+#: far only by that.
+_AS_A_FACTOR = 0.4
 
 
 @dataclass(frozen=True)
@@ -91,11 +78,15 @@ class Prior:
     spread : float
         Standard deviation: relative (of the logarithm), or in the parameter's unit.
     relative : bool
+        Whether the logarithm is normal, of what is known to a share or to a factor.
 
     Examples
     --------
     >>> Prior(400.0, 0.05).deviation(420.0) < 1.0
     True
+    >>> to_a_factor = Prior(1e17, math.log(3.0))
+    >>> round(to_a_factor.deviation(3e17), 6), round(to_a_factor.deviation(1e17 / 9), 6)
+    (1.0, -2.0)
     """
 
     value: float
@@ -104,7 +95,7 @@ class Prior:
 
     @property
     def absolute(self) -> float:
-        """The spread in the parameter's unit."""
+        """The spread in the parameter's unit, of small changes."""
         return self.spread * (self.value if self.relative else 1.0)
 
     def at(self, deviation: float) -> float:
@@ -121,6 +112,15 @@ class Prior:
         """Return the derivative of `deviation` by the value."""
         return 1.0 / (self.spread * (value if self.relative else 1.0))
 
+    def used(self, value: float, spread: float) -> PriorUse:
+        """Return what data made of it, a value and a standard deviation in the parameter's unit."""
+        distribution: Distribution = "log-normal" if self.relative else "normal"
+        return PriorUse(self.value, self.absolute, value, spread, distribution)
+
+
+#: Of a parameter, or of its logarithm.
+Distribution = Literal["normal", "log-normal"]
+
 
 @dataclass(frozen=True)
 class PriorUse:
@@ -132,12 +132,45 @@ class PriorUse:
         Before, in the parameter's unit.
     posterior_value, posterior_spread : float
         After.
+    distribution : {"normal", "log-normal"}
+        If log-normal, spread / value is the standard deviation of the logarithm.
+
+    Examples
+    --------
+    >>> use = Prior(1e17, math.log(3.0)).used(3e17, 3e16)
+    >>> use.stated, round(use.moved, 6), round(use.left, 3)
+    ('1e+17 ×/ 3', 1.0, 0.091)
     """
 
     value: float
     spread: float
     posterior_value: float
     posterior_spread: float
+    distribution: Distribution = "normal"
+
+    @property
+    def _by_logarithm(self) -> bool:
+        return self.distribution == "log-normal" and self.value > 0 and self.posterior_value > 0
+
+    @property
+    def moved(self) -> float:
+        """How far the data moved it, in standard deviations of the prior."""
+        if self._by_logarithm:
+            return math.log(self.posterior_value / self.value) * self.value / self.spread
+        return (self.posterior_value - self.value) / self.spread
+
+    @property
+    def left(self) -> float:
+        """The share of the prior's standard deviation that the data leave."""
+        share = self.posterior_spread / self.spread
+        return share * self.value / self.posterior_value if self._by_logarithm else share
+
+    @property
+    def stated(self) -> str:
+        """What was known, in words: ``4e+17 ± 2e+16``, or ``1e+17 ×/ 3``."""
+        if self._by_logarithm and self.spread > _AS_A_FACTOR * self.value:
+            return f"{self.value:.4g} ×/ {math.exp(self.spread / self.value):.3g}"
+        return f"{self.value:.4g} ± {self.spread:.2g}"
 
 
 class Moved(NamedTuple):
@@ -302,13 +335,9 @@ def priors_of(
         if isinstance(text, Prior):
             found[name] = text
             continue
-        value, spread, relative = _parsed(text, f"{where}: {name}")
-        share = value is None and relative and _LEAST <= spread <= _LARGEST_SHARE
-        if name in (ALL_DIMENSIONS, *SCALES) and not share:
-            raise InputError(
-                f"{where}: {name} = '{text}', expected a share such as '± 5%', at most "
-                f"{_LARGEST_SHARE:.0%}"
-            )
+        value, spread, written = parsed(text, f"{where}: {name}")
+        if name in (ALL_DIMENSIONS, *SCALES):
+            _check_common(name, text, where, value is None, spread, written)
         if name in SCALES:
             found[name] = Prior(1.0, spread)
             continue
@@ -323,14 +352,31 @@ def priors_of(
         else:
             some = [name]
         for one, own in zip(some, probe.at(some).tolist(), strict=True):
-            found[one] = Prior(own if value is None else value, spread, relative)
-            _check(found[one], known[one], f"{where}: {one}")
+            found[one] = Prior(own if value is None else value, spread, written != "unit")
+            _check(found[one], known[one], f"{where}: {one}", written)
     counting = parameters_of(probe, in_time=in_time)
     return {name: prior for name, prior in found.items() if name in counting or name in SCALES}
 
 
-def _check(prior: Prior, known: Parameter, where: str) -> None:
+def _check_common(
+    name: str, text: str, where: str, own: bool, spread: float, written: Written
+) -> None:
+    """Refuse what cannot be said of all dimensions, or of what an instrument shows."""
+    as_share = written == "share" or (written == "factor" and name not in SCALES)
+    if not (own and as_share and _LEAST <= spread <= _LARGEST_SHARE):
+        raise InputError(
+            f"{where}: {name} = '{text}', expected a share such as '± 5%', at most "
+            f"{_LARGEST_SHARE:.0%}"
+        )
+
+
+def _check(prior: Prior, known: Parameter, where: str, written: Written) -> None:
     """Refuse a prior outside what a parameter can be, or with a spread that means nothing."""
+    if written == "factor" and known.lower < 0:
+        raise InputError(
+            f"{where} may be negative: expected a spread in its unit such as '± "
+            f"{abs(known.upper) / 10:g}', found a factor"
+        )
     if not known.lower <= prior.value <= known.upper:
         raise InputError(
             f"{where} = {prior.value:g}, expected a value from {known.lower:g} to {known.upper:g} "
@@ -343,24 +389,3 @@ def _check(prior: Prior, known: Parameter, where: str) -> None:
         raise InputError(
             f"{where}: a spread of {share:.2g} times the value, expected {_LEAST:g} to {_MOST:g}"
         )
-
-
-def _parsed(text: str, where: str) -> tuple[float | None, float, bool]:
-    """Return value (None for the probe's own), spread and whether that is relative."""
-    wrong = InputError(
-        f"{where} = '{text[:60]}', expected a value and its spread such as '3.3e17 ± 15%', "
-        "'0.40 ± 0.02' or '± 5%'"
-    )
-    match = _TEXT.fullmatch(text.replace("+-", "±").replace("+/-", "±"))
-    if match is None:
-        raise wrong
-    first, second = (part.strip() for part in match.groups())
-    relative = second.endswith("%")
-    try:
-        value = float(first) if first else None
-        spread = float(second.removesuffix("%")) / (100.0 if relative else 1.0)
-    except ValueError:
-        raise wrong from None
-    if not (0 < spread < np.inf and (value is None or np.isfinite(value))):
-        raise wrong
-    return value, spread, relative

@@ -14,11 +14,13 @@ from pydantic import Field, SerializeAsAny, model_validator
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import write_text
 from hotlever.materials import HIGH_DOPED, LOW_DOPED, Kind, Material, full_name
+from hotlever.materials.foreign_laws import LAWS, own_laws, refuse_own_laws, with_laws_of
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.materials.presets import materials_of
 from hotlever.probe.circuit import Circuit, Contact, Wiring
 from hotlever.probe.layout import Layout
-from hotlever.probe.priors import PriorTexts, priors_of
+from hotlever.probe.prior_texts import PriorTexts
+from hotlever.probe.priors import priors_of
 from hotlever.probe.sections import read_sections, section_lines, with_values
 from hotlever.probe.shapes import (
     PARAMETRIC,
@@ -155,6 +157,7 @@ class Probe(Record):
         InputError
             Naming the section and key, what was found and what is expected.
         """
+        refuse_own_laws(values, where)
         for name, section in values.items():
             if name not in SECTIONS:
                 raise unknown_name("section", name, SECTIONS, where)
@@ -218,11 +221,13 @@ class Probe(Record):
         return not {LOW_DOPED, HIGH_DOPED}.isdisjoint(self.layout().materials)
 
     def values(self) -> dict[str, dict[str, Any]]:
-        """Return the sections as plain values: what `from_values` takes."""
+        """Return the sections as plain values: what `from_values` takes, or refuses."""
         found: dict[str, dict[str, Any]] = self.shape.sections()
         if self.materials:
             found[_MATERIALS] = {name: kind.model_dump() for name, kind in self.materials.items()}
         found |= {name: part.model_dump() for name, part in self._parts.items()}
+        if laws := own_laws(self.made_of):
+            found[LAWS] = laws
         return {name: with_values(section) for name, section in found.items()}
 
     def field(self, name: str) -> tuple[str, str, type[Record]]:
@@ -241,6 +246,7 @@ class Probe(Record):
             **named,
             **_PARTS,
             **wired,
+            **{f"layers.{one}": record for one, record in self.shape.layer_records().items()},
         }
         if dot and section not in records:
             raise unknown_name("section", section, [*SECTIONS, *named, *wired])
@@ -270,8 +276,13 @@ class Probe(Record):
             If a name exists in no section (the nearest one is given) or a value is impossible.
         """
         sections = self.values()
+        sections.pop(LAWS, None)
         for name, value in changes.items():
             section, key, _ = self.field(name)
+            if key in self.shape.read_with:
+                raise InputError(
+                    f"{name} counts when a drawing is read, expected it in the probe file"
+                )
             inside, (*above, last) = sections, section.split(".")
             for one in [_MATERIALS] if section in self.materials else above:
                 inside = inside.setdefault(one, {})
@@ -279,11 +290,10 @@ class Probe(Record):
         sections = {name: with_values(section) for name, section in sections.items()}
         shape = PARAMETRIC.get(str(sections["probe"]["shape"]))
         if shape is not None and not isinstance(self.shape, shape):
-            own = {
-                key: value for key, value in sections["probe"].items() if key in shape.model_fields
-            }
-            sections["probe"] = own
-        return Probe.from_values(sections, "probe")
+            own = sections["probe"].items()
+            sections["probe"] = {key: value for key, value in own if key in shape.model_fields}
+        changed: Probe = with_laws_of(self, Probe.from_values(sections, "probe"))
+        return changed
 
     def at(self, names: Sequence[str]) -> Array:
         """Return some of its values by their names in a probe file, shape (len(names),)."""
@@ -385,6 +395,8 @@ class Probe(Record):
             lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]
             values, meaning = example.model_dump(), example.description()
             lines += section_lines("tip", values, meaning, start="# ")[1:]
+        if laws := own_laws(self.made_of):
+            lines += section_lines(LAWS, laws, {})
         return "\n".join(lines) + "\n"
 
     def to_file(self, path: str | os.PathLike[str]) -> None:

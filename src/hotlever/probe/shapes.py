@@ -38,7 +38,8 @@ def thickness(meaning: str = "of the silicon") -> Any:
     return _length(meaning, 0.01, 20)
 
 
-def _edge_bias() -> Any:
+def edge_bias() -> Any:
+    """Return the bounds of how far edges are outside the drawing (µm), and what that is."""
     meaning = "all etched edges lie so far outside the drawing"
     return Field(default=0.0, ge=-MOST_EDGE_BIAS, le=MOST_EDGE_BIAS, description=meaning)
 
@@ -48,6 +49,8 @@ class Shape(Record):
 
     #: Whether the outline follows dimensions, which can be uncertain or varied.
     outline_moves: ClassVar[bool] = True
+    #: Keys of a probe file that count while it is read, and mean nothing to what was read.
+    read_with: ClassVar[tuple[str, ...]] = ()
 
     shape: str
 
@@ -56,9 +59,17 @@ class Shape(Record):
         """The names of the materials, beside ``[material]``, that it says it is made of."""
         return ()
 
+    def layer_records(self) -> dict[str, type[Record]]:
+        """Return what the sections ``[layers.NAME]`` hold, by the names of the layers."""
+        return {}
+
     @abstractmethod
     def dimensions(self) -> dict[str, float]:
         """Return the dimensions (µm) that are given and can change, by name."""
+
+    def notes(self) -> list[str]:
+        """Return what a user should hear of it before anything is solved."""
+        return []
 
     def tied(self) -> tuple[str, ...]:
         """Return dimensions that cannot change by themselves, since parts would come apart."""
@@ -155,7 +166,7 @@ class ThreeLeg(Parametric):
     reader_centre_um: float | None = _length(
         "base to the reader's centre; left out: 2/3 of the length", 0.05, 2000, default=None
     )
-    edge_bias_um: float = _edge_bias()
+    edge_bias_um: float = edge_bias()
 
     def _parts_fit(self) -> None:
         front = self.length_um - self.bridge_width_um
@@ -257,7 +268,7 @@ class UShape(Parametric):
     )
     heater_width_um: float = _length("along the lever")
     thickness_um: float = thickness()
-    edge_bias_um: float = _edge_bias()
+    edge_bias_um: float = edge_bias()
 
     def _parts_fit(self) -> None:
         _need(
@@ -293,6 +304,10 @@ class UShape(Parametric):
     def _filled(self) -> bool:
         """Whether the heater fills the gap."""
         return self.heater_length_um == self.gap_um
+
+    def notes(self) -> list[str]:
+        """Return what a user should hear of it before anything is solved."""
+        return []
 
     def tied(self) -> tuple[str, ...]:
         """Return gap and length of a heater that fills it."""

@@ -7,11 +7,17 @@ from collections.abc import Callable
 import numpy as np
 
 from hotlever import figures
-from hotlever.fitting.batch import Batch
-from hotlever.fitting.levers import compare_levers, statements
-from hotlever.fitting.result import Fit
-from hotlever.fitting.uncertainty import Uncertainty
-from hotlever.fitting.words import lever_rows, outcome, parameter_rows, uncertainty_tables
+from hotlever.estimation.batch import Batch
+from hotlever.estimation.levers import compare_levers, statements
+from hotlever.estimation.result import Fit
+from hotlever.estimation.uncertainty import Uncertainty
+from hotlever.estimation.words import (
+    NEAREST,
+    lever_rows,
+    outcome,
+    parameter_rows,
+    uncertainty_tables,
+)
 from hotlever.lever import Lever
 from hotlever.report.page import Block, Page
 from hotlever.text import INVERSION, sentence
@@ -48,9 +54,7 @@ def add_fit(page: Page, fit: Fit) -> None:
     model = lever.sweep(measured.bias.values)
     page.figure(
         "fit_data_and_model",
-        figures.data_and_model(
-            measured, model, fit.observables, with_priors=bool(fit.options.priors)
-        ),
+        figures.data_and_model(measured, model, fit.observables),
         "Measured and modelled observables against bias, and their difference. "
         "Grey: the stated error of the measured temperature.",
     )
@@ -59,7 +63,9 @@ def add_fit(page: Page, fit: Fit) -> None:
         "fit_tip_band",
         figures.tip_band(fit.band, measured),
         "The tip temperature that the fit predicts, with the band that follows from the "
-        "covariance of the parameters (model errors not included).",
+        "covariance of the parameters (model errors not included)."
+        if fit.describes_data
+        else "The tip temperature of the nearest lever, which is no estimate.",
     )
     low, high = measured.bias.values[[0, -1]].tolist()
     curve = lever.sweep(np.linspace(low, high, _POINTS))
@@ -79,18 +85,23 @@ def add_fit(page: Page, fit: Fit) -> None:
 
 
 def _add_words(page: Page, fit: Fit) -> None:
+    if not fit.describes_data:
+        page.text(sentence(fit.doubt))
+        page.text(sentence(NEAREST))
     page.table(
         ("parameter", "value", "unit", ""),
         parameter_rows(fit),
-        "Material parameters; standard errors in units of the last digits.",
+        "Material parameters; standard errors in units of the last digits."
+        if fit.describes_data
+        else "Material parameters of the nearest lever.",
     )
-    for text in [f"no such lever shows these data: {fit.reason}"] * bool(fit.reason) + fit.notes:
+    for text in fit.notes:
         page.text(sentence(text))
     page.text(f"{'; '.join(outcome(fit))}.")
 
 
 def _add_correlation(page: Page, fit: Fit) -> None:
-    if len(fit.names) < 2:
+    if len(fit.names) < 2 or not fit.describes_data:
         return
     page.figure(
         "fit_correlation",
@@ -106,8 +117,12 @@ def _add_fit_in_time(page: Page, fit: Fit) -> None:
         "fit_in_time",
         figures.fitted_history(measured, fit.model(), fit.observables, fit.band),
         "Measured and modelled observables against time, and their difference; and the tip "
-        "temperature that the fit predicts, with the 95 % band that follows from the covariance of "
-        "the parameters (model errors not included).",
+        + (
+            "temperature that the fit predicts, with the 95 % band that follows from the "
+            "covariance of the parameters (model errors not included)."
+            if fit.describes_data
+            else "temperature of the nearest lever, which is no estimate."
+        ),
     )
     _add_correlation(page, fit)
 
@@ -163,7 +178,8 @@ def levers_page(batch: Batch) -> Page:
     )
     columns, *rows = lever_rows(levers)
     page.table(columns, rows, "Standard errors in units of the last digits.")
-    noted = [(name, text) for name, one in batch.fits.items() for text in one["notes"]]
+    noted = [*batch.undescribed.items()]
+    noted += [(name, text) for name, one in batch.fits.items() for text in one["notes"]]
     if noted:
         page.heading("What single fits say")
         page.table(("lever", "note"), noted)

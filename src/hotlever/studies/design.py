@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,11 +13,12 @@ import xarray as xr
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import unknown_name
 from hotlever.lever import Lever
-from hotlever.materials import PARAMETERS
+from hotlever.materials import LOW_DOPED, full_name
 from hotlever.materials.doping import diffusion_length
 from hotlever.probe import MeshOptions, Probe
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.steps import each
+from hotlever.text import parameter_named
 from hotlever.types import Array, Progress
 
 #: What follows from a design; k is the power of the knee in air over that in vacuum.
@@ -30,14 +31,16 @@ ANNEALING = {
     "annealing_K": "temperature of the annealing",
     "annealing_min": "time of the annealing",
 }
-#: What a designer asks for first.
-USUAL = ("heater_length_um", "heater_width_um", "thickness_um", "n_d", *ANNEALING)
+#: What a designer asks of the heater first, by its name in a shape or a material.
+_OF_SHAPES = ("heater_length_um", "heater_width_um", "scale", "thickness_um")
+_OF_HEATERS = ("n_d", "resistivity")
 #: Of these, what the table of sensitivities shows.
 _SHOWN = ("knee_K", "knee_mW", "knee_V", "knee_bias_V", "tip_K", "cold_ohm", "k")
 #: Relative change by which a sensitivity is found; for the annealing temperature far smaller.
 _STEP = 0.02
 #: Between the coarse and the default mesh, for differences between levers.
 DESIGN_MESH = MeshOptions(corner=0.1, heater=0.35, lever=0.15, panels=0.6)
+_NO_KNEE = "no knee: the lever voltage rises until something melts"
 #: √(T_tip − T_base) (K^½) of a lever that is called cold.
 _COLD_U = 0.5
 
@@ -65,17 +68,40 @@ class Design:
         InputError
             If there is none; the text gives the nearest one.
         """
-        if name in ANNEALING:
-            return float(getattr(self, name))
-        known = {
-            key: entry
-            for section in self.probe.values().values()
-            for key, entry in section.items()
-            if type(entry) in (int, float)
-        }
+        known = self.numbers
         if name not in known:
-            raise unknown_name("name", name, [*known, *ANNEALING])
-        return float(known[name])
+            raise unknown_name("name", name, known)
+        return known[name]
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """All that can be varied, by name: the numbers of the probe file, and the annealing."""
+        fixed, found = (*self.probe.shape.read_with, "tolerance_um"), dict[str, float]()
+        for section, entries in self.probe.values().items():
+            for key, entry in entries.items():
+                if isinstance(entry, Mapping):
+                    # a material's name is enough, a layer or a contact has its section before it
+                    start = key if section == "materials" else f"{section}.{key}"
+                    found |= {f"{start}.{own}": one for own, one in entry.items() if _number(one)}
+                elif _number(entry) and key not in fixed:
+                    found[key] = float(entry)
+        return found | {name: getattr(self, name) for name in ANNEALING if self._is_annealed}
+
+    @property
+    def usual(self) -> tuple[str, ...]:
+        """What a designer asks for first: of a drawing, what it has in place of dimensions."""
+        names = self.numbers
+        heater = self.probe.layout().heater.stack
+        of_heater = [full_name(film.material, own) for film in heater for own in _OF_HEATERS]
+        thickness = [name for name in names if name.startswith("layers.")]
+        first = (*_OF_SHAPES, *thickness, *of_heater, *ANNEALING)
+        return tuple(name for name in dict.fromkeys(first) if name in names)
+
+    @property
+    def _is_annealed(self) -> bool:
+        """Whether dopant of the silicon of ``[material]`` diffuses anywhere."""
+        regions = self.probe.layout().regions
+        return any(one.taper is not None and one.stack[0].material == LOW_DOPED for one in regions)
 
     def changed(self, name: str, value: float) -> Probe:
         """Return the probe with one value changed.
@@ -92,6 +118,10 @@ class Design:
             diffusion_length(one.annealing_K, 60.0 * one.annealing_min) for one in (self, other)
         )
         return self.probe.with_(delta=self.probe.material.delta * float(after / before))
+
+
+def _number(entry: Any) -> bool:
+    return type(entry) in (int, float)
 
 
 def quantities(probe: Probe, power_mW: float, air: bool = True) -> dict[str, float]:
@@ -163,7 +193,7 @@ def vary(
 
 def sensitivities(
     design: Design,
-    names: Sequence[str] = USUAL,
+    names: Sequence[str] | None = None,
     *,
     power_mW: float = 2.0,
     air: bool = True,
@@ -171,21 +201,18 @@ def sensitivities(
 ) -> xr.Dataset:
     """Return the quantities of a design, and how each changes with some of its numbers.
 
+    These are by default its `Design.usual` ones.
+
     Returns
     -------
     xarray.Dataset
         `QUANTITIES` of the design; and on ``name`` its ``value`` and, as ``by_`` each quantity,
         the change for one per cent more of it, in K for temperatures and in per cent for
         everything else; central differences.
-
-    Raises
-    ------
-    ComputationError
-        If the design has no knee.
     """
+    design.probe.circuit.need_cold_start("a study of a design")
+    names = design.usual if names is None else names
     base = quantities(design.probe, power_mW, air)
-    if np.isnan(base["knee_K"]):
-        Lever(design.probe.in_medium("vacuum"), DESIGN_MESH).knee()  # says why
     columns: dict[str, list[float]] = {f"by_{key}": [] for key in QUANTITIES}
     value = [design.value(name) for name in names]
     for name, here in each(list(zip(names, value, strict=True)), progress):
@@ -211,7 +238,7 @@ def knee_notes(data: xr.Dataset) -> list[str]:
     if not without.size:
         return []
     values = ", ".join(f"{value:g}" for value in without)
-    return [f"no knee with {name} = {values}: the lever voltage rises until something melts"]
+    return [_NO_KNEE.replace("no knee", f"no knee with {name} = {values}")]
 
 
 def sensitivity_text(data: xr.Dataset) -> str:
@@ -219,10 +246,16 @@ def sensitivity_text(data: xr.Dataset) -> str:
     base = {key: data[key].item() for key in QUANTITIES}
     shown = [key for key in _SHOWN if np.isfinite(base[key])]
     width = max(map(len, data.name.values))
+    knee = (
+        _NO_KNEE
+        if np.isnan(base["knee_K"])
+        else f"knee at {base['knee_K']:.0f} K, {base['knee_V']:.3f} V, {base['knee_mA']:.3f} mA, "
+        f"{base['knee_mW']:.3f} mW (bias {base['knee_bias_V']:.2f} V)"
+    )
+    if np.isfinite(base["inversion_K"]):
+        knee += f", inversion temperature {base['inversion_K']:.0f} K"
     lines = [
-        f"knee at {base['knee_K']:.0f} K, {base['knee_V']:.3f} V, {base['knee_mA']:.3f} mA, "
-        f"{base['knee_mW']:.3f} mW (bias {base['knee_bias_V']:.2f} V), inversion temperature "
-        f"{base['inversion_K']:.0f} K; tip at {base['tip_K']:.0f} K with "
+        f"{knee}; tip at {base['tip_K']:.0f} K with "
         f"{data.attrs['power_mW']:g} mW; {base['cold_ohm']:.0f} ohm when cold"
         + ("" if np.isnan(base["k"]) else f"; k = {base['k']:.3f} in air"),
         "change for 1 % more of each (K for temperatures, % for the others):",
@@ -245,8 +278,5 @@ def label_of(name: str) -> str:
     """Return the label of an axis along which a number of a design runs."""
     if name in ANNEALING:
         return f"{ANNEALING[name]} ({name.rpartition('_')[2]})"
-    if name in PARAMETERS:
-        known = PARAMETERS[name]
-        return known.symbol if known.unit == "1" else f"{known.symbol} ({known.unit})"
-    words, _, unit = name.rpartition("_")
-    return f"{words.replace('_', ' ')} ({unit.replace('um', 'µm').replace('ohm', 'Ω')})"
+    known = parameter_named(name)
+    return known.symbol if known.unit == "1" else f"{known.symbol} ({known.unit})"

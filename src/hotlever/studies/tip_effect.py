@@ -13,7 +13,7 @@ import xarray as xr
 
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError
-from hotlever.fitting import Measurement, fit
+from hotlever.estimation import Measurement, fit
 from hotlever.lever import Branch, Lever, OperatingPoint
 from hotlever.probe import Probe, Tip
 from hotlever.spieser2017 import RAMP

@@ -23,7 +23,7 @@ from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.datasets import labelled
 from hotlever.errors import BranchEndError, HotleverError
-from hotlever.fitting import Measurement
+from hotlever.estimation import Measurement
 from hotlever.lever import Branch, Lever
 from hotlever.lever.equations import LeverEquations
 from hotlever.materials import LOW_DOPED
@@ -223,8 +223,7 @@ def judge(
         rows, doubted = found.table, found.reason
         tip = lever.sweep(rows.bias_V.values).tip_K.values
         off[0] = rows.tip_K.values - tip
-        limit = np.where(off[0] > 0, rows.tip_low_K.values, rows.tip_high_K.values)
-        stated = np.abs(limit - rows.tip_K.values) / BAND
+        stated = stated_on_that_side(rows, off[0])
         with suppress(HotleverError):
             for place, way in enumerate(paper_ways(data, nominal), start=1):
                 off[place] = way(rows.power_mW.values) - tip
@@ -238,6 +237,29 @@ def judge(
     }
     coordinates = {"way": list(WAYS), "twin": number, "other_law": "mobility" in departures}
     return labelled(columns, (), coordinates)
+
+
+def stated_on_that_side(table: xr.Dataset, off_K: Array) -> Array:
+    """Return the standard errors (K) of a calibration's table on the side it is off to, (n,)."""
+    limit = np.where(off_K > 0, table.tip_low_K.values, table.tip_high_K.values)
+    return np.asarray(np.abs(limit - table.tip_K.values) / BAND)
+
+
+def held_by_decile(ratios: Sequence[Array]) -> Array:
+    """Return the share of rows within the band, by level of confidence and decile of the bias.
+
+    Parameters
+    ----------
+    ratios : sequence of ndarray
+        Error over stated error of each twin, (rows,), rising in bias; every twin counts alike.
+
+    Returns
+    -------
+    ndarray, shape (levels, 10)
+    """
+    parts = [np.array_split(one, _DECILES) for one in ratios]
+    held = [[[np.mean(part < limit) for part in one] for one in parts] for limit in LEVELS.values()]
+    return np.mean(held, axis=1)
 
 
 def together(judged: Sequence[xr.Dataset]) -> xr.Dataset:
@@ -258,12 +280,10 @@ def summary(found: xr.Dataset) -> xr.Dataset:
     """
     answered = found.isel(twin=(found.refused == "").values)
     ratio = abs(answered.off_K.sel(way=ESTIMATE) / answered.stated_K).values
+    # of data that are not described no error is stated
+    ratio = ratio[np.isfinite(ratio).any(axis=1)]
     largest = abs(answered.off_K).max("row").transpose("way", "twin").values
-    parts = [np.array_split(one[np.isfinite(one)], _DECILES) for one in ratio]
-    held = [
-        np.mean([[np.mean(part < limit) for part in one] for one in parts], axis=0)
-        for limit in LEVELS.values()
-    ]
+    held = held_by_decile([one[np.isfinite(one)] for one in ratio])
     return labelled(
         {
             "largest_K": (("way", "percentile"), np.nanpercentile(largest, PERCENTILES, axis=1).T),

@@ -11,6 +11,7 @@ from hotlever.app.rooms.results import SHOWING, download_button
 from hotlever.app.rooms.room import MEDIA, REFERENCE, choice, field, several
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
+from hotlever.text import sentence, value_with_error
 
 #: What a calibration rests on: the option of the command, and what it is called.
 _RESTS = {"probe": "--probe", "fit": "--fit", "law": "--power-law"}
@@ -65,8 +66,7 @@ class CalibrateRoom(MeasuredRoom):
         kind, _, name = chosen["rests"].partition(":")
         if name:
             arguments += [_RESTS[kind], named(name)]
-        for column in chosen.get("columns", []):
-            arguments += ["--column", column]
+        arguments += self.column_options()
         if chosen.get("medium"):
             arguments += ["--medium", chosen["medium"]]
         arguments += several("--prior", chosen.get("priors"))
@@ -84,9 +84,19 @@ class CalibrateRoom(MeasuredRoom):
         await self._questions(name)
 
     async def _questions(self, name: str) -> None:
-        """Show what to set for a temperature, and what a bias or a power gives."""
+        """Show what to set for a temperature, and what a bias or a power gives, or why not."""
+        doubt: str | None = None
+        with self.complaint.caught():
+            call, folder = f"{SHOWING}:doubted", self.session.project.folder
+            doubt = await self.session.full.call(call, folder, name)
+        if doubt is None:
+            return
         with ui.card().classes("w-full").props("flat bordered"):
             ui.label("What do I set?").classes("text-bold")
+            if doubt:
+                said = f"This calibration does not tell. {sentence(doubt)}"
+                ui.label(said).classes("remark").props("data-answer=none")
+                return
             asked = [_Question(self.session, name, along) for along in _ASKED]
         for one in asked:
             await one.answer()
@@ -125,6 +135,6 @@ def _answer(row: dict[str, float]) -> str:
     low, high = row["tip_low_K"], row["tip_high_K"]
     return (
         f"set a bias of {row['bias_V']:.3f} V: lever {row['lever_V']:.3f} V, "
-        f"{row['current_mA']:.4f} mA, {row['power_mW']:.3f} mW; tip {row['tip_K']:.0f} K "
-        f"± {row['tip_stderr_K']:.0f} K (95 %: {low:.0f} to {high:.0f} K)"
+        f"{row['current_mA']:.4f} mA, {row['power_mW']:.3f} mW; tip "
+        f"{value_with_error(row['tip_K'], row['tip_stderr_K'])} K (95 %: {low:.0f} to {high:.0f} K)"
     )

@@ -63,13 +63,25 @@ class Picture:
         self._mesh.tooltip("The triangles that the lever is solved on")
         self._column = ui.column().classes("w-full gap-1")
 
-    async def of(self, function: str, *arguments: Any) -> dict[str, Any]:
-        """Have a probe drawn by a function of the worker."""
-        call = f"{SHOWING}:{function}"
-        drawn: dict[str, Any] = await self._session.quick.call(
-            call, *arguments, self._chosen["mesh"]
-        )
+    def clear(self) -> None:
+        """Show none."""
         self._column.clear()
+
+    async def of(self, function: str, *arguments: Any) -> dict[str, Any]:
+        """Have a probe drawn by a function of the worker.
+
+        Raises
+        ------
+        HotleverError
+            If it cannot be drawn. No picture is shown then: the last one is of another probe.
+        """
+        call = f"{SHOWING}:{function}"
+        try:
+            drawn: dict[str, Any] = await self._session.quick.call(
+                call, *arguments, self._chosen["mesh"]
+            )
+        finally:
+            self._column.clear()
         with self._column:
             figure(drawn["figure"], "The lever from above: regions, terminals and tip", wide=True)
             if not drawn["fault"]:

@@ -26,6 +26,7 @@ class FitRoom(MeasuredRoom):
 
     name, kind, ending = "fit", "fit", FIT
     button, icon = "Fit", "query_stats"
+    tellable = ("columns", "waveform")
 
     def options(self) -> None:
         """Show what is fitted, and how."""
@@ -47,7 +48,8 @@ class FitRoom(MeasuredRoom):
             self._medium = choice("Medium", MEDIA, chosen.get("medium", ""), self._choose)
             self._fixed = field("Hold (n_d=3.3e17, p)", chosen.get("fixed", ""), self._choose)
             pulse = "Pulse of a file in time (10V,20us)"
-            field(pulse, chosen.get("waveform", ""), self._told).props("debounce=600")
+            self._waveform = field(pulse, self.told.get("waveform", ""), self._tell_waveform)
+            self._waveform.props("debounce=600")
             self._free = field("Vary too (film.tcr)", chosen.get("free", ""), self._choose)
             known = "Known beforehand (n_d=3.3e17±15%)"
             self._priors = field(known, chosen.get("priors", ""), self._choose)
@@ -60,9 +62,16 @@ class FitRoom(MeasuredRoom):
         self.chosen |= {"free": self._free.value, "priors": self._priors.value}
         self.show_command()
 
-    async def _told(self, event: Any) -> None:
-        self.chosen["waveform"] = (event.value or "").replace(" ", "")
-        await self.read()
+    async def _tell_waveform(self, event: Any) -> None:
+        waveform = (event.value or "").replace(" ", "")
+        if waveform != self.told.get("waveform", ""):  # typed, and not shown for another file
+            self.told["waveform"] = waveform
+            await self.read()
+
+    def show_told(self) -> None:
+        """Show what was told of the measurement that is chosen."""
+        super().show_told()
+        self._waveform.set_value(self.told.get("waveform", ""))
 
     def understood(self) -> None:
         """Offer what was measured."""
@@ -80,11 +89,10 @@ class FitRoom(MeasuredRoom):
         kept = [name for name in self.has if name not in chosen.get("without", [])]
         if kept != self.has:
             arguments += ["--observables", ",".join(kept)]
-        for column in chosen.get("columns", []):
-            arguments += ["--column", column]
+        arguments += self.column_options()
         arguments += several("--fix", chosen.get("fixed"))
-        if chosen.get("waveform"):
-            arguments += ["--pulse", chosen["waveform"]]
+        if self.told.get("waveform"):
+            arguments += ["--pulse", self.told["waveform"]]
         if chosen.get("free"):
             arguments += ["--free", chosen["free"].replace(" ", "")]
         arguments += several("--prior", chosen.get("priors"))

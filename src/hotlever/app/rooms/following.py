@@ -47,7 +47,8 @@ class Following:
             self._knee = number_shown("knee", "knee of the I-V curve")
         self._model = ui.label("starting").classes("text-xs opacity-70").props("aria-live=polite")
         self._notes = ui.label().classes("text-sm remark")
-        self._plots = LivePlots()
+        with ui.column().classes("w-full") as self._around:
+            self._plots = LivePlots()
 
     def follow(self, sliders: Sliders) -> None:
         """Have the lever follow; while it does, only what is wanted last counts."""
@@ -93,6 +94,7 @@ class Following:
             answer = await desk.call(f"{LIVE}:answer", folder, wanted["probe"], changes, ask)
         except HotleverError as error:
             if not self._model.is_deleted:
+                self._blank()
                 self._complaint.say(str(error))
             return False
         if self._model.is_deleted:  # the tab was closed meanwhile
@@ -100,6 +102,7 @@ class Following:
         if any(wanted[key] != self._chosen[key] for key in ("probe", "changes")) and not quick:
             return False  # parameters have moved on while the full lever was solved
         self._complaint.clear()
+        self._around.set_visibility(True)
         now, knee = answer["now"], answer["curves"]["knee"]
         for key, (_, form) in _NUMBERS.items():
             value = now[key]
@@ -110,6 +113,14 @@ class Following:
         self._notes.set_text("; ".join(now["notes"]))
         self._plots.show(answer)
         return True
+
+    def _blank(self) -> None:
+        """Show no numbers where there are none: the last ones were of another state."""
+        for label in (*self._shown.values(), self._knee):
+            label.set_text("–")
+        self._model.set_text("no state is shown")
+        self._notes.set_text("")
+        self._around.set_visibility(False)
 
     def _geometry(self, wanted: dict[str, Any]) -> Any:
         """Return what a reduced lever belongs to, in what is wanted."""

@@ -43,14 +43,14 @@ class Opened:
 
     def set_up(self, session: Session) -> None:
         """Take the example, and choose."""
-        chosen = session.chosen.setdefault(self.room.strip("/"), {})
-        chosen |= deepcopy(self.chosen)
-        source = EXAMPLES / self.example
+        chosen = deepcopy(self.chosen)
         if self.key:
             chosen[self.key] = session.project.take_example(self.example)
         elif self.example:
-            for folder in sorted(one.name for one in source.iterdir() if one.is_dir()):
-                list(session.project.take_example_folder(f"{self.example}/{folder}", folder))
+            inside = (EXAMPLES / self.example).iterdir()
+            folders = sorted(one.name for one in inside if one.is_dir())
+            session.project.take_example_folders(self.example, *folders)
+        session.chosen.setdefault(self.room.strip("/"), {}).update(chosen)
 
     def open(self, session: Session, complaint: Complaint) -> None:
         """Set the room up, and go there."""

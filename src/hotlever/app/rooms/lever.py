@@ -9,21 +9,19 @@ from nicegui import ui
 
 from hotlever.app.jobs import Job, named
 from hotlever.app.page import Complaint, Work, drop_zone, hand_over, two_columns
-from hotlever.app.project import DRAWINGS, safe_name
+from hotlever.app.project import DRAWINGS
 from hotlever.app.rooms.drawn import Fields, Picture
+from hotlever.app.rooms.imported import Imports
+from hotlever.app.rooms.probe_file import ProbeFile
 from hotlever.app.rooms.results import FIGURE_FILES, SHOWING
 from hotlever.app.rooms.room import Room
 from hotlever.app.session import Session
-from hotlever.errors import HotleverError
-from hotlever.files import read_text, write_text
+from hotlever.errors import HotleverError, InputError
 
 _SHAPES = {"three-leg": "three legs", "u-shape": "two legs (U)"}
 _FILE = "a probe file or a drawing"
+_NEW = "my-lever.toml"
 _DROP = "Drop a drawing here (GDSII, OASIS, DXF), or a probe file"
-
-
-#: Bytes that a probe file may have.
-_LARGEST = 1_000_000
 
 
 class LeverRoom(Room):
@@ -34,21 +32,22 @@ class LeverRoom(Room):
     def __init__(self, session: Session, complaint: Complaint) -> None:
         super().__init__(session, complaint)
         start: dict[str, Any] = {"shape": "three-leg", "changes": {}, "text": None}
-        self.chosen |= start | self.chosen
+        self.chosen |= start | {"name": _NEW, "saved": ""} | self.chosen
+        self._file = ProbeFile(session, self.chosen)
         self._shown_text, self._fault = "", ""
         with two_columns() as (left, right):
             with left:
                 drop_zone(session, complaint, _DROP, self._dropped)
-                self._pick = ui.select(
-                    self._files, label="Open", on_change=self._picked, clearable=True
-                )
-                self._pick.classes("w-full").props("dense outlined")
+                self._pick = ui.select(self._files, label="Open")
+                self._pick.on_value_change(lambda event: self._open(event.value))
+                self._pick.classes("w-full").props("dense outlined clearable")
                 self._shape = ui.toggle(
                     _SHAPES, value=self.chosen["shape"], on_change=self._take_shape
                 ).props("no-caps dense unelevated")
                 self._fields = Fields(self._change)
             with right:
-                Work(session, self.name, self._imported)
+                self._work = Work(session, self.name, self._ended)
+                self._imports = Imports(session, self.chosen, self.run, self._begin, self._show)
                 self._picture = Picture(session, self.chosen, self._draw)
                 self._save()
                 with ui.expansion("The probe file").classes("w-full").props("dense"):
@@ -64,7 +63,7 @@ class LeverRoom(Room):
 
     def _save(self) -> None:
         with ui.row().classes("items-center w-full"):
-            self._name = ui.input("Save as", value=self.chosen.get("name", "my-lever.toml"))
+            self._name = ui.input("Save as", value=self.chosen["name"])
             self._name.props("dense outlined")
             ui.button("Save", icon="save", on_click=self._write).props("no-caps")
             ui.button("Simulate", icon="tune", on_click=self._simulate).props("no-caps outline")
@@ -74,21 +73,22 @@ class LeverRoom(Room):
                 )
 
     async def open(self) -> None:
-        """Show what was open last; a drawing that was just dropped is imported."""
-        drawing = self.chosen.pop("drawing", None)
-        if drawing is not None:
-            self._import(drawing)
-            return
-        if self.chosen["text"] is not None:
-            self._quietly(self.chosen["text"])
+        """Show what was open last; a drawing that was just dropped is opened."""
+        with self.complaint.caught():
+            self._file.take_up()
+        self._quietly(self.chosen["text"] or "")
         await self._draw(fields=True)
+        await self._open(self.chosen.get("drawing"))
 
     # --- parametric -------------------------------------------------------------------------------
 
     async def _take_shape(self, event: Any) -> None:
         if event.value is None:  # a file is open
             return
-        self.chosen |= {"shape": event.value, "changes": {}, "text": None}
+        self._work.hide()
+        name = self._name.value if self.chosen["text"] is None else _NEW
+        self.chosen |= {"shape": event.value, "changes": {}}
+        self._begin(name, None)
         self._pick.set_value(None)
         await self._draw(fields=True)
 
@@ -104,6 +104,9 @@ class LeverRoom(Room):
         """Draw what is chosen."""
         chosen, title = self.chosen, self._name.value
         text = chosen["text"]
+        if text == "":  # nothing is open
+            self._picture.clear()
+            return
         try:
             if text is not None:
                 folder = self.session.project.folder
@@ -126,48 +129,52 @@ class LeverRoom(Room):
 
     async def _dropped(self, names: list[str]) -> None:
         self._pick.set_options(self._files)
-        if names[-1] in self._files:
-            self._pick.set_value(names[-1])
-        else:
+        if names[-1] not in self._files:
             self.complaint.say(f"{names[-1]}: unknown type of file, expected {_FILE}")
+        elif self._pick.value == names[-1]:  # dropped again
+            await self._open(names[-1])
+        else:
+            self._pick.set_value(names[-1])
 
-    async def _picked(self, event: Any) -> None:
-        name = event.value
+    async def _open(self, name: str | None) -> None:
+        """Show a probe file, or the probe of a drawing."""
         if name is None:
             return
+        if not await self._file.may_go():
+            self._imports.clear()
+            self._pick.set_value(None)
+            return
         self.complaint.clear()
+        self._work.hide()
         if name.lower().endswith(DRAWINGS):
-            self._import(name)
-            return
-        with self.complaint.caught():
-            path = self.session.project.path(name)
-            text = read_text(path, largest=_LARGEST)
-            self._name.set_value(path.name)
-            self._fields.clear()
-            self.chosen["text"] = text
-            self._quietly(text)
-            await self._draw()
+            await self._imports.open(name, self.session.jobs.by_room.get(self.name))
+        else:
+            await self._show(name)
 
-    def _import(self, drawing: str) -> None:
-        """Have a probe file proposed for a drawing."""
-        stem = Path(drawing).stem
-        arguments = ["probe", "import", named(drawing), "-o", f"{stem}.toml"]
-        if self.run([*arguments, "--plot", f"{stem}.svg"]):
-            self.chosen["name"] = f"{stem}.toml"
-            self._name.set_value(f"{stem}.toml")
-
-    async def _imported(self, job: Job) -> None:
-        if job.standing != "done":
-            return
-        output = job.arguments[job.arguments.index("-o") + 1]
-        path = self.session.project.path(output)
-        self._pick.set_options(self._files)
+    def _begin(self, name: str = "", text: str | None = "") -> None:
+        """Show no lever until another one is there: none may stand under the other's name."""
+        self._fault = ""
+        self.chosen |= {"name": name, "text": text, "saved": ""}
+        self._name.set_value(name)
         self._fields.clear()
-        self.chosen["text"] = path.read_text(encoding="utf-8")
-        self._quietly(self.chosen["text"])
-        await self._draw()
-        outlines = self.session.project.path(f"{path.stem}.svg").read_text(encoding="utf-8")
-        self._picture.add(job.result, outlines)
+        self._picture.clear()
+        self._imports.clear()
+        self._quietly("")
+        self.show_command()
+
+    async def _show(self, name: str, listing: str = "", plot: str = "") -> None:
+        """Show a probe file, and what the drawing holds that it was proposed for."""
+        self._begin(name)
+        with self.complaint.caught():
+            self._quietly(self._file.open(name))
+            await self._draw()
+            if plot:
+                outlines = self.session.project.path(plot).read_text(encoding="utf-8")
+                self._picture.add(listing, outlines)
+
+    async def _ended(self, job: Job) -> None:
+        self._pick.set_options(self._files)
+        await self._imports.done(job)
 
     async def _edited(self, event: Any) -> None:
         if event.value != self._shown_text:
@@ -191,31 +198,29 @@ class LeverRoom(Room):
         mesh = ["--mesh"] if self.chosen["mesh"] else []
         return ["probe", "show", named(name), "--plot", f"{Path(name).stem}.svg", *mesh]
 
-    def _write(self) -> bool:
-        if self._fault and self.chosen["text"] is None:
-            self.complaint.say(self._fault)
-            return False
+    async def _write(self) -> bool:
+        """Write the probe file; return whether it is there now."""
         with self.complaint.caught():
-            name = safe_name(self._name.value or "")
-            name = name if name.endswith(".toml") else f"{name}.toml"
-            write_text(self.session.project.path(name), self._shown_text)
+            if self._fault and self.chosen["text"] is None:
+                raise InputError(self._fault)
+            name = await self._file.save(self._name.value or "", self._shown_text)
+            if name is None:
+                return False
             self._name.set_value(name)
-            self.chosen["name"] = name
             self._pick.set_options(self._files)
             ui.notify(f"{name} is written", type="positive")
             return True
         return False
 
-    def _simulate(self) -> None:
-        if self._write():
+    async def _simulate(self) -> None:
+        if await self._write():
             self.session.chosen["simulate"] = {"probe": self._name.value}
             ui.navigate.to("/simulate")
 
     async def _give(self, suffix: str) -> None:
-        if self._write():
+        if await self._write():
             with self.complaint.caught():
-                call, folder = f"{SHOWING}:probe_file", self.session.project.folder
-                name = self._name.value
+                name, folder = self._name.value, self.session.project.folder
                 asked = folder, name, suffix, self.chosen["mesh"]
-                made = self.session.quick.call(call, *asked)
+                made = self.session.quick.call(f"{SHOWING}:probe_file", *asked)
                 await hand_over(made, f"{Path(name).stem}{suffix}")

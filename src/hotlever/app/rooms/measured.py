@@ -26,6 +26,8 @@ class MeasuredRoom(Room):
     kind, ending = "", ""
     #: Of the button that makes it.
     button, icon = "", ""
+    #: What its command takes of what can be told of a file, see `Session.told_of`.
+    tellable: tuple[str, ...] = ("columns",)
 
     def __init__(self, session: Session, complaint: Complaint) -> None:
         super().__init__(session, complaint)
@@ -113,11 +115,11 @@ class MeasuredRoom(Room):
                 "outline no-caps dense"
             )
         with ui.expansion("Columns with other names").classes("w-full").props("dense"):
-            ui.textarea(
-                value="\n".join(self.chosen.get("columns", [])),
-                placeholder="I_h (uA)=Current",
-                on_change=self._columns,
-            ).props('dense outlined autogrow aria-label="Which column is which, one on a line"')
+            self._columns = ui.textarea(
+                value=self._columns_told(), placeholder="I_h (uA)=Current", on_change=self._tell
+            )
+            label = "Which column is which, one on a line"
+            self._columns.props(f'dense outlined autogrow aria-label="{label}"')
             ui.label("One on a line: QUANTITY (UNIT)=NAME of the column, or its number.").classes(
                 "text-xs opacity-70"
             )
@@ -145,12 +147,32 @@ class MeasuredRoom(Room):
 
     async def _picked(self, event: Any) -> None:
         self.chosen["data"] = event.value
+        self.show_told()
         await self.read()
 
-    async def _columns(self, event: Any) -> None:
+    @property
+    def told(self) -> dict[str, Any]:
+        """What was told of this measurement, in whatever room; see `Session.told_of`."""
+        return self.session.told_of(self.chosen.get("data"))
+
+    def column_options(self) -> list[str]:
+        """Return the options of a command that say which column is which."""
+        columns = self.told.get("columns", [])
+        return [word for column in columns for word in ("--column", column)]
+
+    def _columns_told(self) -> str:
+        return "\n".join(self.told.get("columns", []))
+
+    async def _tell(self, event: Any) -> None:
         lines = (line.strip() for line in (event.value or "").splitlines())
-        self.chosen["columns"] = [line for line in lines if line]
-        await self.read()
+        columns = [line for line in lines if line]
+        if columns != self.told.get("columns", []):  # typed, and not shown for another file
+            self.told["columns"] = columns
+            await self.read()
+
+    def show_told(self) -> None:
+        """Show what was told of the measurement that is chosen."""
+        self._columns.set_value(self._columns_told())
 
     async def read(self) -> None:
         """Read the measurement, and show what was understood, and what was made of it before."""
@@ -159,7 +181,8 @@ class MeasuredRoom(Room):
         self.complaint.clear()
         if name is not None:
             call, folder = f"{SHOWING}:understood", self.session.project.folder
-            told = {key: self.chosen.get(key) for key in ("columns", "probe", "waveform")}
+            told = {key: self.told.get(key) for key in self.tellable}
+            told["probe"] = self.chosen.get("probe")
             try:
                 found = await self.session.full.call(call, folder, name, told)
             except HotleverError as error:

@@ -77,8 +77,7 @@ class RamanRoom(Room):
 
             def example() -> None:
                 with self.complaint.caught():
-                    for one in (_PLATE, _TIP):
-                        list(self.session.project.take_example_folder(f"raman/{one}", one))
+                    self.session.project.take_example_folders("raman", _PLATE, _TIP)
                     ui.navigate.reload()
 
             ui.button("Try the example", icon="science", on_click=example).props(

@@ -91,8 +91,15 @@ def probe_names(session: Session) -> dict[str, str]:
 
 
 def choice(label: str, options: Any, value: Any, changed: Any) -> ui.select:
-    """Show a choice; one that is no option any more is the first."""
-    value = value if value in options else next(iter(options), None)
+    """Show a choice, the first option if there is none.
+
+    A file that is not there any more stays chosen and is said to be missing: in its place another
+    would give other numbers without a word.
+    """
+    if value is None:
+        value = next(iter(options), None)
+    elif value not in options:
+        options = {**options, value: f"{value} (not in the folder)"}
     select = ui.select(options, label=label, value=value, on_change=changed)
     return select.classes("w-full").props("dense outlined")
 

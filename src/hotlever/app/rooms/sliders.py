@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -81,6 +82,7 @@ class Sliders:
             ).props("no-caps dense unelevated")
             self._gap = ui.number(
                 "surface (µm)",
+                value=self._chosen["changes"].get("surface_gap_um"),
                 min=0.01,
                 max=1e4,
                 on_change=lambda event: self._change("surface_gap_um", event.value),
@@ -97,6 +99,7 @@ class Sliders:
                 min=0.0, max=self._chosen["most"], step=0.01, value=self._chosen["bias"]
             ).props('aria-label="Bias"')
             number.bind_value(slider)
+            self._slider_of_bias = slider
             slider.on_value_change(lambda event: self._move_bias(event.value))
 
     async def open(self) -> None:
@@ -158,6 +161,10 @@ class Sliders:
     def _move_bias(self, value: float | None) -> None:
         if value is not None:
             self._chosen["bias"] = float(value)
+            if value > self._chosen["most"]:
+                # one may type more than the slider has, and the curves go as far
+                self._chosen["most"] = float(math.ceil(value))
+                self._slider_of_bias.props(f"max={self._chosen['most']:g}")
             self._moved()
 
     def _change(self, name: str, value: Any, of_probe: Any = None) -> None:

@@ -13,7 +13,6 @@ from hotlever.app.rooms.plots import INK, axes, plotted, short
 from hotlever.app.session import Session
 from hotlever.colours import BLUE, GREEN, VERMILION
 from hotlever.errors import HotleverError
-from hotlever.files import write_text
 from hotlever.raman import Correction, read_corrections
 from hotlever.raman.correction import corrections_text
 
@@ -164,11 +163,11 @@ class OneSpectrum:
                 return
             if after != Correction():
                 known[self._name] = after
-            path = self._session.project.path(CORRECTIONS)
+            project = self._session.project
             if known:
-                write_text(path, corrections_text(known))
+                project.write(CORRECTIONS, corrections_text(known), f"corrected {self._name}")
             else:
-                path.unlink(missing_ok=True)
+                project.changes.remove(project.path(CORRECTIONS))
             await self._show()
             self._changed()
 

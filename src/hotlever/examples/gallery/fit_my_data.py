@@ -2,7 +2,7 @@
 
 from hotlever import Lever, figures, fit, save_figure
 
-found = fit("examples/lever-a.csv")
+found = fit("src/hotlever/examples/lever-a.csv")
 for name, one in found.parameters.items():
     print(f"{name}: {one.value:.4g} ± {one.stderr:.1g} {one.unit}")
 

@@ -3,7 +3,7 @@
 from hotlever import Lever, Probe, figures, save_figure
 from hotlever.lever.fields import FieldMapper
 
-probe = Probe.from_file("examples/palladium-on-nitride.toml")
+probe = Probe.from_file("src/hotlever/examples/palladium-on-nitride.toml")
 lever = Lever(probe)
 (state,) = lever.solve([0.5])
 print(f"At a bias of 0.5 V the tip is at {state.tip_K:.0f} K.")

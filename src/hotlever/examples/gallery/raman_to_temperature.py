@@ -10,8 +10,8 @@ from hotlever import (
     save_figure,
 )
 
-calibration, hot_plate = calibrate_from(read_spectra(["examples/raman/hot-plate"]))
-lines = measure(read_spectra(["examples/raman/tip"]))
+calibration, hot_plate = calibrate_from(read_spectra(["src/hotlever/examples/raman/hot-plate"]))
+lines = measure(read_spectra(["src/hotlever/examples/raman/tip"]))
 table = read_lines(lines, Thermometer(calibration))
 columns = (table.file, table.temperature_K, table.temperature_error_K)
 for file, T, error in zip(*(one.values for one in columns), strict=True):

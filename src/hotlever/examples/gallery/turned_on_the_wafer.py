@@ -5,7 +5,7 @@ import numpy as np
 
 from hotlever import Lever, Probe, figures, save_figure
 
-library = gdstk.read_gds("examples/reference-probe.gds")
+library = gdstk.read_gds("src/hotlever/examples/reference-probe.gds")
 (cell,) = library.top_level()
 library.new_cell("WAFER").add(gdstk.Reference(cell, (120, -35), rotation=np.pi / 6))
 library.write_gds("turned.gds")

@@ -298,12 +298,12 @@ def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Arra
     time = columns["time_us"]
     at_rest = lever.space.air is not None and lever.equations.heat_in_air is None
     notes = [_AIR_NOTE] if at_rest else []
-    notes += range_notes(lever.probe, "{} µs on", time, columns["max_K"])
+    notes += range_notes(lever, "{} µs on", time, columns["max_K"])
     return labelled(
         columns,
         "time",
         {"time": time},
-        **probe_attributes(lever.probe),
+        **probe_attributes(lever),
         waveform=waveform.text,
         notes="\n".join(notes),
     )

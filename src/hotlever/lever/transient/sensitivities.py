@@ -134,7 +134,7 @@ def with_sensitivities(
         },
         "time",
         {"time": times, "observable": list(OBSERVABLES), "parameter": list(names)},
-        **probe_attributes(lever.probe),
+        **probe_attributes(lever),
         waveform=waveform.text,
     )
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from hotlever.estimation import Fit, Measurement, fit, read_measurement
+from hotlever.estimation.words import parameter_rows
 from hotlever.figures import correlation_matrix
-from hotlever.fitting import Fit, Measurement, fit, read_measurement
-from hotlever.fitting.words import parameter_rows
 from hotlever.materials import PARAMETERS
 from hotlever.report.fit_pages import add_fit
 from hotlever.report.reproduce.findings import Findings

@@ -1,0 +1,267 @@
+"""Fits of many levers: in parallel, each written as it comes, resumed where they were stopped."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dask.system import CPU_COUNT
+
+from hotlever import __version__
+from hotlever.cluster import guarded, local_client, remote_client, run_all
+from hotlever.errors import HotleverError, InputError
+from hotlever.estimation.estimator import fit
+from hotlever.estimation.levers import described
+from hotlever.estimation.options import FitOptions
+from hotlever.estimation.words import doubt
+from hotlever.files import Outputs, json_text, output_folder, read_json, write_text
+from hotlever.lever.lever import Lever
+from hotlever.lever.reduction import cached_reduction, can_be_reduced
+from hotlever.measurement import Measurement, read_measurement, with_measured_circuit
+from hotlever.probe import Probe
+from hotlever.types import Progress
+
+
+@dataclass
+class Batch:
+    """What became of many data files.
+
+    Attributes
+    ----------
+    fits : dict of str to dict
+        Contents of the fit files, by the name of the lever, in the order of the data files.
+    failures : dict of str to HotleverError
+        By data file: why it could not be read or fitted.
+    reused : int
+        Fits that had been written before from the same data, probe, options and version.
+    """
+
+    fits: dict[str, dict[str, Any]] = field(default_factory=dict)
+    failures: dict[str, HotleverError] = field(default_factory=dict)
+    reused: int = 0
+
+    @property
+    def exit_status(self) -> int:
+        """0 if all is done, 2 if an input was at fault, else 1 if a computation failed.
+
+        Data that no such lever shows are none of which the computation could be finished.
+        """
+        statuses = [error.exit_status for error in self.failures.values()]
+        return max(statuses, default=min(len(self.undescribed), 1))
+
+    @property
+    def undescribed(self) -> dict[str, str]:
+        """By lever: that its data are not described, and why."""
+        said = {
+            name: doubt(described(one), one.get("reason", "")) for name, one in self.fits.items()
+        }
+        return {name: f"{name}: {text}" for name, text in said.items() if text}
+
+
+def fit_many(
+    paths: Sequence[str | os.PathLike[str]],
+    folder: str | os.PathLike[str],
+    probe: Probe | None = None,
+    options: FitOptions | None = None,
+    *,
+    processes: int | None = None,
+    scheduler: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    reading: Callable[[Measurement], None] | None = None,
+    reducing: Progress | None = None,
+    progress: Progress | None = None,
+) -> Batch:
+    """Fit many levers and write a fit file for each as soon as it is done.
+
+    A file that cannot be read or fitted is reported in the result; the others go on. A lever
+    whose fit file is there already, from the same data, probe, options and version, is not fitted
+    again.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Measurement files.
+    folder : path
+        Where the fit files go, named after the data files.
+    probe : Probe, optional
+        The reference probe by default.
+    options : FitOptions, optional
+    processes : int, optional
+        Local worker processes; by default as many as there are processors. They are started by
+        spawn: a script needs ``if __name__ == "__main__"``.
+    scheduler : str, optional
+        Address of a running Dask scheduler to use instead.
+    columns : mapping of str to str, optional
+        Names of the columns in all files, see `read_measurement`.
+    reading : callable, optional
+        Called with each measurement that was read.
+    reducing, progress : callable, optional
+        Called with the steps done and their number: while a geometry is reduced, and with the
+        levers done.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made, or no scheduler answers.
+    ComputationError
+        If the scheduler is lost. What was done by then is written.
+    """
+    probe, options = probe or Probe.reference(), options or FitOptions()
+    if processes is not None and processes < 1:
+        raise InputError(f"found processes = {processes}, expected 1 or more")
+    outputs, target, data = Outputs(*paths), Path(folder), lever_names(paths)
+    outputs.folder(target)
+    files = {name: target / f"{name}.json" for name in data}
+    batch, waiting = Batch(), {}
+
+    def failed(path: str | Path, error: HotleverError) -> None:
+        text = str(error)
+        batch.failures[str(path)] = (
+            error if text.startswith(str(path)) else type(error)(f"{path}: {text}")
+        )
+
+    def tell() -> None:
+        if progress is not None:
+            progress(len(batch.fits) + len(batch.failures), len(files))
+
+    for name, path in data.items():
+        try:
+            measurement = read_measurement(path, columns, probe.circuit)
+            measurement.need_rest("a fit of several levers")
+            if reading is not None:
+                reading(measurement)
+            if target.is_dir():
+                outputs.target(files[name])
+        except InputError as error:
+            failed(path, error)
+            continue
+        content = _written_before(files[name], _request(measurement, probe, options, columns))
+        if content is None:
+            waiting[name] = measurement
+        else:
+            batch.fits[name] = content
+            batch.reused += 1
+    tell()
+    if waiting:
+        local = min(processes or CPU_COUNT, len(waiting))
+        with local_client(local) if scheduler is None else remote_client(scheduler) as client:
+            for name, reason in _reduced(probe, options, waiting, reducing).items():
+                failed(waiting.pop(name).path, reason)
+            names = list(waiting)
+            tasks = ((measurement, probe, options) for measurement in waiting.values())
+            for number, result in run_all(client, _fitted, tasks):
+                name, measurement = names[number], waiting[names[number]]
+                try:
+                    if isinstance(result, HotleverError):
+                        raise result
+                    content = {**result, "request": _request(measurement, probe, options, columns)}
+                    output_folder(target)
+                    write_text(files[name], json_text(content))
+                    batch.fits[name] = content
+                except HotleverError as error:
+                    failed(measurement.path, error)
+                tell()
+    batch.fits = {name: batch.fits[name] for name in files if name in batch.fits}
+    return batch
+
+
+def lever_names(paths: Sequence[str | os.PathLike[str]]) -> dict[str, Path]:
+    """Name the different data files: by their own names, with folders where these are the same.
+
+    Examples
+    --------
+    >>> list(lever_names(["a/lever-1.csv", "a/lever-2.csv", "a/../a/lever-1.csv"]))
+    ['lever-1', 'lever-2']
+    >>> list(lever_names(["a/lever-1.csv", "b/lever-1.csv"]))
+    ['a_lever-1.csv', 'b_lever-1.csv']
+    """
+    different: dict[object, Path] = {}
+    for path in map(Path, paths):
+        different.setdefault(_identity(path), path)
+    count = Counter(path.stem.casefold() for path in different.values())
+    names: dict[str, Path] = {}
+    for path in different.values():
+        alone = count[path.stem.casefold()] == 1
+        name = path.stem if alone else "_".join(path.relative_to(path.anchor).parts)
+        # a file name need not be text; and not all disks tell a from A
+        name = name.encode(errors="backslashreplace").decode()
+        taken, number, plain = {one.casefold() for one in names}, 2, name
+        while name.casefold() in taken:
+            name, number = f"{plain}-{number}", number + 1
+        names[name] = path
+    return names
+
+
+def _identity(path: Path) -> object:
+    """Return what two names of one file have in common."""
+    try:
+        found = path.stat()
+    except OSError:
+        return os.path.realpath(path)
+    return found.st_dev, found.st_ino
+
+
+def _written_before(file: Path, record: dict[str, Any]) -> dict[str, Any] | None:
+    """Return a fit file that was made from the same; None if there is none."""
+    try:
+        content = read_json(file)
+    except InputError:
+        return None
+    return content if content.get("request") == record else None
+
+
+def _request(
+    measurement: Measurement,
+    probe: Probe,
+    options: FitOptions,
+    columns: Mapping[str, str] | None,
+) -> dict[str, Any]:
+    """Return all that a fit depends on, for its file: the same again need not be fitted."""
+    record = {
+        "sha256": measurement.sha256,
+        "probe": probe.values(),
+        "options": options.values(),
+        "version": __version__,
+        **({"columns": dict(columns)} if columns else {}),
+    }
+    return dict(json.loads(json.dumps(record)))
+
+
+def _reduced(
+    probe: Probe,
+    options: FitOptions,
+    waiting: Mapping[str, Measurement],
+    progress: Progress | None,
+) -> dict[str, HotleverError]:
+    """Reduce each geometry once, before the workers need it; return why some levers have none.
+
+    Base temperature and medium are part of a geometry.
+    """
+    known: dict[object, HotleverError | None] = {}
+
+    def reduce_one(measurement: Measurement) -> HotleverError | None:
+        measured, _ = with_measured_circuit(probe, measurement, options.medium)
+        geometry = measured.circuit.base_temperature_K, measured.surroundings.medium
+        if geometry not in known:
+            known[geometry] = guarded(_reduce, (measured, options, progress))
+        return known[geometry]
+
+    results = {name: guarded(reduce_one, (data,)) for name, data in waiting.items()}
+    return {name: error for name, error in results.items() if error is not None}
+
+
+def _reduce(probe: Probe, options: FitOptions, progress: Progress | None) -> None:
+    own = options.of(probe)
+    names = {*own.usual, *own.varied}
+    if can_be_reduced(probe, names):
+        cached_reduction(Lever(probe), progress, names)
+
+
+def _fitted(measurement: Measurement, probe: Probe, options: FitOptions) -> dict[str, Any]:
+    """Fit one lever, in a worker; return the content of its fit file."""
+    return fit(measurement, probe, options).content()

@@ -1,0 +1,191 @@
+"""Sampling a density with independent ensembles of emcee's walkers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import emcee
+import numpy as np
+
+from hotlever.cluster import local_processes
+from hotlever.errors import ComputationError, InputError
+from hotlever.estimation.chains import effective_sample_size, split_rhat
+from hotlever.types import Array, Progress
+
+# The logarithm of a density, up to a constant; −∞ where it vanishes.
+LogDensity = Callable[[Array], float]
+
+#: Ensembles that know nothing of each other, so that R̂ compares independent runs.
+ENSEMBLES = 4
+#: Walkers of an ensemble: at least, and for each parameter.
+_WALKERS, _WALKERS_EACH = 24, 3
+#: Steps of every walker that are dropped. The walkers start from the linearised posterior.
+_WARM_UP = 25
+#: Steps between two reports of progress.
+_BLOCK = 10
+#: Share of moves proposed from the linearised posterior; the others follow the walkers.
+_GAUSSIAN_SHARE = 0.6
+#: Degrees of freedom of that proposal, whose tails must be wider than the posterior's.
+_TAILS = 5.0
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """A normal approximation of a density of d quantities."""
+
+    mean: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class Chains:
+    """Points (ensembles, walkers, draws, d), their density, and the share of accepted proposals."""
+
+    points: Array
+    log_probability: Array
+    accepted: float
+
+
+def sample(
+    log_density: LogDensity,
+    approximation: Gaussian,
+    *,
+    samples: int,
+    walkers: int | None = None,
+    processes: int = 1,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Chains:
+    """Sample a density with independent ensembles of emcee's walkers.
+
+    Part of the moves are proposed from a normal approximation with wide tails, independent of
+    the walker's place, the others from the differences between walkers: the former make nearly
+    independent samples where the approximation is good, the latter need none.
+
+    Parameters
+    ----------
+    log_density : callable
+        Picklable if `processes` is more than one.
+    approximation : Gaussian
+        Where the walkers start, and what is proposed.
+    samples, walkers, processes, seed, progress
+        See `hotlever.estimation.posterior.sample_posterior`.
+
+    Raises
+    ------
+    InputError
+        If a number is too small.
+    ComputationError
+        If no start is found or a worker process dies.
+    """
+    dimension = approximation.mean.size
+    if walkers is None:
+        walkers = max(_WALKERS, _WALKERS_EACH * dimension)
+    for name, value, least in (
+        ("samples", samples, 1),
+        ("walkers", walkers, 2 * dimension),
+        ("processes", processes, 1),
+    ):
+        if value < least:
+            raise InputError(f"found {name} = {value}, expected {least} or more")
+    # R̂ splits the chains and needs a variance of each half
+    draws = max(math.ceil(samples / (ENSEMBLES * walkers)), 4)
+    blocks = [
+        min(_BLOCK, steps - first)
+        for steps in (_WARM_UP, draws)
+        for first in range(0, steps, _BLOCK)
+    ]
+    points, logs, accepted, done = [], [], 0.0, 0
+    seeds = np.random.SeedSequence(seed).generate_state(ENSEMBLES).tolist()
+    with local_processes(min(processes, ENSEMBLES)) as (run, share):
+        density = share(log_density)
+        tasks = [(density, approximation, walkers, number) for number in seeds]
+        states = run(_started, tasks)
+        for steps in blocks:
+            tasks = [(density, approximation, state, steps) for state in states]
+            moved = run(_advanced, tasks)
+            states = [state for state, *_ in moved]
+            done += steps
+            if done > _WARM_UP:
+                points.append([chain for _, chain, _, _ in moved])
+                logs.append([log for _, _, log, _ in moved])
+                accepted += steps * np.mean([rate for *_, rate in moved])
+            if progress is not None:
+                progress(done, _WARM_UP + draws)
+    chains, densities = (np.concatenate(kept, axis=1).swapaxes(1, 2) for kept in (points, logs))
+    return Chains(chains, densities, float(accepted / draws))
+
+
+def independent_samples(values: Array) -> float:
+    """Return how many independent samples some values, (ensembles, walkers, draws), are worth."""
+    return effective_sample_size(values.reshape(-1, values.shape[-1]))
+
+
+def rhat_of_ensembles(values: Array) -> float:
+    """Return R̂ of some values between ensembles, which are independent; walkers of one are not."""
+    return split_rhat(np.swapaxes(values, 1, 2).reshape(len(values), -1))
+
+
+def _started(
+    log_density: LogDensity, approximation: Gaussian, walkers: int, seed: int
+) -> emcee.State:
+    """Place the walkers of an ensemble where the density does not vanish."""
+    random = np.random.RandomState(seed)
+    coords: list[Array] = []
+    logs: list[float] = []
+    for _ in range(50 * walkers):
+        point = _wide_draws(approximation, 1, random)[0]
+        value = log_density(point)
+        if np.isfinite(value):
+            coords.append(point)
+            logs.append(value)
+        if len(coords) == walkers:
+            state = emcee.State(np.array(coords), log_prob=np.array(logs))
+            state.random_state = random.get_state()
+            return state
+    raise ComputationError(
+        f"only {len(coords)} of {50 * walkers} starting points of the posterior can be solved "
+        "within the bounds of the parameters; fix those that the data do not determine"
+    )
+
+
+def _advanced(
+    log_density: LogDensity, approximation: Gaussian, state: emcee.State, steps: int
+) -> tuple[emcee.State, Array, Array, float]:
+    """Move an ensemble; return it, its points (steps, walkers, d), their density, acceptance."""
+
+    def proposed(coords: Array, random: Any) -> tuple[Array, Array]:
+        """Return new points, wherever the walkers are, and the logarithm of q(old) / q(new)."""
+        points = _wide_draws(approximation, len(coords), random)
+        return points, _log_density(approximation, coords) - _log_density(approximation, points)
+
+    sampler = emcee.EnsembleSampler(
+        *state.coords.shape,
+        log_density,
+        moves=[
+            (emcee.moves.MHMove(proposed), _GAUSSIAN_SHARE),
+            (emcee.moves.DEMove(), 1.0 - _GAUSSIAN_SHARE),
+        ],
+    )
+    state = sampler.run_mcmc(state, steps, skip_initial_state_check=True)
+    accepted = float(np.mean(sampler.acceptance_fraction))
+    return state, sampler.get_chain(), sampler.get_log_prob(), accepted
+
+
+def _log_density(approximation: Gaussian, points: Array) -> Array:
+    """Return the logarithm of the density of `_wide_draws`, up to a constant."""
+    away = points - approximation.mean
+    lengths = np.einsum("ij,jk,ik->i", away, np.linalg.inv(approximation.covariance), away)
+    return np.asarray(-0.5 * (_TAILS + away.shape[1]) * np.log1p(lengths / _TAILS))
+
+
+def _wide_draws(approximation: Gaussian, count: int, random: Any) -> Array:
+    """Draw from a multivariate Student's t, shape (count, d)."""
+    factor = np.linalg.cholesky(approximation.covariance)
+    normal = random.normal(size=(count, approximation.mean.size))
+    stretch = np.sqrt(_TAILS / random.chisquare(_TAILS, size=(count, 1)))
+    draws: Array = approximation.mean + stretch * (normal @ factor.T)
+    return draws

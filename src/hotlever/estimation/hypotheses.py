@@ -1,0 +1,212 @@
+"""What may be wrong with data, or with what is said of their lever: one list of hypotheses.
+
+Each changes the rows that were measured, or the probe, by one unknown, and asks one question.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from hotlever.probe import Probe
+from hotlever.text import parameter_named
+from hotlever.types import Array
+
+#: A current that stands at its highest value in so many rows, within this share, is clipped, if it
+#: is below that in so many.
+_LEVEL_ROWS, _LEVEL, _BELOW = 2, 1e-4, 5
+#: The range of a meter may be off by such a factor, and its zero by such a share.
+_FACTOR, _OF_THE_ZERO = 50.0, 0.5
+#: How much warmer than stated the base may be (K).
+_WARMER = (30.0, 60.0, 100.0)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of an I-V curve in the order of the file, which of them count, and their resistor."""
+
+    bias_V: Array
+    current_mA: Array
+    series_kohm: float
+    kept: Array
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One unknown, and what it would mean.
+
+    Attributes
+    ----------
+    asks : callable
+        Return a question for the value of the unknown that was found; empty if it asks nothing.
+    rows : callable, optional
+        Return the rows as they should have been, for a value of the unknown.
+    probe : callable, optional
+        Return the probe as it should have been.
+    starts : sequence of float
+        Values of the unknown to begin from. A change of the probe, which has to be solved, takes
+        no others.
+    parameter : str
+        Of which nothing is known beforehand; then its value is the unknown.
+    free : bool
+        Whether the unknown takes other values than those.
+    far_fetched : bool
+        Whether others that explain the data as well come first.
+    """
+
+    asks: Callable[[float], str]
+    rows: Callable[[Rows, float], Rows] | None = None
+    probe: Callable[[Probe, float], Probe] | None = None
+    starts: Sequence[float] = (0.0,)
+    parameter: str = ""
+    free: bool = False
+    far_fetched: bool = False
+
+
+def hypotheses_of(rows: Rows, probe: Probe, names: Sequence[str]) -> list[Hypothesis]:
+    """Return all that may be wrong; names are those of the parameters that have priors."""
+    return [
+        *_of_units(),
+        *_of_the_meter(rows),
+        _of_the_resistor(rows),
+        *_of_the_rows(rows),
+        *_of_the_lever(probe),
+        *(_of_a_parameter(probe, name) for name in names if _stated(probe, name)),
+    ]
+
+
+def _of_units() -> list[Hypothesis]:
+    def current(rows: Rows, factor: float) -> Rows:
+        return replace(rows, current_mA=factor * rows.current_mA)
+
+    def bias(rows: Rows, factor: float) -> Rows:
+        return replace(rows, bias_V=factor * rows.bias_V)
+
+    def swapped(rows: Rows, _: float) -> Rows:
+        return replace(rows, bias_V=rows.current_mA, current_mA=rows.bias_V)
+
+    def of_the_lever(rows: Rows, _: float) -> Rows:
+        return replace(rows, bias_V=rows.bias_V + rows.series_kohm * rows.current_mA)
+
+    small, large = (
+        f"is the unit of the current wrong, so that it is 1000 times too {size} ({example})?"
+        for size, example in (
+            ("small", "mA labelled µA, or A labelled mA"),
+            ("large", "µA labelled mA, or mA labelled A"),
+        )
+    )
+    return [
+        Hypothesis(lambda _: small, current, starts=(1e3,)),
+        Hypothesis(lambda _: large, current, starts=(1e-3,)),
+        Hypothesis(lambda _: "is the bias given in mV?", bias, starts=(1e-3,)),
+        Hypothesis(lambda _: "are bias and current swapped?", swapped),
+        Hypothesis(lambda _: "is V_b the lever's own voltage, not the bias?", of_the_lever),
+    ]
+
+
+def _of_the_meter(rows: Rows) -> list[Hypothesis]:
+    largest, along = float(rows.current_mA.max()), np.linspace(0.0, 1.0, rows.bias_V.size)
+
+    def scaled(rows: Rows, more: float) -> Rows:
+        return replace(rows, current_mA=rows.current_mA / (1.0 + more))
+
+    def raised(pattern: Array | float, rows: Rows, share: float) -> Rows:
+        return replace(rows, current_mA=rows.current_mA - share * largest * pattern)
+
+    def asks(question: str) -> Callable[[float], str]:
+        return lambda share: (
+            f"{question} by {share:+.1%} of its largest value?" if abs(share) < _OF_THE_ZERO else ""
+        )
+
+    def times(more: float) -> str:
+        known = 1.0 / _FACTOR < 1.0 + more < _FACTOR  # or else it is another unit
+        return f"is the current {1.0 + more:.3g} times what it should be?" if known else ""
+
+    zero, drift = "is the zero of the current off", "does the zero of the current drift"
+    return [
+        Hypothesis(times, scaled, free=True, far_fetched=True),
+        Hypothesis(asks(zero), partial(raised, 1.0), free=True),
+        Hypothesis(asks(drift), partial(raised, along), free=True),
+    ]
+
+
+def _of_the_resistor(rows: Rows) -> Hypothesis:
+    stated = rows.series_kohm
+    measured = float(np.median(rows.bias_V / np.maximum(np.abs(rows.current_mA), 1e-12)))
+
+    def other(rows: Rows, kohm: float) -> Rows:
+        return replace(rows, series_kohm=max(kohm, 0.0))
+
+    return Hypothesis(
+        lambda kohm: (
+            f"is the series resistance, with contacts, rather {kohm:.3g} than {stated:.3g} kΩ?"
+        ),
+        other,
+        starts=(stated, stated / 2, 0.8 * measured),
+        free=True,
+    )
+
+
+def _of_the_rows(rows: Rows) -> list[Hypothesis]:
+    bias, current, place = rows.bias_V, rows.current_mA, np.arange(rows.bias_V.size)
+    found = []
+    level = current >= current.max() * (1.0 - _LEVEL)
+    if level.sum() >= _LEVEL_ROWS and (~level).sum() >= _BELOW:
+        text = f"is the current clipped at {current.max():.3g} mA, by the range of its meter?"
+        found.append(Hypothesis(lambda _: text, lambda rows, _: replace(rows, kept=~level)))
+
+    def part(first: bool, rows: Rows, cut: float) -> Rows:
+        return replace(rows, kept=(place < cut) == first)
+
+    def asks(cut: float) -> str:
+        return (
+            f"are there two sweeps, a new one from row {cut + 1:.0f} ({bias[int(cut)]:.3g} V) on?"
+        )
+
+    # where the bias goes back, or else at some quarter
+    back = (np.flatnonzero(np.diff(bias) < 0)[:1] + 1).tolist()
+    cuts = [*back, *(quarter * place.size // 4 for quarter in (1, 2, 3))]
+    both = (Hypothesis(asks, partial(part, first), starts=cuts) for first in (True, False))
+    return [*found, *both]
+
+
+def _of_the_lever(probe: Probe) -> list[Hypothesis]:
+    medium, base = probe.surroundings.medium, probe.circuit.base_temperature_K
+    other = "air" if medium == "vacuum" else "vacuum"
+    usual = Probe.reference().shape, Probe.u_shape().shape
+    shape = next(one for one in usual if one.shape != probe.shape.shape)
+    return [
+        Hypothesis(
+            lambda _: f"is the lever in {other}, not in {medium}?",
+            probe=lambda probe, _: probe.in_medium(other),
+        ),
+        Hypothesis(
+            lambda _: f"is the drawing that of another lever, {shape.shape}?",
+            probe=lambda probe, _: probe.model_copy(update={"shape": shape, "tip": None}),
+        ),
+        Hypothesis(
+            lambda warmer: f"is the base temperature rather about {base + warmer:.0f} K?",
+            probe=lambda probe, warmer: probe.with_(base_temperature_K=base + warmer),
+            starts=_WARMER,
+        ),
+    ]
+
+
+def _of_a_parameter(probe: Probe, name: str) -> Hypothesis:
+    (stated,) = probe.at([name]).tolist()
+    known, whose = parameter_named(name), "doping" if name == "n_d" else "drawing"
+    return Hypothesis(
+        lambda value: (
+            f"is the {whose} another, with {known.symbol} rather {value:.3g} than {stated:.3g} "
+            f"{known.unit}?"
+        ),
+        parameter=name,
+    )
+
+
+def _stated(probe: Probe, name: str) -> bool:
+    """Whether a parameter is one that a user states of a lever."""
+    return name == "n_d" or name in probe.shape.dimensions()

@@ -1,0 +1,78 @@
+"""Whether a model describes the data that it was fitted to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hotlever.estimation.residuals import Residuals
+from hotlever.types import Array
+
+#: Data are not described where they differ from the model by more than this share of the largest
+#: (rms), and neighbours together: the product of two is this share of the square, of white noise 0.
+#: Neither are they where so many neighbours differ by three times as much in their median.
+_SCATTER, _TOGETHER, _RUN = 0.004, 0.4, 4
+#: The share for fits whose weights are no errors, which hold dimensions and whatever else is fixed.
+_HELD_SCATTER = 0.01
+#: Outliers stand alone: so many neighbours that are off by more than so many standard deviations
+#: are none; nor are one fewer at the end, with nothing beyond.
+_NEIGHBOURS, _FAR = 3, 8.0
+#: Fewer rows tell nothing of their neighbours.
+_ROWS = 7
+
+
+#: What a caption calls the usual scatter.
+USUAL_SCATTER = _SCATTER
+
+
+def undescribed(residuals: Residuals, values: Array) -> str:
+    """Return where data are not described by predicted values (3, n); empty if they are.
+
+    Tip temperatures are left out: a thermometer's scale may be off by more than its readings
+    scatter.
+    """
+    scatter = _SCATTER if residuals.errors_known else _HELD_SCATTER
+    difference = residuals.difference(values) / residuals.largest
+    in_order = np.argsort(residuals.along, kind="stable")
+    for name, whole, down in zip(residuals.observables, difference, residuals.down, strict=True):
+        known = np.isfinite(whole)
+        if name == "tip" or known.sum() < _ROWS:
+            continue
+        # what a robust fit has forgotten stands alone, or is seen as a run
+        squares = float(np.sum((down * whole)[known] ** 2))
+        rms = np.sqrt(squares / known.sum())
+        # a drift shows in the order of the rows, another lever in that of the bias
+        rows = [(down * whole)[order] for order in (known, in_order[known[in_order]])]
+        together = max(float(row[1:] @ row[:-1]) for row in rows)
+        ordered = in_order[known[in_order]]
+        windows = np.lib.stride_tricks.sliding_window_view(whole[ordered], _RUN)
+        runs = np.abs(np.median(windows, axis=1))
+        if rms > scatter and together > _TOGETHER * squares:
+            worst = int(np.nanargmax(np.abs(whole)))
+            return (
+                f"{name} differs by {rms:.1%} of its largest value (rms), and not at "
+                f"random; most at {residuals.along[worst]:.3g} {residuals.unit}"
+            )
+        if runs.max() > 3.0 * _SCATTER:
+            run = residuals.along[ordered[np.argmax(runs) + np.arange(_RUN)]]
+            return (
+                f"{name} differs by {runs.max():.1%} of its largest value in neighbouring rows, "
+                f"from {run[0]:.3g} to {run[-1]:.3g} {residuals.unit}"
+            )
+    return ""
+
+
+def off_together(residuals: Residuals, values: Array) -> str:
+    """Return where neighbouring data are off together, as no outliers are; empty if none are."""
+    in_order = np.argsort(residuals.along, kind="stable")
+    along = residuals.along[in_order]
+    for name, row in zip(residuals.observables, residuals.deviations(values), strict=True):
+        if name == "tip" or row.size < _ROWS:
+            continue
+        far = np.append(np.abs(row[in_order]) > _FAR, True)
+        together = np.lib.stride_tricks.sliding_window_view(far, _NEIGHBOURS).all(axis=1)
+        if together.any():
+            first = int(np.argmax(together))
+            last = min(first + _NEIGHBOURS, along.size) - 1
+            ends = f"{along[first]:.3g} to {along[last]:.3g} {residuals.unit}"
+            return f"{name} is off in neighbouring rows, from {ends}"
+    return ""

@@ -1,0 +1,299 @@
+"""What a fit makes small: data and priors as residuals of the parameters that it varies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from hotlever.errors import ComputationError
+from hotlever.estimation.coordinates import Coordinates
+from hotlever.estimation.experiment import Prediction
+from hotlever.estimation.residuals import Residuals
+from hotlever.probe import Probe
+from hotlever.probe.priors import JointPrior, Moved, Prior
+from hotlever.types import Array
+
+#: Scaled residual given to trial parameters for which the lever has no state: far beyond any
+#: real one, so that a search turns back.
+UNSOLVED = 10.0
+#: A datum that alone decides a parameter says nothing of its own noise.
+_LEAST_FREE = 0.05
+
+
+class Objective:
+    """Weighted residuals of data and priors, by the coordinates of the parameters that are varied.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    probe : Probe
+        Whose parameters are varied, (p,) of them.
+    names : sequence of str
+        Parameters of the derivatives of predictions.
+    varied : list of str
+        Those of them that are varied.
+    priors : mapping of str to Prior, optional
+    joint : JointPrior, optional
+
+    Attributes
+    ----------
+    informed : bool
+        Whether there are priors; then residuals count standard deviations.
+    coordinates : Coordinates
+        Of the varied parameters: a point, (p,), stands for their values.
+    bounds : ndarray, shape (2, p)
+        Of the points.
+    """
+
+    def __init__(
+        self,
+        residuals: Residuals,
+        probe: Probe,
+        names: Sequence[str],
+        varied: list[str],
+        priors: Mapping[str, Prior] | None = None,
+        joint: JointPrior | None = None,
+    ) -> None:
+        self.residuals, self.names, self.varied = residuals, tuple(names), varied
+        self.columns = [self.names.index(name) for name in varied]
+        self._priors = {varied.index(name): prior for name, prior in (priors or {}).items()}
+        self._joint, self.informed = joint, bool(priors) or joint is not None
+        self._of_joint = [] if joint is None else [varied.index(name) for name in joint.names]
+        relative = {name for name, prior in (priors or {}).items() if prior.relative}
+        if joint is not None:
+            known = zip(joint.names, joint.relative, strict=True)
+            relative |= {name for name, is_relative in known if is_relative}
+        self.coordinates = Coordinates.of(probe, varied, relative)
+        self.bounds = self.coordinates.bounds
+
+    def values(self, probe: Probe) -> Array:
+        """Return the varied parameters of a probe in their own units."""
+        return probe.at(self.varied)
+
+    def point(self, probe: Probe) -> Array:
+        """Return the point of a probe."""
+        return self.coordinates.point(self.values(probe))
+
+    def at(self, probe: Probe, point: Array) -> Probe:
+        """Return a probe with the values of a point.
+
+        Raises
+        ------
+        InputError
+            If no such lever can be drawn.
+        """
+        values = self.coordinates.values(point).tolist()
+        return probe.moved(dict(zip(self.varied, values, strict=True)))
+
+    def rates(self, probe: Probe) -> Array:
+        """Return the derivatives of the varied parameters by their coordinates, (p,)."""
+        return self.coordinates.rates(self.point(probe))
+
+    def residual(self, values: Array, point: Array) -> Array:
+        """Return the residuals of data and priors, for predicted values (3, n)."""
+        return np.concatenate([self.residuals.weighted(values), self.from_priors(point)])
+
+    def jacobian(self, slopes: Array, point: Array) -> Array:
+        """Return their derivatives by the coordinates, for predicted slopes (3, n, k)."""
+        return np.concatenate([self.of_data(slopes, point), self.of_priors(point)])
+
+    def squares(self, at: Prediction) -> float:
+        """Return the sum of squares of the weighted residuals and of the distance from priors."""
+        residual = self.residual(at.values, self.point(at.probe))
+        return float(residual @ residual)
+
+    def used_up(self, probe: Probe, slopes: Array) -> Array:
+        """Return which share of each datum's noise a fit with priors uses up, (observables, n)."""
+        jacobian = self.of_data(slopes, self.point(probe))
+        leverage = np.zeros(self.residuals.data.shape)
+        leverage[self.residuals.present] = np.einsum(
+            "ij,jk,ik->i", jacobian, self._posterior(probe, slopes), jacobian
+        )
+        return leverage
+
+    def _posterior(self, probe: Probe, slopes: Array) -> Array:
+        """Return the covariance of the coordinates that data and priors leave."""
+        jacobian = self.jacobian(slopes, self.point(probe))
+        return inverse_or_nan(jacobian.T @ jacobian)
+
+    def covariance(self, at: Prediction) -> Array:
+        """Return the covariance of the varied parameters in their own units; NaN if singular.
+
+        With priors it is that of the posterior, linearised. Without, noise differs between
+        observables and along each of them by more than the weights know, so every datum's variance
+        is taken from its own residual, enlarged by its leverage h (MacKinnon and White's HC3,
+        J. Econometrics 29, 305 (1985)): C = A⁻¹ Jᵀ V J A⁻¹ with A = JᵀJ and V = r² / (1 − h)².
+        """
+        residual, rates = self.residuals.weighted(at.values), self.rates(at.probe)
+        jacobian = self.of_data(at.slopes, self.point(at.probe))
+        if self.informed:
+            return self._posterior(at.probe, at.slopes) * np.outer(rates, rates)
+        inverse = inverse_or_nan(jacobian.T @ jacobian)
+        if residual.size <= rates.size:
+            return np.full_like(inverse, np.nan)
+        leverage = np.einsum("ij,jk,ik->i", jacobian, inverse, jacobian)
+        influence = inverse @ jacobian.T * (residual / np.maximum(1.0 - leverage, _LEAST_FREE))
+        return np.asarray(influence @ influence.T * np.outer(rates, rates))
+
+    def shares(self, at: Prediction) -> dict[str, Array]:
+        """Return what adds up to the covariance that priors and data leave.
+
+        By the name of each prior, and of the data as ``measurement``: the estimate is, to first
+        order, a weighted sum of all of them, each with an error of its own.
+        """
+        if not self.informed:
+            return {"measurement": self.covariance(at)}
+        jacobian = self.of_data(at.slopes, self.point(at.probe))
+        prior = self.of_priors(self.point(at.probe))
+        names = [*(self.varied[place] for place in self._priors), *["fit"] * len(self._of_joint)]
+        left = self._posterior(at.probe, at.slopes) * self.rates(at.probe)[:, None]
+        found = {"measurement": left @ (jacobian.T @ jacobian) @ left.T}
+        for name, row in zip(names, prior, strict=True):
+            found[name] = found.get(name, 0.0) + np.outer(left @ row, left @ row)
+        return found
+
+    def moved(self, at: Prediction) -> dict[str, Moved]:
+        """Return how far a prediction is from the priors of single parameters."""
+        point = self.point(at.probe)
+        own = slice(len(self._priors))
+        size, by = self.from_priors(point)[own], self.of_priors(point)[own]
+        left = np.sqrt(np.einsum("ij,jk,ik->i", by, self._posterior(at.probe, at.slopes), by))
+        names = [self.varied[place] for place in self._priors]
+        return dict(zip(names, map(Moved, size.tolist(), left.tolist()), strict=True))
+
+    def from_priors(self, point: Array) -> Array:
+        """Return how far parameters are from their priors, in standard deviations."""
+        values = self.coordinates.values(point)
+        own = [prior.deviation(values[place]) for place, prior in self._priors.items()]
+        if self._joint is not None:
+            own = [*own, *self._joint.deviations(values[self._of_joint])]
+        return np.array(own)
+
+    def of_priors(self, point: Array) -> Array:
+        """Return the derivatives of `from_priors` by the coordinates."""
+        rows, values = np.zeros((len(self._priors), point.size)), self.coordinates.values(point)
+        rates = self.coordinates.rates(point)
+        for row, (place, prior) in zip(rows, self._priors.items(), strict=True):
+            row[place] = prior.slope(values[place]) * rates[place]
+        if self._joint is not None:
+            joint = np.zeros((len(self._of_joint), point.size))
+            joint[:, self._of_joint] = self._joint.slopes(values[self._of_joint])
+            rows = np.concatenate([rows, joint * rates])
+        return rows
+
+    def log_volume(self, point: Array) -> float:
+        """Return the logarithm of the volume that a unit of the coordinates has.
+
+        It is of what the densities of the parameters are stated by: values, or logarithms.
+        """
+        by_logarithm = {place for place, prior in self._priors.items() if prior.relative}
+        if self._joint is not None:
+            by_logarithm |= {
+                place
+                for place, relative in zip(self._of_joint, self._joint.relative, strict=True)
+                if relative
+            }
+        rates, values = self.coordinates.rates(point), self.coordinates.values(point)
+        of_logarithm = np.isin(np.arange(point.size), list(by_logarithm))
+        return float(np.sum(np.log(np.where(of_logarithm, rates / values, rates))))
+
+    def of_data(self, slopes: Array, point: Array) -> Array:
+        """Return the derivatives of the weighted residuals by the coordinates."""
+        rates = self.coordinates.rates(point)
+        return self.residuals.jacobian(slopes[:, :, self.columns] * rates)
+
+
+class Vicinity:
+    """Residuals and their derivatives near a prediction, without solving a lever.
+
+    Other predictions say how values bend on the way to them: by what they differ there from what
+    is expected, growing as the square of the distance. Distances are measured by what data and
+    priors tell, so that those along the narrow valleys that a search follows are kept apart from
+    those across (Schnabel and Frank, SIAM J. Numer. Anal. 21, 815 (1984)).
+
+    Parameters
+    ----------
+    objective : Objective
+    at : Prediction
+    others : sequence of Prediction
+    least : float
+        Standard deviations from which on the others count: what nearer ones differ by would be
+        carried too far by those who look far away.
+    """
+
+    def __init__(
+        self,
+        objective: Objective,
+        at: Prediction,
+        others: Sequence[Prediction] = (),
+        least: float = 0.0,
+    ) -> None:
+        self.objective, self.at = objective, at
+        self.origin = objective.point(at.probe)
+        self._parameters = at.probe.at(objective.names)
+        self._bends: list[tuple[Array, Array]] = []
+        self._latest: tuple[Array, tuple[Array, Array]] | None = None
+        jacobian = objective.jacobian(at.slopes, self.origin)
+        for other in others:
+            there = objective.point(other.probe)
+            along = jacobian.T @ (jacobian @ (there - self.origin))
+            size = float(along @ (there - self.origin))
+            with suppress(ComputationError):
+                missed = other.values - self._predicted(there)[0]
+                # the product with this direction is 1 at the other prediction
+                if size > least**2:
+                    self._bends.append((along / size, missed))
+
+    def predict(self, point: Array) -> tuple[Array, Array]:
+        """Return I_h, V_r and T_tip (3, n), and their derivatives by all parameters (3, n, k).
+
+        Raises
+        ------
+        ComputationError
+            If the lever has no such states.
+        """
+        # asked for twice, for the residuals and their derivatives
+        if self._latest is None or not np.array_equal(self._latest[0], point):
+            self._latest = point.copy(), self._predicted(point)
+        return self._latest[1]
+
+    def _predicted(self, point: Array) -> tuple[Array, Array]:
+        objective = self.objective
+        parameters = self._parameters.copy()
+        parameters[objective.columns] = objective.coordinates.values(point)
+        values, slopes = self.at.nearby.predict(parameters)
+        for along, missed in self._bends:
+            way = float(along @ (point - self.origin))
+            values = values + missed * way**2
+            slopes[:, :, objective.columns] += missed[:, :, None] * (
+                2.0 * way * along / objective.coordinates.rates(point)
+            )
+        return values, slopes
+
+    def residual(self, point: Array) -> Array:
+        """Return the residuals of data and priors; large ones if the lever has no such states."""
+        try:
+            return self.objective.residual(self.predict(point)[0], point)
+        except ComputationError:
+            data = np.full(self.objective.residuals.size, UNSOLVED)
+            return np.concatenate([data, self.objective.from_priors(point)])
+
+    def jacobian(self, point: Array) -> Array:
+        """Return their derivatives by the coordinates."""
+        return self.objective.jacobian(self.predict(point)[1], point)
+
+
+def inside(point: Array, low: Array, high: Array) -> Array:
+    """Return where a search begins that must begin within its bounds."""
+    margin = 1e-6 * (high - low)
+    return np.clip(point, low + margin, high - margin)
+
+
+def inverse_or_nan(matrix: Array) -> Array:
+    """Return the inverse of a matrix; NaN if it is singular."""
+    try:
+        return np.asarray(np.linalg.inv(matrix), dtype=float)
+    except np.linalg.LinAlgError:
+        return np.full_like(matrix, np.nan)

@@ -1,0 +1,338 @@
+"""The least-squares problem of an estimate: Gauss-Newton steps, robust weights, confirmation.
+
+A lever is solved with its exact derivatives. Near it, voltages at a given tip temperature are
+nearly powers of the parameters; the optimum among such neighbours, within a region that grows and
+shrinks with how well they tell, is solved next. A search ends where the gradient does: where
+Gauss and Newton's step would lower the sum of squares by next to nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import optimize
+
+from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.estimation.experiment import Experiment, Prediction
+from hotlever.estimation.objective import Objective, Vicinity, inside, inverse_or_nan
+from hotlever.estimation.residuals import Residuals
+from hotlever.estimation.search_options import SearchOptions
+from hotlever.probe import Probe
+from hotlever.probe.priors import JointPrior, Prior
+from hotlever.types import Array, Progress
+
+#: Branches that most searches need, for a progress bar to fill.
+_USUAL_BRANCHES = 8
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Where a search ended.
+
+    Attributes
+    ----------
+    probe : Probe
+    prediction : Prediction
+    stderr : ndarray, shape (p,)
+        From `covariance`; infinite where there is none.
+    covariance : ndarray, shape (p, p)
+        If all weighted data had the same noise: the paper's assumption. NaN if it
+        could not be estimated.
+    decrement : float
+        By how much Gauss and Newton's step would still lower the sum of squares.
+    converged : bool
+        Whether that is next to nothing.
+    """
+
+    probe: Probe
+    prediction: Prediction
+    stderr: Array
+    covariance: Array
+    decrement: float
+    converged: bool
+
+
+class Optimiser:
+    """Finds the parameters whose prediction is nearest to a measurement.
+
+    It begins at the probe `start`, where what is not varied stays, or from a prediction for a
+    similar one, `near`; priors by name, or a joint one of all that is varied, count as further
+    data. `progress` is called with the branches solved and how many there usually are, `seen` with
+    each prediction that is compared with the data.
+
+    Attributes
+    ----------
+    model : Experiment
+        As confirmed last.
+    objective : Objective
+    evaluations, steps : int
+        Branches solved, and those of them that led nearer to the optimum.
+    """
+
+    def __init__(
+        self,
+        model: Experiment,
+        residuals: Residuals,
+        start: Probe,
+        varied: list[str],
+        progress: Progress | None = None,
+        near: Prediction | None = None,
+        priors: Mapping[str, Prior] | None = None,
+        joint: JointPrior | None = None,
+        seen: Callable[[Prediction], None] | None = None,
+        options: SearchOptions | None = None,
+    ) -> None:
+        self.model, self.residuals = model, residuals
+        self._start, self._progress, self._seen = start, progress, seen
+        self.objective = Objective(residuals, start, model.names, varied, priors, joint)
+        self._at_hand = {} if near is None else {near.probe: near}
+        self._options = options or SearchOptions()
+        self.evaluations, self.steps = 0, 0
+
+    def solve_and_confirm(self, robust: bool) -> Optimum:
+        """Find the optimum, make the model exact there, and go on until that matters no more.
+
+        Raises
+        ------
+        ComputationError
+            If the lever cannot be solved at the start, or confirmations do not settle.
+        """
+        options = self._options
+        optimum = self.solve(self._start)
+        unknown = self.residuals.without_errors.any() and not self.objective.informed
+        for _ in range(options.scatter_rounds if unknown else 0):
+            self.residuals.take_scatter(optimum.prediction.values)
+            optimum = self.solve(optimum.probe)
+        if robust:
+            optimum = self._reweighted(optimum)
+        for _ in range(options.confirmations):
+            confirmed = self.model.confirmed(optimum.prediction)
+            if confirmed is self.model:
+                return optimum
+            self.model = confirmed
+            others, self._at_hand = self.others(optimum.prediction), {}
+            for other in others:
+                # with what the fast lever lacked, it may melt below the highest bias
+                with suppress(ComputationError):
+                    self._at_hand[other.probe] = confirmed.predict(other.probe, other)
+            self._at_hand[optimum.probe] = confirmed.predict(optimum.probe, optimum.prediction)
+            previous, optimum = optimum, self.solve(optimum.probe)
+            if not optimum.converged or self._settled(previous, optimum):
+                return optimum
+        return replace(optimum, converged=False)
+
+    def _reweighted(self, optimum: Optimum) -> Optimum:
+        """Lessen the weight of outliers until nothing changes: gently at first.
+
+        With priors outliers stand out at once, since these hold a fit that others would pull along;
+        without any there is nothing to do.
+        """
+        options = self._options
+        if self.objective.informed and not self.residuals.has_outliers(optimum.prediction.values):
+            return optimum
+        for gently, most in ((True, options.gentle_rounds), (False, options.robust_rounds)):
+            for _ in range(most):
+                self.residuals.lessen(optimum.prediction.values, gently)
+                # outliers can drive the first fit onto a bound, where it would stay without priors
+                origin = self._start if gently and not self.objective.informed else optimum.probe
+                previous, optimum = optimum, self.solve(origin)
+                if not optimum.converged or self._settled(previous, optimum):
+                    break
+        return optimum
+
+    def _settled(self, previous: Optimum, optimum: Optimum) -> bool:
+        """Whether the parameters have moved too little for another confirmation to matter."""
+        options, objective = self._options, self.objective
+        now = objective.values(optimum.probe)
+        size = np.maximum(np.abs(now), objective.coordinates.scale)
+        least = np.minimum(options.settled * optimum.stderr, options.settled_relative * size)
+        return bool(np.all(np.abs(now - objective.values(previous.probe)) <= least))
+
+    def solve(self, start: Probe) -> Optimum:
+        """Find the optimum of the present model and weights.
+
+        Raises
+        ------
+        InputError
+            If a parameter starts outside its bounds.
+        ComputationError
+            If the lever cannot be solved at the start.
+        """
+        objective, options = self.objective, self._options
+        self._check_start(start)
+        # without priors a robust search begins anew with each choice of weights
+        in_all = options.most_in_all * (1 if objective.informed else options.gentle_rounds)
+        most = min(self.evaluations + options.most_branches, in_all)
+        at, region = self._predict(start), options.first_region
+        while True:
+            near = Vicinity(objective, at, self._bending(at))
+            target, least = self._minimum(near, region)
+            if self._takes_scatter:
+                target, least = self._with_scatter(target, region, near)
+            squares, step = objective.squares(at), target - near.origin
+            room = objective.coordinates.room(near.origin)
+            inner = bool(np.all(np.abs(step) < 0.99 * region * room))
+            decrement = self._decrement(at)
+            tolerance = self._tolerance(at, squares)
+            # a step within the region that gains nothing is as good as none
+            if decrement <= tolerance or (inner and squares - least <= tolerance):
+                return self._optimum(at, decrement, converged=True)
+            if region < options.smallest_region:
+                # only rounding errors are left, if so little is promised
+                precise = decrement <= options.negligible_of_misfit * squares
+                return self._optimum(at, decrement, converged=precise)
+            if self.evaluations >= most:
+                return self._optimum(at, decrement, converged=False)
+            length = float(np.max(np.abs(step) / room))
+            trial = self._trial(at, target)
+            better = np.inf if trial is None else objective.squares(trial)
+            gain = (squares - better) / max(squares - least, 1e-300)
+            if gain < options.doubted:
+                region = 0.3 * length
+            elif gain > options.trusted:
+                region = min(max(region, 2.0 * length), options.largest_region)
+            if trial is not None and better < squares:
+                self.steps += 1
+                at = trial
+
+    @property
+    def _takes_scatter(self) -> bool:
+        """Whether the noise of some observables is found with the optimum."""
+        unknown = bool(self.residuals.without_errors.any())
+        return unknown and self.objective.informed and self._options.scatter_rounds > 0
+
+    def _check_start(self, start: Probe) -> None:
+        values = self.objective.values(start).tolist()
+        for known, value in zip(self.objective.coordinates.parameters, values, strict=True):
+            if not known.lower <= value <= known.upper:
+                raise InputError(
+                    f"{known.name} = {value:g} to start from, expected a value between "
+                    f"{known.lower:g} and {known.upper:g} {known.unit}"
+                )
+
+    def _tolerance(self, at: Prediction, squares: float) -> float:
+        """Return by how much the sum of squares may still fall where a search ends."""
+        options, residuals = self._options, self.residuals
+        hopeless = self._is_hopeless(at, squares)
+        least = (options.negligible_of_misfit if hopeless else options.negligible) * squares
+        if self.objective.informed:
+            return max(options.decrement, least)
+        noise = residuals.noise_squares(at.values)
+        precise = residuals.size * (options.precision * residuals.unit_weight) ** 2
+        return max(options.relative_decrement * noise, least, precise)
+
+    def _is_hopeless(self, at: Prediction, squares: float) -> bool:
+        """Whether a sum of squares is so far above what noise explains that no lever is near."""
+        residuals = self.residuals
+        noise = 1.0 if self.objective.informed else residuals.noise_squares(at.values)
+        return bool(squares > self._options.misfit * residuals.size * noise)
+
+    def _decrement(self, at: Prediction) -> float:
+        """Return by how much Gauss and Newton's step would lower the sum of squares.
+
+        Parameters at their bounds, beyond which it leads, stay there.
+        """
+        objective = self.objective
+        point = objective.point(at.probe)
+        residual = objective.residual(at.values, point)
+        jacobian = objective.jacobian(at.slopes, point)
+        low, high = objective.bounds
+        margin = 1e-5 * (high - low)
+        free = np.ones(point.size, dtype=bool)
+        for _ in range(point.size):
+            some = jacobian[:, free]
+            step = np.zeros(point.size)
+            step[free] = np.linalg.lstsq(some, -residual)[0]
+            held = ((point <= low + margin) & (step < 0)) | ((point >= high - margin) & (step > 0))
+            if not (held & free).any():
+                break
+            free &= ~held
+        return float(residual @ residual - np.sum((residual + jacobian @ step) ** 2))
+
+    def _optimum(self, at: Prediction, decrement: float, *, converged: bool) -> Optimum:
+        objective = self.objective
+        point = objective.point(at.probe)
+        residual = objective.residual(at.values, point)
+        jacobian = objective.jacobian(at.slopes, point)
+        free = residual.size - point.size
+        rates = objective.coordinates.rates(point)
+        covariance = np.full((point.size, point.size), np.nan)
+        if free > 0:
+            covariance = inverse_or_nan(jacobian.T @ jacobian) * (residual @ residual / free)
+        covariance = covariance * np.outer(rates, rates)
+        variance = np.diag(covariance)
+        stderr = np.sqrt(np.where(variance > 0, variance, np.inf))
+        return Optimum(at.probe, at, stderr, covariance, decrement, converged)
+
+    def _trial(self, at: Prediction, point: Array) -> Prediction | None:
+        """Solve the lever of a point; None if it cannot be drawn or solved."""
+        try:
+            return self._predict(self.objective.at(at.probe, point))
+        except HotleverError:
+            return None
+
+    def _with_scatter(self, point: Array, region: float, near: Vicinity) -> tuple[Array, float]:
+        """Take scatter and optimum in turns, among parameters near those of a prediction."""
+        options, least = self._options, np.inf
+        for _ in range(options.scatter_rounds):
+            values, slopes = near.predict(point)
+            probe = self.objective.at(near.at.probe, point)
+            used_up = self.objective.used_up(probe, slopes)
+            self.residuals.take_scatter(values, used_up, options.usual_scatter)
+            point, least = self._minimum(near, region, point)
+        return point, least
+
+    def _minimum(
+        self, near: Vicinity, region: float, start: Array | None = None
+    ) -> tuple[Array, float]:
+        """Return the point of least squares within a region about a prediction, and these."""
+        objective, (lower, upper) = self.objective, self.objective.bounds
+        room = region * objective.coordinates.room(near.origin)
+        low, high = np.maximum(lower, near.origin - room), np.minimum(upper, near.origin + room)
+        minimum = optimize.least_squares(
+            near.residual,
+            inside(near.origin if start is None else start, low, high),
+            near.jacobian,
+            (low, high),
+            x_scale="jac",
+            ftol=1e-5 if objective.informed else 1e-10,
+            xtol=1e-10,
+            gtol=None,
+            max_nfev=100,
+        )
+        return minimum.x, 2.0 * float(minimum.cost)
+
+    def _bending(self, prediction: Prediction) -> list[Prediction]:
+        # without priors residuals have no size that says what is near
+        return self.others(prediction) if self.objective.informed else []
+
+    def others(self, prediction: Prediction) -> list[Prediction]:
+        """Return the predictions at hand beside one."""
+        return [one for one in self._at_hand.values() if one is not prediction]
+
+    def _predict(self, probe: Probe) -> Prediction:
+        """Predict with the model, from the latest prediction; what was asked before is at hand."""
+        known = self._at_hand.pop(probe, None)
+        if known is not None:
+            self._at_hand[probe] = known
+            return known
+        near = next(reversed(self._at_hand.values()), None)
+        self.evaluations += 1
+        try:
+            prediction = self.model.predict(probe, near)
+        except ComputationError:
+            if near is None:
+                raise
+            # a step too far to be followed from there
+            prediction = self.model.predict(probe)
+        self._at_hand[probe] = prediction
+        if len(self._at_hand) > self._options.kept:
+            del self._at_hand[next(iter(self._at_hand))]
+        if self._progress is not None:
+            self._progress(self.evaluations, max(_USUAL_BRANCHES, self.evaluations))
+        if self._seen is not None:
+            self._seen(prediction)
+        return prediction

@@ -1,0 +1,150 @@
+"""What a fit is asked: the one set of options of `fit`, of batches and of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal, get_args
+
+from hotlever.errors import InputError, unknown_name
+from hotlever.lever.dataset import OBSERVABLES
+from hotlever.materials import PARAMETERS, parameter
+from hotlever.materials.parameters import OF_SILICON
+from hotlever.probe import Probe
+from hotlever.probe.parameters import (
+    heat_capacities,
+    of_materials,
+    parameter_of,
+    usual_parameters,
+)
+from hotlever.probe.priors import SCALES, Prior
+from hotlever.probe.surroundings import Medium
+
+Weights = Literal["maximum", "errors"]
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """What a fit is asked.
+
+    Attributes
+    ----------
+    observables : sequence of {"current", "reader", "tip"}, optional
+        Option I of the paper is ``["current"]``, option II ``["current", "reader"]``, option
+        III all three. All that the measurement has, by default.
+    fixed : mapping of str to float or None
+        Parameters to hold, at a value or (None) at the probe's.
+    robust : bool
+        Lessen the weight of points far from the others' fit: from 3.5 standard deviations on, as
+        the median absolute residual tells them, down to nothing beyond 6. With priors this is done
+        wherever there are enough data to tell.
+    weights : {"maximum", "errors"}
+        Divide every observable by its largest measured value, as in the paper, or every datum by
+        its measurement error; an observable without errors then takes its scatter about the fit.
+    drift : bool
+        Let the zeros of I_h and V_r lie on straight lines over the order of the rows.
+    medium : {"vacuum", "air"}, optional
+        What the lever was measured in; wins over measurement and probe.
+    priors : mapping of str to Prior or str
+        What is known before, of parameters of the material, dimensions, the circuit or the scales
+        of meters, also as text (`hotlever.probe.priors`); all that have a prior are varied.
+    usual_priors : bool
+        Whether what is usually known beforehand counts where no prior is stated, as it does in a
+        calibration (`hotlever.probe.priors.default_priors`).
+    free : sequence of str
+        What else is varied, beside what usually is.
+    usual : sequence of str
+        What usually is: by default the six parameters of the paper's lever. A fit takes what its
+        probe is made of (`hotlever.probe.parameters.usual_parameters`), and one of what was
+        measured in time the scales of the heat capacities.
+
+    Raises
+    ------
+    InputError
+        If a name does not exist, with the nearest that does.
+    """
+
+    observables: Sequence[str] | None = None
+    fixed: Mapping[str, float | None] = field(default_factory=dict)
+    robust: bool = False
+    weights: Weights = "maximum"
+    drift: bool = False
+    medium: Medium | None = None
+    priors: Mapping[str, Prior | str] = field(default_factory=dict)
+    usual_priors: bool = False
+    free: Sequence[str] = ()
+    usual: Sequence[str] = tuple(PARAMETERS)
+
+    def __post_init__(self) -> None:
+        for name in self.fixed:
+            if "." not in name and name not in OF_SILICON:
+                parameter(name)
+            for others, what in ((self.priors, "has a prior"), (self.free, "is free")):
+                if name in others:
+                    raise InputError(f"{name} is fixed and {what}, expected one of them")
+        if not self.varied:
+            raise InputError("all parameters are fixed; nothing is left to fit")
+        asked: list[tuple[str, Any, tuple[str, ...]]] = [
+            ("weights", self.weights, get_args(Weights))
+        ]
+        asked += [("observable", name, tuple(OBSERVABLES)) for name in self.observables or ()]
+        if self.medium is not None:
+            asked.append(("medium", self.medium, get_args(Medium)))
+        for kind, name, known in asked:
+            if name not in known:
+                raise unknown_name(kind, str(name), known)
+        if self.observables is None:
+            return
+        if not self.observables:
+            raise InputError(f"no observables; expected some of {', '.join(OBSERVABLES)}")
+        chosen = tuple(name for name in OBSERVABLES if name in self.observables)
+        object.__setattr__(self, "observables", chosen)
+
+    @property
+    def material(self) -> list[str]:
+        """The parameters to find of those that are usually varied."""
+        return [name for name in self.usual if name not in self.fixed]
+
+    @property
+    def varied(self) -> list[str]:
+        """All parameters to find."""
+        more = dict.fromkeys([*self.priors, *self.free])
+        return [*self.material, *(name for name in more if name not in {*self.usual, *SCALES})]
+
+    def of(self, probe: Probe, *, in_time: bool = False) -> FitOptions:
+        """Return the options for a probe: what usually varies is what it is made of.
+
+        Raises
+        ------
+        InputError
+            If it has no such parameter as is fixed or free, with the nearest that it has; or if
+            all are fixed.
+        """
+        known = of_materials(probe, in_time=in_time)
+        for name in self.fixed:
+            if name not in known:
+                raise unknown_name("parameter", name, known)
+        for name in self.free:
+            parameter_of(probe, name, in_time=in_time)
+        usual = heat_capacities(probe) if in_time else usual_parameters(probe)
+        return replace(self, usual=usual)
+
+    def held(self, probe: Probe) -> Probe:
+        """Return a probe with the fixed values in place.
+
+        Raises
+        ------
+        InputError
+            If a value is impossible.
+        """
+        values = {name: value for name, value in self.fixed.items() if value is not None}
+        return probe.with_(**values) if values else probe
+
+    def values(self) -> dict[str, Any]:
+        """Return the options as plain values."""
+        found = asdict(self) | {"fixed": dict(self.fixed), "free": list(self.free)}
+        if not found["usual_priors"]:
+            del found["usual_priors"]
+        if tuple(found.pop("usual")) != tuple(PARAMETERS):
+            found["usual"] = list(self.usual)
+        return found

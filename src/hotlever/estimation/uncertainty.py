@@ -1,0 +1,215 @@
+"""How sure a fit is beyond its covariance: posterior, predictive band and profiles together.
+
+In numbers for the fit file, and in words.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from dask.system import CPU_COUNT
+
+from hotlever.cluster import local_processes
+from hotlever.estimation.posterior import BAND_QUANTILES, predictive_band, sample_posterior
+from hotlever.estimation.profile import profile_likelihood
+from hotlever.estimation.result import Fit
+from hotlever.files import json_text
+from hotlever.probe.parameters import parameters_of
+from hotlever.types import Array, Progress
+
+#: Chains are called unsettled above this R̂ or below this effective sample size (Vehtari et al.,
+#: doi:10.1214/20-BA1221).
+_RHAT, _EFFECTIVE = 1.01, 400
+#: A parameter is called undetermined if this share of the samples lies within the second share
+#: of its range from a bound, or if its spread is more than the third share of the prior's.
+_AT_BOUND, _NEAR, _AS_WIDE = 0.025, 0.02, 0.7
+#: It is said to be as known before from this share of its prior's spread on.
+_AS_KNOWN = 0.9
+#: The lever that is sampled is said to be off from this error on (K).
+_ROUGH_ERROR_K = 1.0
+#: Intervals are said to differ from those of the standard error by more than this share of it.
+_DIFFERENT = 0.5
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What was sampled and profiled of a fit.
+
+    Attributes
+    ----------
+    fit : Fit
+    posterior, band : xarray.Dataset or None
+        See `sample_posterior` and `predictive_band`.
+    profiles : dict of str to xarray.Dataset
+        By parameter; see `profile_likelihood`.
+    """
+
+    fit: Fit
+    posterior: xr.Dataset | None
+    band: xr.Dataset | None
+    profiles: dict[str, xr.Dataset]
+
+    def statements(self) -> list[str]:
+        """Say in words what the data leave open, and what that means for the tip temperature."""
+        found = []
+        if self.posterior is not None:
+            found += _unsettled(self.posterior)
+            error = self.posterior.attrs["rough_error_K"]
+            if error > _ROUGH_ERROR_K:
+                found.append(
+                    f"the lever that was sampled is off by up to {error:.1f} K at the outermost "
+                    "samples of the posterior"
+                )
+            for name in self.fit.names:
+                found += _about(self.fit, name, self.posterior[name].values.ravel())
+        for profile in self.profiles.values():
+            found += profile.attrs["notes"].splitlines()
+        if self.band is not None:
+            low, *_, high = self.band.tip_K.values
+            widest = int(np.argmax(high - low))
+            found.append(
+                "the predicted tip temperature is uncertain by at most "
+                f"{(high - low)[widest] / 2:.1f} K (half of the 95 % band, at "
+                f"{self.band.bias.values[widest]:.3g} V), the model taken as exact"
+            )
+        return found
+
+    def to_json(self) -> str:
+        """Return the fit file with the keys ``posterior`` and ``profiles`` beside its own."""
+        content = self.fit.content()
+        if self.posterior is not None:
+            content["posterior"] = _posterior_content(self.posterior)
+        if self.band is not None:
+            content["posterior"]["band"] = {
+                name.replace("bias", "bias_V"): self.band[name].values.tolist()
+                for name in ("quantile", "bias", "tip_K", "power_mW", "tip_at_power_K")
+            }
+        if self.profiles:
+            content["profiles"] = {
+                name: _profile_content(profile) for name, profile in self.profiles.items()
+            }
+        content["uncertainty_notes"] = self.statements()
+        return json_text(content)
+
+
+def examine(
+    fit: Fit,
+    *,
+    samples: int | None = None,
+    profiles: bool = False,
+    processes: int | None = None,
+    sampling: Progress | None = None,
+    banding: Progress | None = None,
+    profiling: Progress | None = None,
+) -> Uncertainty:
+    """Sample the posterior of a fit, with its predictive band, and profile its parameters.
+
+    Parameters
+    ----------
+    fit : Fit
+    samples : int, optional
+        Of the posterior, at least; none by default.
+    profiles : bool
+        Whether to profile every parameter that the fit varied.
+    processes : int, optional
+        Started by spawn, if more than one: see `sample_posterior`. By default one for each
+        processor.
+    sampling, banding, profiling : callable, optional
+        Called with the steps (for profiles: parameters) done and their number.
+
+    Raises
+    ------
+    InputError
+        If a number is too small, or profiles are asked for of the only varied parameter.
+    ComputationError
+        If no start for sampling is found, a worker process dies, or the lever cannot be solved.
+    """
+    processes = processes or CPU_COUNT
+    curves, posterior, band = {}, None, None
+    if profiles:
+        tasks = [(fit, name) for name in fit.names]
+        # some at a time, in processes of their own
+        with local_processes(min(processes, len(tasks))) as (run, _):
+            found = run(profile_likelihood, tasks, profiling)
+        curves = dict(zip(fit.names, found, strict=True))
+    if samples is not None:
+        posterior = sample_posterior(fit, samples=samples, processes=processes, progress=sampling)
+        band = predictive_band(fit, posterior, progress=banding)
+    return Uncertainty(fit, posterior, band, curves)
+
+
+def _unsettled(posterior: xr.Dataset) -> list[str]:
+    """Name the quantities whose chains do not agree, or say too little."""
+    rhat, effective = posterior.rhat.values, posterior.effective_sample_size.values
+    names = posterior.quantity.values[(rhat > _RHAT) | (effective < _EFFECTIVE)].tolist()
+    if not names:
+        return []
+    return [
+        f"the posterior of {', '.join(names).replace('_temperature', ' temperature')} is not "
+        f"settled: R̂ up to {rhat.max():.3f} (expected at most {_RHAT:g}), as few as "
+        f"{effective.min():.0f} effective samples (expected at least {_EFFECTIVE}); take more "
+        "samples"
+    ]
+
+
+def _about(fit: Fit, name: str, values: Array) -> list[str]:
+    """Say whether a parameter is undetermined, or its interval not that of its standard error."""
+    known, fitted = parameters_of(fit.probe)[name], fit.parameters[name]
+    span, undetermined = known.upper - known.lower, f"{name} is not determined by these data: its"
+    for bound, inwards in ((known.lower, 1.0), (known.upper, -1.0)):
+        if np.mean(inwards * (values - bound) < _NEAR * span) > _AT_BOUND:
+            unit = "" if known.unit == "1" else f" {known.unit}"
+            return [f"{undetermined} posterior reaches its bound {bound:g}{unit}"]
+    prior = fit.known_before.get(name)
+    if prior is not None and np.std([*map(prior.deviation, values)]) > _AS_KNOWN:
+        return [f"{name} is as known before: these data do not tell"]
+    if values.std() > _AS_WIDE * span / np.sqrt(12.0):
+        return [f"{undetermined} posterior is about as wide as its bounds"]
+    if not fitted.stderr:
+        return []
+    # two standard errors, nearly: the quantile of the normal distribution
+    reach = 1.96 * fitted.stderr
+    said = np.array([fitted.value - reach, fitted.value + reach])
+    found = np.percentile(values, (2.5, 97.5))
+    if np.abs(found - said).max() <= _DIFFERENT * reach:
+        return []
+    return [
+        f"{name}: 95 % of the posterior lies between {found[0]:.4g} and {found[1]:.4g}, not "
+        f"between {said[0]:.4g} and {said[1]:.4g} as its standard error says"
+    ]
+
+
+def _posterior_content(posterior: xr.Dataset) -> dict[str, Any]:
+    quantities = {}
+    for name in posterior.quantity.values.tolist():
+        one, values = posterior.sel(quantity=name), posterior[name].values
+        quantities[name] = {
+            "mean": float(values.mean()),
+            "standard_deviation": float(values.std()),
+            "quantiles": {f"{q:g}": float(np.percentile(values, q)) for q in BAND_QUANTILES},
+            "effective_sample_size": round(one.effective_sample_size.item(), 1),
+            "rhat": round(one.rhat.item(), 5),
+            "unit": posterior[name].attrs["units"],
+        }
+    return {
+        "samples": posterior.sizes["chain"] * posterior.sizes["draw"],
+        "seed": posterior.attrs["seed"],
+        "noise": posterior.attrs["noise"],
+        "acceptance_fraction": round(posterior.acceptance_fraction.item(), 4),
+        "quantities": quantities,
+    }
+
+
+def _profile_content(profile: xr.Dataset) -> dict[str, Any]:
+    return {
+        "value": profile.value.values.tolist(),
+        "delta_chi_square": profile.delta_chi_square.values.tolist(),
+        "interval": {
+            f"{100 * level:.0f}": profile.interval.sel(level=level).values.tolist()
+            for level in profile.level.values
+        },
+        "notes": profile.attrs["notes"].splitlines(),
+    }

@@ -1,0 +1,84 @@
+"""The tip temperature of a lever by its power, as far as that is a function.
+
+On most levers the power rises with the tip temperature to the end. Where the heat moves towards the
+tip faster than the tip gets hotter, the power turns: the tip gets hotter with less of it, and a
+power belongs to several temperatures.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import PPoly
+
+from hotlever.lever.curve import smooth_curve
+from hotlever.lever.equations import steps_of
+from hotlever.lever.ramp import crossing
+from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from hotlever.lever.branch import Branch
+
+
+class ByPower:
+    """A branch of a lever that starts cold, read by its power."""
+
+    def __init__(self, branch: Branch) -> None:
+        self._branch = branch
+
+    @cached_property
+    def _power(self) -> PPoly:
+        """P_l (mW) by u."""
+        lever, current = (self._branch.curve.c[..., place] for place in (0, 1))
+        product = np.zeros((len(lever) + len(current) - 1, lever.shape[1]))
+        for place, row in enumerate(lever):
+            product[place : place + len(current)] += row * current
+        return PPoly(product, self._branch.curve.x)
+
+    @cached_property
+    def turn_u(self) -> float | None:
+        """Where the power is highest before it falls; None if it rises to the end."""
+        falling = [u for u in self._branch.turns(self._power).tolist() if self._power(u, 2) < 0]
+        return falling[0] if falling else None
+
+    @cached_property
+    def highest_mW(self) -> float:
+        """The highest power up to which every power has one temperature."""
+        end = self._branch.end_u
+        if self.turn_u is None:
+            return float(self._power(end))
+        level = self._branch.turns(self._power)
+        beyond = np.append(level[level > self.turn_u], end)
+        return float(self._power(beyond).min())
+
+    def u(self, power_mW: Array) -> Array:
+        """Return where some powers (mW) are; NaN where there is none, or several."""
+        if self.turn_u is None:
+            u = self._by_root(np.sqrt(np.maximum(power_mW, 0.0)))
+        else:
+            flat = crossing(self._power, 0.0, self.turn_u, power_mW.ravel())
+            u = flat.reshape(power_mW.shape)
+        inside = (power_mW >= 0) & (power_mW <= self.highest_mW)
+        return np.where(inside, u, np.nan)
+
+    def slope(self, power_mW: Array) -> Array:
+        """Return dT_tip/dP_l (K/mW) at some powers (mW), which are not zero."""
+        if self.turn_u is not None:
+            u = self.u(power_mW)
+            return np.asarray(2.0 * u / self._power(u, 1))
+        root = np.sqrt(power_mW)
+        return np.asarray(self._by_root(root) * self._by_root(root, 1) / root)
+
+    @cached_property
+    def _by_root(self) -> PPoly:
+        """u by the root of the power, which is nearly a straight line."""
+        u, values, slopes = self._branch.u, self._branch.values, self._branch.value_slopes
+        power = values[:, 0] * values[:, 1]
+        slope = slopes[:, 0] * values[:, 1] + values[:, 0] * slopes[:, 1]
+        root = np.sqrt(power)
+        # at zero power both begin as u
+        by_u = np.append(np.sqrt(slopes[0, 0] * slopes[0, 1]), slope[1:] / (2.0 * root[1:]))
+        bent = root[np.isin(u, steps_of(self._branch.equations))]
+        return smooth_curve(root, u, 1.0 / by_u, bent)

@@ -1,0 +1,19 @@
+"""Measured data of one lever: the record, and the files that it is read from.
+
+`columns` knows the names and units of the columns, `settings` the comments that give circuit and
+surroundings, `sweeps` polarities and the order of the rows, `checks` what no lever can show.
+"""
+
+from hotlever.measurement.columns import parse_columns
+from hotlever.measurement.conditions import with_measured_circuit
+from hotlever.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, Measurement
+from hotlever.measurement.reading import read_measurement
+
+__all__ = [
+    "COLUMNS",
+    "OBSERVABLE_SYMBOLS",
+    "Measurement",
+    "parse_columns",
+    "read_measurement",
+    "with_measured_circuit",
+]

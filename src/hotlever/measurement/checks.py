@@ -1,0 +1,120 @@
+"""What no lever can show is refused; what it hardly can is noted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hotlever.errors import InputError, shown
+from hotlever.measurement.columns import Column
+from hotlever.measurement.data import COLUMNS
+from hotlever.measurement.settings import plausible
+from hotlever.probe import Circuit
+from hotlever.tables import Table
+from hotlever.types import Array
+
+#: Where the largest value of a column can lie, in the unit inside; else its unit is wrong.
+_PLAUSIBLE = {"V_b": (1e-3, 1e3), "I_h": (1e-9, 1e3), "V_r": (1e-9, 1e3), "T_tip": (0.0, 5e3)}
+#: A standard error this much smaller than the largest value is none.
+_LEAST_ERROR = 1e-9
+#: Part of the largest value by which noise and drift may push a current or voltage below 0.
+NOISE = 0.05
+#: K, and standard errors, by which a tip may seem colder than its base.
+_COLDER_K, _COLDER_ERRORS = 20.0, 4.0
+#: Resistances (kΩ) of levers, cold and hot.
+_LEVER_KOHM = (0.1, 60.0)
+#: K; probe files take no colder base.
+_COLDEST_BASE_K = 250.0
+
+
+def colder_than_base(tip_K: Array, error_K: Array, base_K: float) -> NDArray[np.bool_]:
+    """Return where a tip seems colder than its base by more than an offset or noise explain."""
+    margin = np.maximum(_COLDER_K, _COLDER_ERRORS * np.nan_to_num(error_K))
+    return np.asarray(tip_K < base_K - margin)
+
+
+def note_rows(notes: list[str], table: Table, odd: NDArray[np.bool_], text: str) -> None:
+    """Note what is odd about some rows, if there are any."""
+    if odd.any():
+        others = f", and in {odd.sum() - 1} more rows" if odd.sum() > 1 else ""
+        notes.append(f"{table.where(int(np.argmax(odd)))}: {text}{others}")
+
+
+def check(
+    table: Table,
+    columns: dict[str, Column],
+    values: dict[str, Array],
+    settings: dict[str, Any],
+    notes: list[str],
+    *,
+    signed: bool = False,
+) -> None:
+    """Refuse what no lever can show, and note what it hardly can.
+
+    What may be of either sign is asked less: in time a current goes on or off before the bias is
+    known to, and other supplies drive a current of their own.
+    """
+    for symbol in (symbol for symbol in COLUMNS if symbol in columns):
+        of, data = symbol.removeprefix("d"), values[symbol]
+        unit, (low, high) = COLUMNS[of][1], _PLAUSIBLE[of]
+        size = np.nanmax(np.abs(values[of]), initial=0.0)
+        if symbol != of:
+            wrong = (data <= _LEAST_ERROR * size) | (data > high)
+            expected = f"a standard error above 0 and up to {high:g} {unit}, or an empty cell"
+        else:
+            wrong, expected = (data <= 0.0) & (symbol == "T_tip"), "a temperature above 0 K"
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            cell = shown(table.rows[row][columns[symbol].place])
+            raise InputError(f"{table.where(row)}: {symbol} is '{cell}', expected {expected}")
+        if symbol == of and not np.isnan(data).all():
+            for largest in (size,) if signed else (np.nanmax(data), size):
+                plausible(f"{table.path}: the largest {symbol}", unit, largest, low, high)
+            negative = (data < -NOISE * size) & (not signed)
+            note_rows(notes, table, negative, f"{symbol} is negative")
+
+    base = settings.get("base_temperature_K", _COLDEST_BASE_K)
+    colder = colder_than_base(values["T_tip"], values["dT_tip"], base)
+    text = f"T_tip is below the base temperature ({base:g} K), perhaps in another unit"
+    note_rows(notes, table, colder, text)
+    if signed:
+        return
+
+    bias, current = values["V_b"], values["I_h"]
+    ohm = settings.get("series_resistance_ohm", 0.0)
+    lever = Circuit(series_resistance_ohm=ohm).lever_voltage(bias, current)
+    below = lever < -NOISE * bias.max()
+    if below.any():
+        row = int(np.argmax(below))
+        raise InputError(
+            f"{table.where(row)}: V_b = {bias[row]:g} V and I_h = {current[row]:g} mA leave "
+            f"{lever[row]:.3g} V for the lever behind R_s = {ohm:g} ohm, expected a voltage above "
+            f"0{_likely(bias, current, ohm / 1000.0)}"
+        )
+
+
+def _likely(bias: Array, current: Array, series_kohm: float) -> str:
+    """Ask after what would leave a lever of some kilo-ohm behind a series resistance; or nothing.
+
+    Of biases (V) and currents (mA) that leave none.
+    """
+    hypotheses = {
+        "is V_b the lever's own voltage, not the bias?": (bias + series_kohm * current, current),
+        "are the columns of V_b and I_h swapped?": (current, bias),
+        "is the unit of I_h wrong (µA labelled mA)?": (bias, current / 1000.0),
+        "is the unit of V_b wrong (V labelled mV)?": (bias * 1000.0, current),
+        "is the unit of R_s wrong (ohm labelled kOhm)?": None,
+    }
+    asked = []
+    for question, rows in hypotheses.items():
+        volts, milliampere = rows or (bias, current)
+        behind = series_kohm / 1000.0 if rows is None else series_kohm
+        heated = (milliampere > 0) & (volts > 0)
+        if not heated.any():
+            continue
+        ratio = volts[heated] / milliampere[heated] - behind
+        if ratio.min() > _LEVER_KOHM[0] and ratio.max() < _LEVER_KOHM[1]:
+            asked.append(question)
+    return f": {' or: '.join(asked)}" if asked else ""

@@ -1,0 +1,261 @@
+"""Which column of a measurement file is which quantity, by its heading or because one is told."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from hotlever.cells import text_lines
+from hotlever.errors import InputError, quoted, shown, unknown_name
+from hotlever.files import read_bytes
+from hotlever.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, TIME
+from hotlever.tables import Table
+from hotlever.types import Array
+from hotlever.units import TIMES, conversion, name_and_unit, unknown_unit
+
+#: The voltage over the lever, from which the bias follows.
+LEVER = "V_l"
+#: Quantities that a column can be, with the unit inside.
+QUANTITIES = {symbol: unit for symbol, (_, unit) in COLUMNS.items()} | {LEVER: "V", TIME: "us"}
+MEANING = {
+    "V_b": "bias",
+    "I_h": "heater current",
+    "V_r": "reader voltage",
+    "T_tip": "tip temperature",
+    LEVER: "voltage over the lever",
+    TIME: "time",
+    "dT_tip": "standard error",
+    "dI_h": "standard error",
+    "dV_r": "standard error",
+}
+#: Their other names, in small letters without blanks and marks.
+_NAMES = {
+    **dict.fromkeys(("vb", "ub", "vbias", "ubias", "bias", "biasvoltage"), "V_b"),
+    **dict.fromkeys(("vl", "ul", "vlever", "ulever", "lever", "levervoltage"), LEVER),
+    **dict.fromkeys(("ih", "i", "current", "heatercurrent", "levercurrent"), "I_h"),
+    **dict.fromkeys(("vr", "ur", "vreader", "ureader", "reader", "readervoltage"), "V_r"),
+    **dict.fromkeys(("ttip", "tip", "tiptemperature"), "T_tip"),
+    **dict.fromkeys(("dttip", "δttip"), "dT_tip"),
+    "dih": "dI_h",
+    "δih": "dI_h",
+    "dvr": "dV_r",
+    "δvr": "dV_r",
+}
+#: First heading of a B1500's table, whose units are those of SI without a prefix.
+_IN_SI = "DataName"
+#: Bytes of a file of column names.
+_LARGEST = 100_000
+
+
+@dataclass(frozen=True)
+class Column:
+    """Place of a quantity in a table, and its unit."""
+
+    symbol: str
+    place: int
+    unit: str
+    heading: str
+
+    def values(self, table: Table) -> Array:
+        """Return the data in the unit used inside; raises InputError (see `Table.numbers`)."""
+        inside = QUANTITIES[self.symbol]
+        scale = conversion(self.unit, inside, difference=self.symbol[0] == "d")
+        assert scale is not None
+        return scale[0] * table.numbers(self.place, self.symbol) + scale[1]
+
+
+def symbol_of(name: str) -> str | None:
+    """Return the quantity that a column of this name holds, None if that is not known.
+
+    Examples
+    --------
+    >>> symbol_of("Vb"), symbol_of("I_h"), symbol_of("Voltage")
+    ('V_b', 'I_h', None)
+    """
+    return _NAMES.get(re.sub(r"[\W_]+", "", name[:40]).lower())
+
+
+def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
+    """Parse ``I_h (uA)=Current``: which heading, or number, of a column is which quantity.
+
+    What has no ``=`` is a file of such lines; those that start with ``#`` are comments.
+
+    Raises
+    ------
+    InputError
+        If there is no such quantity, unit or file, or one is given twice.
+
+    Examples
+    --------
+    >>> parse_columns(["I_h (uA)=Current", "V_b (V)=2"])
+    {'I_h (uA)': 'Current', 'V_b (V)': '2'}
+    """
+    lines: list[tuple[str, str]] = []
+    for text in texts:
+        if "=" in str(text):
+            lines.append((f"--column {text!s}", str(text)))
+            continue
+        for place, line in enumerate(text_lines(read_bytes(text, _LARGEST), str(text)), start=1):
+            if line.strip() and not line.lstrip().startswith("#"):
+                lines.append((f"{text}: line {place}", line))
+    found: dict[str, str] = {}
+    seen: set[str] = set()
+    for where, line in lines:
+        quantity, equals, heading = (part.strip(' \t"') for part in line.partition("="))
+        if not equals or not heading:
+            raise InputError(
+                f"{where}: found '{shown(line)}', expected one like 'I_h (uA)=Current'"
+            )
+        symbol, _ = _asked(quantity, where)
+        if symbol in seen:
+            raise InputError(f"{where}: {symbol} is given twice, expected once")
+        seen.add(symbol)
+        found[quantity] = heading
+    return found
+
+
+def _asked(quantity: str, where: str) -> tuple[str, str | None]:
+    """Return symbol and unit of what a column is told to be."""
+    name, unit = name_and_unit(quantity)
+    # no heading of that name alone is a time: settings of instruments are called so too
+    symbol = TIME if name.casefold() in TIMES else symbol_of(name)
+    if symbol is None:
+        raise unknown_name("quantity", name, QUANTITIES, where)
+    if unit is not None and conversion(unit, QUANTITIES[symbol]) is None:
+        raise unknown_unit(unit, QUANTITIES[symbol], f"{where}: {symbol}")
+    return symbol, unit
+
+
+def is_heading(name: str, told: Mapping[str, str]) -> bool:
+    """Whether a heading is that of a known quantity, or of a column that one is told of."""
+    bare = name_and_unit(name)[0]
+    return symbol_of(bare) is not None or _same(told.values(), name)
+
+
+def _same(headings: Iterable[str], name: str) -> bool:
+    """Whether a heading, with or without its unit, is one of some."""
+    both = {name.casefold(), name_and_unit(name)[0].casefold()}
+    return any(heading.casefold() in both for heading in headings)
+
+
+def find_columns(table: Table, told: Mapping[str, str], notes: list[str]) -> dict[str, Column]:
+    """Find the columns of each quantity; a note on each column that is none.
+
+    Raises
+    ------
+    InputError
+        If a unit is missing or unknown, or two columns are the same quantity.
+    """
+    where = table.where(-1)
+    found: dict[str, Column] = {}
+    for quantity, heading in told.items():
+        symbol, unit = _asked(quantity, where)
+        place = _place(table, heading, where)
+        found[symbol] = _column(table, symbol, place, unit)
+    exact = {symbol.lower(): symbol for symbol in QUANTITIES if symbol != TIME}
+    used = {column.place for column in found.values()}
+    # its own symbol names a quantity before any other name
+    for names in (exact, _NAMES):
+        taken = set(found)
+        for place, heading in enumerate(table.names):
+            name = name_and_unit(heading)[0].lower()
+            symbol = names.get(name if names is exact else re.sub(r"[\W_]+", "", name[:40]), "")
+            if symbol == "" or symbol in taken or place in used:
+                continue
+            if symbol in found:
+                raise InputError(
+                    f"{where}: column '{symbol}' stands twice; {_told(symbol)} says which it is"
+                )
+            found[symbol] = _column(table, symbol, place, None)
+            used.add(place)
+    for place, heading in enumerate(table.names):
+        name, unit = name_and_unit(heading)
+        of_time = name.casefold() in TIMES and conversion(unit or "", QUANTITIES[TIME])
+        if of_time and TIME not in found and place not in used:
+            found[TIME] = _column(table, TIME, place, None)
+            used.add(place)
+    for place, heading in enumerate(table.names):
+        if place not in used and heading != _IN_SI and heading.strip():
+            unit = name_and_unit(heading)[1] or ""
+            alike = (s for s, u in QUANTITIES.items() if s not in found and conversion(unit, u))
+            likely = next((s for s in alike if s not in (LEVER, TIME)), None)
+            hint = f"; if it is {likely}, name it '{likely} ({unit})'" if likely else ""
+            notes.append(f"{table.path}: column '{shown(heading)}' is not used{hint}")
+    return found
+
+
+def _place(table: Table, heading: str, where: str) -> int:
+    """Return the place of a column by its heading, with or without unit, or by its number."""
+    width = len(table.rows[0])
+    places = [at for at, name in enumerate(table.names) if name.casefold() == heading.casefold()]
+    places = places or [at for at, name in enumerate(table.names) if _same([heading], name)]
+    if len(places) > 1:
+        raise InputError(
+            f"{where}: column {quoted(heading)} stands {len(places)} times, expected its number "
+            f"(1 to {width})"
+        )
+    if places:
+        return places[0]
+    if heading.isdecimal() and len(heading) < 5 and 1 <= int(heading) <= width:
+        return int(heading) - 1
+    if not table.names or heading.isdecimal():
+        raise InputError(
+            f"{where}: no column {quoted(heading)}, expected its number (1 to {width})"
+            + " or heading" * bool(table.names)
+        )
+    raise unknown_name("column", heading, [shown(name) for name in table.names[:9]], where)
+
+
+def _column(table: Table, symbol: str, place: int, told: str | None) -> Column:
+    """Return a column with its unit, which the file or the user gives."""
+    heading, inside = table.names[place] if table.names else "", QUANTITIES[symbol]
+    where = f"{table.where(-1)}: column '{shown(heading or str(place + 1))}'"
+    written = name_and_unit(heading)[1]
+    if table.names[:1] == [_IN_SI]:
+        written = written or {"mA": "A"}.get(inside, inside)
+    unit = told or written
+    if unit is None:
+        raise InputError(
+            f"{where} has no unit, expected '{symbol} ({inside})' or another unit in parentheses; "
+            f"{_told(symbol, heading or str(place + 1))} gives one"
+        )
+    scale = conversion(unit, inside)
+    if scale is None:
+        raise unknown_unit(unit, inside, f"{table.where(-1)}: {shown(heading)}")
+    if told and written and conversion(written, inside) not in (None, scale):
+        raise InputError(f"{where}: its unit is {written}, expected {told} as --column says")
+    return Column(symbol, place, unit, heading)
+
+
+def _told(symbol: str, heading: str = "HEADING") -> str:
+    return f"--column '{symbol} ({QUANTITIES[symbol]})={shown(heading)}'"
+
+
+def require(table: Table, found: Mapping[str, Column], *, driven: bool = False) -> None:
+    """Refuse a table without bias, unless it is `driven`, or without anything that depends on it.
+
+    Raises
+    ------
+    InputError
+        If either is missing.
+    """
+    shows = {*OBSERVABLE_SYMBOLS.values()} | ({LEVER} if TIME in found else set())
+    given = driven or "V_b" in found or {LEVER, "I_h"} <= set(found)
+    if given and found.keys() & shows:
+        return
+    where = table.where(-1)
+    names = ", ".join(repr(shown(name)) for name in table.names[:9])
+    what = f"the header names {names}" if table.names else "numbers without a header row"
+    if TIME in found:
+        raise InputError(
+            f"{where}: {what}; expected 'V_b (V)', or a wave form such as --pulse 10V,5us, and at "
+            "least one of 'I_h (mA)', 'V_l (V)', 'V_r (mV)', 'T_tip (K)' beside the time"
+        )
+    voltage = (name for name in table.names if conversion(name_and_unit(name)[1] or "", "V"))
+    first = next(voltage, "HEADING" if table.names else "1")
+    raise InputError(
+        f"{where}: {what}; expected 'V_b (V)' and at least one of 'I_h (mA)', 'V_r (mV)', "
+        f"'T_tip (K)', or 'V_l (V)' and 'I_h (mA)'; other names with {_told('V_b', first)}"
+    )

@@ -1,0 +1,237 @@
+"""Measured data sets: bias, current, reader voltage and tip temperature of one lever."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from hotlever.datasets import labelled
+from hotlever.errors import InputError, unknown_name
+from hotlever.lever.dataset import OBSERVABLES, circuit_of
+from hotlever.lever.transient.history import checked_times
+from hotlever.lever.transient.waveform import Waveform
+from hotlever.probe import Circuit
+from hotlever.probe.surroundings import Medium
+from hotlever.types import Array
+
+#: The time, in files of what was measured in time.
+TIME = "t"
+#: Quantities of a measurement file: symbol in the header, attribute, unit inside.
+COLUMNS = {
+    "V_b": ("bias_V", "V"),
+    "I_h": ("current_mA", "mA"),
+    "V_r": ("reader_V", "V"),
+    "T_tip": ("tip_K", "K"),
+    "dT_tip": ("tip_error_K", "K"),
+    "dI_h": ("current_error_mA", "mA"),
+    "dV_r": ("reader_error_V", "V"),
+}
+#: The columns a fit can compare, by the name users give it.
+OBSERVABLE_SYMBOLS = {"current": "I_h", "reader": "V_r", "tip": "T_tip"}
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One lever's data, row by row as in the file; NaN where a cell was empty.
+
+    Attributes
+    ----------
+    bias_V, current_mA, reader_V, tip_K, tip_error_K : ndarray, shape (n,)
+        The last is the standard error of the tip temperature.
+    current_error_mA, reader_error_V : ndarray, shape (n,), or None
+        Standard errors of the others.
+    series_resistance_ohm, base_temperature_K : float or None
+        If the file gives them.
+    medium : {"vacuum", "air"} or None
+        If the file says it.
+    gas_conductivity, pressure_mbar : float or None
+        Of the gas, over that of dry air, and its pressure, if the file says them.
+    path, sha256 : str
+        Origin; empty for data made in memory.
+    notes : tuple of str
+        What of the file was not used or not understood, and what looks wrong in it.
+    understood : tuple of tuple of str
+        What each column and setting of the file was taken for, as rows of a table.
+    rows : ndarray, shape (n,), or None
+        Of how many rows of the file each is the mean, if they were averaged.
+    time_us : ndarray, shape (n,), or None
+        When each row was measured (µs, rising) of a lever that was cold before; None at rest.
+    waveform : Waveform or None
+        Of the bias, for what was measured in time.
+    """
+
+    bias_V: Array
+    current_mA: Array
+    reader_V: Array
+    tip_K: Array
+    tip_error_K: Array
+    series_resistance_ohm: float | None = None
+    base_temperature_K: float | None = None
+    medium: Medium | None = None
+    path: str = ""
+    sha256: str = ""
+    notes: tuple[str, ...] = ()
+    current_error_mA: Array | None = None
+    reader_error_V: Array | None = None
+    gas_conductivity: float | None = None
+    pressure_mbar: float | None = None
+    understood: tuple[tuple[str, ...], ...] = ()
+    rows: Array | None = None
+    time_us: Array | None = None
+    waveform: Waveform | None = None
+
+    @classmethod
+    def in_time(
+        cls,
+        time_us: ArrayLike,
+        waveform: Waveform,
+        current_mA: ArrayLike | None = None,
+        reader_V: ArrayLike | None = None,
+        **more: Any,
+    ) -> Measurement:
+        """Return what was measured of a cold lever under a wave form.
+
+        Parameters
+        ----------
+        time_us : array_like, shape (n,)
+            Rising, from 0 on.
+        waveform : Waveform
+        current_mA, reader_V : array_like, shape (n,), optional
+            NaN where nothing was measured.
+        **more
+            Other attributes.
+
+        Raises
+        ------
+        InputError
+            If the times do not rise, or a column has another shape.
+
+        Examples
+        --------
+        >>> from hotlever.lever.transient import step
+        >>> Measurement.in_time([1.0, 2.0], step(4.0), [0.577, 0.576]).observables
+        ('current',)
+        """
+        times = checked_times(time_us)
+        nothing = np.full(times.shape, np.nan)
+        given = {
+            name: nothing if values is None else np.asarray(values, dtype=float)
+            for name, values in (("current_mA", current_mA), ("reader_V", reader_V))
+        }
+        if not np.array_equal(times, np.ravel(time_us)) or any(
+            values.shape != times.shape for values in given.values()
+        ):
+            raise InputError("expected times that rise, and one current and reader voltage each")
+        columns: Any = {"tip_K": nothing, "tip_error_K": nothing, **given, **more}
+        return cls(waveform.bias(times), time_us=times, waveform=waveform, **columns)
+
+    @property
+    def along(self) -> tuple[Array, str]:
+        """What tells the rows apart, and its unit: the time (µs), or at rest the bias (V)."""
+        return (self.bias_V, "V") if self.time_us is None else (self.time_us, "µs")
+
+    def need_rest(self, what: str) -> None:
+        """Refuse what was measured in time.
+
+        Raises
+        ------
+        InputError
+            If it was; the text says that `what` needs a sweep.
+        """
+        if self.time_us is not None:
+            raise InputError(
+                f"{self.path or 'measurement'}: was measured in time, within "
+                f"{np.ptp(self.time_us):.4g} µs; {what} expects a slow sweep of the bias"
+            )
+
+    @classmethod
+    def given(
+        cls, measurement: Measurement | str | os.PathLike[str], circuit: Circuit | None = None
+    ) -> Measurement:
+        """Return a measurement as it is, or read one that was made in a circuit from its file.
+
+        Raises
+        ------
+        InputError
+            If it is neither, or the file is at fault.
+        """
+        if isinstance(measurement, Measurement):
+            return measurement
+        if isinstance(measurement, str | os.PathLike):
+            from hotlever.measurement.reading import read_measurement
+
+            return read_measurement(measurement, circuit=circuit)
+        raise InputError(
+            f"found {type(measurement).__name__}, expected a Measurement or a measurement file"
+        )
+
+    @classmethod
+    def of_sweep(cls, sweep: xr.Dataset) -> Measurement:
+        """Return a sweep as if it had been measured, without noise, with its circuit and medium.
+
+        Examples
+        --------
+        >>> from hotlever import Probe, sweep
+        >>> Measurement.of_sweep(sweep(Probe.reference(), [1.0, 2.0])).observables
+        ('current', 'reader', 'tip')
+        """
+        circuit, names = circuit_of(sweep), ("bias_V", *OBSERVABLES.values())
+        columns: dict[str, Any] = {name: sweep[name].values for name in names}
+        return cls(
+            **columns,
+            tip_error_K=np.full(sweep.bias_V.size, np.nan),
+            series_resistance_ohm=circuit.series_resistance_ohm,
+            base_temperature_K=circuit.base_temperature_K,
+            medium=sweep.attrs["medium"],
+        )
+
+    def dataset(self, circuit: Circuit) -> xr.Dataset:
+        """Return the data by the names that a sweep has, V_l and P_l included.
+
+        Rising in bias, or in time.
+        """
+        named = ((name, getattr(self, name)) for name, _ in COLUMNS.values())
+        columns = {name: values for name, values in named if values is not None}
+        columns["lever_V"] = circuit.lever_voltage(self.bias_V, self.current_mA)
+        columns["power_mW"] = circuit.power(self.bias_V, self.current_mA)
+        if self.time_us is not None:
+            return labelled(columns, "time", {"time": self.time_us})
+        return labelled(columns, coordinates={"bias": self.bias_V}).sortby("bias")
+
+    def observable(self, name: str) -> Array:
+        """Return the data of ``current`` (mA), ``reader`` (V) or ``tip`` (K).
+
+        Raises
+        ------
+        InputError
+            If there is no observable of this name.
+        """
+        if name not in OBSERVABLES:
+            raise unknown_name("observable", name, OBSERVABLES)
+        values: Array = getattr(self, OBSERVABLES[name])
+        return values
+
+    def error(self, name: str) -> Array:
+        """Return the standard errors of an observable's data, NaN where there are none."""
+        self.observable(name)
+        values = getattr(self, COLUMNS["d" + OBSERVABLE_SYMBOLS[name]][0])
+        return np.full(self.bias_V.shape, np.nan) if values is None else values
+
+    def part(self, rows: NDArray[np.bool_]) -> Measurement:
+        """Return some rows, (n,) of bool, as a measurement."""
+        columns: Any = {
+            name: values[rows]
+            for name, values in vars(self).items()
+            if isinstance(values, np.ndarray)
+        }
+        return replace(self, **columns)
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """Names of the observables that have any data."""
+        return tuple(name for name in OBSERVABLES if np.isfinite(self.observable(name)).any())

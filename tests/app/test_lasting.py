@@ -1,0 +1,385 @@
+"""What a user made stays: probe files that were edited, choices after a restart, other files."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import gdstk
+import pytest
+from nicegui import ui
+from nicegui.testing import User
+from nicegui.testing.user_interaction import UserInteraction
+from test_rooms import drop, shown, until, visit
+from test_rooms_at_work import done
+
+from hotlever.app.choices import CHOICES
+from hotlever.app.project import EXAMPLES, Project
+from hotlever.app.session import Session
+from hotlever.probe import Probe
+
+DROPPED = "dropped own.gds"
+OWN = (EXAMPLES / "reference-probe.gds").read_bytes()
+
+
+def at_once(session: Session) -> None:
+    """Have commands run in this process, before they are said to have been started."""
+
+    def start(room: str, arguments: list[str], then: Any = None) -> Any:
+        job = session.jobs.by_room[room] = done(arguments, session.project.folder)[0]
+        return job
+
+    session.jobs.start = start  # type: ignore[method-assign]
+
+
+def of(user: User, kind: Any, label: str = "") -> Any:
+    """Return the last element of a kind, with some label."""
+    there = (one for one in user.client.elements.values() if isinstance(one, kind))
+    return [one for one in there if not label or one.props.get("label") == label][-1]
+
+
+def texts(user: User) -> list[str]:
+    """Return what labels say."""
+    there = user.client.elements.values()
+    return [one.text for one in there if isinstance(one, ui.label) and one.visible]
+
+
+def images(user: User) -> list[str]:
+    """Return what the pictures of a page show."""
+    return [one.props["alt"] for one in user.client.elements.values() if one.tag == "img"]
+
+
+# --- edits ----------------------------------------------------------------------------------------
+
+
+def test_a_drawing_that_comes_again_leaves_an_edited_probe_file_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "own.toml"
+
+    async def story(user: User, session: Session) -> None:
+        at_once(session)
+        await user.open("/lever")
+        await drop(user, "own.gds", OWN)
+        await user.should_see("What the drawing holds", retries=100)
+        edited = path.read_text().replace("thickness_um = 0.4", "thickness_um = 0.31")
+        path.write_text(edited)
+        # dropped where it was dropped, dropped at the start, and chosen under Open
+        await drop(user, "own.gds", OWN)
+        await user.should_see("own.toml is there already, and was kept as it is.", retries=50)
+        assert path.read_text() == edited == of(user, ui.textarea).value
+        await user.open("/")
+        await drop(user, "own.gds", OWN)
+        await user.open("/lever")
+        await user.should_see("own.toml is there already", retries=50)
+        await user.open("/lever")
+        of(user, ui.select, "Open").set_value("own.gds")
+        await user.should_see("own.toml is there already", retries=50)
+        assert path.read_text() == edited == of(user, ui.textarea).value
+        # who wants the proposal asks for it, and has the edits back
+        press(user, "Propose anew")
+        await until(lambda: path.read_text() != edited)
+        await until(lambda: "thickness_um = 0.4 " in of(user, ui.textarea).value)
+        press(user, "Undo")
+        words = "hotlever probe import own.gds -o own.toml --plot own.svg"
+        await user.should_see(words)
+        # two were made: the last button of the name is of the first, which made the file
+        assert [one.what for one in session.project.changes.latest()] == [words, words, DROPPED]
+        buttons = [one for one in user.client.elements.values() if isinstance(one, ui.button)]
+        again = next(one for one in buttons if one.props.get("aria-label") == f"Undo: {words}")
+        UserInteraction(user, {again}, None).click()
+        await until(lambda: path.read_text() == edited)
+        await user.open("/lever")
+        await until(lambda: of(user, ui.textarea).value == edited)
+
+    visit(tmp_path, story)
+
+
+def press(user: User, text: str) -> None:
+    """Press the last button that says something: that of the room, not the one that leads to it."""
+    buttons = [one for one in user.client.elements.values() if isinstance(one, ui.button)]
+    named = [one for one in buttons if text in (one.text, one.props.get("aria-label"))]
+    UserInteraction(user, {named[-1]}, None).click()
+
+
+def test_saving_asks_before_another_file_is_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "my-lever.toml"
+    path.write_text("mine, made elsewhere")
+
+    async def story(user: User, session: Session) -> None:
+        await user.open("/lever")
+        await until(lambda: "length_um = 54.4" in of(user, ui.textarea).value)
+        question = "my-lever.toml is there already"
+        for button in ("Save", "Simulate", "PNG"):
+            press(user, button)
+            await user.should_see(question, retries=50)
+            press(user, "Keep it")
+            await user.should_not_see(question, retries=50)
+            assert path.read_text() == "mine, made elsewhere"
+        press(user, "Save")
+        await user.should_see(question, retries=50)
+        press(user, "Replace it")
+        await until(lambda: "three-leg" in path.read_text())
+        # what was saved here is saved again without a question, unless another has written it
+        of(user, ui.number, "length_um").set_value(60.0)
+        await until(lambda: "length_um = 60" in of(user, ui.textarea).value)
+        press(user, "Save")
+        await until(lambda: "length_um = 60" in path.read_text())
+        path.write_text("edited elsewhere")
+        press(user, "Save")
+        await user.should_see(question, retries=50)
+        for change in session.project.changes.latest():
+            session.project.changes.undo(change)
+        assert path.read_text() == "mine, made elsewhere"
+
+    visit(tmp_path, story)
+
+
+def test_edits_that_are_not_saved_are_asked_about(tmp_path: Path) -> None:
+    for name in ("a.toml", "b.toml"):
+        (tmp_path / name).write_text(f"# {name}")
+
+    async def story(user: User, session: Session) -> None:
+        await user.open("/lever")
+        of(user, ui.select, "Open").set_value("a.toml")
+        await until(lambda: of(user, ui.textarea).value == "# a.toml")
+        of(user, ui.textarea).set_value("# edited")
+        await until(lambda: session.chosen["lever"]["text"] == "# edited")
+        of(user, ui.select, "Open").set_value("b.toml")
+        await user.should_see("edits that are not saved", retries=50)
+        press(user, "Go on with it")
+        await until(lambda: of(user, ui.select, "Open").value is None)
+        assert of(user, ui.textarea).value == "# edited"
+
+    visit(tmp_path, story)
+
+
+# --- the lever that is shown ----------------------------------------------------------------------
+
+
+def drawing_of(*boxes: tuple[int, float, float, float, float]) -> bytes:
+    """Return the bytes of a drawing with some boxes, each of a layer."""
+    library = gdstk.Library(unit=1e-6, precision=1e-12)
+    cell = library.new_cell("TOP")
+    for layer, x0, y0, x1, y1 in boxes:
+        cell.add(gdstk.rectangle((x0, y0), (x1, y1), layer=layer))
+    with tempfile.TemporaryDirectory() as folder:
+        library.write_gds(f"{folder}/a.gds")
+        return Path(folder, "a.gds").read_bytes()
+
+
+def test_a_second_drawing_leaves_nothing_of_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    second = drawing_of((1, 0, 0, 50, 10))  # a plate: no heater, no terminals
+
+    async def story(user: User, session: Session) -> None:
+        at_once(session)
+        await user.open("/lever")
+        await drop(user, "first.gds", OWN)
+        await user.should_see("What the drawing holds", retries=100)
+        await until(lambda: len(images(user)) == 2)
+        await drop(user, "second.gds", second)
+        await until(lambda: of(user, ui.input, "Save as").value == "second.toml")
+        await until(lambda: "All outlines of the drawing, by layer" in images(user))
+        await until(lambda: "second.toml" in shown(user, "role=alert"))
+        heads = [one for one in user.client.elements.values() if isinstance(one, ui.expansion)]
+        assert [one.text for one in heads].count("What the drawing holds") == 1
+        assert "The lever from above: regions, terminals and tip" not in images(user)
+        assert not [one for one in user.client.elements.values() if isinstance(one, ui.table)]
+        # nor does one that cannot be read
+        await drop(user, "first.gds", OWN)
+        await until(lambda: "The lever from above" in " ".join(images(user)))
+        await drop(user, "third.gds", b"no drawing")
+        await until(lambda: not images(user))
+        assert of(user, ui.textarea).value == ""
+        press(user, "Save")
+        await user.should_see("there is no probe here yet", retries=50)
+        assert sorted(session.project.probes) == ["first.toml", "second.toml"]
+
+    visit(tmp_path, story)
+
+
+# --- a restart ------------------------------------------------------------------------------------
+
+CHOSEN: dict[str, Any] = {
+    "dark": True,
+    "lever": {"shape": "u-shape", "changes": {"length_um": 60.5}, "text": None, "mesh": True},
+    "simulate": {
+        "probe": "own.toml",
+        "changes": {"n_d": 5e17, "medium": "air", "surface_gap_um": None},
+        "bias": 6.5,
+        "most": 10.0,
+        "view": "time",
+    },
+    "pulse": {"kind": "train", "height": 7.0, "count": 3, "until": None},
+    "raman": {"law": "linear", "spectrum": "tip/a.txt", "calibration": "r.json"},
+    "fit": {
+        "data": "mine.csv",
+        "probe": "own.toml",
+        "without": ["tip"],
+        "robust": True,
+        "medium": "air",
+        "fixed": "p",
+        "free": "n_d",
+        "priors": "n_d=±15%",
+    },
+    "calibrate": {"data": "mine.csv", "rests": "probe:own.toml", "pulse": "5us"},
+    "levers": {"data": ["mine.csv"], "probe": "own.toml"},
+    "files": {"mine.csv": {"columns": ["V_b (V)=a", "I_h (mA)=b"], "waveform": ""}},
+    "asked": {"tip_K": 650.0},
+}
+
+
+def test_what_was_chosen_is_there_after_a_restart(tmp_path: Path) -> None:
+    session = Session(Project(tmp_path))
+    session.keep()
+    assert not (tmp_path / ".hotlever").exists()  # nothing was chosen
+    session.chosen.update(deepcopy(CHOSEN))
+    session.chosen["calibrate"]["run"] = True  # of this very moment
+    session.keep()
+    again = Session(Project(tmp_path))
+    assert (again.chosen, again.remark) == (CHOSEN, "")
+
+
+def test_pages_after_a_restart_show_what_was_chosen(tmp_path: Path) -> None:
+    (tmp_path / "mine.csv").write_text("a,b\n" + "".join(f"{n / 2},{n / 9}\n" for n in range(20)))
+
+    words = "hotlever fit mine.csv --probe own.toml --column 'V_b (V)=a' --column 'I_h (mA)=b'"
+
+    async def first(user: User, session: Session) -> None:
+        session.reduced[None, ()] = False  # it is not what is tested, and takes long
+        session.project.write("own.toml", Probe.reference().to_toml(), "saved")
+        await user.open("/simulate")
+        of(user, ui.select, "Probe").set_value("own.toml")
+        await until(lambda: "full lever" in shown(user, "aria-live=polite"))
+        of(user, ui.slider).set_value(300.0)
+        await until(lambda: "base_temperature_K" in session.chosen["simulate"]["changes"])
+        await user.open("/fit")
+        of(user, ui.select, "Probe").set_value("own.toml")
+        of(user, ui.textarea).set_value("V_b (V)=a\nI_h (mA)=b")
+        user.find("Hold (n_d=3.3e17, p)").type("p")
+        await user.should_see(f"{words} --fix p -o mine.fit.json", retries=50)
+        session.keep()
+
+    async def second(user: User, session: Session) -> None:
+        await user.open("/fit")
+        await user.should_see(f"{words} --fix p -o mine.fit.json", retries=50)
+        assert of(user, ui.textarea).value == "V_b (V)=a\nI_h (mA)=b"
+        await user.open("/simulate")
+        words_of_sweep = "hotlever sweep own.toml --bias 0:12:49 --set base_temperature_K=300"
+        await user.should_see(words_of_sweep, retries=100)
+        assert of(user, ui.select, "Probe").value == "own.toml"
+
+    visit(tmp_path, first)
+    visit(tmp_path, second)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "not valid JSON"),
+        ("[]", "expected an object"),
+        ('{"schema": 7, "chosen": {}}', "found schema 7, expected 1"),
+        ('{"schema": 1}', "chosen: input should be"),
+        ('{"schema": 1, "chosen": {"fit": {"robust": "perhaps"}}}', "fit.robust"),
+        ('{"schema": 1, "chosen": {"lever": {"shape": "round"}}}', "lever.shape"),
+        ('{"schema": 1, "chosen": {"simulate": {"changes": {"n_d": "air"}}}}', "n_d = air"),
+        ('{"schema": 1, "chosen": {"simulate": {"changes": {"medium": 5}}}}', "medium = 5"),
+        ('{"schema": 1, "chosen": {"calibrate": {"rests": "x:y"}}}', "calibrate.rests"),
+    ],
+)
+def test_a_damaged_or_foreign_file_of_choices_is_a_line(
+    tmp_path: Path, text: str, said: str
+) -> None:
+    hidden = tmp_path / ".hotlever"
+    hidden.mkdir()
+    (hidden / CHOICES).write_text(text)
+
+    async def story(user: User, session: Session) -> None:
+        assert session.chosen == {}
+        await user.open("/fit")
+        line = shown(user, "role=status")
+        assert line.startswith(f".hotlever/{CHOICES}: ")
+        assert said in line
+        assert "\n" not in line
+        await user.open("/raman")
+        assert shown(user, "role=status") == ""
+
+    visit(tmp_path, story)
+    assert (hidden / "choices.unread.json").read_text() == text
+
+
+def test_what_is_unknown_in_a_file_of_choices_is_left_out(tmp_path: Path) -> None:
+    hidden = tmp_path / ".hotlever"
+    hidden.mkdir()
+    chosen = {"fit": {"robust": True, "later": 1}, "another": 2}
+    (hidden / CHOICES).write_text(json.dumps({"schema": 1, "chosen": chosen}))
+    session = Session(Project(tmp_path))
+    assert (session.chosen, session.remark) == ({"fit": {"robust": True}}, "")
+
+
+def test_a_chosen_file_that_is_gone_gives_no_other_numbers(tmp_path: Path) -> None:
+    (tmp_path / "lever-a.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
+
+    async def story(user: User, session: Session) -> None:
+        session.chosen |= {"fit": {"probe": "gone.toml"}, "calibrate": {"rests": "fit:gone.json"}}
+        await user.open("/fit")
+        await until(lambda: "gone.toml: no such file" in shown(user, "role=alert"))
+        assert of(user, ui.select, "Probe").value == "gone.toml"
+        await user.open("/calibrate")
+        await user.should_see("hotlever calibrate lever-a.csv --fit gone.json", retries=50)
+
+    visit(tmp_path, story)
+
+
+# --- columns --------------------------------------------------------------------------------------
+
+
+def test_columns_belong_to_the_file_that_they_were_typed_for(tmp_path: Path) -> None:
+    rows = "".join(f"{n / 2},{n / 9}\n" for n in range(20))
+
+    async def story(user: User, session: Session) -> None:
+        await user.open("/fit")
+        await drop(user, "odd.csv", f"a,b\n{rows}".encode())
+        await until(lambda: bool(shown(user, "role=alert").strip()))
+        of(user, ui.textarea).set_value("V_b (V)=a\nI_h (mA)=b")
+        words = "odd.csv --column 'V_b (V)=a' --column 'I_h (mA)=b'"
+        await user.should_see(f"hotlever fit {words} -o odd.fit.json", retries=50)
+        # the next file is another, and of another pulse
+        await drop(user, "plain.csv", f"V_b (V),I_h (mA)\n{rows}".encode())
+        await user.should_see("hotlever fit plain.csv -o plain.fit.json", retries=50)
+        assert not shown(user, "role=alert").strip()
+        assert of(user, ui.textarea).value == ""
+        of(user, ui.select, "Measurement").set_value("odd.csv")
+        await user.should_see(f"hotlever fit {words} -o odd.fit.json", retries=50)
+        assert of(user, ui.textarea).value == "V_b (V)=a\nI_h (mA)=b"
+        # the same file has the same columns in the next room
+        session.chosen["calibrate"] = {"data": "odd.csv"}
+        await user.open("/calibrate")
+        await user.should_see(f"hotlever calibrate {words}", retries=50)
+
+    visit(tmp_path, story)
+
+
+def test_a_pulse_belongs_to_the_file_that_it_was_told_for(tmp_path: Path) -> None:
+    rows = "".join(f"{0.1 * n},{1.28 - 0.01 * n:.3f}\n" for n in range(20))
+    (tmp_path / "rest.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
+    (tmp_path / "timed.csv").write_text(f"t (us),I_h (mA)\n{rows}")
+
+    async def story(user: User, session: Session) -> None:
+        session.chosen["fit"] = {"data": "timed.csv"}
+        await user.open("/fit")
+        await user.should_see("--pulse 10V,5us", retries=50)
+        user.find("Pulse of a file in time (10V,20us)").type("9V, 5us")
+        await user.should_see("hotlever fit timed.csv --pulse 9V,5us", retries=50)
+        of(user, ui.select, "Measurement").set_value("rest.csv")
+        await user.should_see("hotlever fit rest.csv -o rest.fit.json", retries=50)
+        assert not shown(user, "role=alert").strip()
+
+    visit(tmp_path, story)

@@ -1,0 +1,91 @@
+"""A fit file is input like any other: read back whole, or refused in one line."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from hotlever.errors import InputError
+from hotlever.estimation import FitOptions, fit, read_fit
+from hotlever.measurement import Measurement
+from made_up import GONE, damaged
+
+
+@pytest.fixture(scope="module")
+def found(lever):
+    sweep = lever.sweep(np.linspace(1.0, 11.0, 12))
+    options = FitOptions(fixed={"p": None, "a0": None, "a1": None})
+    return fit(Measurement.of_sweep(sweep), options=options)
+
+
+@pytest.fixture(scope="module")
+def content(found):
+    return json.loads(json.dumps(found.content()))
+
+
+def nested(depth):
+    value = []
+    for _ in range(depth):
+        value = [value]
+    return value
+
+
+@pytest.mark.parametrize(
+    ("keys", "value"),
+    [
+        (("data",), 3),
+        (("data",), GONE),
+        (("correlation", "names"), None),
+        (("correlation", "names"), ["nd"]),
+        (("correlation", "matrix"), [[1.0]]),
+        (("correlation", "matrix", 0), nested(60)),
+        (("parameters",), []),
+        (("parameters",), {}),
+        (("parameters", "n_d", "value"), "much"),
+        (("parameters", "n_d", "value"), 10**400),
+        (("parameters", "n_d", "value"), float("nan")),
+        (("parameters", "n_d", "stderr"), -1.0),
+        (("observables",), ["voltage"]),
+        (("data", "columns", "V_b"), []),
+        (("data", "columns", "V_b", 3), "3 V"),
+        (("data", "weights"), [[1.0]]),
+        (("probe",), {"probe": {"shape": "four-leg"}}),
+        (("probe", "material", "n_d"), -1.0),
+        (("options",), None),
+        (("options", "medium"), "water"),
+        (("band",), {"bias_V": [1.0]}),
+        (("common_noise_covariance",), [[1.0, 2.0]]),
+        (("notes",), "none"),
+        (("evaluations",), 1.5),
+    ],
+)
+def test_a_damaged_file_is_refused_in_one_line(content, tmp_path, keys, value):
+    path = tmp_path / "fit.json"
+    path.write_text(json.dumps(damaged(content, *keys, value=value)))
+    with pytest.raises(InputError, match=r"fit\.json") as refused:
+        read_fit(path)
+    assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 400
+
+
+@pytest.mark.parametrize("text", ["", "3", "[]", "{", '{"a": ' * 1000 + "1" + "}" * 1000])
+def test_what_is_no_fit_file_is_refused(tmp_path, text):
+    (tmp_path / "fit.json").write_text(text)
+    with pytest.raises(InputError, match=r"fit\.json"):
+        read_fit(tmp_path / "fit.json")
+
+
+def test_what_was_written_is_read_back_whole(found, content, tmp_path):
+    (tmp_path / "fit.json").write_text(json.dumps(content))
+    again = read_fit(tmp_path / "fit.json")
+    old, new = found.content(), again.content()
+    for key in ("probe", "data", "options", "observables", "band", "residual_rms", "notes"):
+        assert new[key] == old[key]
+    assert again.parameters.keys() == found.parameters.keys()
+    for name, parameter in found.parameters.items():
+        assert again.parameters[name].value == parameter.value
+    # made of standard errors and correlations, which rounds
+    np.testing.assert_allclose(again.covariance, found.covariance, rtol=1e-14)
+    np.testing.assert_array_equal(again.common_noise_covariance, found.common_noise_covariance)

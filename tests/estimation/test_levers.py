@@ -1,0 +1,163 @@
+"""What several fits say together."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from hotlever.errors import InputError
+from hotlever.estimation.batch import Batch
+from hotlever.estimation.levers import INVERSION, compare_levers, levers_csv, statements
+from hotlever.estimation.words import lever_rows
+from hotlever.materials import PARAMETERS
+from hotlever.spieser2017 import PUBLISHED
+
+
+def content(values: dict[str, float], stderr: dict[str, float | None], inversion=830.0):
+    return {
+        "parameters": {
+            name: {"value": values[name], "stderr": stderr.get(name), "unit": "", "vary": True}
+            for name in PARAMETERS
+        },
+        "inversion_temperature_K": inversion,
+        "inversion_temperature_stderr_K": None,
+    }
+
+
+def wafer(count: int, scatter: float, stderr: float, seed: int = 0):
+    """Levers that differ in c_kappa by `scatter` and are measured within `stderr`."""
+    rng = np.random.default_rng(seed)
+    base = PUBLISHED["option III"].material.model_dump()
+    fits = {}
+    for number in range(count):
+        found = base["c_kappa"] + rng.normal(0, np.hypot(scatter, stderr))
+        fits[f"lever-{number}"] = content({**base, "c_kappa": found}, {"c_kappa": stderr})
+    return fits
+
+
+def test_the_published_levers():
+    """Table II: n_d scatters by far more than the other parameters."""
+    fits = {
+        name: content(PUBLISHED[name].material.model_dump(), {})
+        for name in ("lever 1", "lever 2", "lever 3", "lever 4")
+    }
+    data = compare_levers(fits)
+    n_d = data.sel(quantity="n_d")
+    assert n_d["mean"].item() == pytest.approx((5.75 + 3.64 + 3.50 + 5.93) / 4 * 1e17)
+    share = data.scatter / data["mean"]
+    assert share.sel(quantity="n_d") > 0.25
+    assert (share.drop_sel(quantity=["n_d"]) < 0.125).all()
+    assert np.isnan(data.mean_stderr).all()
+    assert data.counts.all()
+    assert statements(data) == []
+
+
+def test_levers_that_differ_are_told_from_levers_that_do_not():
+    differ = statements(compare_levers(wafer(20, scatter=0.02, stderr=0.005)))
+    assert re.fullmatch(
+        r"the levers differ in c_kappa: they scatter by 2\.\d%, χ² is \d\d\d for 19 degrees of "
+        r"freedom \(Birge ratio 3\.\d\)",
+        differ[0],
+    )
+    alike = statements(compare_levers(wafer(20, scatter=0.0, stderr=0.005)))
+    assert alike == [
+        "the scatter of c_kappa between the levers is no larger than the standard errors explain"
+    ]
+
+
+def test_equal_levers_are_rarely_said_to_differ():
+    said = [
+        statements(compare_levers(wafer(10, 0.0, 0.005, seed)))[0].startswith("the levers differ")
+        for seed in range(300)
+    ]
+    assert sum(said) <= 10  # 1 % expected; 10 or more has a probability below 1e-3
+
+
+def test_a_lever_that_stands_apart_is_named():
+    fits = wafer(12, scatter=0.01, stderr=0.005)
+    fits["lever-7"]["parameters"]["c_kappa"]["value"] += 0.3
+    assert "lever-7 stands apart from the other levers in c_kappa" in statements(
+        compare_levers(fits)
+    )
+
+
+def test_the_mean_is_weighted_and_its_error_that_of_the_scatter():
+    fits = wafer(3, scatter=0.0, stderr=0.005)
+    for one, value, stderr in zip(fits.values(), (0.7, 0.72, 0.9), (0.01, 0.02, 0.05), strict=True):
+        one["parameters"]["c_kappa"] |= {"value": value, "stderr": stderr}
+    data = compare_levers(fits).sel(quantity="c_kappa")
+    weights = np.array([1e4, 2.5e3, 4e2])
+    mean = (weights @ [0.7, 0.72, 0.9]) / weights.sum()
+    assert data["mean"].item() == pytest.approx(mean)
+    chi_square = weights @ (np.array([0.7, 0.72, 0.9]) - mean) ** 2
+    assert data.birge_ratio.item() == pytest.approx(np.sqrt(chi_square / 2))
+    assert data.birge_ratio > 1
+    assert data.mean_stderr.item() == pytest.approx(np.sqrt(chi_square / 2 / weights.sum()))
+    # levers that scatter by less than their errors do not make these smaller
+    alike = {f"lever-{k}": fits["lever-0"] for k in range(4)}
+    equal = compare_levers(alike).sel(quantity="c_kappa")
+    assert equal.birge_ratio < 1e-6
+    assert equal.mean_stderr.item() == pytest.approx(0.005)
+
+
+def test_a_lever_that_determines_nothing_spoils_neither_mean_nor_verdict():
+    """c_kappa = 0.719 ± 300 was written as 0(300), and all levers were said to be alike."""
+    fits = wafer(4, scatter=0.05, stderr=0.005)
+    before = compare_levers(fits)
+    fits["dull"] = content(
+        {**PUBLISHED["option III"].material.model_dump(), "c_kappa": 0.719}, {"c_kappa": 300.0}
+    )
+    data = compare_levers(fits)
+    for name in ("mean", "mean_stderr", "scatter", "chi_square"):
+        assert data[name].sel(quantity="c_kappa") == before[name].sel(quantity="c_kappa")
+    rows = {row[0]: row for row in lever_rows(data)}
+    assert rows["dull"][1] == "not determined"
+    assert statements(data) == [
+        "dull is left out of the mean of c_kappa, which its data do not determine",
+        *statements(before),
+    ]
+    assert statements(before)[0].startswith("the levers differ in c_kappa")
+
+
+@pytest.mark.parametrize("answer", [{"describes_data": None}, {"describes_data": False}, {}])
+def test_a_lever_that_is_not_described_is_left_out_and_named(answer):
+    fits = wafer(3, scatter=0.0, stderr=0.005)
+    before = compare_levers(fits)
+    wrong = {**answer, "reason": "current differs by 5%"}
+    fits["other"] = content({**dict.fromkeys(PARAMETERS, 1.0)}, {"c_kappa": 0.001}) | wrong
+    data = compare_levers(fits)
+    assert data["mean"].equals(before["mean"])
+    assert "other is left out: its data are not described" in statements(data)
+    assert set(next(row for row in lever_rows(data) if row[0] == "other")[1:]) == {""}
+    assert set(levers_csv(data).splitlines()[-1].split(",")) == {"other", ""}
+    only = compare_levers({"other": fits["other"]})
+    assert np.isnan(only["mean"]).all()
+    assert statements(only) == ["other is left out: its data are not described"]
+    batch = Batch(fits)
+    assert batch.exit_status == 1
+    assert list(batch.undescribed) == ["other"]
+    assert "current differs by 5%" in batch.undescribed["other"]
+
+
+def test_one_lever_has_no_scatter():
+    data = compare_levers(wafer(1, 0.0, 0.01))
+    assert np.isnan(data.scatter).all()
+    assert statements(data) == []
+
+
+def test_csv_has_empty_cells_for_what_is_not_known():
+    text = levers_csv(compare_levers(wafer(2, 0.01, 0.005))).splitlines()
+    assert text[0].startswith("lever,c_kappa,c_kappa_stderr,delta,delta_stderr")
+    assert text[0].endswith(f"{INVERSION}_K,{INVERSION}_stderr_K")
+    cells = text[1].split(",")
+    assert cells[0] == "lever-0"
+    assert cells[2] == "0.005"
+    assert cells[4] == ""
+
+
+@pytest.mark.parametrize("fits", [{}, {"a": {"parameters": {}}}, {"a": []}])
+def test_what_is_no_fit_file_is_refused(fits):
+    with pytest.raises(InputError, match=r"no fits to compare|not a fit file"):
+        compare_levers(fits)

@@ -1,0 +1,71 @@
+"""Which state a row is compared with: the nearest on its load line, whatever a ramp would take."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever.estimation.experiment import experiment_of
+from hotlever.estimation.load_lines import Rows, nearest_states
+from hotlever.lever import Lever
+from hotlever.lever.lever import COARSE
+from hotlever.probe import Probe
+
+NAMES = ("n_d", "heater_width_um", "series_resistance_ohm")
+
+
+@pytest.fixture(scope="module")
+def folded():
+    """A lever with a small resistor: its bias rises to a fold, falls, and rises again."""
+    probe = Probe.reference().with_(series_resistance_ohm=300.0)
+    return Lever(probe, COARSE).branch()
+
+
+def rows_on(branch, tip_K):
+    """Rows that lie on a branch, by their tip temperatures."""
+    circuit = branch.equations.circuit
+    current = branch.current(tip_K)
+    bias = circuit.bias(branch.lever_voltage(tip_K), current)
+    nothing = np.full(tip_K.size, np.nan)
+    return Rows(bias, np.stack([current, nothing, nothing]))
+
+
+def test_rows_stay_on_their_part_of_a_branch_that_folds(folded):
+    tips = np.array([400.0, 700.0, 870.0, 960.0, 1100.0, 1250.0])
+    rows = rows_on(folded, tips)
+    assert rows.bias_V[4] < rows.bias_V[2]  # it folds
+    u, short = nearest_states(folded, folded.equations.circuit, rows)
+    assert np.abs(folded.tip_K(u) - tips).max() < 1e-3
+    assert np.all(short == 1.0)
+    ramp = folded.read(folded.equations.circuit, rows.bias_V[:3]).u
+    assert np.allclose(u[:3], ramp, rtol=0, atol=1e-9)
+
+
+def test_beyond_its_highest_bias_a_lever_goes_on_with_the_resistance_it_has_there(folded):
+    circuit = folded.equations.circuit
+    highest = float(circuit.bias(*folded.curve(np.linspace(0, folded.end_u, 4000))[:, :2].T).max())
+    nothing = np.full(2, np.nan)
+    rows = Rows(np.array([1.1, 1.3]) * highest, np.stack([[0.9, 1.0], nothing, nothing]))
+    u, short = nearest_states(folded, circuit, rows)
+    assert np.allclose(short, [1.1, 1.3], rtol=1e-6)
+    assert u[0] == u[1]
+
+
+@pytest.mark.parametrize("highest", [0.9, 1.25])
+def test_derivatives_by_parameters_are_those_of_the_values(highest):
+    """Also where rows are beyond the fold of a candidate: order two of a Taylor remainder."""
+    probe = Probe.reference().with_(series_resistance_ohm=300.0)
+    knee_V = 3.4
+    bias = np.linspace(0.4, highest, 5) * knee_V
+    current = 0.3 * bias
+    shown = np.stack([current, np.full(5, np.nan), np.full(5, np.nan)])
+    model = experiment_of(probe, bias, names=NAMES).measuring(bias, shown)
+    at = model.predict(probe)
+    start, step = probe.at(NAMES), np.array([0.02, -0.01, 0.01])
+    misses = []
+    for share in (1.0, 0.5):
+        values = at.nearby.predict(start * (1.0 + share * step))[0]
+        expected = at.values + at.slopes @ (start * share * step)
+        misses.append(np.abs(values - expected)[0].max())
+    assert misses[0] < 0.02 * at.values[0].max()
+    assert misses[1] < 0.35 * misses[0] + 1e-9

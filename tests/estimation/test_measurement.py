@@ -1,0 +1,332 @@
+"""Reading measurement files."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from threading import Thread
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hotlever.errors import InputError
+from hotlever.estimation import read_measurement
+
+PLAIN = "V_b (V),I_h (mA),V_r (mV),T_tip (K),dT_tip (K)\n1,0.1,50,,\n2,0.2,100,300,5\n"
+
+
+def read(tmp_path, text, encoding="utf-8"):
+    path = tmp_path / "data.csv"
+    path.write_text(text, encoding=encoding)
+    return read_measurement(path)
+
+
+def test_example_has_all_observables_and_its_circuit():
+    from importlib.resources import as_file, files
+
+    with as_file(files("hotlever") / "examples" / "lever-a.csv") as path:
+        data = read_measurement(path)
+    assert data.observables == ("current", "reader", "tip")
+    assert len(data.bias_V) == 25
+    assert (data.series_resistance_ohm, data.base_temperature_K) == (5600.0, 293.0)
+    assert data.reader_V[0] == pytest.approx(0.06012)
+    assert np.isnan(data.tip_K[0])
+    assert len(data.sha256) == 64
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN,
+        "# a comment\n\nI_h [uA],V_b [mV],T_tip [degC],V_r [V],dT_tip [mK]\n"
+        "100,1000,,0.05,\n200,2000,26.85,0.1,5000\n",
+        "V_b (V);I_h (mA);V_r (mV);T_tip (K);dT_tip (K)\n1,0;0,1;50;;\n2,0;0,2;100;300,0;5\n",
+        "V_b (V)\tI_h (µA)\tV_r (mV)\tT_tip (K)\tdT_tip (degC)\n"
+        "1\t1e2\t50\t\t\n2\t200\t100\t300\t5\n",
+        '"V_b (V)","I_h (A)","V_r (mV)","T_tip (K)","dT_tip (K)","time (s)"\n'
+        "1,1e-4,50,nan,,0\n2,2e-4,100,300,5,1\n",
+        "\ufeff" + PLAIN.replace("\n", "\r\n"),
+    ],
+    ids=["plain", "other units and order", "semicolons", "tabs", "extra column", "bom, crlf"],
+)
+def test_all_ways_to_write_the_same_data(tmp_path, text):
+    data = read(tmp_path, text)
+    np.testing.assert_allclose(data.bias_V, [1, 2])
+    np.testing.assert_allclose(data.current_mA, [0.1, 0.2])
+    np.testing.assert_allclose(data.reader_V, [0.05, 0.1])
+    np.testing.assert_allclose(data.tip_K, [np.nan, 300])
+    np.testing.assert_allclose(data.tip_error_K, [np.nan, 5])
+
+
+@pytest.mark.parametrize(
+    ("comment", "ohm", "kelvin"),
+    [
+        ("# R_s (kOhm): 5.6\n# base temperature (K): 295\n", 5600, 295),
+        ("# R_s (Ω): 910\n# base temperature (°C) = 20\n", 910, 293.15),
+        ("#R_s [ohm]: 5,6e3\n# something (else): entirely\n", 5600, None),
+    ],
+)
+def test_comments_may_give_the_circuit(tmp_path, comment, ohm, kelvin):
+    data = read(tmp_path, comment + PLAIN)
+    assert data.series_resistance_ohm == pytest.approx(ohm)
+    assert data.base_temperature_K == (None if kelvin is None else pytest.approx(kelvin))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"data.csv: no header row"),
+        ("# only\n# comments\n", r"no header row"),
+        ("V_b (V),I_h (mA)\n", r"no data rows"),
+        ("a,b\n1,2\n", r"line 1: the header names 'a', 'b'; expected 'V_b \(V\)'"),
+        ("V_b (V),time (s)\n1,2\n", r"at least one of 'I_h \(mA\)'"),
+        ("V_b,I_h (mA)\n1,2\n", r"column 'V_b' has no unit, expected 'V_b \(V\)'"),
+        ("V_b (V),V_b (V),I_h (mA)\n1,1,1\n", r"column 'V_b' stands twice"),
+        ("V_b (V),I_h (mV)\n1,2\n", r"I_h \(mV\): unit 'mV' is not understood here.*like mA"),
+        ("V_b (V),I_h (foo)\n1,2\n", r"unit 'foo' is not understood"),
+        ("V_b (V),I_h (mA)\n1,x\n", r"line 2: I_h: found 'x', expected a number"),
+        ("V_b (V),I_h (mA)\n1,2\n1,2,3\n", r"line 3: 3 cells, expected 2"),
+        ("V_b (V),I_h (mA)\n,2\n", r"line 2: V_b is '', expected a bias of 0 or more"),
+        ("V_b (V),I_h (mA)\n-1,2\n", r"line 2: V_b is '-1'"),
+        ("V_b (V),I_h (mA)\n1,inf\n", r"found 'inf', expected a number"),
+        ("V_b (V),I_h (mA)\n1,\n", r"no values in any of the columns"),
+        ("# R_s (kV): 5\n" + PLAIN, r"line 1: R_s: unit 'kV' is not understood here"),
+        ("# R_s (kOhm): many\n" + PLAIN, r"line 1: R_s: found 'many', expected a number"),
+    ],
+)
+def test_errors_name_line_and_column(tmp_path, text, message):
+    with pytest.raises(InputError, match=message) as caught:
+        read(tmp_path, text)
+    assert "\n" not in str(caught.value)
+
+
+def test_binary_and_missing_files_are_one_line(tmp_path):
+    (tmp_path / "data.csv").write_bytes(b"\x89PNG\r\n\x1a\n\xff\xfe\x00")
+    with pytest.raises(InputError, match="not a text file"):
+        read_measurement(tmp_path / "data.csv")
+    with pytest.raises(InputError, match="no such file"):
+        read_measurement(tmp_path / "none.csv")
+
+
+@given(st.text(max_size=200))
+def test_any_text_is_read_or_refused_in_one_line(tmp_path_factory, text):
+    path = tmp_path_factory.mktemp("any") / "data.csv"
+    path.write_text(text, encoding="utf-8")
+    try:
+        read_measurement(path)
+    except InputError as error:
+        message = str(error)  # either outcome is fine, a crash is not
+        assert path.name in message
+
+
+@pytest.mark.parametrize(
+    ("comment", "medium"),
+    [
+        ("# medium: air, 21 °C", "air"),
+        ("# Medium: Vacuum, 1e-2 mbar", "vacuum"),
+        ("# taken in air", None),
+        ("# 1e-5 mbar", "vacuum"),
+        ("# medium = N2, 1 bar", "air"),
+        ("# atmosphere: lab air, 960 hPa", "air"),
+    ],
+)
+def test_a_comment_gives_the_medium(tmp_path, comment, medium):
+    path = tmp_path / "data.csv"
+    path.write_text(f"{comment}\nV_b (V),I_h (mA)\n1,0.1\n", encoding="utf-8")
+    assert read_measurement(path).medium == medium
+
+
+# --- settings ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("comment", "ohm", "kelvin", "medium"),
+    [
+        ("R_s: 10 kOhm", 10e3, None, None),
+        ("R_s = 10 kOhm", 10e3, None, None),
+        ("Rs (kOhm): 10", 10e3, None, None),
+        ("Series resistance = 5.6 kΩ", 5600, None, None),
+        ("R_s: 5.6kOhm (four wires)", 5600, None, None),
+        ("R_s (kOhm): 5.6 ± 0.1,,,", 5600, None, None),
+        ("base temperature: 353 K", None, 353, None),
+        ("T_base (K): 353", None, 353, None),
+        ("T0 = 20 °C", None, 293.15, None),
+        ("T0 = 20 deg C", None, 293.15, None),
+        ("R_s = 5.6 kOhm, T0 = 293 K; medium: air", 5600, 293, "air"),
+        ("medium: lab air", None, None, "air"),
+        ("medium = in vacuum", None, None, "vacuum"),
+    ],
+)
+def test_settings_as_people_write_them(tmp_path, comment, ohm, kelvin, medium):
+    data = read(tmp_path, f"# {comment}\nV_b (V),I_h (mA)\n1,0.01\n")
+    assert data.series_resistance_ohm == (None if ohm is None else pytest.approx(ohm))
+    assert data.base_temperature_K == (None if kelvin is None else pytest.approx(kelvin))
+    assert (data.medium, data.notes) == (medium, ())
+
+
+@pytest.mark.parametrize(
+    "comment",
+    [
+        *("R_s 10 kOhm", "R_s (kOhm) 10", "R_s: 5600", "R_s: 5.6k", "R_s: nan ohm", "R = 5 kOhm"),
+        *("R_s: 10,000 Ohm", "R_s (kOhm): 5600 Ohm"),
+        *("base temprature (K): 300", "base temperature is 300 K", "T0 = 12:30", "T_base: 68 F"),
+        *("medium air", "medium:", "gas: on", "pressure: low", "p = 2.65", "293 K"),
+        *("bias resistor: 10k", "resistance 10", "stage temperature = 353", "temp: 80", "T: 353"),
+    ],
+)
+def test_what_looks_like_a_setting_and_is_not_clear_is_noted(tmp_path, comment):
+    data = read(tmp_path, f"# {comment}\n{PLAIN}")
+    assert (data.series_resistance_ohm, data.base_temperature_K, data.medium) == (None,) * 3
+    (note,) = data.notes
+    assert f"data.csv: line 1: '# {comment}' is not understood and not used" in note
+
+
+@pytest.mark.parametrize("comment", ["lever C", "2024-05-01 12:30", "laser: 532 nm", "RS-232"])
+def test_other_comments_are_no_matter(tmp_path, comment):
+    assert read(tmp_path, f"# {comment}\n{PLAIN}").notes == ()
+
+
+@pytest.mark.parametrize(
+    ("comment", "message"),
+    [
+        (
+            "R_s = -5 ohm",
+            "line 1: R_s: series_resistance_ohm = -5.0: .* greater than or equal to 0",
+        ),
+        ("R_s: 10 GOhm", "line 1: R_s: .* = 1.*: .* less than or equal to 10000000"),
+        ("R_s (ohm): 10,000", "line 1: R_s: found '10,000', expected a number"),
+        ("R_s (kOhm): 5.6x", "line 1: R_s: found '5.6x', expected a number"),
+        ("R_s (mA^1000000): 5", "unit 'mA\\^1000000' is not understood"),
+        ("T_base (K): 77", "line 1: base temperature: .* = 77.0: .* greater than or equal to 250"),
+        ("R_s: 1 kOhm\n# R_s: 2 kOhm", "line 2: series_resistance_ohm is 2000.0, but 1000.0"),
+        ("medium: air\n# medium: vacuum", "line 2: medium is vacuum, but air further up"),
+        ("medium: helium", "line 1: medium is 'helium', expected vacuum, air or nitrogen"),
+        ("medium: no air", "line 1: medium is 'no air', expected vacuum, air or nitrogen"),
+        ("medium: forming gas, 5 % H2", "line 1: medium is 'forming gas, 5 % H2', expected vacuum"),
+        ("gas: argon", "line 1: medium is 'argon'"),
+        ("100 mbar He", "line 1: medium is '100 mbar He'"),
+        ("pressure (mbar): 100", "line 1: the pressure is 100 mbar and no gas is named"),
+        ("medium: vacuum, 10 mbar", "line 1: the pressure is 10 mbar and this is no vacuum"),
+        ("medium: air, 1,013 mbar", "line 1: found '1,013 mbar', expected no mark of thousands"),
+        ("medium: air, -5 mbar", "line 1: pressure: found -5 mbar"),
+        ("pressure (K): 5", "line 1: pressure: unit 'K' is not understood here"),
+    ],
+)
+def test_impossible_settings_are_refused(tmp_path, comment, message):
+    with pytest.raises(InputError, match=message):
+        read(tmp_path, f"# {comment}\n{PLAIN}")
+
+
+# --- notes, and data that no lever can show ------------------------------------------------
+
+
+def test_a_column_like_a_known_one_is_named_with_what_it_may_be(tmp_path):
+    data = read(tmp_path, "V_b (V),I_h (mA),T apex (K),U (mV),time (s)\n1,0.1,300,50,0\n")
+    assert [note.split(": ", 1)[1] for note in data.notes] == [
+        "column 'T apex (K)' is not used; if it is T_tip, name it 'T_tip (K)'",
+        "column 'U (mV)' is not used; if it is V_r, name it 'V_r (mV)'",
+        "column 'time (s)' is not used",
+    ]
+
+
+def test_written_nan_is_noted_and_empty_cells_are_not(tmp_path):
+    data = read(tmp_path, "V_b (V),I_h (mA),V_r (mV)\n1,0.1,\n2,nan,NaN\n3,0.3,n/a\n")
+    assert [note.split(": ", 1)[1] for note in data.notes] == [
+        "line 3: I_h is written as missing",
+        "line 3: V_r is written as missing, and in 1 more rows",
+    ]
+    assert np.isnan(data.current_mA[1])
+
+
+def test_a_thousand_notes_are_cut_short(tmp_path):
+    names = ",".join(f"x{i}" for i in range(1000))
+    data = read(tmp_path, f"V_b (V),I_h (mA),{names}\n1,0.1{',0' * 1000}\n")
+    assert len(data.notes) == 21
+    assert data.notes[-1].endswith("980 more such notes")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("I_h (mA)\n1,-0.1\n2,-0.2\n", "largest I_h: found -0.1 mA, .*is the sign wrong"),
+        ("I_h (mA)\n1,0\n2,0\n", "the largest I_h: found 0 mA"),
+        ("I_h (A)\n1,2\n", "the largest I_h: found 2000 mA, expected 1e-09 to 1000 mA"),
+        ("I_h (pA)\n1,0.1\n", "the largest I_h: found 1e-10 mA"),
+        ("I_h (mA)\n2000,1\n", "the largest V_b: found 2000 V, expected 0.001 to 1000 V"),
+        ("V_r (kV)\n1,2\n", "the largest V_r: found 2000 V"),
+        ("T_tip (K)\n1,300\n2,0\n", "line 3: T_tip is '0', expected a temperature above 0 K"),
+        ("T_tip (°C)\n1,-300\n", "line 2: T_tip is '-300', expected a temperature above 0 K"),
+        ("T_tip (kK)\n1,300\n", "the largest T_tip: found 300000 K"),
+        (
+            "T_tip (K),dT_tip (K)\n1,300,5\n2,300,0\n",
+            "line 3: dT_tip is '0', expected a standard e",
+        ),
+        ("T_tip (K),dT_tip (K)\n1,300,1e-300\n", "line 2: dT_tip is '1e-300', expected a standard"),
+        ("I_h (mA),dI_h (mA)\n1,0.1,-1\n", "line 2: dI_h is '-1', .* or an empty cell"),
+        ("V_r (mV),dV_r (kV)\n1,50,2\n", "line 2: dV_r is '2', .* up to 1000 V"),
+    ],
+)
+def test_data_that_no_lever_can_show_are_refused(tmp_path, text, message):
+    with pytest.raises(InputError, match=message) as caught:
+        read(tmp_path, f"V_b (V),{text}")
+    assert "data.csv" in str(caught.value)
+
+
+def test_currents_in_another_unit_than_the_header_says(tmp_path):
+    with pytest.raises(InputError, match=r"line 3: V_b = 2 V and I_h = 200 mA leave -1\.12e\+03 V"):
+        read(tmp_path, "# R_s (kOhm): 5.6\nV_b (V),I_h (mA)\n2,200\n")
+
+
+def test_what_a_lever_can_hardly_show_is_noted(tmp_path):
+    text = "# base temperature (K): 293\nV_b (V),I_h (mA),T_tip (K),dT_tip (K)\n0,-0.001,,\n"
+    assert read(tmp_path, text + "2,0.2,280,\n3,0.3,270,9\n").notes == ()
+    notes = read(tmp_path, text + "2,0.2,27,\n3,-0.2,28,\n").notes
+    assert [note.split(": ", 1)[1] for note in notes] == [
+        "line 5: I_h is negative",
+        "line 4: T_tip is below the base temperature (293 K), perhaps in another unit, and in 1 "
+        "more rows",
+    ]
+
+
+# --- files ---------------------------------------------------------------------------------
+
+
+def test_what_was_hashed_is_what_was_read_even_from_a_pipe(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = Thread(target=lambda: pipe.write_text(PLAIN))
+    writer.start()
+    data = read_measurement(pipe)
+    writer.join()
+    assert data.sha256 == hashlib.sha256(PLAIN.encode()).hexdigest()
+    np.testing.assert_array_equal(data.bias_V, [1, 2])
+
+
+def test_twenty_thousand_rows_are_quick_and_a_million_are_refused(tmp_path):
+    began = time.perf_counter()
+    assert read(tmp_path, PLAIN + "3,0.3,150,300,5\n" * 20_000).bias_V.size == 20_002
+    with pytest.raises(InputError, match="1000003 lines, expected at most 200000"):
+        read(tmp_path, PLAIN + "3,0.3,150,300,5\n" * 1_000_000)
+    assert time.perf_counter() - began < 5.0
+
+
+@given(st.binary(max_size=60), st.integers(0, 120), st.integers(0, 20))
+def test_a_damaged_file_is_read_or_refused_in_one_line(tmp_path_factory, part, place, length):
+    raw = f"# R_s (kOhm): 5.6\n{PLAIN}".encode()
+    path = tmp_path_factory.getbasetemp() / "damaged.csv"
+    path.write_bytes(raw[:place] + part + raw[place + length :])
+    message = ""
+    try:
+        data = read_measurement(path)
+    except InputError as error:
+        message = str(error)
+    if message:
+        assert path.name in message
+        return
+    assert np.all(data.bias_V >= 0)
+    for name in data.observables:
+        assert not np.isinf(data.observable(name)).any()
+        assert not np.any(data.error(name) <= 0)

@@ -1,0 +1,102 @@
+"""How noise goes with the size of what is shown."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever.estimation.noise import relative_noise
+from hotlever.estimation.residuals import Residuals
+from hotlever.measurement import Measurement
+
+SHOWN = np.linspace(0.05, 1.5, 40)
+NOTHING = np.zeros(SHOWN.size)
+USUAL = 1e-3 * SHOWN.max()
+
+
+def noise(seed, size):
+    return size * np.random.default_rng(seed).standard_normal(SHOWN.size)
+
+
+def mean_of_levers(size):
+    """Return what the noise of 40 measurements is taken for, in the mean."""
+    return np.mean([relative_noise(noise(n, size), SHOWN, NOTHING, USUAL) for n in range(40)], 0)
+
+
+def test_noise_in_proportion_is_recognised():
+    found = mean_of_levers(2e-3 * SHOWN)
+    expected = SHOWN / np.sqrt(np.mean(SHOWN**2))
+    # where there is next to no current, some of it may be the same everywhere
+    np.testing.assert_allclose(found[8:], expected[8:], rtol=0.1)
+
+
+def test_noise_that_is_the_same_everywhere_is_recognised():
+    np.testing.assert_allclose(mean_of_levers(2e-3), 1.0, atol=0.15)
+
+
+@pytest.mark.parametrize("place", [2, 37])
+def test_outliers_do_not_tell_how_noise_goes(place):
+    clean = noise(1, 2e-3 * SHOWN)
+    spoilt = clean.copy()
+    spoilt[place] = 50 * 2e-3 * SHOWN[place]
+    found, expected = (relative_noise(one, SHOWN, NOTHING, USUAL) for one in (spoilt, clean))
+    np.testing.assert_allclose(found[4:], expected[4:], rtol=0.25)
+
+
+def test_what_a_fit_has_taken_up_counts_as_noise():
+    """The last ten residuals are half of the noise that was there."""
+    used_up = np.where(np.arange(SHOWN.size) < 30, 0.0, 0.75)
+    whole = [noise(n, 2e-3) for n in range(40)]
+    left = [one * np.sqrt(1 - used_up) for one in whole]
+    found = [relative_noise(one, SHOWN, used_up, USUAL) for one in left]
+    expected = [relative_noise(one, SHOWN, NOTHING, USUAL) for one in whole]
+    np.testing.assert_allclose(found, expected)
+
+
+def test_rows_without_data_have_no_noise_of_their_own():
+    difference = noise(3, 2e-3 * SHOWN)
+    difference[5:9] = np.nan
+    found = relative_noise(difference, SHOWN, NOTHING, USUAL)
+    assert np.all(found[5:9] == 1.0)
+    some = np.isfinite(difference)
+    np.testing.assert_allclose(
+        found[some], relative_noise(difference[some], SHOWN[some], NOTHING[some], USUAL)
+    )
+    assert np.mean(found[some] ** 2) == pytest.approx(1.0)
+
+
+def residuals_of(current):
+    """Return the residuals of a measurement whose current is predicted as shown."""
+    nothing = np.full(SHOWN.size, np.nan)
+    measurement = Measurement(np.arange(1.0, 41.0), current, nothing, nothing, nothing)
+    found = Residuals(measurement, ("current",), "errors")
+    predicted = np.stack([SHOWN, SHOWN, SHOWN])
+    for _ in range(3):
+        found.take_scatter(predicted, usual=1e-3)
+    return found, predicted
+
+
+def test_noise_of_large_data_makes_no_outliers_of_them():
+    currents = [SHOWN + noise(n, 2e-3 * SHOWN) for n in range(40)]
+    found = [residuals_of(current) for current in currents]
+    assert np.mean([one.has_outliers(predicted) for one, predicted in found]) < 0.1
+    # each datum has the weight that its own noise gives it
+    weights = np.mean([one.by[0] for one, _ in found], axis=0)
+    np.testing.assert_allclose(weights[8:] * 2e-3 * SHOWN[8:], 1.0, atol=0.12)
+
+
+def test_an_outlier_is_one():
+    spoilt = SHOWN + noise(4, 2e-3 * SHOWN)
+    spoilt[30] *= 1.02
+    residuals, predicted = residuals_of(spoilt)
+    assert residuals.has_outliers(predicted)
+
+
+def test_what_is_smooth_is_no_noise():
+    """A current that bends away from the prediction by a tenth has noise of a thousandth."""
+    bent = SHOWN + 0.1 * SHOWN.max() * np.sin(np.linspace(0.0, np.pi, SHOWN.size))
+    wrong, _ = residuals_of(bent + noise(5, 1e-3 * SHOWN.max()))
+    assert np.sqrt(np.mean(wrong.by**-2.0)) < 6e-3 * SHOWN.max()
+    # and noise is counted in full
+    right, _ = residuals_of(SHOWN + noise(5, 0.05 * SHOWN.max()))
+    assert np.sqrt(np.mean(right.by**-2.0)) > 0.04 * SHOWN.max()

@@ -1,0 +1,143 @@
+"""A search ends at a minimum, wherever it began, or says that it has not come to one."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hotlever
+from hotlever.calibration import calibrate
+from hotlever.errors import InputError
+from hotlever.estimation import Measurement, fit
+from hotlever.estimation.estimator import estimate
+from hotlever.estimation.experiment import full_experiment
+from hotlever.estimation.optimiser import Optimiser
+from hotlever.estimation.options import FitOptions
+from hotlever.estimation.residuals import Residuals
+from hotlever.estimation.search_options import SearchOptions
+from hotlever.lever import Lever
+from hotlever.lever.lever import COARSE
+from hotlever.materials import PARAMETERS
+from hotlever.probe import Probe
+
+NOISE = 5e-4
+FOLDER = Path(hotlever.__file__).parent / "examples"
+
+
+def curve(probe: Probe, highest_V: float, rows: int = 25, **settings) -> Measurement:
+    """The I-V curve of a lever, with noise."""
+    bias = np.linspace(0.4, highest_V, rows)
+    current = Lever(probe, COARSE).sweep(bias).current_mA.values
+    noise = NOISE * np.random.default_rng(3).standard_normal(rows)
+    nothing = np.full(rows, np.nan)
+    return Measurement(bias, current * (1.0 + noise), nothing, nothing, nothing, **settings)
+
+
+@pytest.fixture(scope="module")
+def reference_curve():
+    return curve(Probe.reference(), 11.0)
+
+
+def test_data_of_another_lever_are_fitted_to_their_noise_or_not_described():
+    """The probe forgotten: a search that shrinks its steps is at no minimum."""
+    other = curve(Probe.u_shape(), 8.0)
+    result = fit(other)
+    rms = result.residual_rms["current_mA"] / other.current_mA.max()
+    assert result.describes_data
+    assert rms < 2.0 * NOISE
+
+
+def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
+    model = lambda probe, bias: full_experiment(Lever(probe, COARSE), bias)  # noqa: E731
+    found = estimate(reference_curve, Probe.u_shape(), FitOptions(), model=model)
+    objective, at = found.problem.objective, found.optimum.prediction
+    least, optimum = objective.squares(at), objective.point(at.probe)
+    noise = found.problem.residuals.noise_squares(at.values)
+    assert found.optimum.converged
+    jacobian = objective.jacobian(at.slopes, optimum)
+    axes = np.linalg.svd(jacobian)[2]
+    for axis in axes:
+        size = float(np.linalg.norm(jacobian @ axis))
+        for way in (-1.0, 1.0):
+            # one standard error along each axis, or as far as powers tell of other levers
+            step = min(np.sqrt(noise) / size, 0.2)
+            there = objective.at(at.probe, optimum + way * step * axis)
+            assert objective.squares(found.problem.model.predict(there, at)) > least - 0.05 * noise
+
+
+def test_a_clipped_current_is_not_described(reference_curve):
+    top = np.sort(reference_curve.current_mA)[-5]
+    clipped = replace(reference_curve, current_mA=np.minimum(reference_curve.current_mA, top))
+    result = fit(clipped)
+    assert result.describes_data is False
+    assert "neighbouring rows" in result.reason or "not at random" in result.reason
+    assert "clipped" in result.reason
+    assert result.parameters["n_d"].stderr is None
+
+
+@pytest.mark.parametrize(
+    ("stated", "cause"),
+    [
+        ({"series_resistance_ohm": 2000.0}, r"series resistance, with contacts, rather 5\.[56]"),
+        ({"medium": "air"}, r"is the lever in vacuum, not in air\?"),
+    ],
+)
+@pytest.mark.slow
+def test_a_fit_names_what_was_stated_wrongly(reference_curve, stated, cause):
+    probe = Probe.reference()
+    medium = stated.pop("medium", None)
+    probe = probe.with_(**stated) if stated else probe.in_medium(medium)
+    result = fit(reference_curve, probe)
+    assert not result.describes_data
+    assert re.search(cause, result.reason)
+
+
+@pytest.mark.parametrize(
+    ("bias", "current", "question"),
+    [
+        (lambda v, i: i, lambda v, i: v, "columns of V_b and I_h swapped"),
+        (lambda v, i: v - 5.6 * i, lambda v, i: i, "V_b the lever's own voltage"),
+    ],
+)
+def test_hints_on_a_file_are_tried(tmp_path, reference_curve, bias, current, question):
+    volts, milliampere = reference_curve.bias_V, reference_curve.current_mA
+    rows = np.stack([bias(volts, milliampere), current(volts, milliampere)], axis=1)
+    path = tmp_path / "wrong.csv"
+    lines = [f"{row[0]:.6g},{row[1]:.6g}" for row in rows]
+    path.write_text("\n".join(["# R_s (kOhm): 5.6", "V_b (V),I_h (mA)", *lines]), encoding="utf-8")
+    with pytest.raises(InputError, match=question):
+        fit(path)
+
+
+def test_a_current_whose_unit_is_wrong_is_told_from_other_scales(reference_curve):
+    thousandth = replace(reference_curve, current_mA=reference_curve.current_mA / 1000.0)
+    with pytest.raises(InputError, match="1000 times too small"):
+        calibrate(thousandth)
+
+
+def test_a_search_that_was_ended_says_that_it_has_not_converged(coarse):
+    far = Probe.reference().with_(n_d=1.2e17, c_kappa=1.0)
+    data = curve(Probe.reference(), 9.0, 15)
+    residuals = Residuals(data, ["current"])
+    model = full_experiment(coarse, residuals.bias).measuring(residuals.bias, residuals.shown)
+    options = SearchOptions(most_branches=2)
+    search = Optimiser(model, residuals, far, list(PARAMETERS), options=options)
+    optimum = search.solve(far)
+    assert not optimum.converged
+    assert optimum.decrement > 1e-3 * search.objective.squares(optimum.prediction)
+
+
+def test_levers_that_cannot_be_drawn_bound_a_search():
+    """Once the search walked until a bar was 0.6 nm long, as if the input were at fault."""
+    probe = Probe.u_shape().with_(
+            gap_um=20.0, heater_length_um=16.0, heater_width_um=8.0, leg_width_um=15.0,
+            length_um=110.0, bridge_width_um=15.0, thickness_um=1.0, n_d=3e16,
+        ).in_medium("air")  # fmt: skip
+    priors = {"n_d": "± 60%", "dimensions": "± 30%", "thickness_um": "± 30%"}
+    result = calibrate(FOLDER / "uiuc-lever.csv", probe=probe, priors=priors)
+    assert result.describes_data
+    assert result.table.tip_K.max() == pytest.approx(500.0, abs=40.0)

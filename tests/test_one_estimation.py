@@ -1,0 +1,39 @@
+"""Fits and calibrations are one estimation: the same data and priors, the same lever."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hotlever
+from hotlever.calibration import calibrate
+from hotlever.estimation import fit
+
+SLOW = pytest.mark.slow
+FOLDER = Path(hotlever.__file__).parent / "examples"
+EXAMPLES = [
+    ("lever-a.csv", None),
+    ("uiuc-lever.csv", "uiuc-lever.toml"),
+    pytest.param("lever-b.csv", None, marks=SLOW),
+    pytest.param("boron-lever.csv", "boron-lever.toml", marks=SLOW),
+    pytest.param("palladium-on-nitride.csv", "palladium-on-nitride.toml", marks=SLOW),
+    pytest.param("reference-probe.csv", None, marks=SLOW),
+]
+
+
+@pytest.mark.parametrize(("data", "probe"), EXAMPLES)
+def test_fit_and_calibrate_give_the_same_parameters(data, probe):
+    stated = None if probe is None else FOLDER / probe
+    calibration = calibrate(FOLDER / data, probe=stated)
+    fitted = fit(FOLDER / data, stated, usual_priors=True)
+    assert fitted.describes_data == calibration.describes_data
+    names = fitted.names
+    assert set(calibration.priors) >= set(names)
+    assert np.allclose(fitted.probe.at(names), calibration.probe.at(names), rtol=1e-9, atol=0)
+    for name in names:
+        # one posterior, of which both give what they are asked for
+        assert fitted.parameters[name].stderr == pytest.approx(
+            calibration.priors[name].posterior_spread, rel=1e-9
+        )
