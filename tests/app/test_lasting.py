@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import tempfile
 from copy import deepcopy
@@ -16,6 +17,7 @@ from nicegui.testing.user_interaction import UserInteraction
 from test_rooms import drop, shown, until, visit
 from test_rooms_at_work import done
 
+from hotlever.app import showing
 from hotlever.app.choices import CHOICES
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.session import Session
@@ -201,6 +203,33 @@ def test_a_second_drawing_leaves_nothing_of_the_first(
         press(user, "Save")
         await user.should_see("there is no probe here yet", retries=50)
         assert sorted(session.project.probes) == ["first.toml", "second.toml"]
+
+    visit(tmp_path, story)
+
+
+def test_what_nobody_typed_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # what is put into the field of the probe file is no edit, however late its event is handled:
+    # the picture would be drawn again, without what the drawing holds
+    monkeypatch.chdir(tmp_path)
+    drawn: list[str] = []
+    draw = showing.probe_of_text
+
+    def counted(*arguments: Any) -> Any:
+        drawn.append(arguments[3])
+        return draw(*arguments)
+
+    monkeypatch.setattr(showing, "probe_of_text", counted)
+
+    async def story(user: User, session: Session) -> None:
+        at_once(session)
+        await user.open("/lever")
+        await drop(user, "first.gds", OWN)
+        await user.should_see("What the drawing holds", retries=100)
+        probe = session.project.path("first.toml").read_bytes()
+        await drop(user, "second.toml", probe)
+        await until(lambda: len(images(user)) == 1)
+        await asyncio.sleep(0.5)
+        assert drawn == ["first.toml", "second.toml"]
 
     visit(tmp_path, story)
 

@@ -11,6 +11,7 @@ from nicegui import ui
 from hotlever.app.page import figure, table
 from hotlever.app.rooms.results import SHOWING
 from hotlever.app.session import Session
+from hotlever.errors import HotleverError
 
 
 class Fields:
@@ -62,26 +63,40 @@ class Picture:
         self._mesh = ui.switch("mesh", value=chosen["mesh"], on_change=switch).props("dense")
         self._mesh.tooltip("The triangles that the lever is solved on")
         self._column = ui.column().classes("w-full gap-1")
+        self._latest = 0
 
     def clear(self) -> None:
-        """Show none."""
+        """Show none, nor one that is being drawn."""
+        self._latest += 1
         self._column.clear()
 
-    async def of(self, function: str, *arguments: Any) -> dict[str, Any]:
+    async def of(self, function: str, *arguments: Any) -> dict[str, Any] | None:
         """Have a probe drawn by a function of the worker.
+
+        Returns
+        -------
+        dict or None
+            What the worker says of it; None if another picture was asked for meanwhile.
 
         Raises
         ------
         HotleverError
             If it cannot be drawn. No picture is shown then: the last one is of another probe.
         """
-        call = f"{SHOWING}:{function}"
+        self._latest += 1
+        turn, call = self._latest, f"{SHOWING}:{function}"
         try:
             drawn: dict[str, Any] = await self._session.quick.call(
                 call, *arguments, self._chosen["mesh"]
             )
-        finally:
+        except HotleverError:
+            if turn != self._latest:
+                return None
             self._column.clear()
+            raise
+        if turn != self._latest:
+            return None
+        self._column.clear()
         with self._column:
             figure(drawn["figure"], "The lever from above: regions, terminals and tip", wide=True)
             if not drawn["fault"]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
 from pathlib import Path
 from typing import Any
 
@@ -114,9 +115,11 @@ class LeverRoom(Room):
             else:
                 values = chosen["shape"], chosen["changes"]
                 drawn = await self._picture.of("probe_of_values", *values, title)
+            if drawn is None:
+                return
             self._fault = drawn["fault"]
         except HotleverError as error:
-            self._fault = str(error)
+            drawn, self._fault = {}, str(error)
         if text is None and not self._fault:
             self._quietly(drawn["text"])
             if fields:
@@ -176,12 +179,14 @@ class LeverRoom(Room):
         self._pick.set_options(self._files)
         await self._imports.done(job)
 
-    async def _edited(self, event: Any) -> None:
-        if event.value != self._shown_text:
-            self.chosen["text"] = self._shown_text = event.value
-            self._fields.clear()
-            self._shape.set_value(None)
-            await self._draw()
+    def _edited(self, event: Any) -> Awaitable[None] | None:
+        """Take what was typed, at once: later the text may be another one, which nobody typed."""
+        if event.value == self._shown_text:
+            return None
+        self.chosen["text"] = self._shown_text = event.value
+        self._fields.clear()
+        self._shape.set_value(None)
+        return self._draw()
 
     def _quietly(self, text: str) -> None:
         """Show a probe file that nobody typed."""
