@@ -13,7 +13,7 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit, read_fit
-from hotlever.estimation.estimator import estimate
+from hotlever.estimation.inverse_problem import estimate
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.scales import CommonError, errors_of_scales

@@ -13,8 +13,8 @@ import hotlever
 from hotlever.calibration import calibrate
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.estimator import estimate
 from hotlever.estimation.experiment import full_experiment
+from hotlever.estimation.inverse_problem import estimate
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.residuals import Residuals

@@ -8,7 +8,7 @@ is needed: a lever that was measured below it is less certain above, and that is
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from hotlever.calibration.limits import BAND, posterior_of_tip, profile_of_tip
 from hotlever.calibration.plausibility import misfit
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, FitOptions, Measurement
-from hotlever.estimation.estimator import Estimate, estimate
+from hotlever.estimation.either_medium import error_of_choice
+from hotlever.estimation.inverse_problem import Estimate, estimate
 from hotlever.lever import Branch
 from hotlever.lever.curve import spline_through
 from hotlever.lever.dataset import OBSERVABLES
@@ -82,6 +83,8 @@ class Estimated:
     converged : bool
         Whether the search came to its end.
     notes : list of str
+    estimate : Estimate
+        That all this is read from.
     """
 
     probe: Probe
@@ -94,7 +97,7 @@ class Estimated:
     priors: dict[str, PriorUse]
     reason: str
     notes: list[str]
-    _estimate: Estimate
+    estimate: Estimate
     converged: bool = True
 
     @property
@@ -109,7 +112,7 @@ class Estimated:
     @property
     def branch(self) -> Branch:
         """The lever as far as it was measured, corrected by the full model."""
-        return self._estimate.branch
+        return self.estimate.branch
 
     def knee_of(self, branch: Branch) -> Knee:
         """Return the knee of a branch of this lever, with standard errors; NaN without one."""
@@ -123,12 +126,12 @@ class Estimated:
     @property
     def varied(self) -> list[str]:
         """The parameters that were estimated."""
-        return self._estimate.options.varied
+        return self.estimate.options.varied
 
     @property
     def shares(self) -> dict[str, Array]:
         """What adds up to their covariance (p, p), by source; independent of each other."""
-        return _shares(self._estimate)
+        return _shares(self.estimate)
 
     def directions(self, least: float = 0.0) -> list[dict[str, float]]:
         """Return changes of the parameters by one standard error, independent of each other.
@@ -136,17 +139,30 @@ class Estimated:
         They are along the axes of the correlation, those left out whose variance is less than
         some share of a parameter's.
         """
-        covariance = self._estimate.covariance
+        covariance = self.estimate.covariance
         scale = np.sqrt(np.diag(covariance))
         variances, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
         steps = (axes * np.sqrt(np.maximum(variances, 0.0)) * scale[:, None]).T
         kept = variances >= least
         return [dict(zip(self.varied, step.tolist(), strict=True)) for step in steps[kept]]
 
+    def or_else(self, other: Estimated) -> Estimated:
+        """Return what is known of the tip temperature if the lever may as well be another one."""
+        tip, low, high = (
+            np.interp(self.bias_V, other.bias_V, known)
+            for known in (other.tip_K, other.tip_low_K, other.tip_high_K)
+        )
+        return replace(
+            self,
+            parts=self.parts | {"medium": error_of_choice(self.tip_K, tip)},
+            tip_low_K=np.minimum(self.tip_low_K, low),
+            tip_high_K=np.maximum(self.tip_high_K, high),
+        )
+
     def _knee_changes(self) -> Array:
         """Return V_l, I_h, P_l and V_b of the knee one standard error away on each axis."""
-        known = self._estimate.problem.model.names
-        at = self._estimate.optimum.prediction
+        known = self.estimate.problem.model.names
+        at = self.estimate.optimum.prediction
         origin, circuit = at.probe.at(known), self.probe.circuit
         changes = []
         for direction in self.directions():
@@ -299,7 +315,7 @@ def _put_together(
             *(jump.note for jump in jumps),
             *residuals.suspicious(at.values, robust=True),
         ],
-        _estimate=found,
+        estimate=found,
         converged=converged,
     )
 

@@ -27,6 +27,8 @@ from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
+from hotlever.estimation.either_medium import InMedium, likelier
+from hotlever.estimation.options import UNKNOWN_MEDIUM
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import with_measured_circuit
@@ -70,8 +72,9 @@ def calibrate(
     law : PowerLaw, optional
         A power law in vacuum, in place of a model. It takes a lever that only the swept supply
         heats.
-    medium : {"vacuum", "air"}, optional
-        What the lever is in; by default what the data file says, or else the fit or the probe.
+    medium : {"vacuum", "air", "unknown"}, optional
+        What the lever is in; by default what the data file says, or else the fit or the probe. If
+        it is unknown both are tried (`hotlever.estimation.either_medium`).
         With vacuum for data from air the paper's rule is used: the temperatures that the probe has
         in vacuum, at k times the power.
     priors : mapping of str to Prior or str, optional
@@ -110,12 +113,8 @@ def calibrate(
     whole = Measurement.given(measurement, origin.circuit)
     measured = averaged(whole, robust=True)
     measured.need_rest("a calibration")
-    # a power law holds for vacuum, whatever the lever is in
-    known = measured if law is None else replace(measured, medium=None)
-    probe, notes = with_measured_circuit(origin, known, medium if law is None else "vacuum")
-    notes += note_on_averages(whole, measured)
+    more = note_on_averages(whole, measured)
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
-        probe.circuit.need_cold_start("a power law")
         if samples:
             raise InputError("the paper's rule has no posterior; expected a probe or a fit")
         if pulse is not None:
@@ -123,18 +122,17 @@ def calibrate(
                 "the paper's rule says nothing about a pulse; expected a probe or a fit, in the "
                 "medium of the data"
             )
-        return _by_rule(measured, probe, law, route, notes)
+        # a power law holds for vacuum, whatever the lever is in
+        known = measured if law is None else replace(measured, medium=None)
+        probe, notes = with_measured_circuit(origin, known, "vacuum")
+        probe.circuit.need_cold_start("a power law")
+        return _by_rule(measured, probe, law, route, [*notes, *more])
     if pulse is not None:
-        probe.circuit.need_cold_start("a calibration for pulses")
-    causes = Diagnosis(measured, probe, priors)
-    check_plausible(measured, probe, causes, known_beforehand(probe, priors))
-    try:
-        found = estimated(measured, probe, fit, priors, samples, progress)
-    except ComputationError as error:
-        raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
-    if found.reason:
-        found = replace(found, reason=f"{found.reason}; {causes.named(fit is not None)}")
-    result = _by_estimate(measured, found, route, [*notes, *remarks(measured, found.tip_K)])
+        origin.circuit.need_cold_start("a calibration for pulses")
+
+    found = _estimate_of(measured, origin, fit, medium, priors, samples, progress)
+    found = replace(found, notes=[*more, *found.notes])
+    result = _by_estimate(measured, found, route)
     if pulse is None:
         return result
     if not result.describes_data:
@@ -144,9 +142,39 @@ def calibrate(
     return replace(result, pulse=pulsed)
 
 
-def _by_estimate(
-    measured: Measurement, found: Estimated, route: str, notes: list[str]
-) -> Calibration:
+def _estimate_of(
+    measured: Measurement,
+    origin: Probe,
+    fit: Fit | None,
+    medium: str | None,
+    priors: Mapping[str, Prior | str] | None,
+    samples: int,
+    progress: Progress | None,
+) -> Estimated:
+    """Estimate a lever in the medium that is asked for; in either if that is not known."""
+
+    def within(medium: str | None) -> InMedium[Estimated]:
+        probe, notes = with_measured_circuit(origin, measured, medium)
+        causes = Diagnosis(measured, probe, priors)
+        check_plausible(measured, probe, causes, known_beforehand(probe, priors))
+        try:
+            found = estimated(measured, probe, fit, priors, samples, progress)
+        except ComputationError as error:
+            raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
+        if found.reason:
+            found = replace(found, reason=f"{found.reason}; {causes.named(fit is not None)}")
+        found = replace(found, notes=[*notes, *remarks(measured, found.tip_K), *found.notes])
+        return InMedium(found, found.estimate, found.reason)
+
+    if medium != UNKNOWN_MEDIUM:
+        return within(medium).answer
+    found, other, words = likelier(within)
+    found = found if other is None else found.or_else(other)
+    return replace(found, notes=[words, *found.notes])
+
+
+def _by_estimate(measured: Measurement, found: Estimated, route: str) -> Calibration:
+    notes = found.notes
     lever, measured_part = Lever(found.probe.in_medium("vacuum"), COARSE), found.branch
     vacuum, medium = lever.branch(), found.probe.surroundings.medium
     # beyond the measured range a coarse lever says where the knee is
@@ -189,7 +217,7 @@ def _by_estimate(
         priors=found.priors,
         reason=found.reason,
         converged=found.converged,
-        notes=[*notes, *found.notes],
+        notes=notes,
     )
 
 

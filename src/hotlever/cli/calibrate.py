@@ -11,7 +11,7 @@ from hotlever.cli.application import app
 from hotlever.cli.options import (
     ColumnOption,
     File,
-    MediumOption,
+    MeasuredMediumOption,
     PlotFile,
     PriorOption,
     check_medium,
@@ -38,7 +38,7 @@ def calibrate_command(
     ),
     power_law: File = Option(None, help="Power law in vacuum (JSON), or a calibration file."),
     column: ColumnOption = None,
-    medium: MediumOption = None,
+    medium: MeasuredMediumOption = None,
     prior: PriorOption = None,
     pulse: str | None = Option(
         None, metavar="TIME[,PERIOD]", help="Calibrate a pulse too, such as 5us or 5us,100us."
@@ -57,13 +57,14 @@ def calibrate_command(
     from hotlever.calibration.power_law import read_power_law
     from hotlever.calibration.procedure import calibrate
     from hotlever.estimation import read_fit, read_measurement
+    from hotlever.estimation.options import UNKNOWN_MEDIUM
     from hotlever.measurement import parse_columns
 
     given = {"--fit": fit_file, "--probe": probe_file, "--power-law": power_law}
     several = [name for name, path in given.items() if path is not None]
     if len(several) > 1:
         raise InputError(f"{' and '.join(several)}: expected at most one of {', '.join(given)}")
-    check_medium(medium)
+    check_medium(medium, UNKNOWN_MEDIUM)
     timing = None if pulse is None else _timing(pulse)
     columns = parse_columns(column or [])
     outputs = Outputs(data, *given.values(), *column_files(column))

@@ -14,7 +14,7 @@ from hotlever.cli.options import (
     USUAL,
     ColumnOption,
     File,
-    MediumOption,
+    MeasuredMediumOption,
     PriorOption,
     check_number,
     column_files,
@@ -71,7 +71,7 @@ def fit_command(
     ),
     column: ColumnOption = None,
     prior: PriorOption = None,
-    medium: MediumOption = None,
+    medium: MeasuredMediumOption = None,
     output: File = Option(
         None, "-o", "--output", help="Fit file (JSON); a folder of them with several data files."
     ),

@@ -62,6 +62,10 @@ DataOutput = Annotated[
     File, Option("-o", "--output", help="FILE.csv or FILE.nc; standard output if left out.")
 ]
 MediumOption = Annotated[str | None, Option(help="vacuum or air; what the files say if left out.")]
+MeasuredMediumOption = Annotated[
+    str | None,
+    Option(help="vacuum, air or unknown (both are tried); what the files say if left out."),
+]
 
 
 def options_of(function: Callable[..., Any], name: str) -> Callable[[Callable[..., None]], Any]:
@@ -115,12 +119,13 @@ def check_plot(outputs: Outputs, plot: Path | None) -> None:
         outputs.file(plot, *FIGURE_TYPES)
 
 
-def check_medium(medium: str | None) -> None:
+def check_medium(medium: str | None, *more: str) -> None:
     """Refuse a medium that does not exist."""
     from hotlever.probe.surroundings import Medium
 
-    if medium is not None and medium not in get_args(Medium):
-        raise InputError(f"--medium {shown(medium)}: expected {' or '.join(get_args(Medium))}")
+    known = *get_args(Medium), *more
+    if medium is not None and medium not in known:
+        raise InputError(f"--medium {shown(medium)}: expected {' or '.join(known)}")
 
 
 def column_files(columns: list[str] | None) -> list[Path]:

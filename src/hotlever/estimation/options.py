@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.lever.dataset import OBSERVABLES
@@ -21,6 +21,8 @@ from hotlever.probe.priors import SCALES, Prior
 from hotlever.probe.surroundings import Medium
 
 Weights = Literal["maximum", "errors"]
+#: What the medium is called if nobody knows it: either is tried.
+UNKNOWN_MEDIUM = "unknown"
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,9 @@ class FitOptions:
         its measurement error; an observable without errors then takes its scatter about the fit.
     drift : bool
         Let the zeros of I_h and V_r lie on straight lines over the order of the rows.
-    medium : {"vacuum", "air"}, optional
-        What the lever was measured in; wins over measurement and probe.
+    medium : {"vacuum", "air", "unknown"}, optional
+        What the lever was measured in; wins over measurement and probe. If it is unknown both are
+        tried (`hotlever.estimation.either_medium`).
     priors : mapping of str to Prior or str
         What is known before, of parameters of the material, dimensions, the circuit or the scales
         of meters, also as text (`hotlever.probe.priors`); all that have a prior are varied.
@@ -69,7 +72,7 @@ class FitOptions:
     robust: bool = False
     weights: Weights = "maximum"
     drift: bool = False
-    medium: Medium | None = None
+    medium: Medium | Literal["unknown"] | None = None
     priors: Mapping[str, Prior | str] = field(default_factory=dict)
     usual_priors: bool = False
     free: Sequence[str] = ()
@@ -89,7 +92,7 @@ class FitOptions:
         ]
         asked += [("observable", name, tuple(OBSERVABLES)) for name in self.observables or ()]
         if self.medium is not None:
-            asked.append(("medium", self.medium, get_args(Medium)))
+            asked.append(("medium", self.medium, (*get_args(Medium), UNKNOWN_MEDIUM)))
         for kind, name, known in asked:
             if name not in known:
                 raise unknown_name(kind, str(name), known)
@@ -128,6 +131,12 @@ class FitOptions:
             parameter_of(probe, name, in_time=in_time)
         usual = heat_capacities(probe) if in_time else usual_parameters(probe)
         return replace(self, usual=usual)
+
+    @property
+    def media(self) -> tuple[Medium | None, ...]:
+        """What is to be tried: None is what measurement and probe say."""
+        asked = self.medium
+        return get_args(Medium) if asked == UNKNOWN_MEDIUM else (cast("Medium | None", asked),)
 
     def held(self, probe: Probe) -> Probe:
         """Return a probe with the fixed values in place.

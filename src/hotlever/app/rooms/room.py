@@ -11,7 +11,12 @@ from hotlever.app.page import Complaint, command_shown, framed, python_shown
 from hotlever.app.session import Session
 
 REFERENCE = "reference probe"
-MEDIA = {"": "as the files say", "vacuum": "vacuum", "air": "air"}
+MEDIA = {
+    "": "as the files say",
+    "vacuum": "vacuum",
+    "air": "air",
+    "unknown": "not known: either is tried",
+}
 
 
 class Room(ABC):

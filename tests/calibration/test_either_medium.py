@@ -1,0 +1,117 @@
+"""A lever whose medium nobody knows: both are tried, and errors hold both if both describe it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hotlever.calibration.procedure import calibrate
+from hotlever.errors import ComputationError, InputError
+from hotlever.estimation import fit
+from hotlever.estimation.either_medium import InMedium, likelier
+from synthetic_curves import measured_curve, measurement_of
+
+#: Where a lever is so cold that little tells what it is in (K).
+COLD_K = 480.0
+
+
+@pytest.fixture(scope="module")
+def cold(lever, reference):
+    """The cold part of the reference lever's curve, measured in vacuum."""
+    whole = measurement_of(measured_curve(reference, np.random.default_rng(0)))
+    tip_K = reference.tip_K(reference.read(lever.circuit, whole.bias_V).u)
+    return replace(whole.part(tip_K < COLD_K), medium=None)
+
+
+def test_errors_hold_both_media_where_the_data_do_not_tell(cold, reference):
+    either = calibrate(cold, medium="unknown")
+    assert "do not tell which" in either.notes[0]
+    table = either.table
+    own = calibrate(cold, medium=either.medium).table
+    other = calibrate(cold, medium="air" if either.medium == "vacuum" else "vacuum").table
+    np.testing.assert_array_equal(table.tip_K, own.tip_K)
+    away = np.abs(other.tip_K - own.tip_K)
+    np.testing.assert_allclose(table.budget_K.sel(source="medium"), away / np.sqrt(2.0), atol=0.05)
+    np.testing.assert_allclose(table.tip_stderr_K**2, own.tip_stderr_K**2 + away**2 / 2, rtol=0.01)
+    for limit, hold in (("tip_low_K", np.minimum), ("tip_high_K", np.maximum)):
+        np.testing.assert_allclose(table[limit], hold(own[limit], other[limit]), atol=0.05)
+    true = reference.tip_temperature(table.power_mW)
+    assert np.all((table.tip_low_K <= true) & (true <= table.tip_high_K))
+
+
+def test_a_fit_in_either_medium_is_one_in_the_better(cold):
+    known = {"n_d": "3.3e17 ± 15%"}
+    either = fit(cold, medium="unknown", usual_priors=True, priors=known)
+    own = fit(cold, medium=either.medium, usual_priors=True, priors=known)
+    assert either.options.medium == either.medium
+    assert {name: one.value for name, one in either.parameters.items()} == {
+        name: one.value for name, one in own.parameters.items()
+    }
+    assert np.all(either.band.tip_stderr_K >= own.band.tip_stderr_K)
+    assert either.band.tip_stderr_K[-1] > 1.05 * own.band.tip_stderr_K[-1]
+
+
+@pytest.mark.slow
+def test_what_describes_the_data_is_the_answer(reference):
+    measured = measurement_of(measured_curve(reference, np.random.default_rng(0)))
+    found = calibrate(replace(measured, medium=None), medium="unknown")
+    assert found.describes_data and found.medium == "vacuum"
+    assert "in air a lever does not describe the data" in found.notes[0]
+    assert "medium" not in found.table.source.values
+
+
+def answers(of: dict[str, tuple[str, float] | Exception]) -> Any:
+    """Answer as told: a reason against it, and how unlikely it is."""
+
+    def answered(medium: str) -> InMedium[str]:
+        told = of[medium]
+        if isinstance(told, Exception):
+            raise told
+        residuals = SimpleNamespace(rms=lambda _: {"current_mA": 0.00123})
+        estimate: Any = SimpleNamespace(
+            unlikeliness=told[1],
+            problem=SimpleNamespace(residuals=residuals),
+            optimum=SimpleNamespace(prediction=SimpleNamespace(values=None)),
+        )
+        return InMedium(medium, estimate, told[0])
+
+    return answered
+
+
+def test_a_described_answer_comes_before_a_likelier_one():
+    best, other, words = likelier(answers({"vacuum": ("", 9.0), "air": ("no such lever", 1.0)}))
+    assert (best, other) == ("vacuum", None)
+    assert words == (
+        "the medium is not known: in vacuum a lever describes the data (rms 0.0012 mA); "
+        "in air a lever does not describe the data (rms 0.0012 mA)"
+    )
+
+
+def test_of_two_described_the_likelier_is_the_answer():
+    best, other, _ = likelier(answers({"vacuum": ("", 9.0), "air": ("", 1.0)}))
+    assert (best, other) == ("air", "vacuum")
+
+
+def test_of_two_that_are_not_described_the_nearer_is_shown():
+    best, other, _ = likelier(answers({"vacuum": ("no", 9.0), "air": ("no", 1.0)}))
+    assert (best, other) == ("air", None)
+
+
+def test_what_cannot_be_solved_is_said():
+    failure = ComputationError("it melts")
+    best, other, words = likelier(answers({"vacuum": failure, "air": ("", 1.0)}))
+    assert (best, other) == ("air", None)
+    assert words.endswith("in vacuum none can be solved: it melts")
+    with pytest.raises(ComputationError, match="it melts"):
+        likelier(answers({"vacuum": failure, "air": failure}))
+
+
+def test_only_data_may_be_of_an_unknown_medium(run, cold):
+    code, _, said = run("sweep", "--medium", "unknown")
+    assert code == 2 and "--medium unknown: expected vacuum or air" in said
+    with pytest.raises(InputError, match="unknown medium 'unknow'"):
+        fit(cold, medium="unknow")
