@@ -17,6 +17,7 @@ from hotlever.calibration.inference import _before
 from hotlever.calibration.power_law import EQ12, read_power_law
 from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
+from hotlever.calibration.words import calibration_text
 from hotlever.errors import InputError
 from hotlever.estimation import fit, read_fit
 from hotlever.lever import Lever
@@ -103,7 +104,7 @@ def test_priors_say_what_was_known_and_what_the_data_made_of_it(calibrated):
     assert (use.value, use.spread) == (5.75e17, pytest.approx(0.15 * 5.75e17))
     assert use.posterior_spread < use.spread
     assert calibrated.describes_data
-    text = calibrated.text()
+    text = calibration_text(calibrated)
     assert "as known before, since the data do not tell: " in text
     assert "gap_um" in text
 

@@ -11,6 +11,7 @@ from hotlever import Lever, Probe
 from hotlever.calibration import Calibration, calibrate, read_calibration, read_power_law
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.pulses import PulseTiming
+from hotlever.calibration.words import calibration_text
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement
 from hotlever.lever.lever import COARSE
@@ -61,7 +62,7 @@ def test_the_table_is_by_the_bias_of_the_swept_supply(calibration, truth):
 def test_no_power_tells_the_temperature(calibration, measured, tmp_path):
     assert calibration.power_law is None
     assert np.isnan(calibration.k)
-    assert "no power law: with held supplies" in calibration.text()
+    assert "no power law: with held supplies" in calibration_text(calibration)
     held = r"\[circuit.reader\]: .* takes a lever that only the swept supply heats"
     with pytest.raises(InputError, match=held):
         calibration.tip_temperature(1.0)
@@ -75,7 +76,7 @@ def test_no_power_tells_the_temperature(calibration, measured, tmp_path):
     assert again.table.total_power_mW.values.tolist() == pytest.approx(
         calibration.table.total_power_mW.values.tolist()
     )
-    assert again.text() == calibration.text()
+    assert calibration_text(again) == calibration_text(calibration)
     assert again.table_csv().splitlines()[0].endswith(",tip_high_K,total_power_mW")
     with pytest.raises(InputError, match="found no power law"):
         read_power_law(tmp_path / "calibration.json")

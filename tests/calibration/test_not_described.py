@@ -15,6 +15,7 @@ import pytest
 from hotlever import figures
 from hotlever.app import showing
 from hotlever.calibration.calibration import Calibration, read_calibration
+from hotlever.calibration.words import calibration_text
 from hotlever.cli import main
 from hotlever.errors import InputError
 from hotlever.files import json_text
@@ -76,10 +77,10 @@ def test_files_have_no_errors(folder):
 
 
 def test_words_say_whose_the_numbers_are(refused):
-    first, second, *_ = refused.text().splitlines()
+    first, second, *_ = calibration_text(refused).splitlines()
     assert first.startswith("no lever like this one shows these data: ")
     assert "of the lever that comes nearest, and no estimate" in second
-    assert not re.search(r"\d\(\d|±", refused.text().removeprefix(first))
+    assert not re.search(r"\d\(\d|±", calibration_text(refused).removeprefix(first))
     assert not any("95 %" in note for note in refused.notes)
 
 
@@ -102,6 +103,15 @@ def test_no_band_is_drawn_and_the_figure_says_so(refused):
     for axes in (by_power, by_bias):
         assert "the nearest lever" in [line.get_label() for line in axes.lines]
     assert not any("95 %" in text.get_text() for text in iv.get_legend().get_texts())
+
+
+def test_the_rows_that_no_lever_shows_are_drawn(refused):
+    drawn = {line.get_label(): line for line in figures.calibration_curves(refused).axes[3].lines}
+    measured = refused.measurement
+    clipped = measured.bias_V[measured.current_mA > 0.999 * measured.current_mA.max()]
+    assert clipped.size > 3
+    assert set(drawn["off"].get_xdata()) & set(clipped)
+    assert drawn["measured"].get_xdata().size == measured.bias_V.size
 
 
 def test_the_page_has_no_errors(refused):

@@ -13,7 +13,6 @@ from hotlever.calibration.procedure import calibrate
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement
 from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.figures import calibration_curves
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 from synthetic_curves import measured_curve, measurement_of
@@ -96,21 +95,6 @@ def test_a_fit_that_is_another_lever_s_is_said_to_be(curve):
     assert Diagnosis(shown(curve), Probe.reference()).named(fitted=True) == (
         "is it the fit of another lever?"
     )
-
-
-def test_data_that_no_such_lever_shows_are_said_and_shown_to_be(curve):
-    wrong = np.minimum(curve.current_mA, 0.8 * curve.current_mA.max())
-    found = calibrate(shown(curve, current_mA=wrong))
-    assert not found.describes_data
-    assert found.text().startswith("no lever like this one shows these data: ")
-    # no error bars, since they would not hold
-    assert not re.search(r"\d\(\d", found.text())
-    assert found.content()["describes_data"] is False
-    drawn = {line.get_label(): line for line in calibration_curves(found).axes[3].lines}
-    clipped = curve.bias_V[curve.current_mA > 1.02 * wrong.max()]
-    assert clipped.size > 3
-    assert set(clipped) <= set(drawn["off"].get_xdata())
-    assert drawn["measured"].get_xdata().size == curve.bias_V.size
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from hotlever.calibration import calibrate, read_calibration
 from hotlever.calibration import pulses as module
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.pulses import PULSE_COLUMNS, PulseTiming
+from hotlever.calibration.words import calibration_text
 from hotlever.errors import InputError
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -84,7 +85,7 @@ def test_the_file_reads_back(calibrated, tmp_path):
     for name in (*PULSE_COLUMNS, "budget_K"):
         np.testing.assert_allclose(again.table[name], calibrated.pulse.table[name])
     assert calibrated.table_csv().splitlines()[0] == ",".join(PULSE_COLUMNS)
-    assert "a pulse of 5 µs:" in calibrated.text()
+    assert "a pulse of 5 µs:" in calibration_text(calibrated)
     content = json.loads(path.read_text())
     del content["pulse"]["table"][0]
     path.write_text(json.dumps(content))

@@ -115,7 +115,7 @@ def test_the_page_has_no_errors(refused):
 
 def test_how_sure_it_is_cannot_be_asked(refused):
     for ask in (sample_posterior, lambda one: profile_likelihood(one, "n_d")):
-        with pytest.raises(InputError, match="expected a fit that describes its data; no such"):
+        with pytest.raises(InputError, match="expected data that a lever describes; no such"):
             ask(refused)
 
 

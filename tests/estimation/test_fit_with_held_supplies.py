@@ -14,6 +14,7 @@ from hotlever.estimation.experiment import Experiment
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
+from hotlever.measurement import given_measurement
 from hotlever.probe import MeshOptions
 
 BIAS = np.array([-7.5, -4.0, 0.0, 1.0, 5.0, 8.0])
@@ -112,7 +113,7 @@ def test_a_file_is_mirrored_only_where_polarities_are_alike(tmp_path):
     path.write_text("V_b (V),I_h (mA)\n-2,-0.35\n-1,-0.2\n1,0.07\n2,0.21\n")
     held = wired("held voltage").circuit
     assert read_measurement(path).bias_V.tolist() == [2.0, 1.0, 1.0, 2.0]
-    assert Measurement.given(path, held).bias_V.tolist() == [-2.0, -1.0, 1.0, 2.0]
+    assert given_measurement(path, held).bias_V.tolist() == [-2.0, -1.0, 1.0, 2.0]
 
 
 def test_a_fit_in_time_is_refused():

@@ -17,6 +17,7 @@ from hotlever.estimation.inverse_problem import estimate
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.scales import CommonError, errors_of_scales
+from hotlever.estimation.words import fit_text
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
@@ -193,7 +194,7 @@ def test_doping_known_by_orders_of_magnitude_is_found_and_said_by_its_factor(dat
     assert use.moved == pytest.approx(np.log(value / 1.733e17) / np.log(3.0), rel=1e-12)
     assert result.priors["base_temperature_K"].distribution == "normal"
     away = f"n_d by {use.moved:+.1f} σ"
-    assert (away in repr(result)) == (abs(use.moved) > 1.0)
+    assert (away in fit_text(result)) == (abs(use.moved) > 1.0)
     assert result.content()["priors"]["n_d"]["distribution"] == "log-normal"
 
 

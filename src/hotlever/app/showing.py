@@ -21,6 +21,7 @@ from hotlever import figures
 from hotlever.app.child import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.calibration import STATED, TABLE_COLUMNS
+from hotlever.calibration.words import calibration_text
 from hotlever.cli.options import load_probe
 from hotlever.cli.waveforms import pulses
 from hotlever.datasets import QUANTITIES
@@ -313,7 +314,7 @@ def _calibration_page(
     calibration: Calibration, added: Callable[[Block], None] | None = None
 ) -> Page:
     made = Page(f"Calibration of {calibration.measurement.path}", added=added)
-    made.text(calibration.text())
+    made.text(calibration_text(calibration))
     for note in calibration.notes:
         made.text(sentence(note))
     described = calibration.describes_data

@@ -15,24 +15,23 @@ from hotlever import __version__
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseCalibration, PulseSection
-from hotlever.calibration.words import calibration_text
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
 from hotlever.estimation.embedded import (
     EmbeddedMeasurement,
     Number,
     UsedPrior,
-    Verdict,
     array,
     embed,
     prior_uses,
     without_spread,
 )
-from hotlever.estimation.words import doubt
-from hotlever.files import json_text, without_nan, write_text
+from hotlever.estimation.verdict import Outcome, Verdict
+from hotlever.files import without_nan
 from hotlever.measurement import Measurement
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import PriorUse
+from hotlever.text import value_with_error
 from hotlever.types import Array
 
 #: Columns of a calibration's table; the last say how sure it is.
@@ -43,7 +42,7 @@ TOTAL_POWER = "total_power_mW"
 
 
 @dataclass(frozen=True)
-class Calibration:
+class Calibration(Outcome):
     """The tip temperature of one lever against what its instrument shows.
 
     Where the data are not described by any such lever, the numbers are those of the nearest one and
@@ -105,30 +104,18 @@ class Calibration:
     pulse: PulseCalibration | None = None
     converged: bool = True
 
-    def __post_init__(self) -> None:
-        if self.describes_data:
-            return
-        # errors about a lever that does not show the data would not hold
+    lever = "lever like this one"
+
+    def _without_errors(self) -> dict[str, Any]:
         errors = (*STATED, "budget_K")
         unknown = {name: xr.full_like(self.table[name], np.nan) for name in errors}
-        for name, value in {
+        return {
             "table": self.table.assign(unknown),
             "knee": self.knee.without_errors,
             "k_stderr": np.nan,
             "priors": without_spread(self.priors),
             "pulse": None,
-        }.items():
-            object.__setattr__(self, name, value)
-
-    @property
-    def describes_data(self) -> bool | None:
-        """Whether such a lever shows what was measured; None if the search did not converge."""
-        return not self.reason if self.converged else None
-
-    @property
-    def doubt(self) -> str:
-        """That no such lever shows the data, or that the search did not converge; else empty."""
-        return doubt(self.describes_data, self.reason, "lever like this one")
+        }
 
     @property
     def base_temperature_K(self) -> float:
@@ -186,17 +173,6 @@ class Calibration:
         lever, current = (self._read(tip_K, "tip_K", name) for name in ("lever_V", "current_mA"))
         return np.asarray((circuit or self.probe.circuit).bias(lever, current))
 
-    def need_described(self, what: str) -> None:
-        """Raise an error unless the data are described, for what has no meaning otherwise.
-
-        Raises
-        ------
-        InputError
-            If they are not.
-        """
-        if not self.describes_data:
-            raise InputError(f"{what}: expected data that the lever shows; {self.doubt}")
-
     @property
     def heating(self) -> xr.Dataset:
         """The rows of the table that have a tip temperature, from the coldest on."""
@@ -213,11 +189,10 @@ class Calibration:
         return np.interp(np.asarray(at, dtype=float), x, y, left=np.nan, right=np.nan)
 
     def __repr__(self) -> str:
-        return f"<Calibration of {self.measurement.path or 'a measurement'}>\n{self.text()}"
-
-    def text(self) -> str:
-        """Return the calibration as lines of text, its error budget included."""
-        return calibration_text(self)
+        hottest = self.table.isel(bias=int(np.nanargmax(self.table.tip_K)))
+        tip = value_with_error(hottest.tip_K.item(), hottest.tip_stderr_K.item())
+        said = self.doubt or f"{tip} K at {hottest.bias_V.item():.4g} V in {self.medium}"
+        return f"<Calibration of {self.measurement.path or 'a measurement'}: {said}>"
 
     # --- the file -------------------------------------------------------------------------------
 
@@ -251,10 +226,6 @@ class Calibration:
             "software": f"hotlever {__version__}",
         }
         return dict(without_nan(content))
-
-    def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the calibration file, whole or not at all."""
-        write_text(path, json_text(self.content()))
 
     def table_csv(self) -> str:
         """Return the table as CSV, to load into an instrument; that of the pulse if there is."""

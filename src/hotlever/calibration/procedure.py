@@ -31,7 +31,7 @@ from hotlever.estimation.either_medium import InMedium, likelier
 from hotlever.estimation.options import UNKNOWN_MEDIUM
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
-from hotlever.measurement import with_measured_circuit
+from hotlever.measurement import given_measurement, with_measured_circuit
 from hotlever.measurement.averages import averaged, note_on_averages
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import Prior, known_beforehand
@@ -110,7 +110,7 @@ def calibrate(
     else:
         route = "probe" if law is None else "power law"
         origin = Probe.reference() if probe is None else Probe.given(probe)
-    whole = Measurement.given(measurement, origin.circuit)
+    whole = given_measurement(measurement, origin.circuit)
     measured = averaged(whole, robust=True)
     measured.need_rest("a calibration")
     more = note_on_averages(whole, measured)

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from hotlever.calibration.calibration import Calibration
+from hotlever.calibration.pulses import PulseCalibration
 from hotlever.estimation.words import NEAREST, prior_lines
 from hotlever.text import aligned, significant, value_with_error
-
-if TYPE_CHECKING:
-    from hotlever.calibration.calibration import Calibration
-    from hotlever.calibration.pulses import PulseCalibration
 
 #: Tip temperatures (K) at which the error budget is printed.
 _SHOWN, _FEW = (400.0, 600.0, 800.0, 900.0, 1000.0, 1100.0, 1200.0), 4

@@ -56,6 +56,7 @@ def calibrate_command(
     """Find the tip temperature of a lever from its I-V curve, with its error."""
     from hotlever.calibration.power_law import read_power_law
     from hotlever.calibration.procedure import calibrate
+    from hotlever.calibration.words import calibration_text
     from hotlever.estimation import read_fit, read_measurement
     from hotlever.estimation.options import UNKNOWN_MEDIUM
     from hotlever.measurement import parse_columns
@@ -101,7 +102,7 @@ def calibrate_command(
             from hotlever import figures
 
             figures.save_figure(figures.calibration_curves(result), plot)
-    give(result.text() + "\n")
+    give(calibration_text(result) + "\n")
     if not result.describes_data:
         raise ComputationError(f"{data}: {result.doubt}")
 

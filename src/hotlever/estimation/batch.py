@@ -18,7 +18,7 @@ from hotlever.errors import HotleverError, InputError
 from hotlever.estimation.estimator import fit
 from hotlever.estimation.levers import described
 from hotlever.estimation.options import FitOptions
-from hotlever.estimation.words import doubt
+from hotlever.estimation.verdict import doubt
 from hotlever.files import Outputs, json_text, output_folder, read_json, write_text
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduction import cached_reduction, can_be_reduced

@@ -1,4 +1,4 @@
-"""What fit and calibration files have in common: their verdict, priors, and the measurement."""
+"""What fit and calibration files have in common: priors, and the measurement."""
 
 from __future__ import annotations
 
@@ -49,27 +49,6 @@ class Section(BaseModel):
             return cls.model_validate(read_json(path))
         except ValidationError as error:
             raise explained(error, cls, f"{path}: not a {kind} file") from None
-
-
-class Verdict(Section):
-    """Whether data are described, as a result file says it; one that does not say so has a reason.
-
-    Attributes
-    ----------
-    describes_data : bool or None
-        None where the search did not converge.
-    reason : str
-        Why they are not; empty if they are.
-    """
-
-    describes_data: bool | None = True
-    reason: str = ""
-
-    @property
-    def verdict(self) -> dict[str, Any]:
-        """The same as fits and calibrations have it: `converged` and `reason`."""
-        reason = self.reason or ("" if self.describes_data else "the file does not say why")
-        return {"converged": self.describes_data is not None, "reason": reason}
 
 
 class UsedPrior(Section):

@@ -21,7 +21,12 @@ from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.scales import errors_of_scales
 from hotlever.estimation.search import search_from_anywhere, search_near
 from hotlever.lever.branch import Branch
-from hotlever.measurement import OBSERVABLE_SYMBOLS, Measurement, with_measured_circuit
+from hotlever.measurement import (
+    OBSERVABLE_SYMBOLS,
+    Measurement,
+    given_measurement,
+    with_measured_circuit,
+)
 from hotlever.measurement.averages import averaged, note_on_averages
 from hotlever.probe import Probe
 from hotlever.probe.priors import (
@@ -159,7 +164,7 @@ def estimate(
     # what an earlier one used
     memory.give_back()
     given = Probe.reference() if probe is None else Probe.given(probe)
-    whole = Measurement.given(measurement, given.circuit)
+    whole = given_measurement(measurement, given.circuit)
     measurement = averaged(whole, options.robust)
     in_time = measurement.time_us is not None
     if in_time:

@@ -51,20 +51,17 @@ def nearest_states(branch: Branch, circuit: Circuit, rows: Rows) -> tuple[Array,
 
     By so much, at least one, the values of a state are to be multiplied to reach the bias.
     """
-    ramp = branch.read(circuit, rows.bias_V)
     curve = PPoly(circuit.bias(branch.curve.c[..., 0], branch.curve.c[..., 1]), branch.curve.x)
     cold = branch.equations.circuit.starts_cold
     start = 0.0 if cold else float(branch.u[0])
     level = np.sort(curve.derivative().roots(extrapolate=False))
     ends = [start, *level[(level > start) & (level < branch.end_u)].tolist(), branch.end_u]
-    missing = np.isnan(ramp.u)
-    short = np.ones(rows.bias_V.shape)
-    if len(ends) == 2 and not missing.any():
-        return ramp.u, short
-    u, away = ramp.u.copy(), np.full(rows.bias_V.shape, np.inf)
-    # a cold lever is told apart from itself by the size of the bias only
+    # a cold lever is told apart from itself by the size of the bias only, and has none without
     bias = np.abs(rows.bias_V) if cold else rows.bias_V
     heated = np.flatnonzero(bias > 0) if cold else np.arange(bias.size)
+    u, away = np.zeros(bias.shape), np.full(bias.shape, np.inf)
+    u[heated] = np.nan
+    short = np.ones(bias.shape)
     for low, high in pairwise(ends):
         first, last = float(curve(low)), float(curve(high))
         here = heated[(bias[heated] >= min(first, last)) & (bias[heated] <= max(first, last))]

@@ -21,7 +21,6 @@ from hotlever.estimation.embedded import (
     Section,
     Spread,
     UsedPrior,
-    Verdict,
     array,
     embed,
     prior_uses,
@@ -30,8 +29,8 @@ from hotlever.estimation.embedded import (
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.scales import errors_of_scales
-from hotlever.estimation.words import doubt, fit_text
-from hotlever.files import json_text, without_nan, write_text
+from hotlever.estimation.verdict import Outcome, Verdict
+from hotlever.files import without_nan
 from hotlever.lever.lever import Lever
 from hotlever.materials import full_name
 from hotlever.measurement import Measurement
@@ -42,6 +41,7 @@ from hotlever.probe.parameters import (
     usual_parameters,
 )
 from hotlever.probe.priors import Prior, PriorUse, priors_of
+from hotlever.text import value_with_error
 from hotlever.types import Array
 
 #: What a fit file holds just as a fit does.
@@ -65,7 +65,7 @@ class FittedParameter:
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(Outcome):
     """Material parameters found from a measurement.
 
     Where the data are not described by any such lever, the parameters are those of the nearest one
@@ -130,42 +130,22 @@ class Fit:
     notes: list[str] = field(default_factory=list)
     converged: bool = True
 
-    def __post_init__(self) -> None:
-        if self.describes_data:
-            return
-        # errors about a lever that does not show the data would not hold
+    def _without_errors(self) -> dict[str, Any]:
         stderr = xr.full_like(self.band.tip_stderr_K, np.nan)
-        for name, value in {
+        return {
             "covariance": np.full_like(self.covariance, np.nan),
             "common_noise_covariance": np.full_like(self.covariance, np.nan),
             "band": self.band.assign(tip_stderr_K=stderr),
             "priors": without_spread(self.priors),
-        }.items():
-            object.__setattr__(self, name, value)
-
-    @property
-    def describes_data(self) -> bool | None:
-        """Whether such a lever shows what was measured; None if the search did not converge."""
-        return not self.reason if self.converged else None
-
-    @property
-    def doubt(self) -> str:
-        """That no such lever shows the data, or that the search did not converge; else empty."""
-        return doubt(self.describes_data, self.reason)
-
-    def need_described(self, what: str) -> None:
-        """Raise an error unless the data are described, for what has no meaning otherwise.
-
-        Raises
-        ------
-        InputError
-            If they are not.
-        """
-        if not self.describes_data:
-            raise InputError(f"{what}: expected a fit that describes its data; {self.doubt}")
+        }
 
     def __repr__(self) -> str:
-        return f"<Fit of {self.measurement.path or 'a measurement'}>\n{fit_text(self)}"
+        values = (
+            f"{name} {value_with_error(fitted.value, fitted.stderr)}"
+            for name, fitted in self.parameters.items()
+        )
+        said = self.doubt or ", ".join(values)
+        return f"<Fit of {self.measurement.path or 'a measurement'}: {said}>"
 
     @property
     def in_time(self) -> bool:
@@ -284,14 +264,6 @@ class Fit:
             "software": f"hotlever {__version__}",
         }
         return dict(without_nan(content))
-
-    def to_json(self) -> str:
-        """Return the fit file."""
-        return json_text(self.content())
-
-    def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the fit file, whole or not at all."""
-        write_text(path, self.to_json())
 
 
 class _Parameter(Section):

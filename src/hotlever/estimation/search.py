@@ -53,7 +53,8 @@ def search_from_anywhere(
         If the lever cannot be solved at the start.
     """
     ends = []
-    if not _is_far(forward, residuals, start):
+    is_near = not _is_far(forward, residuals, start)
+    if is_near:
         with suppress(ComputationError):
             ends.append(search_near(forward, residuals, start, options, search, seen))
             if _describes(*ends[0]):
@@ -61,6 +62,9 @@ def search_from_anywhere(
     again, nearer = grown(
         forward, measurement, residuals.observables, start, options.varied, **search
     )
+    if is_near and ends and nearer == start:
+        # cold rows say nothing else, and the same search would come to the same end
+        return ends[0]
     try:
         ends.append(search_near(again, residuals, nearer, options, search, seen))
     except ComputationError:

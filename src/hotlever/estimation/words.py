@@ -57,16 +57,7 @@ def parameter_rows(fit: Fit) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def doubt(describes_data: bool | None, reason: str, lever: str = "such lever") -> str:
-    """Say that data are not described, or that the search did not converge; empty if they are."""
-    if describes_data:
-        return ""
-    if describes_data is None:
-        return f"the search for a lever that shows these data did not converge: {reason}"
-    return f"no {lever} shows these data: {reason}"
-
-
-def outcome(fit: Fit) -> list[str]:
+def conclusions(fit: Fit) -> list[str]:
     """Say what follows from the parameters of a fit, and how well it describes the data."""
     inversion = value_with_error(fit.inversion_temperature_K, fit.inversion_temperature_stderr_K)
     has_one = np.isfinite(fit.inversion_temperature_K)
@@ -116,7 +107,7 @@ def prior_lines(priors: Mapping[str, PriorUse]) -> list[str]:
 def fit_text(fit: Fit) -> str:
     """Return the result of a fit as lines of text; first that it describes no data, if so."""
     lines = [] if fit.describes_data else [fit.doubt, NEAREST]
-    lines += [*aligned(parameter_rows(fit)), *outcome(fit), *prior_lines(fit.priors)]
+    lines += [*aligned(parameter_rows(fit)), *conclusions(fit), *prior_lines(fit.priors)]
     return "\n".join(lines)
 
 

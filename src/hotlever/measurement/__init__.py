@@ -7,12 +7,13 @@ surroundings, `sweeps` polarities and the order of the rows, `checks` what no le
 from hotlever.measurement.columns import parse_columns
 from hotlever.measurement.conditions import with_measured_circuit
 from hotlever.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, Measurement
-from hotlever.measurement.reading import read_measurement
+from hotlever.measurement.reading import given_measurement, read_measurement
 
 __all__ = [
     "COLUMNS",
     "OBSERVABLE_SYMBOLS",
     "Measurement",
+    "given_measurement",
     "parse_columns",
     "read_measurement",
     "with_measured_circuit",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -148,27 +147,6 @@ class Measurement:
                 f"{self.path or 'measurement'}: was measured in time, within "
                 f"{np.ptp(self.time_us):.4g} µs; {what} expects a slow sweep of the bias"
             )
-
-    @classmethod
-    def given(
-        cls, measurement: Measurement | str | os.PathLike[str], circuit: Circuit | None = None
-    ) -> Measurement:
-        """Return a measurement as it is, or read one that was made in a circuit from its file.
-
-        Raises
-        ------
-        InputError
-            If it is neither, or the file is at fault.
-        """
-        if isinstance(measurement, Measurement):
-            return measurement
-        if isinstance(measurement, str | os.PathLike):
-            from hotlever.measurement.reading import read_measurement
-
-            return read_measurement(measurement, circuit=circuit)
-        raise InputError(
-            f"found {type(measurement).__name__}, expected a Measurement or a measurement file"
-        )
 
     @classmethod
     def of_sweep(cls, sweep: xr.Dataset) -> Measurement:

@@ -175,3 +175,22 @@ def _range(values: Array, unit: str) -> str:
     count = np.isfinite(values).sum()
     some = "" if count == values.size else f", {count} values"
     return f"{np.nanmin(values):.5g} to {np.nanmax(values):.5g} {unit}{some}"
+
+
+def given_measurement(
+    measurement: Measurement | str | os.PathLike[str], circuit: Circuit | None = None
+) -> Measurement:
+    """Return a measurement as it is, or read one that was made in a circuit from its file.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or the file is at fault.
+    """
+    if isinstance(measurement, Measurement):
+        return measurement
+    if isinstance(measurement, str | os.PathLike):
+        return read_measurement(measurement, circuit=circuit)
+    raise InputError(
+        f"found {type(measurement).__name__}, expected a Measurement or a measurement file"
+    )

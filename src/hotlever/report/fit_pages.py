@@ -13,8 +13,8 @@ from hotlever.estimation.result import Fit
 from hotlever.estimation.uncertainty import Uncertainty
 from hotlever.estimation.words import (
     NEAREST,
+    conclusions,
     lever_rows,
-    outcome,
     parameter_rows,
     uncertainty_tables,
 )
@@ -97,7 +97,7 @@ def _add_words(page: Page, fit: Fit) -> None:
     )
     for text in fit.notes:
         page.text(sentence(text))
-    page.text(f"{'; '.join(outcome(fit))}.")
+    page.text(f"{'; '.join(conclusions(fit))}.")
 
 
 def _add_correlation(page: Page, fit: Fit) -> None:

@@ -1,8 +1,9 @@
 """How sure is my tip temperature?"""
 
 from hotlever import calibrate, figures, save_figure
+from hotlever.calibration.words import calibration_text
 
 calibration = calibrate("src/hotlever/examples/lever-a.csv")
-print(calibration.text())
+print(calibration_text(calibration))
 
 save_figure(figures.calibration_curves(calibration), "how_sure.png")
