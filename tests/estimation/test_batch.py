@@ -155,7 +155,11 @@ time.sleep(600)
     ("lost", "message"),
     [
         (lambda process: process.kill(), "the scheduler is lost; what was done until then"),
-        (lambda process: process.communicate(timeout=0.01), "the scheduler has no workers left"),
+        pytest.param(
+            lambda process: process.communicate(timeout=0.01),
+            "the scheduler has no workers left",
+            marks=pytest.mark.slow,
+        ),
     ],
     ids=["scheduler", "workers"],
 )

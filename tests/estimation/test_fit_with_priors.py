@@ -42,6 +42,12 @@ def found(data):
     return fit(data[0], NOMINAL, priors=default_priors(NOMINAL))
 
 
+@pytest.fixture(scope="module")
+def solved(data):
+    """The same with the problem that it solves."""
+    return estimate(data[0], NOMINAL, FitOptions(priors=default_priors(NOMINAL)))
+
+
 def test_the_tip_is_found_with_an_honest_error(data, found):
     error = np.abs(found.band.tip_K.values - data[1].tip_K.values)
     assert error.max() < 40.0
@@ -82,11 +88,10 @@ def test_a_narrow_prior_is_a_fixed_parameter(data):
     np.testing.assert_allclose(fixed.band.tip_K, narrow.band.tip_K, atol=0.5)
 
 
-def test_the_shares_add_up_to_the_covariance(data):
-    options = FitOptions(priors=default_priors(NOMINAL))
-    one = estimate(data[0], NOMINAL, options)
+def test_the_shares_add_up_to_the_covariance(solved):
+    one = solved
     shares = one.problem.objective.shares(one.optimum.prediction)
-    assert set(shares) == {"measurement", *options.priors}
+    assert set(shares) == {"measurement", *default_priors(NOMINAL)}
     total = np.sum(list(shares.values()), axis=0)
     scale = np.sqrt(np.diag(one.covariance))
     np.testing.assert_allclose(
@@ -94,9 +99,9 @@ def test_the_shares_add_up_to_the_covariance(data):
     )
 
 
-def test_how_far_a_prior_is_pulled_is_what_the_others_gain_without_it(data):
+def test_how_far_a_prior_is_pulled_is_what_the_others_gain_without_it(solved):
     """Of the linearised estimate, as nearly as a search ends at its optimum."""
-    one = estimate(data[0], NOMINAL, FitOptions(priors=default_priors(NOMINAL)))
+    one = solved
     objective, at = one.problem.objective, one.optimum.prediction
     scaled = objective.point(at.probe)
     residual, jacobian = (

@@ -52,6 +52,7 @@ def test_sensitivities_have_taylor_order_two(in_air, name):
         assert linear or np.log2(rest[0] / rest[1]) > 1.75
 
 
+@pytest.mark.slow
 def test_halved_panels_change_less_than_a_thousandth(lever, fine):
     probe = fine.probe
 

@@ -25,11 +25,10 @@ from scipy.interpolate import PPoly
 
 from hotlever.errors import BranchEndError
 from hotlever.lever.by_power import ByPower
-from hotlever.lever.curve import smooth_curve
-from hotlever.lever.equations import SHOWN, LeverEquations, steps_of
-from hotlever.lever.hottest import highest_rises, where_it_reaches
+from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.ramp import Reading, crossing
 from hotlever.lever.sections import UNIT_K, UNIT_V, Across, ByTip, Sections
+from hotlever.lever.solved_states import SolvedStates
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 
@@ -90,18 +89,11 @@ class Branch:
 
     Attributes
     ----------
-    equations : LeverEquations
-    u : ndarray, shape (k,)
-        √(T_tip − T_base) (K^½) of the states, the first at zero power. Of a lever that does not
-        start cold: how far along the branch they are, from where it is without a bias; negative
-        on the way to biases of the other polarity.
-    x, slopes : ndarray, shape (size + 1, k)
-        The states, and their derivatives by u.
+    states : SolvedStates
+        Of a lever that starts cold at u = √(T_tip − T_base) (K^½).
     values, value_slopes : ndarray, shape (k, 4)
         V_l (V), I_h (mA), V_r (V) and the rise of the tip (K) of each state, and their derivatives
         by u.
-    highest_rise : ndarray, shape (k,)
-        The highest rise (K) anywhere in the lever.
     places : Sections, optional
         Of a lever that does not start cold: what the places u of similar levers have in common, if
         they are not lines across this branch itself.
@@ -114,21 +106,32 @@ class Branch:
     (900, [2.02, 2.6])
     """
 
-    equations: LeverEquations
-    u: Array
-    x: Array
-    slopes: Array
+    states: SolvedStates
     values: Array
     value_slopes: Array
-    highest_rise: Array
     places: Sections | None = None
 
     # --- the curves -------------------------------------------------------------------------------
 
+    @property
+    def equations(self) -> LeverEquations:
+        """What was solved."""
+        return self.states.equations
+
+    @property
+    def u(self) -> Array:
+        """Where the states are, (k,)."""
+        return self.states.u
+
+    @property
+    def x(self) -> Array:
+        """The states, (size + 1, k)."""
+        return self.states.x
+
     @cached_property
     def curve(self) -> PPoly:
         """V_l (V), I_h (mA), V_r (V) and the rise of the tip (K) by u."""
-        return self.through(self.values, self.value_slopes)
+        return self.states.through(self.values, self.value_slopes)
 
     @cached_property
     def sections(self) -> Sections:
@@ -153,40 +156,25 @@ class Branch:
     @cached_property
     def mirrored(self) -> Branch:
         """The same with all potentials and currents reversed, followed the other way."""
-        sign = np.where(self.equations.space.is_temperature, 1.0, -1.0)[:, None]
-        of_shown = np.ones(self.values.shape[1])
-        of_shown[: len(SHOWN)] = -1.0
-        return Branch(
-            self.equations.mirrored,
-            -self.u[::-1],
-            sign * self.x[:, ::-1],
-            -sign * self.slopes[:, ::-1],
-            of_shown * self.values[::-1],
-            -of_shown * self.value_slopes[::-1],
-            self.highest_rise[::-1],
-        )
+        sign = np.ones(self.values.shape[1])
+        sign[: len(SHOWN)] = -1.0
+        values, slopes = sign * self.values[::-1], -sign * self.value_slopes[::-1]
+        return Branch(self.states.mirrored, values, slopes)
 
     @property
     def base_temperature_K(self) -> float:
         """Temperature without power (K)."""
         return self.equations.base_temperature_K
 
-    @cached_property
+    @property
     def end_u(self) -> float:
         """Where the branch ends: at its last state, or where something begins to melt."""
-        if not self.melts:
-            return float(self.u[-1])
-        return where_it_reaches(self, self._melting_rise)
+        return self.states.end_u
 
     @property
     def melts(self) -> bool:
         """Whether the branch ends because something melts: silicon, or another material."""
-        return bool(self.highest_rise[-1] >= self._melting_rise)
-
-    @property
-    def _melting_rise(self) -> float:
-        """Rise (K) beyond which no state is meaningful."""
-        return self.equations.limit[0] - self.base_temperature_K
+        return self.states.melts
 
     @property
     def hottest_K(self) -> float:
@@ -199,10 +187,6 @@ class Branch:
         if self.equations.circuit.starts_cold:
             return np.asarray(self.base_temperature_K + u**2)
         return np.asarray(self.base_temperature_K + self.curve(u)[..., TIP_RISE])
-
-    def highest_rise_at(self, u: Array) -> Array:
-        """Return the highest rise (K) anywhere in the lever at some places of the branch, (n,)."""
-        return highest_rises(self, u)
 
     def u_at(self, tip_K: ArrayLike) -> Array:
         """Return u at tip temperatures (K) of a lever that starts cold; NaN outside the branch."""
@@ -239,7 +223,7 @@ class Branch:
     @cached_property
     def by_power(self) -> ByPower:
         """The tip temperature by power, as far as that is a function."""
-        return ByPower(self)
+        return ByPower(self.states, self.curve, self.values, self.value_slopes)
 
     @property
     def highest_power_mW(self) -> float:
@@ -261,16 +245,11 @@ class Branch:
         """Return dT_tip/dP_l (K/mW) by power (mW), which is not zero."""
         return self.by_power.slope(np.asarray(power_mW, dtype=float))
 
-    def turns(self, quantity: PPoly) -> Array:
-        """Return u where a curve over u is level."""
-        level = np.sort(quantity.derivative().roots(extrapolate=False))
-        return level[(level > 0) & (level < self.end_u)]
-
     @cached_property
     def knee_u(self) -> float | None:
         """Where the knee is."""
         lever_V = PPoly(self.curve.c[..., 0], self.curve.x)
-        falling = [u for u in self.turns(lever_V).tolist() if lever_V(u, 2) < 0]
+        falling = [u for u in self.states.turns(lever_V).tolist() if lever_V(u, 2) < 0]
         return falling[0] if falling else None
 
     @property
@@ -282,27 +261,6 @@ class Branch:
         """Return the operating point at u."""
         lever, current, *_ = self.curve(u).tolist()
         return OperatingPoint(lever, current, lever * current, float(self.tip_K(u)))
-
-    @cached_property
-    def _states(self) -> PPoly:
-        return self.through(self.x.T, self.slopes.T)
-
-    def states(self, u: Array) -> Array:
-        """Return the states at some u, shape (size + 1, n)."""
-        return np.asarray(self._states(u)).T
-
-    def states_slope(self, u: Array) -> Array:
-        """Return the derivatives of the states by u at some u, shape (size + 1, n)."""
-        return np.asarray(self._states(u, 1)).T
-
-    def through(self, values: Array, slopes: Array) -> PPoly:
-        """Return the curve through some quantities of the states and their slopes, (k, ...)."""
-        return smooth_curve(self.u, values, slopes, self.steps)
-
-    @cached_property
-    def steps(self) -> Array:
-        """Where higher derivatives by u step."""
-        return steps_of(self.equations) if self.equations.circuit.starts_cold else np.empty(0)
 
     # --- in a circuit -----------------------------------------------------------------------------
 
@@ -332,7 +290,7 @@ class Branch:
         u, start = np.full(bias.shape, np.nan), self._without_bias(curve)
         # what is at no bias is found to rounding errors
         reading = Reading(u, [], min(0.0, float(curve(start))), start, float(self.tip_K(start)))
-        turns = [turn for turn in self.turns(curve).tolist() if turn > start]
+        turns = [turn for turn in self.states.turns(curve).tolist() if turn > start]
         for low, high in pairwise([start, *turns, self.end_u]):
             highest = float(curve(high))
             if highest <= reading.last_V:

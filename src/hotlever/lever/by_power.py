@@ -8,48 +8,53 @@ power belongs to several temperatures.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import PPoly
 
 from hotlever.lever.curve import smooth_curve
-from hotlever.lever.equations import steps_of
 from hotlever.lever.ramp import crossing
+from hotlever.lever.solved_states import SolvedStates
 from hotlever.types import Array
-
-if TYPE_CHECKING:
-    from hotlever.lever.branch import Branch
 
 
 class ByPower:
-    """A branch of a lever that starts cold, read by its power."""
+    """A branch of a lever that starts cold, read by its power.
 
-    def __init__(self, branch: Branch) -> None:
-        self._branch = branch
+    Parameters
+    ----------
+    states : SolvedStates
+    curve : PPoly
+        V_l (V) and I_h (mA) by u, and what else a branch shows.
+    values, slopes : ndarray, shape (k, 2 or more)
+        The same of the states, and their derivatives by u.
+    """
+
+    def __init__(self, states: SolvedStates, curve: PPoly, values: Array, slopes: Array) -> None:
+        self._states, self._curve, self._values, self._slopes = states, curve, values, slopes
 
     @cached_property
     def _power(self) -> PPoly:
         """P_l (mW) by u."""
-        lever, current = (self._branch.curve.c[..., place] for place in (0, 1))
+        lever, current = (self._curve.c[..., place] for place in (0, 1))
         product = np.zeros((len(lever) + len(current) - 1, lever.shape[1]))
         for place, row in enumerate(lever):
             product[place : place + len(current)] += row * current
-        return PPoly(product, self._branch.curve.x)
+        return PPoly(product, self._curve.x)
 
     @cached_property
     def turn_u(self) -> float | None:
         """Where the power is highest before it falls; None if it rises to the end."""
-        falling = [u for u in self._branch.turns(self._power).tolist() if self._power(u, 2) < 0]
+        falling = [u for u in self._states.turns(self._power).tolist() if self._power(u, 2) < 0]
         return falling[0] if falling else None
 
     @cached_property
     def highest_mW(self) -> float:
         """The highest power up to which every power has one temperature."""
-        end = self._branch.end_u
+        end = self._states.end_u
         if self.turn_u is None:
             return float(self._power(end))
-        level = self._branch.turns(self._power)
+        level = self._states.turns(self._power)
         beyond = np.append(level[level > self.turn_u], end)
         return float(self._power(beyond).min())
 
@@ -74,11 +79,11 @@ class ByPower:
     @cached_property
     def _by_root(self) -> PPoly:
         """u by the root of the power, which is nearly a straight line."""
-        u, values, slopes = self._branch.u, self._branch.values, self._branch.value_slopes
+        u, values, slopes = self._states.u, self._values, self._slopes
         power = values[:, 0] * values[:, 1]
         slope = slopes[:, 0] * values[:, 1] + values[:, 0] * slopes[:, 1]
         root = np.sqrt(power)
         # at zero power both begin as u
         by_u = np.append(np.sqrt(slopes[0, 0] * slopes[0, 1]), slope[1:] / (2.0 * root[1:]))
-        bent = root[np.isin(u, steps_of(self._branch.equations))]
+        bent = root[np.isin(u, self._states.steps)]
         return smooth_curve(root, u, 1.0 / by_u, bent)

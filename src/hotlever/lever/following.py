@@ -14,6 +14,7 @@ from hotlever.lever.equations import LeverEquations, steps_of
 from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
 from hotlever.lever.pinned import Pinned
 from hotlever.lever.sections import Sections
+from hotlever.lever.solved_states import SolvedStates
 from hotlever.types import Array
 
 #: Steps between the states of a branch: in u (K^½) where it is cold, in the tip temperature (K)
@@ -80,7 +81,7 @@ class Follower:
         A leg may get hotter faster than the tip. Steps are halved then, so that branches of similar
         levers still have most of their places in common.
         """
-        slopes = self._equations.space.rises(self._branch.slopes[:, -1:])
+        slopes = self._equations.space.rises(self._branch.states.slopes[:, -1:])
         faster = float(slopes.max()) / (2.0 * u)
         return _STEP_K / 2.0 ** np.ceil(np.log2(max(1.0, faster / _MUCH_FASTER)))
 
@@ -88,7 +89,7 @@ class Follower:
         """Find the state at u; None if it could lie on another branch."""
         known = self._branch
         weights = hermite_weights(known.u[None, -_BEHIND:], np.array([u]))[0]
-        behind = np.concatenate([known.x[:, -_BEHIND:], known.slopes[:, -_BEHIND:]], axis=1)
+        behind = np.concatenate([known.x[:, -_BEHIND:], known.states.slopes[:, -_BEHIND:]], axis=1)
         expected = behind @ weights[:, None]
         try:
             found = self._solved(u, expected)
@@ -140,17 +141,14 @@ def part_of(equations: LeverEquations, u: Array, x: Array, slopes: Array) -> Bra
     values = np.vstack([equations.observed(x), equations.space.tip_rise(x)])
     by_u = equations.observed_change(x, slopes), equations.space.tip_rise(slopes)
     highest = equations.highest_rise(x)
-    return Branch(equations, u, x, slopes, values.T, np.vstack(by_u).T, highest)
+    states = SolvedStates(equations, u, x, slopes, highest)
+    return Branch(states, values.T, np.vstack(by_u).T)
 
 
 def joined(branch: Branch, after: Branch) -> Branch:
     """Return a branch with another part after it."""
     return Branch(
-        branch.equations,
-        np.append(branch.u, after.u),
-        np.hstack([branch.x, after.x]),
-        np.hstack([branch.slopes, after.slopes]),
+        branch.states.followed_by(after.states),
         np.vstack([branch.values, after.values]),
         np.vstack([branch.value_slopes, after.value_slopes]),
-        np.append(branch.highest_rise, after.highest_rise),
     )

@@ -134,7 +134,7 @@ def pin_along(branch: Branch, u: float) -> Pin:
     """Return a pin that changes along a branch at a place of it: the tip, if it starts cold."""
     if branch.equations.circuit.starts_cold:
         return TIP
-    return Heading.along(branch.equations.space, branch.states_slope(np.array([u]))).pin
+    return Heading.along(branch.equations.space, branch.states.slope(np.array([u]))).pin
 
 
 def followed(
@@ -216,11 +216,11 @@ class HeldFollower:
         """Find the state a step along the branch; None if the step is too long."""
         known, equations = self._branch, self._equations
         space, u, behind = equations.space, float(known.u[-1]), slice(-2, None)
-        last, slope = known.x[:, -1:], known.slopes[:, -1:]
+        last, slope = known.x[:, -1:], known.states.slopes[:, -1:]
         expected = last + step * slope
         if known.u.size > 1:
             weights = hermite_weights(known.u[None, behind], np.array([u + step]))[0]
-            before = np.concatenate([known.x[:, behind], known.slopes[:, behind]], axis=1)
+            before = np.concatenate([known.x[:, behind], known.states.slopes[:, behind]], axis=1)
             expected = before @ weights[:, None]
         here = Heading.along(space, slope)
         pin = here.pin

@@ -335,11 +335,13 @@ class Lever:
     ) -> xr.Dataset:
         """Return what is observed at some places of the branch."""
         balances = balance_columns(self.equations, branch.x)
-        slopes = balance_slopes(self.equations, branch.x, branch.slopes)
+        slopes = balance_slopes(self.equations, branch.x, branch.states.slopes)
         base = self.circuit.base_temperature_K
         shown = branch.shown(u)
-        shown |= {"tip_K": branch.tip_K(u), "max_K": base + branch.highest_rise_at(u)}
-        return sweep_dataset(self, shown, branch.through(balances, slopes)(u), notes, sensitivities)
+        shown |= {"tip_K": branch.tip_K(u), "max_K": base + branch.states.highest_rise_at(u)}
+        return sweep_dataset(
+            self, shown, branch.states.through(balances, slopes)(u), notes, sensitivities
+        )
 
     @one_blas_thread
     def pulse(

@@ -173,7 +173,7 @@ def _modes(
     """Find the modes of states, and of their changes with parameters and along the branch."""
     full = lever.space
     hot = full.is_temperature[:-1]
-    cold = training[0].branch.slopes[:, 0]
+    cold = training[0].branch.states.slopes[:, 0]
     lift = np.where(hot, 0.0, cold[:-1] / cold[-1])
     widths = box.widths
     if full.air is not None and box.scale:
@@ -182,7 +182,7 @@ def _modes(
     for one in training:
         u = one.branch.u[1:]
         vectors.append(one.branch.x[:, 1:])
-        vectors.append(one.branch.slopes[:, 1:] * (_BRANCH_STEP / (2.0 * u)))
+        vectors.append(one.branch.states.slopes[:, 1:] * (_BRANCH_STEP / (2.0 * u)))
         for name, width in widths.items():
             change = one.changes[:, 1:, box.parameters.index(name)]
             vectors.append(change * (_PARAMETER_STEP * width))

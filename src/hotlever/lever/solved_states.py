@@ -1,0 +1,152 @@
+"""States of a lever one after the other: the curve through them, and how hot they get anywhere.
+
+Which place is the hottest changes along a branch: a leg may overtake the heater. So the
+temperatures of all places that come into question are read off their own smooth curves, and the
+highest of them is taken last. A curve through the highest temperatures of the states would not
+know of the bend where one place overtakes another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import PPoly
+
+from hotlever.lever.curve import smooth_curve
+from hotlever.lever.equations import LeverEquations, steps_of
+from hotlever.types import Array
+
+#: Places along a branch that are looked at together.
+_AT_ONCE = 64
+#: Elements with this share of the highest rise at a state nearby come into question.
+_NEARLY = 0.85
+#: Points at which a temperature is looked for between two states, and how often between those.
+_POINTS, _ROUNDS = 17, 3
+
+
+@dataclass(frozen=True)
+class SolvedStates:
+    """States that were solved, and their derivatives along the curve through them.
+
+    Attributes
+    ----------
+    equations : LeverEquations
+    u : ndarray, shape (k,)
+        Where they are: √(T_tip − T_base) (K^½), the first at zero power. Of a lever that does not
+        start cold: how far along the branch they are, from where it is without a bias; negative
+        on the way to biases of the other polarity.
+    x, slopes : ndarray, shape (size + 1, k)
+        The states, and their derivatives by u.
+    highest_rise : ndarray, shape (k,)
+        The highest rise (K) anywhere in the lever.
+    """
+
+    equations: LeverEquations
+    u: Array
+    x: Array
+    slopes: Array
+    highest_rise: Array
+
+    def __call__(self, u: Array) -> Array:
+        """Return the states at some u, shape (size + 1, n)."""
+        return np.asarray(self._curve(u)).T
+
+    def slope(self, u: Array) -> Array:
+        """Return the derivatives of the states by u at some u, shape (size + 1, n)."""
+        return np.asarray(self._curve(u, 1)).T
+
+    @cached_property
+    def _curve(self) -> PPoly:
+        return self.through(self.x.T, self.slopes.T)
+
+    def through(self, values: Array, slopes: Array) -> PPoly:
+        """Return the curve through some quantities of the states and their slopes, (k, ...)."""
+        return smooth_curve(self.u, values, slopes, self.steps)
+
+    @cached_property
+    def steps(self) -> Array:
+        """Where higher derivatives by u step."""
+        return steps_of(self.equations) if self.equations.circuit.starts_cold else np.empty(0)
+
+    @property
+    def mirrored(self) -> SolvedStates:
+        """The same with all potentials and currents reversed, followed the other way."""
+        sign = np.where(self.equations.space.is_temperature, 1.0, -1.0)[:, None]
+        x, slopes = sign * self.x[:, ::-1], -sign * self.slopes[:, ::-1]
+        mirrored = self.equations.mirrored
+        return SolvedStates(mirrored, -self.u[::-1], x, slopes, self.highest_rise[::-1])
+
+    def followed_by(self, after: SolvedStates) -> SolvedStates:
+        """Return the same with others after them."""
+        return SolvedStates(
+            self.equations,
+            np.append(self.u, after.u),
+            np.hstack([self.x, after.x]),
+            np.hstack([self.slopes, after.slopes]),
+            np.append(self.highest_rise, after.highest_rise),
+        )
+
+    # --- how hot they get -------------------------------------------------------------------------
+
+    @property
+    def melting_rise(self) -> float:
+        """Rise (K) beyond which no state is meaningful."""
+        return self.equations.limit[0] - self.equations.base_temperature_K
+
+    @property
+    def melts(self) -> bool:
+        """Whether something melts at the last state: silicon, or another material."""
+        return bool(self.highest_rise[-1] >= self.melting_rise)
+
+    @cached_property
+    def end_u(self) -> float:
+        """Where the states end: at the last one, or where something begins to melt."""
+        return self._where_it_reaches(self.melting_rise) if self.melts else float(self.u[-1])
+
+    def turns(self, quantity: PPoly) -> Array:
+        """Return u where a curve over u is level, up to the end."""
+        level = np.sort(quantity.derivative().roots(extrapolate=False))
+        return level[(level > 0) & (level < self.end_u)]
+
+    def highest_rise_at(self, u: Array) -> Array:
+        """Return the highest rise (K) anywhere in the lever at some u, (n,)."""
+        highest, order = np.empty(u.size), np.argsort(u)
+        for some in np.split(order, range(_AT_ONCE, u.size, _AT_ONCE)):
+            if some.size:
+                highest[some] = self._between_few(u[some])
+        return highest
+
+    def _where_it_reaches(self, rise: float) -> float:
+        """Return the first u at which the highest rise is `rise` (K), as it is at the end.
+
+        The place lies before the first state that is as hot.
+        """
+        after = int(np.flatnonzero(self.highest_rise >= rise)[0])
+        if after == 0:
+            return float(self.u[0])
+        low, high = self.u[after - 1 : after + 1]
+        for _ in range(_ROUNDS):
+            u = np.linspace(low, high, _POINTS)
+            rises = self.highest_rise_at(u)
+            above = max(1, int(np.argmax(rises >= rise)))
+            (low, high), ends = u[above - 1 : above + 1], rises[above - 1 : above + 1]
+        return float(np.interp(rise, ends, [low, high]))
+
+    def _between_few(self, u: Array) -> Array:
+        """Return the highest rises at few u in rising order."""
+        first, last = np.searchsorted(self.u, u[[0, -1]])
+        # the curve between two states depends on the next ones on either side
+        near = slice(max(first - 2, 0), last + 2)
+        nodes, unit = self.u[near], np.eye(self.u[near].size)
+        weights = smooth_curve(
+            nodes, np.hstack([unit, 0.0 * unit]), np.hstack([0.0 * unit, unit]), self.steps
+        )(u)
+        equations, elements = self.equations, self.equations.space.elements
+        rises = equations.nodal_rises(self.x[:, near])
+        slopes = equations.space.nodal_rises(self.slopes[:, near])
+        dofs = elements.dofs[elements.near_highest(rises, _NEARLY)]
+        used, dofs = np.unique(dofs, return_inverse=True)
+        values = np.hstack([rises[used], slopes[used]]) @ weights.T
+        return elements.highest(values, dofs.reshape(-1, elements.dofs.shape[1]))
