@@ -6,10 +6,12 @@ import ast
 import subprocess
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.sparse.csgraph import connected_components
 
 import hotlever
 from hotlever.errors import InputError
@@ -83,6 +85,35 @@ def test_no_layer_imports_one_above_it(layer):
     for package in LAYERS[layer]:
         for path in (SOURCE / package).rglob("*.py"):
             assert not imported(path) & above, path
+
+
+def imports_between_modules() -> dict[str, set[str]]:
+    """Return what each module imports of the others, anywhere and for types too."""
+    of = {}
+    for name in MODULES:
+        source = find_spec(name).origin
+        nodes = ast.walk(ast.parse(Path(source).read_text(encoding="utf-8")))
+        of[name] = {
+            f"{node.module}.{one.name}" if f"{node.module}.{one.name}" in MODULES else node.module
+            for node in nodes
+            if isinstance(node, ast.ImportFrom) and node.module
+            for one in node.names
+        } - {name}
+    return of
+
+
+def test_modules_do_not_import_each_other_in_circles():
+    imports = imports_between_modules()
+    graph = np.array([[other in names for other in MODULES] for names in imports.values()])
+    _, part = connected_components(graph, connection="strong")
+    circles = {MODULES[k] for k in range(len(MODULES)) if np.sum(part == part[k]) > 1}
+    # a probe checks its priors when it is read, and a lever follows pulses
+    assert {".".join(name.split(".")[:3]) for name in circles} == {
+        *("hotlever.probe.probe", "hotlever.probe.priors", "hotlever.probe.parameters"),
+        *("hotlever.lever.dataset", "hotlever.lever.lever", "hotlever.lever.reduced"),
+        *("hotlever.lever.reduction", "hotlever.lever.sensitivities", "hotlever.lever.state"),
+        "hotlever.lever.transient",
+    }
 
 
 # --- what Python users do -----------------------------------------------------------------------

@@ -17,7 +17,7 @@ from nicegui.testing import User
 from test_rooms import Here, shown, until, visit
 
 from hotlever.app import showing
-from hotlever.app.child import run_command
+from hotlever.app.commands import run_command
 from hotlever.app.jobs import Job
 from hotlever.app.page import Complaint
 from hotlever.app.project import CALIBRATION, EXAMPLES

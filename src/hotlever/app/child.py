@@ -10,19 +10,15 @@ import importlib
 import io
 import os
 import queue
-import shlex
 import signal
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import redirect_stdout, suppress
+from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
-from hotlever.app.changes import Changes
-from hotlever.cli.output import heard_by
 from hotlever.errors import HotleverError
 from hotlever.memory import give_back
 from hotlever.types import Progress
@@ -110,23 +106,6 @@ def _next(calls: queue.Queue[_Call]) -> _Call:
     gc.collect()
     give_back()
     return calls.get()
-
-
-def run_command(report: Report, arguments: list[str], folder: Path) -> tuple[int, str]:
-    """Run a command in a folder as the command line does; return exit status and result.
-
-    What it writes there can be undone.
-    """
-    from hotlever.cli import main
-
-    os.chdir(folder)
-    result = io.StringIO()
-    what = shlex.join(["hotlever", *arguments])
-    with heard_by(report), redirect_stdout(result), Changes(folder).recorded(what):
-        try:
-            main(arguments)
-        except SystemExit as ended:
-            return int(ended.code or 0), result.getvalue()
 
 
 def _function(name: str) -> Callable[..., Any]:

@@ -157,7 +157,7 @@ class Jobs:
     async def _run(
         self, room: str, job: Job, worker: Worker, then: Callable[[Job], None] | None
     ) -> None:
-        call = f"{_CHILD}:run_command"
+        call = f"{_COMMANDS}:run_command"
         try:
             status, job.result = await worker.call(
                 call, job.arguments, self._folder, heard=job.hear
@@ -183,4 +183,4 @@ class Jobs:
             await self._workers[room].end()
 
 
-_CHILD = "hotlever.app.child"
+_COMMANDS = "hotlever.app.commands"

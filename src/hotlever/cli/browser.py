@@ -12,7 +12,7 @@ from typer import Argument, Option
 from hotlever.cli.application import app
 from hotlever.cli.options import check_number
 from hotlever.cli.output import fail, tell
-from hotlever.cli.running import unforeseen
+from hotlever.cli.unforeseen import unforeseen_error
 from hotlever.errors import InputError
 
 #: Where a password may stand, that would be seen by others on the command line.
@@ -58,7 +58,7 @@ def app_command(
         tell(f"hotlever app: {address}  (Ctrl-C ends it)")
 
     def failed(error: BaseException) -> None:
-        fail(unforeseen(error, ["app", str(folder)]))
+        fail(unforeseen_error(error, ["app", str(folder)]))
 
     serve(Project(folder), Served(host, port, password), not no_browser, say, failed)
 

@@ -18,7 +18,7 @@ from scipy.sparse.linalg import SuperLU
 
 from hotlever.errors import ComputationError
 from hotlever.lever.elements import sums_by_index
-from hotlever.lever.heat_in_air import AroundLever, HeatInAir
+from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.types import Array, Index
 
 #: Krylov's method stops at this residual, relative to the right-hand side; what is left is small
@@ -49,8 +49,8 @@ class AirLoss:
     ----------
     gas_conductivity : float
         Of the gas, over that of air.
-    around : AroundLever or None
-        Makes what the air takes up in time, once it is asked for.
+    around : callable or None
+        Makes what a gas of some conductivity takes up in time, once it is asked for.
     gap_um : float
         To a surface below; NaN without one.
     by_inverse_gap : ndarray, shape (sites, sites)
@@ -58,7 +58,7 @@ class AirLoss:
     """
 
     gas_conductivity, gap_um = 1.0, float("nan")
-    around: AroundLever | None = None
+    around: Callable[[float], HeatInAir] | None = None
     by_inverse_gap = np.empty((0, 0))
 
     def __init__(
@@ -83,7 +83,7 @@ class AirLoss:
     @property
     def stores(self) -> HeatInAir | None:
         """What the air takes up itself; None where that is not known."""
-        return None if self.around is None else self.around.stores(self.gas_conductivity)
+        return None if self.around is None else self.around(self.gas_conductivity)
 
     def in_gas(self, conductivity: float) -> AirLoss:
         """Return the loss to a gas that conducts so many times as well as air."""

@@ -7,7 +7,7 @@ lever voltage. Where nothing conducts there is no potential.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
 from typing import Any, get_args
 
@@ -18,7 +18,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from hotlever.air.operator import AirOperator
 from hotlever.lever.air_loss import AirLoss, AirSolver
 from hotlever.lever.elements import FiniteElements, sums_by_index
-from hotlever.lever.heat_in_air import AroundLever
+from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.space import (
     FAR,
     AirTangent,
@@ -246,7 +246,9 @@ class FullSpace(Space):
 
     # --- the air ----------------------------------------------------------------------------------
 
-    def in_air(self, air: AirOperator | None, around: AroundLever | None = None) -> FullSpace:
+    def in_air(
+        self, air: AirOperator | None, around: Callable[[float], HeatInAir] | None = None
+    ) -> FullSpace:
         """Return the same space with this air around it, or in vacuum; everything is shared."""
         space = copy(self)
         space.air = None

@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike
 from hotlever.air.operator import air_operator, change_with_gap
 from hotlever.air.surface import PanelOptions
 from hotlever.errors import ComputationError, InputError
+from hotlever.lever.around import AroundLever
 from hotlever.lever.balances import balance_columns, balance_slopes
 from hotlever.lever.branch import Branch, Reach
 from hotlever.lever.dataset import at_bias, checked_bias, sweep_dataset
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.heat_in_air import AroundLever
 from hotlever.lever.held import followed, pin_along
 from hotlever.lever.meshing import chosen_space, flat_space
 from hotlever.lever.pinned import state_at_bias

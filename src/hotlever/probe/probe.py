@@ -22,13 +22,13 @@ from hotlever.probe.layout import Layout
 from hotlever.probe.prior_texts import PriorTexts
 from hotlever.probe.priors import priors_of
 from hotlever.probe.sections import read_sections, section_lines, with_values
+from hotlever.probe.shape_sections import shape_of
 from hotlever.probe.shapes import (
     PARAMETRIC,
     SHAPE_SECTIONS,
     Shape,
     ThreeLeg,
     UShape,
-    shape_of,
 )
 from hotlever.probe.surroundings import Surroundings
 from hotlever.probe.tip import Tip

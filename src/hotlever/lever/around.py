@@ -1,0 +1,127 @@
+"""The heat that the air around a lever takes up in time: made once it is asked for, and cached."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import numpy as np
+from scipy.sparse import diags
+from scipy.sparse.linalg import eigsh
+
+from hotlever.air.operator import PanelledAir
+from hotlever.air.stores import AirStores, stores_of
+from hotlever.air.surface import PanelOptions
+from hotlever.cache import cache_file, store_arrays, stored
+from hotlever.lever.full_space import FullSpace
+from hotlever.lever.heat_in_air import HeatInAir
+from hotlever.lever.space import PER_CM3_TO_NANO_PER_UM3, PER_CM_TO_MILLI_PER_UM
+from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
+from hotlever.probe import Layout
+from hotlever.probe.surroundings import Surroundings
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array
+
+#: Modes of the lever, and how fine the panels are: twice as many change a history by less than
+#: what its steps are off by.
+_MODES, _PANELS = 48, PanelOptions(refinement=0.5)
+
+
+class AroundLever:
+    """Makes the heat in the air around a lever once it is asked for.
+
+    See `hotlever.lever.heat_in_air`.
+    """
+
+    def __init__(
+        self,
+        space: FullSpace,
+        layout: Layout,
+        surroundings: Surroundings,
+        base_temperature_K: float,
+    ) -> None:
+        self._given = space, layout, surroundings, base_temperature_K
+        self._made: dict[float, HeatInAir] = {}
+
+    def __call__(self, gas_conductivity: float) -> HeatInAir:
+        """Return the heat in a gas that conducts so many times as well as air."""
+        if 1.0 not in self._made:
+            self._made[1.0] = taken_up_around(*self._given)
+        if gas_conductivity not in self._made:
+            self._made = {1.0: self._made[1.0]}
+            self._made[gas_conductivity] = self._made[1.0].in_gas(gas_conductivity)
+        return self._made[gas_conductivity]
+
+
+@one_blas_thread
+def taken_up_around(
+    space: FullSpace, layout: Layout, surroundings: Surroundings, base_temperature_K: float
+) -> HeatInAir:
+    """Return the heat that the air around a lever takes up, from the cache or made and cached.
+
+    Parameters
+    ----------
+    space : FullSpace
+        In air.
+    layout : Layout
+        As the air sees it.
+    surroundings : Surroundings
+    base_temperature_K : float
+
+    Raises
+    ------
+    ComputationError
+        If the dimensions of the lever differ too much.
+    """
+    facts = {
+        "nodes": space.elements.nodes,
+        "thickness_um": layout.thickness_um,
+        "surroundings": surroundings.model_dump(exclude={"medium", "gas_conductivity"}),
+        "base_K": base_temperature_K,
+        "panels": asdict(_PANELS),
+    }
+    path = cache_file("stores", facts)
+    names = tuple(AirStores.__dataclass_fields__)
+    known = stored(path, lambda a: (a["modes"], AirStores(**{name: a[name] for name in names})))
+    if known is None:
+        modes = conduction_modes(space, _MODES)
+        panelled = PanelledAir(layout, surroundings, base_temperature_K, _PANELS)
+        sites = panelled.surface.sites
+        # the modes are orthonormal over the lever's area
+        inside = layout.thickness_um * np.eye(_MODES)
+        length = float(np.ptp(layout.corners, axis=0).max())
+        known = modes, stores_of(panelled, space.rise_at(sites, modes), inside, length)
+        store_arrays(path, {"modes": modes, **vars(known[1])})
+    modes, stores = known
+    ends = space.end_test[0]
+    at_points = space.weights * space.temperature.at_points(modes)[0]
+    mass = space.temperature.tested(
+        np.concatenate([at_points[None], np.zeros((2, *at_points.shape))])
+    )
+    kappa, _ = thermal_conductivity_of_air(base_temperature_K)
+    capacity, _ = heat_capacity_of_air(base_temperature_K, surroundings.pressure_mbar)
+    return HeatInAir(
+        stores,
+        mass.T,
+        at_points.sum(axis=0),
+        ends @ at_points,
+        PER_CM_TO_MILLI_PER_UM * float(kappa),
+        PER_CM3_TO_NANO_PER_UM3 * float(capacity),
+    )
+
+
+def conduction_modes(space: FullSpace, count: int) -> Array:
+    """Return the slowest modes of heat conduction in the plane of a lever, (size + 1, count).
+
+    They vanish at the leg ends and are orthonormal over the area.
+    """
+    hot = np.flatnonzero(space.is_temperature)
+    kinds, points = space.temperature.kinds, space.weights.size
+    maps = space.temperature.matrix[:, hot].tocsr()
+    weights = diags(space.weights[:, 0])
+    value, *slopes = (maps[kind * points : (kind + 1) * points] for kind in range(kinds))
+    mass = (value.T @ weights @ value).tocsc()
+    stiffness = sum(slope.T @ weights @ slope for slope in slopes).tocsc()
+    _, found = eigsh(stiffness, count, mass, sigma=0.0, v0=np.ones(hot.size))
+    modes = np.zeros((space.size + 1, count))
+    modes[hot] = found
+    return modes
