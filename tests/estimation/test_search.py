@@ -13,7 +13,7 @@ import hotlever
 from hotlever.calibration import calibrate
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment import full_experiment
+from hotlever.estimation.experiment import Experiment, full_experiment
 from hotlever.estimation.inverse_problem import estimate
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.options import FitOptions
@@ -23,6 +23,7 @@ from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
+from hotlever.studies.wild import wild_twin
 
 NOISE = 5e-4
 FOLDER = Path(hotlever.__file__).parent / "examples"
@@ -52,7 +53,9 @@ def test_data_of_another_lever_are_fitted_to_their_noise_or_not_described():
 
 
 def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
-    model = lambda probe, bias: full_experiment(Lever(probe, COARSE), bias)  # noqa: E731
+    def model(probe: Probe, bias: np.ndarray) -> Experiment:
+        return full_experiment(Lever(probe, COARSE), bias)
+
     found = estimate(reference_curve, Probe.u_shape(), FitOptions(), model=model)
     objective, at = found.problem.objective, found.optimum.prediction
     least, optimum = objective.squares(at), objective.point(at.probe)
@@ -141,3 +144,10 @@ def test_levers_that_cannot_be_drawn_bound_a_search():
     result = calibrate(FOLDER / "uiuc-lever.csv", probe=probe, priors=priors)
     assert result.describes_data
     assert result.table.tip_K.max() == pytest.approx(500.0, abs=40.0)
+
+
+@pytest.mark.slow
+def test_a_fold_that_moves_past_a_row_is_no_obstacle():
+    """Values are not smooth there, and no step gains what the derivatives promise."""
+    twin = wild_twin(38)
+    assert calibrate(twin.measurement, probe=twin.nominal).describes_data

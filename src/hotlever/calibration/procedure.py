@@ -161,7 +161,7 @@ def _estimate_of(
             found = estimated(measured, probe, fit, priors, samples, progress)
         except ComputationError as error:
             raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
-        if found.reason:
+        if found.reason and found.converged:
             found = replace(found, reason=f"{found.reason}; {causes.named(fit is not None)}")
         found = replace(found, notes=[*notes, *remarks(measured, found.tip_K), *found.notes])
         return InMedium(found, found.estimate, found.reason)

@@ -86,7 +86,8 @@ def fit(
             result = replace(result, band=_either(result.band, other[1].band))
     else:
         found, result = fitted(options)
-    if result.describes_data or result.in_time or "current" not in result.observables:
+    # a search that has not come to its end contradicts nothing
+    if result.describes_data is not False or result.in_time or "current" not in result.observables:
         return result
     stated = options.priors or None
     cause = Diagnosis(found.measurement, found.stated, stated).named()

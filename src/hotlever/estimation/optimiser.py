@@ -180,12 +180,13 @@ class Optimiser:
             # a step within the region that gains nothing is as good as none
             if decrement <= tolerance or (inner and squares - least <= tolerance):
                 return self._optimum(at, decrement, converged=True)
-            if region < options.smallest_region:
+            if region < options.smallest_region or self.evaluations >= most:
                 # only rounding errors are left, if so little is promised
                 precise = decrement <= options.negligible_of_misfit * squares
-                return self._optimum(at, decrement, converged=precise)
-            if self.evaluations >= most:
-                return self._optimum(at, decrement, converged=False)
+                precise = precise and region < options.smallest_region
+                return self._optimum(at, decrement, converged=precise or self._is_near(decrement))
+            if region < options.rough_region and self._is_near(decrement):
+                return self._optimum(at, decrement, converged=True)
             length = float(np.max(np.abs(step) / room))
             trial = self._trial(at, target)
             better = np.inf if trial is None else objective.squares(trial)
@@ -223,6 +224,10 @@ class Optimiser:
         noise = residuals.noise_squares(at.values)
         precise = residuals.size * (options.precision * residuals.unit_weight) ** 2
         return max(options.relative_decrement * noise, least, precise)
+
+    def _is_near(self, decrement: float) -> bool:
+        """Whether an optimum is so near that its errors hold, if values are not smooth there."""
+        return self.objective.informed and decrement <= self._options.decrement_where_rough
 
     def _is_hopeless(self, at: Prediction, squares: float) -> bool:
         """Whether a sum of squares is so far above what noise explains that no lever is near."""

@@ -24,6 +24,9 @@ class SearchOptions:
     decrement : float
         Sum of squares that Gauss and Newton's step would still take away at an optimum, where
         squares count standard deviations (with priors): a tenth of a standard error.
+    decrement_where_rough, rough_region : float
+        The same where no longer step than the latter gains anything, since values are not smooth
+        there, as near a fold that moves past a row: a third of a standard error.
     relative_decrement : float
         The same in units of the noise, where weights count no standard deviations: a thirtieth of
         a standard error.
@@ -59,6 +62,8 @@ class SearchOptions:
     trusted: float = 0.7
     doubted: float = 0.25
     decrement: float = 1e-2
+    decrement_where_rough: float = 0.1
+    rough_region: float = 1e-3
     relative_decrement: float = 1e-3
     negligible: float = 1e-6
     negligible_of_misfit: float = 1e-3
