@@ -58,7 +58,7 @@ def test_files_are_told_apart_by_what_they_hold(tmp_path: Path) -> None:
     (tmp_path / "l.GDS").write_text("")
     project = Project(tmp_path)
     assert project.fits == ["one.fit.json"]
-    assert project.calibrations == project.laws == ["cal.json"]
+    assert project.laws == ["cal.json"]
     assert project.probes == ["p.toml"]
     assert project.data == ["m.csv"]
     assert project.drawings == ["l.GDS"]

@@ -129,11 +129,6 @@ class Project:
         return [*alone, *list(among)[:_MOST]]
 
     @property
-    def calibrations(self) -> list[str]:
-        """Calibration files."""
-        return [name for name in self.names(".json") if "route" in self._keys(name)]
-
-    @property
     def laws(self) -> list[str]:
         """Files that hold a power law."""
         wanted = {"power_law", "linear_K_per_mW"}
