@@ -19,7 +19,7 @@ from hotlever.estimation.optimiser import Optimiser, Optimum
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.scales import errors_of_scales
-from hotlever.estimation.search import search_from_anywhere, search_near
+from hotlever.estimation.search import Search
 from hotlever.lever.branch import Branch
 from hotlever.measurement import (
     OBSERVABLE_SYMBOLS,
@@ -206,14 +206,12 @@ def estimate(
         forward = replace(make(probe, residuals.bias), names=names, first_order=not known)
     own = {name: prior for name, prior in priors.items() if name not in SCALES}
     start = options.held(probe.moved({name: prior.value for name, prior in own.items()}))
-    search: Any = {"priors": own, "joint": joint, "progress": progress}
+    search = Search(residuals, start, options.varied, robust, own, joint, progress, seen)
     if isinstance(forward, Experiment):
         forward = forward.measuring(residuals.bias, residuals.shown)
-        problem, optimum = search_from_anywhere(
-            forward, residuals, start, options, measurement, search, seen
-        )
+        problem, optimum = search.from_anywhere(forward, measurement)
     else:
-        problem, optimum = search_near(forward, residuals, start, options, search, seen)
+        problem, optimum = search.near(forward, start)
     seconds = time.perf_counter() - began
     return Estimate(problem, optimum, probe, measurement, options, seconds, notes)
 

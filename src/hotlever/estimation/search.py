@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,71 +14,98 @@ from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.growth import far_from, grown
 from hotlever.estimation.lack_of_fit import undescribed
 from hotlever.estimation.optimiser import Optimiser, Optimum
-from hotlever.estimation.options import FitOptions
 from hotlever.estimation.residuals import Residuals
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
+from hotlever.probe.priors import JointPrior, Prior
+from hotlever.types import Progress
+
+#: The problem as it was solved, and where the search for its solution ended.
+End = tuple[Optimiser, Optimum]
 
 
-def search_near(
-    forward: Any,
-    residuals: Residuals,
-    start: Probe,
-    options: FitOptions,
-    search: dict[str, Any],
-    seen: Callable[[Prediction], None] | None,
-) -> tuple[Optimiser, Optimum]:
-    """Search from a lever that is not far from the one that was measured."""
-    own = residuals.afresh()
-    problem = Optimiser(forward, own, start, options.varied, seen=seen, **search)
-    return problem, problem.solve_and_confirm(options.robust)
+@dataclass(frozen=True)
+class Search:
+    """What is searched for.
 
-
-def search_from_anywhere(
-    forward: Experiment,
-    residuals: Residuals,
-    start: Probe,
-    options: FitOptions,
-    measurement: Measurement,
-    search: dict[str, Any],
-    seen: Callable[[Prediction], None] | None,
-) -> tuple[Optimiser, Optimum]:
-    """Search from a lever of which little may be known.
-
-    If it shows something else than the data, or the search leads to a lever that does, it first
-    grows (`hotlever.estimation.growth`); of two ends the one that describes the data better counts.
-
-    Raises
-    ------
-    ComputationError
-        If the lever cannot be solved at the start.
+    Attributes
+    ----------
+    residuals : Residuals
+    start : Probe
+        As the lever is known beforehand.
+    varied : list of str
+    robust : bool
+        Whether the weight of outliers is lessened.
+    priors, joint, progress, seen
+        See `hotlever.estimation.optimiser.Optimiser`.
     """
-    ends = []
-    is_near = not _is_far(forward, residuals, start)
-    if is_near:
-        with suppress(ComputationError):
-            ends.append(search_near(forward, residuals, start, options, search, seen))
-            if _describes(*ends[0]):
-                return ends[0]
-    again, nearer = grown(
-        forward, measurement, residuals.observables, start, options.varied, **search
-    )
-    if is_near and ends and nearer == start:
-        # cold rows say nothing else, and the same search would come to the same end
-        return ends[0]
-    try:
-        ends.append(search_near(again, residuals, nearer, options, search, seen))
-    except ComputationError:
-        if not ends:
-            raise
-    return min(ends, key=lambda end: (not _describes(*end), _share(*end)))
 
+    residuals: Residuals
+    start: Probe
+    varied: list[str]
+    robust: bool
+    priors: Mapping[str, Prior]
+    joint: JointPrior | None = None
+    progress: Progress | None = None
+    seen: Callable[[Prediction], None] | None = None
 
-def _is_far(forward: Experiment, residuals: Residuals, start: Probe) -> bool:
-    try:
-        return far_from(residuals, forward.predict(start))
-    except ComputationError:
-        return True
+    def near(self, forward: Any, start: Probe) -> End:
+        """Search from a lever that is not far from the one that was measured."""
+        problem = Optimiser(
+            forward,
+            self.residuals.afresh(),
+            start,
+            self.varied,
+            progress=self.progress,
+            priors=self.priors,
+            joint=self.joint,
+            seen=self.seen,
+        )
+        return problem, problem.solve_and_confirm(self.robust)
+
+    def from_anywhere(self, forward: Experiment, measurement: Measurement) -> End:
+        """Search from a lever of which little may be known.
+
+        If it shows something else than the data, or the search leads to a lever that does, it first
+        grows (`hotlever.estimation.growth`); of two ends the one that describes the data better
+        counts.
+
+        Raises
+        ------
+        ComputationError
+            If the lever cannot be solved at the start.
+        """
+        ends: list[End] = []
+        if not self._is_far(forward):
+            with suppress(ComputationError):
+                ends.append(self.near(forward, self.start))
+                if _describes(*ends[0]):
+                    return ends[0]
+        again, nearer = grown(
+            forward,
+            measurement,
+            self.residuals.observables,
+            self.start,
+            self.varied,
+            self.priors,
+            self.joint,
+            self.progress,
+        )
+        if ends and nearer == self.start:
+            # cold rows say nothing else, and the same search would come to the same end
+            return ends[0]
+        try:
+            ends.append(self.near(again, nearer))
+        except ComputationError:
+            if not ends:
+                raise
+        return min(ends, key=lambda end: (not _describes(*end), _share(*end)))
+
+    def _is_far(self, forward: Experiment) -> bool:
+        try:
+            return far_from(self.residuals, forward.predict(self.start))
+        except ComputationError:
+            return True
 
 
 def _describes(problem: Optimiser, optimum: Optimum) -> bool:
