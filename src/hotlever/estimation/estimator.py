@@ -101,13 +101,14 @@ def _fit_of(estimate: Estimate) -> Fit:
     every, covariance = estimate.slopes(optimum.prediction), estimate.covariance
     notes = residuals.suspicious(values, options.robust) + residuals.zeros(values, every)
     chi_square = residuals.reduced_chi_square(values, len(options.varied))
+    converged, reason = estimate.verdict(undescribed(residuals, values))
     if chi_square is not None:
         text = (
             f"the scatter about the fit is {np.sqrt(chi_square):.2f} times the measurement errors"
         )
-        notes.append(text if options.priors else f"{text}; standard errors follow the scatter")
+        follow = not options.priors and converged and not reason
+        notes.append(f"{text}; standard errors follow the scatter" if follow else text)
     weighted = residuals.weighted(values)
-    converged, reason = estimate.verdict(undescribed(residuals, values))
     result = Fit(
         probe=optimum.probe,
         measurement=estimate.measurement,

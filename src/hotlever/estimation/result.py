@@ -63,6 +63,11 @@ class FittedParameter:
     unit: str
     vary: bool
 
+    def __str__(self) -> str:
+        """Return the value with its error, as far as there is one, and its unit."""
+        known = value_with_error(self.value, self.stderr)
+        return known if self.unit == "1" else f"{known} {self.unit}"
+
 
 @dataclass(frozen=True)
 class Fit(Outcome):
@@ -140,10 +145,7 @@ class Fit(Outcome):
         }
 
     def __repr__(self) -> str:
-        values = (
-            f"{name} {value_with_error(fitted.value, fitted.stderr)}"
-            for name, fitted in self.parameters.items()
-        )
+        values = (f"{name} {fitted}" for name, fitted in self.parameters.items())
         said = self.doubt or ", ".join(values)
         return f"<Fit of {self.measurement.path or 'a measurement'}: {said}>"
 

@@ -4,7 +4,7 @@ from hotlever import Lever, figures, fit, save_figure
 
 found = fit("src/hotlever/examples/lever-a.csv")
 for name, one in found.parameters.items():
-    print(f"{name}: {one.value:.4g} ± {one.stderr:.1g} {one.unit}")
+    print(f"{name}: {one}")
 
 measured = found.measurement.dataset(found.probe.circuit)
 model = Lever(found.probe).sweep(found.measurement.bias_V)
