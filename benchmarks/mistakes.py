@@ -227,7 +227,7 @@ def commented(text: str) -> Callable[[Bench], None]:
 
 MISTAKES = [
     Mistake("current in µA under mA", lambda b: b.set(I_h=1e3 * b.current), "µA"),
-    Mistake("current in A under mA", lambda b: b.set(I_h=1e-3 * b.current), r"\bin A\b"),
+    Mistake("current in A under mA", lambda b: b.set(I_h=1e-3 * b.current), "A labelled mA"),
     Mistake("bias in mV under V", lambda b: b.set(V_b=1e3 * b.bias), "mV"),
     Mistake("R_s in kOhm under Ohm", commented("# R_s (Ohm): 5.6"), "R_s|series resis"),
     Mistake("bias and current swapped", swapped, "swapped"),

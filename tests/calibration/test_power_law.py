@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 
 from hotlever.calibration.power_law import EQ12, read_power_law
 from hotlever.calibration.power_law_fit import fit_power_law
+from hotlever.calibration.procedure import _law_of
 from hotlever.errors import InputError
 
 POWER = np.linspace(0.1, 4.0, 80)
@@ -145,3 +148,18 @@ def test_a_bad_power_law_file_is_one_line(tmp_path, content, message):
     path.write_text(content)
     with pytest.raises(InputError, match=message):
         read_power_law(path)
+
+
+def test_a_lever_that_melts_right_above_its_knee_has_a_law(reference):
+    """As that does which comes nearest to a clipped current."""
+    knee = reference.knee.power_mW
+    melting: Any = SimpleNamespace(
+        highest_power_mW=1.006 * knee,
+        base_temperature_K=reference.base_temperature_K,
+        tip_temperature=lambda power: np.where(
+            power <= 1.006 * knee, reference.tip_temperature(power), np.nan
+        ),
+    )
+    law, residual = _law_of(melting, knee)
+    assert law.threshold_mW == pytest.approx(knee)
+    assert residual < 10.0

@@ -22,6 +22,8 @@ from hotlever.probe.priors import Moved, Prior, PriorUse
 
 #: The resistance of a cold lever is within this factor of its model's.
 _WITHIN = 2.5
+#: Beyond so many times that of its model hardly any current flows.
+_OPEN = 100.0
 #: Rows that a calibration needs, and those that are not few.
 _FEWEST, _FEW = 3, 6
 #: Biases below this share of the largest hardly change what other supplies drive.
@@ -78,7 +80,10 @@ def check_plausible(
     if found > series and abs(np.log((found - series) / lever)) < _PULL * spread:
         return
     shown = "V_b / I_h" if alone else "the change of V_b over that of I_h"
-    cause = causes.likeliest() or "no single cause that is known explains it"
+    cause = causes.likeliest()
+    if not cause and found > _OPEN * (lever + series):
+        cause = "hardly any current flows, as if a terminal was open or the meter at another one"
+    cause = cause or "no single cause that is known explains it"
     raise InputError(
         f"{where}: {shown} is {found:.4g} kΩ at low bias, expected about {lever + series:.4g} kΩ "
         f"({series:g} kΩ in series and {lever:.3g} kΩ of the lever): {cause}"

@@ -41,6 +41,8 @@ from hotlever.types import Array, Progress
 _LOOKS_LIKE_AIR = 1.08
 #: Powers (over the knee's) at which the power law is fitted to a model: even, up to here.
 _LAW_TO, _LAW_POINTS = 1.4, 160
+#: Of them at least so many above the knee.
+_LEAST_HOT = 8
 
 
 def calibrate(
@@ -298,8 +300,14 @@ def _tips(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
 
 def _law_of(vacuum: Branch, threshold: float | None) -> tuple[PowerLaw, float]:
     """Fit Eq. 12 to the model in vacuum, with its threshold at the knee; return what it misses."""
-    highest = vacuum.highest_power_mW if threshold is None else _LAW_TO * threshold
+    highest = vacuum.highest_power_mW
+    if threshold is not None:
+        highest = min(highest, _LAW_TO * threshold)
     power = np.linspace(0.0, highest, _LAW_POINTS + 1)[1:]
+    if threshold is not None and np.sum(power > threshold) < _LEAST_HOT:
+        # the lever melts right above its knee
+        power = np.append(power, np.linspace(threshold, highest, _LEAST_HOT + 1)[1:])
+        power = np.unique(power)
     found = fit_power_law(
         power,
         vacuum.tip_temperature(power),
