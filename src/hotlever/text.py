@@ -16,7 +16,7 @@ NOT_DETERMINED = "not determined"
 #: Numbers between these are written without a power of ten.
 _PLAIN = 1e-4, 1e5
 #: Standard errors that 95 % of a normal distribution lie within.
-_BAND = 1.96
+BAND = 1.96
 #: A bound this many times as large as the value is none.
 _FAR = 10.0
 #: Characters beyond which a list takes several lines.
@@ -81,7 +81,7 @@ def value_with_error(
 
 def _interval(value: float, stderr: float, scale: float, bounds: tuple[float, float]) -> str:
     """Return what 95 % lie between, where an error is larger than its value."""
-    low, high = value - _BAND * stderr, value + _BAND * stderr
+    low, high = value - BAND * stderr, value + BAND * stderr
     told_low, told_high = low > bounds[0], high < bounds[1]
     if told_low and told_high:
         return f"{significant(low / scale)} to {significant(high / scale)}"

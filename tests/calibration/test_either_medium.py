@@ -11,8 +11,9 @@ import pytest
 
 from hotlever.calibration.procedure import calibrate
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation import fit
+from hotlever.estimation import Measurement, fit
 from hotlever.estimation.either_medium import InMedium, likelier
+from hotlever.estimation.residuals import Residuals
 from synthetic_curves import measured_curve, measurement_of
 
 #: Where a lever is so cold that little tells what it is in (K).
@@ -117,3 +118,20 @@ def test_only_data_may_be_of_an_unknown_medium(run, cold):
     assert "--medium unknown: expected vacuum or air" in said
     with pytest.raises(InputError, match="unknown medium 'unknow'"):
         fit(cold, medium="unknow")
+
+
+def test_a_left_out_datum_is_no_gain():
+    """Of two levers, one that leaves a datum out is no likelier than one just so far from it."""
+    bias = np.linspace(1.0, 10.0, 20)
+    current, nothing = 0.1 * bias, np.full(20, np.nan)
+    shown = current.copy()
+    shown[7] += 0.1
+    errors = np.full(20, 0.01)
+    measured = Measurement(bias, shown, nothing, nothing, nothing, current_error_mA=errors)
+    residuals = Residuals(measured, ["current"], "errors")
+    values = np.stack([current, nothing, nothing])
+    plain = residuals.normalisation
+    assert plain == pytest.approx(2.0 * 20 * np.log(0.01))
+    residuals.lessen(values, gently=False)
+    assert np.sum(residuals.weighted(values) ** 2) == pytest.approx(0.0, abs=1e-9)
+    assert residuals.normalisation == pytest.approx(plain + 36.0)

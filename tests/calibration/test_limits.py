@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from hotlever.calibration.inference import error_of_model
-from hotlever.calibration.limits import BAND, posterior_of_tip, profile_of_tip
+from hotlever.calibration.limits import posterior_of_tip, profile_of_tip
 from hotlever.probe.surroundings import Surroundings
+from hotlever.text import BAND
 
 TIPS, SLOPES = np.array([300.0, 500.0, 800.0]), np.array([1.0, 10.0, 20.0])
 

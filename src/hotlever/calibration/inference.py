@@ -14,7 +14,7 @@ import numpy as np
 
 from hotlever.calibration.jumps import jumps_of, not_of_a_ramp
 from hotlever.calibration.knee import Knee
-from hotlever.calibration.limits import BAND, posterior_of_tip, profile_of_tip
+from hotlever.calibration.limits import posterior_of_tip, profile_of_tip
 from hotlever.calibration.plausibility import misfit
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, FitOptions, Measurement
@@ -37,6 +37,7 @@ from hotlever.probe.priors import (
     published_material,
 )
 from hotlever.probe.surroundings import Surroundings
+from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
 #: Rows of the table.

@@ -27,10 +27,9 @@ from hotlever.estimation.ensembles import (
 )
 from hotlever.estimation.experiment import Prediction
 from hotlever.estimation.objective import UNSOLVED, Objective, Vicinity, inside
+from hotlever.text import BAND
 from hotlever.types import Array, Index, Progress
 
-#: Standard errors that 95 % of a normal distribution lie within.
-BAND = 1.96
 #: Biases, in the hotter half, at which the tip temperature is pulled away, and by how many
 #: standard errors.
 _PLACES, _AWAY = 3, 2.0

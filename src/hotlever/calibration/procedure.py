@@ -17,7 +17,6 @@ from hotlever.calibration.calibration import (
 )
 from hotlever.calibration.inference import Estimated, estimated
 from hotlever.calibration.knee import IVCurve
-from hotlever.calibration.limits import BAND
 from hotlever.calibration.plausibility import check_plausible, remarks
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.power_law_fit import fit_power_law
@@ -35,6 +34,7 @@ from hotlever.measurement import given_measurement, with_measured_circuit
 from hotlever.measurement.averages import averaged, note_on_averages
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import Prior, known_beforehand
+from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
 #: A vacuum model that needs this factor is told that its lever is probably in air.

@@ -19,7 +19,6 @@ from scipy.integrate import simpson
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from hotlever.calibration.inference import Estimated, error_of_model
-from hotlever.calibration.limits import BAND
 from hotlever.datasets import csv_text, labelled
 from hotlever.errors import ComputationError, InputError, unknown_name
 from hotlever.estimation.embedded import Number, Section, array
@@ -33,6 +32,7 @@ from hotlever.lever.transient.periodic import settled
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
 from hotlever.materials.heat import heat_capacity
 from hotlever.probe import Probe
+from hotlever.text import BAND
 from hotlever.types import Array, Index, Progress
 
 #: Standard deviation of the heat capacity: tables of pure silicon differ by 1 to 2 %, and doping,

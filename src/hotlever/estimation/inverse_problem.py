@@ -140,9 +140,8 @@ class Estimate:
         if not problem.objective.informed:
             # the noise is unknown and in common
             return residuals.size * float(np.log(np.sum(residuals.weighted(values) ** 2)))
-        weights = residuals.by[residuals.present]
         squares = problem.objective.squares(self.optimum.prediction)
-        return float(squares - 2.0 * np.sum(np.log(weights[weights > 0])))
+        return float(squares + residuals.normalisation)
 
 
 def estimate(

@@ -288,6 +288,15 @@ class Residuals:
         return float(np.average(noise**2, weights=self.present.sum(axis=1)))
 
     @property
+    def normalisation(self) -> float:
+        """Minus twice the logarithm of the normal densities' factors, beside the squares.
+
+        An outlier counts as one that is just so far off that it is left out.
+        """
+        each = 2.0 * np.log(self._scale) + _NONE**2 * (1.0 - self.down**2)
+        return float(np.sum(np.broadcast_to(each, self.data.shape)[self.present]))
+
+    @property
     def unit_weight(self) -> float:
         """The largest weighted value of an observable: one, unless weights are those of errors."""
         return float(np.max(np.where(self.present, self.by * self.largest, 0.0)))

@@ -18,6 +18,7 @@ from hotlever.estimation.profile import profile_likelihood
 from hotlever.estimation.result import Fit
 from hotlever.files import json_text
 from hotlever.probe.parameters import parameters_of
+from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
 #: Chains are called unsettled above this R̂ or below this effective sample size (Vehtari et al.,
@@ -171,7 +172,7 @@ def _about(fit: Fit, name: str, values: Array) -> list[str]:
     if not fitted.stderr:
         return []
     # two standard errors, nearly: the quantile of the normal distribution
-    reach = 1.96 * fitted.stderr
+    reach = BAND * fitted.stderr
     said = np.array([fitted.value - reach, fitted.value + reach])
     found = np.percentile(values, (2.5, 97.5))
     if np.abs(found - said).max() <= _DIFFERENT * reach:

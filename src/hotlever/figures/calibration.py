@@ -27,6 +27,7 @@ from hotlever.figures.style import (
 )
 from hotlever.studies.design import label_of
 from hotlever.studies.twins import ESTIMATE, LEVELS, WAYS
+from hotlever.text import BAND
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,7 +77,7 @@ def calibration_curves(calibration: Calibration) -> Figure:
         text = "calibrated lever" if described else "the nearest lever"
         iv.plot(table.lever_V, table.current_mA, color=BLUE, label=text)
         if calibration.knee_measured:
-            across, up = 1.96 * knee.lever_V_stderr, 1.96 * knee.current_mA_stderr
+            across, up = BAND * knee.lever_V_stderr, BAND * knee.current_mA_stderr
             label = "knee, 95 %" if described else "its knee"
             style: Any = {"fmt": "s", "color": VERMILION, "label": label}
             iv.errorbar(knee.lever_V, knee.current_mA, xerr=across, yerr=up, **style)

@@ -28,7 +28,7 @@ from hotlever.figures.style import (
     from_zero,
     panel_letters,
 )
-from hotlever.text import parameter_named, value_with_error
+from hotlever.text import BAND, parameter_named, value_with_error
 from hotlever.types import Array
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def fitted_history(
     # the tip is always drawn, others where they were measured
     panels = [one for one in _PANELS if one[0] == "tip" or measured[one[2]].notnull().any()]
     settles = float(measured.bias_V.max()) == float(measured.bias_V.min())
-    time, width = measured.time.values, 1.96 * band.tip_stderr_K
+    time, width = measured.time.values, BAND * band.tip_stderr_K
     stated = bool(width.notnull().any())
     with figure(3.4 * len(panels), 4.6, 2, len(panels), sharex=True, height_ratios=(1.8, 1.0)) as (
         made,

@@ -17,7 +17,6 @@ import numpy as np
 import xarray as xr
 
 from hotlever.calibration.knee import IVCurve, find_knee
-from hotlever.calibration.limits import BAND
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.transfer import curve_of_law, curve_of_model
@@ -37,6 +36,7 @@ from hotlever.materials.silicon import (
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.priors import default_priors
 from hotlever.probe.tip import Tip
+from hotlever.text import BAND
 from hotlever.types import Array
 
 #: What a twin has and the model that calibrates it has not; each can be left out.
@@ -65,7 +65,7 @@ HIGHEST_V = {"vacuum": 11.0, "air": 13.0}
 HOT = 400.0
 _FINER = MeshOptions(refinement=1.3)
 #: Levels of confidence, and their limits in standard deviations.
-LEVELS = {0.68: 0.994, 0.95: 1.960}
+LEVELS = {0.68: 0.994, 0.95: BAND}
 PERCENTILES = (50, 90, 100)
 _DECILES, _ROWS = 10, 101  # of the bias, and of a calibration's table
 
