@@ -84,6 +84,7 @@ def test_outliers_stand_alone(rows, where):
     assert off_together(compared(off), MODEL) == said
 
 
+@pytest.mark.slow
 def test_a_fit_says_first_that_its_data_are_not_described(run, tmp_path):
     """The current waves by 10 %, as no lever's does."""
     lines = (

@@ -69,6 +69,7 @@ def test_halved_panels_change_less_than_a_thousandth(lever, fine):
     assert np.abs((c.tip_K - b.tip_K) / rise).max() < 5e-4
 
 
+@pytest.mark.slow
 def test_vacuum_is_the_limit_of_low_pressure(lever):
     thin = lever.probe.with_(accommodation=0.9, pressure_mbar=1e-4, medium="air")
     rare = lever.with_probe(thin).sweep(BIAS)
