@@ -10,7 +10,7 @@ import threading
 import time
 from base64 import b64encode
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -23,6 +23,8 @@ EXAMPLES = Path(__file__).parents[1] / "src" / "hotlever" / "examples"
 _START_S, _END_S = 60, 15
 #: Seconds in which a line must be said of a file.
 _SAID_S = 8.0
+#: Milliseconds in which a room that is there comes to rest.
+_IDLE_MS = 10_000
 #: There is no input while another file is on its way.
 _DROP = """async ([zone, name, content]) => {
     const bytes = Uint8Array.from(atob(content), one => one.charCodeAt(0));
@@ -139,7 +141,10 @@ def answer(page: Page, app: App, room: str, zone: int, name: str, content: bytes
 def go(page: Page, app: App, room: str) -> None:
     """Open a room, and wait until it is there."""
     page.goto(f"{app.base}/{room}")
-    page.wait_for_load_state("networkidle")
+    page.wait_for_function("window.did_handshake === true")
+    # an upload that the last room broke off may count as under way for ever
+    with suppress(Error):
+        page.wait_for_load_state("networkidle", timeout=_IDLE_MS)
 
 
 class Seen:
