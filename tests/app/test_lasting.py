@@ -18,8 +18,9 @@ from test_rooms import drop, shown, until, visit
 from test_rooms_at_work import done
 
 from hotlever.app import showing
-from hotlever.app.choices import CHOICES
+from hotlever.app.choices import CHOICES, SCHEMA, read_choices
 from hotlever.app.project import EXAMPLES, Project
+from hotlever.app.rooms.room import MEDIA
 from hotlever.app.session import Session
 from hotlever.probe import Probe
 
@@ -235,6 +236,15 @@ def test_what_nobody_typed_is_drawn_once(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 # --- a restart ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("medium", MEDIA)
+@pytest.mark.parametrize("room", ["fit", "calibrate"])
+def test_every_medium_of_the_rooms_is_kept(tmp_path: Path, room: str, medium: str) -> None:
+    chosen = {room: {"medium": medium}}
+    (tmp_path / CHOICES).write_text(json.dumps({"schema": SCHEMA, "chosen": chosen}))
+    assert read_choices(tmp_path) == (chosen, "")
+
 
 CHOSEN: dict[str, Any] = {
     "dark": True,

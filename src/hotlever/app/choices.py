@@ -19,7 +19,8 @@ from hotlever.files import json_text, output_folder, read_json, write_text
 CHOICES = "choices.json"
 #: Version of the schema below.
 SCHEMA = 1
-Medium = Literal["", "vacuum", "air"]
+#: What a measurement was made in; empty for what its file says.
+Medium = Literal["", "vacuum", "air", "unknown"]
 _MEDIUM, _GAP = "medium", "surface_gap_um"
 
 
