@@ -37,7 +37,7 @@ _LEFT_OUT, _UNKNOWN = 1.2, 2.0
 #: A hypothesis has to lower the sum of squares to this share of what it is without, and to no more
 #: than so much for each row and altogether.
 _BETTER, _EACH, _ALTOGETHER = 0.5, 2.0, 10.0
-#: Suspects within a factor or a difference of the best are as likely; so many are named.
+#: Hypotheses within a factor or a difference of the best are as likely; so many are named.
 _AS_LIKELY, _AS_LIKELY_BY, _NAMED = 1.3, 4.0, 2
 #: The most promising are solved anew where they lead.
 _AGAIN = 4

@@ -22,7 +22,7 @@ from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
 from hotlever.estimation.result import Fit
 from hotlever.estimation.words import undetermined
 from hotlever.lever.dataset import OBSERVABLES
-from hotlever.measurement import Measurement
+from hotlever.measurement import Measurement, given_measurement
 from hotlever.probe import Probe
 from hotlever.probe.surroundings import Medium
 from hotlever.types import Array, Progress
@@ -70,9 +70,11 @@ def fit(
         If the lever cannot be solved at the start, or the fit does not converge.
     """
     options = chosen_options(options, choices)
+    given = Probe.reference() if probe is None else Probe.given(probe)
+    whole = given_measurement(measurement, given.circuit)
 
     def fitted(options: FitOptions) -> tuple[Estimate, Fit]:
-        found = estimate(measurement, probe, options, model=model, progress=progress, seen=seen)
+        found = estimate(whole, given, options, model=model, progress=progress, seen=seen)
         return found, _fit_of(found)
 
     def fitted_in(medium: Medium) -> InMedium[tuple[Estimate, Fit]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -24,7 +23,6 @@ from hotlever.lever.branch import Branch
 from hotlever.measurement import (
     OBSERVABLE_SYMBOLS,
     Measurement,
-    given_measurement,
     with_measured_circuit,
 )
 from hotlever.measurement.averages import averaged, note_on_averages
@@ -145,8 +143,8 @@ class Estimate:
 
 
 def estimate(
-    measurement: Measurement | str | os.PathLike[str],
-    probe: Probe | str | os.PathLike[str] | None,
+    whole: Measurement,
+    given: Probe,
     options: FitOptions,
     *,
     joint: JointPrior | None = None,
@@ -154,7 +152,9 @@ def estimate(
     progress: Progress | None = None,
     seen: Callable[[Prediction], None] | None = None,
 ) -> Estimate:
-    """Find the parameters that priors and a measurement make most likely; see `fit`.
+    """Find the parameters that priors and a whole measurement make most likely; see `fit`.
+
+    The probe is as it was given, not yet in the circuit and medium of the measurement.
 
     A joint prior of several parameters takes the place of priors of their own. With priors the
     data of an observable may be wrong together, by the scale of their meter or thermometer.
@@ -162,8 +162,6 @@ def estimate(
     began = time.perf_counter()
     # what an earlier one used
     memory.give_back()
-    given = Probe.reference() if probe is None else Probe.given(probe)
-    whole = given_measurement(measurement, given.circuit)
     measurement = averaged(whole, options.robust)
     in_time = measurement.time_us is not None
     if in_time:

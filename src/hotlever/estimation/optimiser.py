@@ -166,7 +166,7 @@ class Optimiser:
         # without priors a robust search begins anew with each choice of weights
         in_all = options.most_in_all * (1 if objective.informed else options.gentle_rounds)
         most = min(self.evaluations + options.most_branches, in_all)
-        at, region = self._predict(start), options.first_region
+        at, region = self.predict(start), options.first_region
         while True:
             near = Vicinity(objective, at, self._bending(at))
             target, least = self._minimum(near, region)
@@ -275,7 +275,7 @@ class Optimiser:
     def _trial(self, at: Prediction, point: Array) -> Prediction | None:
         """Solve the lever of a point; None if it cannot be drawn or solved."""
         try:
-            return self._predict(self.objective.at(at.probe, point))
+            return self.predict(self.objective.at(at.probe, point))
         except HotleverError:
             return None
 
@@ -318,7 +318,7 @@ class Optimiser:
         """Return the predictions at hand beside one."""
         return [one for one in self._at_hand.values() if one is not prediction]
 
-    def _predict(self, probe: Probe) -> Prediction:
+    def predict(self, probe: Probe) -> Prediction:
         """Predict with the model, from the latest prediction; what was asked before is at hand."""
         known = self._at_hand.pop(probe, None)
         if known is not None:

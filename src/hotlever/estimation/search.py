@@ -51,7 +51,11 @@ class Search:
 
     def near(self, forward: Any, start: Probe) -> End:
         """Search from a lever that is not far from the one that was measured."""
-        problem = Optimiser(
+        problem = self._problem(forward, start)
+        return problem, problem.solve_and_confirm(self.robust)
+
+    def _problem(self, forward: Any, start: Probe) -> Optimiser:
+        return Optimiser(
             forward,
             self.residuals.afresh(),
             start,
@@ -61,7 +65,6 @@ class Search:
             joint=self.joint,
             seen=self.seen,
         )
-        return problem, problem.solve_and_confirm(self.robust)
 
     def from_anywhere(self, forward: Experiment, measurement: Measurement) -> End:
         """Search from a lever of which little may be known.
@@ -76,9 +79,10 @@ class Search:
             If the lever cannot be solved at the start.
         """
         ends: list[End] = []
-        if not self._is_far(forward):
-            with suppress(ComputationError):
-                ends.append(self.near(forward, self.start))
+        problem = self._problem(forward, self.start)
+        with suppress(ComputationError):
+            if not far_from(self.residuals, problem.predict(self.start)):
+                ends.append((problem, problem.solve_and_confirm(self.robust)))
                 if _describes(*ends[0]):
                     return ends[0]
         again, nearer = grown(
@@ -100,12 +104,6 @@ class Search:
             if not ends:
                 raise
         return min(ends, key=lambda end: (not _describes(*end), _share(*end)))
-
-    def _is_far(self, forward: Experiment) -> bool:
-        try:
-            return far_from(self.residuals, forward.predict(self.start))
-        except ComputationError:
-            return True
 
 
 def _describes(problem: Optimiser, optimum: Optimum) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
 from hotlever.errors import InputError
@@ -20,7 +21,7 @@ def doubt(describes_data: bool | None, reason: str, lever: str = "such lever") -
     return f"no {lever} shows these data: {reason}"
 
 
-class Outcome:
+class Outcome(ABC):
     """What was estimated of a lever; without errors unless the data are described.
 
     Errors about a lever that does not show the data would not hold.
@@ -45,9 +46,9 @@ class Outcome:
         for name, value in ({} if self.describes_data else self._without_errors()).items():
             object.__setattr__(self, name, value)
 
+    @abstractmethod
     def _without_errors(self) -> dict[str, Any]:
         """Return the attributes that hold errors, without any."""
-        raise NotImplementedError
 
     @property
     def describes_data(self) -> bool | None:
@@ -70,9 +71,9 @@ class Outcome:
         if not self.describes_data:
             raise InputError(f"{what}: expected data that a lever describes; {self.doubt}")
 
+    @abstractmethod
     def content(self) -> dict[str, Any]:
         """Return the content of the result file."""
-        raise NotImplementedError
 
     def to_json(self) -> str:
         """Return the result file."""
