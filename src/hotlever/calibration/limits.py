@@ -26,7 +26,8 @@ from hotlever.estimation.ensembles import (
     sample,
 )
 from hotlever.estimation.experiment import Prediction
-from hotlever.estimation.objective import UNSOLVED, Objective, Vicinity, inside
+from hotlever.estimation.objective import Objective, inside
+from hotlever.estimation.surrogate import UNSOLVED, Surrogate
 from hotlever.text import BAND
 from hotlever.types import Array, Index, Progress
 
@@ -100,7 +101,7 @@ def profile_of_tip(
     covariance : ndarray, shape (p, p)
         Of the varied parameters, linearised.
     """
-    optimum, some = Vicinity(objective, at), _looked_at(at)
+    optimum, some = Surrogate(objective, at), _looked_at(at)
     sides = np.ones((2, some.size))
     for side, way in enumerate((-1.0, 1.0)):
         near = _pulled_lever(optimum, covariance, int(some[-1]), way, solved)
@@ -110,12 +111,12 @@ def profile_of_tip(
 
 
 def _pulled_lever(
-    optimum: Vicinity,
+    optimum: Surrogate,
     covariance: Array,
     place: int,
     way: float,
     solved: Callable[[Array, Prediction], Prediction],
-) -> Vicinity | None:
+) -> Surrogate | None:
     """Solve the lever whose tip is pulled to one side, and return what is near it.
 
     It is pulled again from there, until its sum of squares is known; None if that does not end.
@@ -127,7 +128,7 @@ def _pulled_lever(
         there, _ = _pulled(optimum, near, covariance, place, way)
         expected = _squares(near.residual(there))
         try:
-            near = Vicinity(optimum.objective, solved(there, near.at))
+            near = Surrogate(optimum.objective, solved(there, near.at))
         except ComputationError:  # it melts below the highest bias
             break
         if abs(_squares(near.residual(near.origin)) - expected) < _KNOWN:
@@ -136,7 +137,7 @@ def _pulled_lever(
 
 
 def _pulled(
-    optimum: Vicinity, near: Vicinity, covariance: Array, place: int, way: float
+    optimum: Surrogate, near: Surrogate, covariance: Array, place: int, way: float
 ) -> tuple[Array, float]:
     """Return where the tip is pulled to one side at a place, and the standard error there.
 
@@ -202,17 +203,17 @@ def posterior_of_tip(
     and those of `hotlever.estimation.ensembles.sample`. What is sampled costs too little for
     processes of its own.
     """
-    vicinity = Vicinity(objective, at, others, least=_TELLING)
+    surrogate = Surrogate(objective, at, others, least=_TELLING)
     rates = objective.rates(at.probe)
     scaled = covariance / np.outer(rates, rates)
     chains = sample(
-        _Density(vicinity),
-        Gaussian(vicinity.origin, scaled),
+        _Density(surrogate),
+        Gaussian(surrogate.origin, scaled),
         samples=samples,
         progress=progress,
     )
-    some, every = _looked_at(at), chains.points.reshape(-1, vicinity.origin.size)
-    tips = np.array([vicinity.predict(point)[0][2] for point in every])
+    some, every = _looked_at(at), chains.points.reshape(-1, surrogate.origin.size)
+    tips = np.array([surrogate.predict(point)[0][2] for point in every])
     slopes = at.slopes[2][some][:, objective.columns]
     stderr = np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes))
     low, high = np.percentile(tips[:, some], (2.5, 97.5), axis=0)
@@ -235,14 +236,14 @@ def _looked_at(at: Prediction) -> Index:
 class _Density:
     """The logarithm of the posterior density of scaled parameters."""
 
-    vicinity: Vicinity
+    surrogate: Surrogate
 
     def __call__(self, scaled: Array) -> float:
-        low, high = self.vicinity.objective.bounds
+        low, high = self.surrogate.objective.bounds
         if np.any(scaled <= low) or np.any(scaled >= high):
             return -math.inf
-        squares = _squares(self.vicinity.residual(scaled))
-        return -0.5 * squares + self.vicinity.objective.log_volume(scaled)
+        squares = _squares(self.surrogate.residual(scaled))
+        return -0.5 * squares + self.surrogate.objective.log_volume(scaled)
 
 
 class _Pulled:
@@ -252,21 +253,21 @@ class _Pulled:
     the estimate would move half the way: to `_AWAY` standard errors if everything is linear.
     """
 
-    def __init__(self, vicinity: Vicinity, place: int, tip_K: float, stderr: float) -> None:
-        self._vicinity, self._place, self._stderr = vicinity, place, stderr
+    def __init__(self, surrogate: Surrogate, place: int, tip_K: float, stderr: float) -> None:
+        self._surrogate, self._place, self._stderr = surrogate, place, stderr
         self._target = tip_K + 2.0 * _AWAY * stderr
 
     def tip_K(self, scaled: Array) -> float:
-        return float(self._vicinity.predict(scaled)[0][2, self._place])
+        return float(self._surrogate.predict(scaled)[0][2, self._place])
 
     def estimate(self, start: Array) -> Array:
         """Return the scaled parameters of least squares."""
-        objective = self._vicinity.objective
+        objective = self._surrogate.objective
         low, high = objective.bounds
         try:
             self.tip_K(start)
         except ComputationError:
-            start = self._vicinity.origin
+            start = self._surrogate.origin
         found = optimize.least_squares(
             self._residual,
             inside(start, low, high),
@@ -280,17 +281,17 @@ class _Pulled:
         return np.asarray(found.x)
 
     def _residual(self, scaled: Array) -> Array:
-        known = self._vicinity.residual(scaled)
+        known = self._surrogate.residual(scaled)
         try:
             return np.append(known, (self.tip_K(scaled) - self._target) / self._stderr)
         except ComputationError:
             return np.append(known, UNSOLVED)
 
     def _jacobian(self, scaled: Array) -> Array:
-        objective = self._vicinity.objective
-        slope = self._vicinity.predict(scaled)[1][2, self._place, objective.columns]
+        objective = self._surrogate.objective
+        slope = self._surrogate.predict(scaled)[1][2, self._place, objective.columns]
         row = slope * objective.coordinates.rates(scaled) / self._stderr
-        return np.vstack([self._vicinity.jacobian(scaled), row])
+        return np.vstack([self._surrogate.jacobian(scaled), row])
 
 
 def _squares(residual: Array) -> float:

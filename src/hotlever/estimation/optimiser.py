@@ -17,9 +17,10 @@ from scipy import optimize
 
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation.experiment import Experiment, Prediction
-from hotlever.estimation.objective import Objective, Vicinity, inside, inverse_or_nan
+from hotlever.estimation.objective import Objective, inside, inverse_or_nan
 from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.search_options import SearchOptions
+from hotlever.estimation.surrogate import Surrogate
 from hotlever.probe import Probe
 from hotlever.probe.priors import JointPrior, Prior
 from hotlever.types import Array, Progress
@@ -168,7 +169,7 @@ class Optimiser:
         most = min(self.evaluations + options.most_branches, in_all)
         at, region = self.predict(start), options.first_region
         while True:
-            near = Vicinity(objective, at, self._bending(at))
+            near = Surrogate(objective, at, self._bending(at))
             target, least = self._minimum(near, region)
             if self._takes_scatter:
                 target, least = self._with_scatter(target, region, near)
@@ -279,7 +280,7 @@ class Optimiser:
         except HotleverError:
             return None
 
-    def _with_scatter(self, point: Array, region: float, near: Vicinity) -> tuple[Array, float]:
+    def _with_scatter(self, point: Array, region: float, near: Surrogate) -> tuple[Array, float]:
         """Take scatter and optimum in turns, among parameters near those of a prediction."""
         options, least = self._options, np.inf
         for _ in range(options.scatter_rounds):
@@ -291,7 +292,7 @@ class Optimiser:
         return point, least
 
     def _minimum(
-        self, near: Vicinity, region: float, start: Array | None = None
+        self, near: Surrogate, region: float, start: Array | None = None
     ) -> tuple[Array, float]:
         """Return the point of least squares within a region about a prediction, and these."""
         objective, (lower, upper) = self.objective, self.objective.bounds

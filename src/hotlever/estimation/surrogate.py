@@ -1,0 +1,103 @@
+"""The surrogate of a lever: what it would show near one that was solved, at next to no cost.
+
+To first order voltages and currents are powers of the parameters
+(`hotlever.estimation.experiment.Nearby`); other levers that were solved say how they bend on the
+way there. The search, the profile of the tip temperature and its posterior take their levers from
+here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from hotlever.errors import ComputationError
+from hotlever.estimation.experiment import Prediction
+from hotlever.estimation.objective import Objective
+from hotlever.types import Array
+
+#: Scaled residual given to trial parameters for which the lever has no state: far beyond any
+#: real one, so that a search turns back.
+UNSOLVED = 10.0
+
+
+class Surrogate:
+    """Residuals and their derivatives near a prediction, without solving a lever.
+
+    Other predictions say how values bend on the way to them: by what they differ there from what
+    is expected, growing as the square of the distance. Distances are measured by what data and
+    priors tell, so that those along the narrow valleys that a search follows are kept apart from
+    those across (Schnabel and Frank, SIAM J. Numer. Anal. 21, 815 (1984)).
+
+    Parameters
+    ----------
+    objective : Objective
+    at : Prediction
+    others : sequence of Prediction
+    least : float
+        Standard deviations from which on the others count: what nearer ones differ by would be
+        carried too far by those who look far away.
+    """
+
+    def __init__(
+        self,
+        objective: Objective,
+        at: Prediction,
+        others: Sequence[Prediction] = (),
+        least: float = 0.0,
+    ) -> None:
+        self.objective, self.at = objective, at
+        self.origin = objective.point(at.probe)
+        self._parameters = at.probe.at(objective.names)
+        self._bends: list[tuple[Array, Array]] = []
+        self._latest: tuple[Array, tuple[Array, Array]] | None = None
+        jacobian = objective.jacobian(at.slopes, self.origin)
+        for other in others:
+            there = objective.point(other.probe)
+            along = jacobian.T @ (jacobian @ (there - self.origin))
+            size = float(along @ (there - self.origin))
+            with suppress(ComputationError):
+                missed = other.values - self._predicted(there)[0]
+                # the product with this direction is 1 at the other prediction
+                if size > least**2:
+                    self._bends.append((along / size, missed))
+
+    def predict(self, point: Array) -> tuple[Array, Array]:
+        """Return I_h, V_r and T_tip (3, n), and their derivatives by all parameters (3, n, k).
+
+        Raises
+        ------
+        ComputationError
+            If the lever has no such states.
+        """
+        # asked for twice, for the residuals and their derivatives
+        if self._latest is None or not np.array_equal(self._latest[0], point):
+            self._latest = point.copy(), self._predicted(point)
+        return self._latest[1]
+
+    def _predicted(self, point: Array) -> tuple[Array, Array]:
+        objective = self.objective
+        parameters = self._parameters.copy()
+        parameters[objective.columns] = objective.coordinates.values(point)
+        values, slopes = self.at.nearby.predict(parameters)
+        for along, missed in self._bends:
+            way = float(along @ (point - self.origin))
+            values = values + missed * way**2
+            slopes[:, :, objective.columns] += missed[:, :, None] * (
+                2.0 * way * along / objective.coordinates.rates(point)
+            )
+        return values, slopes
+
+    def residual(self, point: Array) -> Array:
+        """Return the residuals of data and priors; large ones if the lever has no such states."""
+        try:
+            return self.objective.residual(self.predict(point)[0], point)
+        except ComputationError:
+            data = np.full(self.objective.residuals.size, UNSOLVED)
+            return np.concatenate([data, self.objective.from_priors(point)])
+
+    def jacobian(self, point: Array) -> Array:
+        """Return their derivatives by the coordinates."""
+        return self.objective.jacobian(self.predict(point)[1], point)
