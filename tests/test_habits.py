@@ -1,0 +1,52 @@
+"""What contributors and those who cite the package read: it names what there is."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import hotlever
+
+ROOT = Path(__file__).parents[1]
+
+
+def read(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def test_files_that_contributors_are_led_to_exist():
+    text = read("CONTRIBUTING.md")
+    named = re.findall(r"`((?:src|tests|docs)/[\w/.]+|\w+\.lock|CHANGELOG\.md)`", text)
+    assert len(named) >= 12
+    assert [name for name in named if not (ROOT / name).exists()] == []
+    packages = re.findall(r"`(\w+)/`", text.partition("| --- |")[2].partition("\n\n")[0])
+    there = {path.parent.name for path in (ROOT / "src" / "hotlever").glob("*/__init__.py")}
+    assert set(packages) == there - {"examples"}
+
+
+def test_commands_that_contributors_are_told_are_targets_of_make():
+    targets = set(re.findall(r"^([\w-]+):", read("Makefile"), re.MULTILINE))
+    told = set(re.findall(r"\bmake\s+(env|test[\w-]*)", read("CONTRIBUTING.md")))
+    assert told == {"env", "test", "test-slow", "test-app", "test-hostile"}
+    assert told <= targets
+
+
+def test_hooks_run_what_make_test_checks_before_the_tests():
+    recipe = read("Makefile").partition("\ntest: env\n")[2].partition("\n\n")[0]
+    before = [line.strip().replace("$(BIN)", ".venv/bin") for line in recipe.splitlines()]
+    checks = [line for line in before if "pytest" not in line]
+    hooks = re.findall(r"entry: (.+)", read(".pre-commit-config.yaml"))
+    assert hooks == checks
+    assert set(re.findall(r"repo: (\S+)", read(".pre-commit-config.yaml"))) == {"local"}
+
+
+def test_the_citation_is_of_this_version_and_licence():
+    project = tomllib.loads(read("pyproject.toml"))["project"]
+    citation = dict(
+        re.findall(r"^(version|license|title|abstract): (.+)$", read("CITATION.cff"), re.M)
+    )
+    assert citation["version"] == project["version"] == hotlever.__version__
+    assert citation["license"] == project["license"]
+    assert citation["title"] == project["name"]
+    assert citation["abstract"] == project["description"]
