@@ -14,12 +14,12 @@ import numpy as np
 
 from hotlever.calibration.jumps import jumps_of, not_of_a_ramp
 from hotlever.calibration.knee import Knee
-from hotlever.calibration.limits import posterior_of_tip, profile_of_tip
 from hotlever.calibration.plausibility import misfit
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, FitOptions, Measurement
 from hotlever.estimation.either_medium import error_of_choice
 from hotlever.estimation.inverse_problem import Estimate, estimate
+from hotlever.estimation.limits import posterior_of_tip, profile_of_tip
 from hotlever.lever import Branch
 from hotlever.lever.curve import spline_through
 from hotlever.lever.dataset import OBSERVABLES

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +17,18 @@ from hotlever.types import Array
 
 #: A datum that alone decides a parameter says nothing of its own noise.
 _LEAST_FREE = 0.05
+#: Scaled residual given to trial parameters for which the lever has no state, so that a search
+#: turns back.
+_UNSOLVED = 10.0
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A further datum that pulls the tip temperature of a row to a value, by an error (K)."""
+
+    row: int
+    tip_K: float
+    error_K: float
 
 
 class Objective:
@@ -62,6 +76,13 @@ class Objective:
             relative |= {name for name, is_relative in known if is_relative}
         self.coordinates = Coordinates.of(probe, varied, relative)
         self.bounds = self.coordinates.bounds
+        self._pull: Pull | None = None
+
+    def pulled(self, pull: Pull) -> Objective:
+        """Return the same with a further datum."""
+        other = copy(self)
+        other._pull = pull
+        return other
 
     def values(self, probe: Probe) -> Array:
         """Return the varied parameters of a probe in their own units."""
@@ -88,11 +109,25 @@ class Objective:
 
     def residual(self, values: Array, point: Array) -> Array:
         """Return the residuals of data and priors, for predicted values (3, n)."""
-        return np.concatenate([self.residuals.weighted(values), self.from_priors(point)])
+        residual = np.concatenate([self.residuals.weighted(values), self.from_priors(point)])
+        if self._pull is None:
+            return residual
+        away = values[2, self._pull.row] - self._pull.tip_K
+        return np.append(residual, away / self._pull.error_K)
+
+    def unsolved(self, point: Array) -> Array:
+        """Return residuals of a lever that has no states: far beyond any real ones."""
+        data = np.full(self.residuals.size, _UNSOLVED)
+        pull = np.full(0 if self._pull is None else 1, _UNSOLVED)
+        return np.concatenate([data, self.from_priors(point), pull])
 
     def jacobian(self, slopes: Array, point: Array) -> Array:
         """Return their derivatives by the coordinates, for predicted slopes (3, n, k)."""
-        return np.concatenate([self.of_data(slopes, point), self.of_priors(point)])
+        jacobian = np.concatenate([self.of_data(slopes, point), self.of_priors(point)])
+        if self._pull is None:
+            return jacobian
+        by = slopes[2, self._pull.row, self.columns] * self.coordinates.rates(point)
+        return np.vstack([jacobian, by / self._pull.error_K])
 
     def squares(self, at: Prediction) -> float:
         """Return the sum of squares of the weighted residuals and of the distance from priors."""

@@ -13,11 +13,10 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import optimize
 
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation.experiment import Experiment, Prediction
-from hotlever.estimation.objective import Objective, inside, inverse_or_nan
+from hotlever.estimation.objective import Objective, inverse_or_nan
 from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.search_options import SearchOptions
 from hotlever.estimation.surrogate import Surrogate
@@ -170,11 +169,11 @@ class Optimiser:
         at, region = self.predict(start), options.first_region
         while True:
             near = Surrogate(objective, at, self._bending(at))
-            target, least = self._minimum(near, region)
-            if self._takes_scatter:
-                target, least = self._with_scatter(target, region, near)
-            squares, step = objective.squares(at), target - near.origin
             room = objective.coordinates.room(near.origin)
+            target, least = near.minimum(region=region * room)
+            if self._takes_scatter:
+                target, least = self._with_scatter(target, region * room, near)
+            squares, step = objective.squares(at), target - near.origin
             inner = bool(np.all(np.abs(step) < 0.99 * region * room))
             decrement = self._decrement(at)
             tolerance = self._tolerance(at, squares)
@@ -280,7 +279,7 @@ class Optimiser:
         except HotleverError:
             return None
 
-    def _with_scatter(self, point: Array, region: float, near: Surrogate) -> tuple[Array, float]:
+    def _with_scatter(self, point: Array, region: Array, near: Surrogate) -> tuple[Array, float]:
         """Take scatter and optimum in turns, among parameters near those of a prediction."""
         options, least = self._options, np.inf
         for _ in range(options.scatter_rounds):
@@ -288,28 +287,8 @@ class Optimiser:
             probe = self.objective.at(near.at.probe, point)
             used_up = self.objective.used_up(probe, slopes)
             self.residuals.take_scatter(values, used_up, options.usual_scatter)
-            point, least = self._minimum(near, region, point)
+            point, least = near.minimum(point, region)
         return point, least
-
-    def _minimum(
-        self, near: Surrogate, region: float, start: Array | None = None
-    ) -> tuple[Array, float]:
-        """Return the point of least squares within a region about a prediction, and these."""
-        objective, (lower, upper) = self.objective, self.objective.bounds
-        room = region * objective.coordinates.room(near.origin)
-        low, high = np.maximum(lower, near.origin - room), np.minimum(upper, near.origin + room)
-        minimum = optimize.least_squares(
-            near.residual,
-            inside(near.origin if start is None else start, low, high),
-            near.jacobian,
-            (low, high),
-            x_scale="jac",
-            ftol=1e-5 if objective.informed else 1e-10,
-            xtol=1e-10,
-            gtol=None,
-            max_nfev=100,
-        )
-        return minimum.x, 2.0 * float(minimum.cost)
 
     def _bending(self, prediction: Prediction) -> list[Prediction]:
         # without priors residuals have no size that says what is near

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import Literal
 
 import emcee
@@ -40,72 +40,118 @@ Noise = Literal["each", "common"]
 
 #: Quantiles (%) of a predictive band: median, 68 % and 95 %.
 BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)
+#: Rounds in which weights and residuals settle that follow from each other.
+_WEIGHT_ROUNDS = 50
 
 
-class FitPosterior:
-    """Posterior density of a fit's varied parameters, by their coordinates."""
+class Posterior:
+    """The density of the parameters of an estimate that its data and priors leave.
 
-    def __init__(self, fit: Fit, model: RoughModel, noise: Noise) -> None:
-        self._model, self._probe, self._residuals = model, fit.probe, fit.residuals()
-        self._objective = Objective(
-            self._residuals, fit.probe, model.names, fit.names, fit.known_before
-        )
-        self.lower, self.upper = self._objective.bounds
-        self.optimum = self._objective.point(fit.probe)
+    Parameters
+    ----------
+    objective : Objective
+        Residuals of (N,) data and of priors, by the coordinates of the (p,) parameters.
+    values : callable
+        Return I_h, V_r and T_tip (3, n) of a point; picklable, if it is sampled in processes.
+    optimum : ndarray, shape (p,)
+        The point about which it is approximated.
+    slopes : ndarray, shape (3, n, k)
+        Derivatives of the values there.
+    noise : {"each", "common"}
+        See `sample_posterior`. With priors residuals count standard deviations, and no noise is
+        unknown.
+    """
+
+    def __init__(
+        self,
+        objective: Objective,
+        values: Callable[[Array], Array],
+        optimum: Array,
+        slopes: Array,
+        noise: Noise = "each",
+    ) -> None:
+        self.objective, self.optimum = objective, optimum
+        self._values, self._slopes = values, slopes
         # the data that share a noise scale
-        self._group = np.nonzero(self._residuals.present)[0] * (noise == "each")
+        self._group = np.nonzero(objective.residuals.present)[0] * (noise == "each")
         self._counts = np.bincount(self._group)
-        stated = [np.isfinite(fit.measurement.error(name)).any() for name in fit.observables]
-        self._known = np.array(stated) if self._objective.informed and noise == "each" else False
-
-    def probe(self, point: Array) -> Probe:
-        """Return the probe of a point."""
-        return self._objective.at(self._probe, point)
-
-    def values(self, points: Array) -> Array:
-        """Return the parameters of points, (..., p)."""
-        return self._objective.coordinates.values(points)
 
     def log_probability(self, point: Array) -> float:
-        """Return the logarithm of the density; −∞ where the lever has no such state."""
-        if np.any(point <= self.lower) or np.any(point >= self.upper):
+        """Return the logarithm of the density, up to a constant; −∞ where there is no lever."""
+        low, high = self.objective.bounds
+        if np.any(point <= low) or np.any(point >= high):
             return -math.inf
         try:
-            values = self._model.predict(self.probe(point))
+            residual = self.objective.residuals.weighted(self._values(point))
         except ComputationError:
             return -math.inf
-        squares = self._squares(self._residuals.weighted(values))
-        unlikely = np.where(self._known, squares, self._counts * np.log(squares))
-        squares = unlikely.sum() + np.sum(self._objective.from_priors(point) ** 2)
-        return float(-0.5 * squares) + self._objective.log_volume(point)
+        unlikely = float(residual @ residual)
+        if not self.objective.informed:
+            unlikely = float(self._counts @ np.log(self._squares(residual)))
+        from_priors = self.objective.from_priors(point)
+        return -0.5 * float(unlikely + from_priors @ from_priors) + self.objective.log_volume(point)
 
-    def linearised(self) -> Gaussian:
-        """Return the posterior of the model linearised at its own material, as a normal one.
+    @cached_property
+    def approximation(self) -> Gaussian:
+        """What it is if the model is linear in the coordinates: a normal density.
 
-        The weights follow from the residuals and the residuals from the weights; a few dozen
-        rounds settle both. Directions that the data leave open are closed by the priors.
+        Without priors the weights follow from the residuals and the residuals from the weights; a
+        few dozen rounds settle both. What has no prior of its own is uniform within its bounds.
         """
-        objective = self._objective
-        residual = self._residuals.weighted(self._model.predict(self._probe))
-        jacobian = objective.of_data(self._model.slopes, self.optimum)
+        objective, (low, high) = self.objective, self.objective.bounds
+        residual = objective.residuals.weighted(self._values(self.optimum))
+        jacobian = objective.of_data(self._slopes, self.optimum)
         of_priors = objective.of_priors(self.optimum)
         pull = of_priors.T @ objective.from_priors(self.optimum)
-        step = np.zeros(self.optimum.size)
-        # what has no prior of its own is uniform within its bounds
-        uniform = np.where(of_priors.any(axis=0), 0.0, 12.0 / (self.upper - self.lower) ** 2)
+        uniform = np.where(of_priors.any(axis=0), 0.0, 12.0 / (high - low) ** 2)
         prior = np.diag(uniform) + of_priors.T @ of_priors
-        for _ in range(50):
-            squares = self._squares(residual + jacobian @ step)
-            weights = np.where(self._known, 1.0, self._counts / squares)[self._group]
+        step, weights = np.zeros(self.optimum.size), np.ones(residual.size)
+        for _ in range(1 if objective.informed else _WEIGHT_ROUNDS):
+            if not objective.informed:
+                squares = self._squares(residual + jacobian @ step)
+                weights = (self._counts / squares)[self._group]
             covariance = np.linalg.inv(jacobian.T @ (weights[:, None] * jacobian) + prior)
             step = -covariance @ (jacobian.T @ (weights * residual) + pull)
-        margin = 1e-3 * (self.upper - self.lower)
-        mean = np.clip(self.optimum + step, self.lower + margin, self.upper - margin)
+        margin = 1e-3 * (high - low)
+        mean = np.clip(self.optimum + step, low + margin, high - margin)
         return Gaussian(mean, np.asarray(covariance, dtype=float))
+
+    def sample(
+        self,
+        *,
+        samples: int,
+        walkers: int | None = None,
+        processes: int = 1,
+        seed: int = 0,
+        progress: Progress | None = None,
+    ) -> Chains:
+        """Sample points; see `hotlever.estimation.ensembles.sample`."""
+        return sample(
+            self.log_probability,
+            self.approximation,
+            samples=samples,
+            walkers=walkers,
+            processes=processes,
+            seed=seed,
+            progress=progress,
+        )
 
     def _squares(self, residual: Array) -> Array:
         """Return the sum of squares of each group; never zero, for its logarithm."""
         return np.maximum(np.bincount(self._group, residual**2), np.finfo(float).tiny)
+
+
+def _posterior_at(fit: Fit, probe: Probe, noise: Noise) -> tuple[Posterior, RoughModel]:
+    """Return the posterior of a fit's parameters, and the model of the levers near a probe."""
+    residuals = fit.residuals()
+    model = rough_model(probe, fit.names, residuals.bias)
+    objective = Objective(residuals, probe, model.names, fit.names, fit.known_before)
+    values = partial(_values_at, model, objective, probe)
+    return Posterior(objective, values, objective.point(probe), model.slopes, noise), model
+
+
+def _values_at(model: RoughModel, objective: Objective, probe: Probe, point: Array) -> Array:
+    return model.predict(objective.at(probe, point))
 
 
 def sample_posterior(
@@ -156,23 +202,17 @@ def sample_posterior(
     if noise not in ("each", "common"):
         raise InputError(f"found noise = {noise!r}, expected 'each' or 'common'")
     fit.need_described("a posterior")
-    bias = fit.residuals().bias
-    at_optimum = FitPosterior(fit, rough_model(fit.probe, fit.names, bias), noise)
+    at_optimum, _ = _posterior_at(fit, fit.probe, noise)
     # with other weights than the fit's, the posterior lies beside the optimum
-    middle = rough_model(at_optimum.probe(at_optimum.linearised().mean), fit.names, bias)
-    target = FitPosterior(fit, middle, noise)
-    chains = sample(
-        target.log_probability,
-        at_optimum.linearised(),
-        samples=samples,
-        walkers=walkers or None,
-        processes=processes,
-        seed=seed,
-        progress=progress,
+    middle = at_optimum.objective.at(fit.probe, at_optimum.approximation.mean)
+    target, model = _posterior_at(fit, middle, noise)
+    chains = target.sample(
+        samples=samples, walkers=walkers, processes=processes, seed=seed, progress=progress
     )
-    data = _dataset(fit, chains, target.values)
+    data = _dataset(fit, chains, target.objective.coordinates.values)
     points = chains.points.reshape(-1, target.optimum.size)
-    error = max(middle.error_K(target.probe(points[place])) for place in _outermost(points))
+    outermost = [target.objective.at(middle, points[row]) for row in _outermost(points)]
+    error = max(map(model.error_K, outermost))
     data.attrs |= {"seed": seed, "noise": noise, "rough_error_K": error}
     return data
 

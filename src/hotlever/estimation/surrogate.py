@@ -12,15 +12,16 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
+from scipy import optimize
 
 from hotlever.errors import ComputationError
 from hotlever.estimation.experiment import Prediction
-from hotlever.estimation.objective import Objective
+from hotlever.estimation.objective import Objective, inside
 from hotlever.types import Array
 
-#: Scaled residual given to trial parameters for which the lever has no state: far beyond any
-#: real one, so that a search turns back.
-UNSOLVED = 10.0
+#: Relative change of the sum of squares at which a minimum is found; without priors squares count
+#: no standard deviations, so that next to nothing may be left.
+_GAIN, _PRECISE_GAIN = 1e-5, 1e-10
 
 
 class Surrogate:
@@ -90,14 +91,61 @@ class Surrogate:
             )
         return values, slopes
 
+    def values(self, point: Array) -> Array:
+        """Return the first of these alone."""
+        return self.predict(point)[0]
+
+    def _has_states(self, point: Array) -> bool:
+        try:
+            self.predict(point)
+        except ComputationError:
+            return False
+        return True
+
     def residual(self, point: Array) -> Array:
         """Return the residuals of data and priors; large ones if the lever has no such states."""
         try:
-            return self.objective.residual(self.predict(point)[0], point)
+            return self.objective.residual(self.values(point), point)
         except ComputationError:
-            data = np.full(self.objective.residuals.size, UNSOLVED)
-            return np.concatenate([data, self.objective.from_priors(point)])
+            return self.objective.unsolved(point)
 
     def jacobian(self, point: Array) -> Array:
         """Return their derivatives by the coordinates."""
         return self.objective.jacobian(self.predict(point)[1], point)
+
+    def squares(self, point: Array) -> float:
+        """Return the sum of squares of the residuals."""
+        residual = self.residual(point)
+        return float(residual @ residual)
+
+    def minimum(
+        self, start: Array | None = None, region: Array | None = None
+    ) -> tuple[Array, float]:
+        """Return the point of least squares, and these.
+
+        Parameters
+        ----------
+        start : ndarray, shape (p,), optional
+            Where the search begins; at the lever that was solved by default, or if there are no
+            states.
+        region : ndarray, shape (p,), optional
+            How far it may go from that lever; by default to the bounds.
+        """
+        objective, (low, high) = self.objective, self.objective.bounds
+        if region is not None:
+            low = np.maximum(low, self.origin - region)
+            high = np.minimum(high, self.origin + region)
+        if start is None or not self._has_states(start):
+            start = self.origin
+        found = optimize.least_squares(
+            self.residual,
+            inside(start, low, high),
+            self.jacobian,
+            (low, high),
+            x_scale="jac",
+            ftol=_GAIN if objective.informed else _PRECISE_GAIN,
+            xtol=1e-10,
+            gtol=None,
+            max_nfev=100,
+        )
+        return found.x, 2.0 * float(found.cost)

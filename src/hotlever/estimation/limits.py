@@ -11,23 +11,17 @@ It takes the levers near the optimum from those that were solved in the search.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
 
 from hotlever.errors import ComputationError
-from hotlever.estimation.ensembles import (
-    Gaussian,
-    independent_samples,
-    rhat_of_ensembles,
-    sample,
-)
+from hotlever.estimation.ensembles import independent_samples, rhat_of_ensembles
 from hotlever.estimation.experiment import Prediction
-from hotlever.estimation.objective import Objective, inside
-from hotlever.estimation.surrogate import UNSOLVED, Surrogate
+from hotlever.estimation.objective import Objective, Pull
+from hotlever.estimation.posterior import Posterior
+from hotlever.estimation.surrogate import Surrogate
 from hotlever.text import BAND
 from hotlever.types import Array, Index, Progress
 
@@ -38,8 +32,6 @@ _PLACES, _AWAY = 3, 2.0
 _ROUNDS, _NEARLY = 3, 0.1
 #: Levers that are solved on each side at most, unless the sum of squares is known as well as this.
 _MOST_SOLVED, _KNOWN = 3, 0.4
-#: Relative change of the sum of squares at which a pulled estimate is found.
-_FOUND = 1e-5
 #: A rise of the sum of squares below which a side is open.
 _LEAST_RISE = 0.25
 #: A linearised error that is right within this factor holds.
@@ -126,12 +118,12 @@ def _pulled_lever(
     near = optimum
     for _ in range(_MOST_SOLVED):
         there, _ = _pulled(optimum, near, covariance, place, way)
-        expected = _squares(near.residual(there))
+        expected = near.squares(there)
         try:
             near = Surrogate(optimum.objective, solved(there, near.at))
         except ComputationError:  # it melts below the highest bias
             break
-        if abs(_squares(near.residual(near.origin)) - expected) < _KNOWN:
+        if abs(near.squares(near.origin) - expected) < _KNOWN:
             return near
     return None
 
@@ -147,19 +139,28 @@ def _pulled(
     slope = at.slopes[2, place, objective.columns]
     along = covariance @ slope
     stderr, here = float(np.sqrt(slope @ along)), float(at.values[2, place])
-    least, multiple, there = _squares(optimum.residual(optimum.origin)), 1.0, near.origin
+    least, multiple, there = optimum.squares(optimum.origin), 1.0, near.origin
     if near is optimum:
         there = there + way * _AWAY * along / (stderr * objective.rates(near.at.probe))
     for _ in range(_ROUNDS):
         # a negative error is one to the cold side
-        pulled = _Pulled(near, place, here, way * multiple * stderr)
-        there = pulled.estimate(there)
-        rise = _squares(near.residual(there)) - least
-        away = abs(pulled.tip_K(there) - here) / stderr
+        pulled = Surrogate(_pulled_away(objective, place, here, way * multiple * stderr), near.at)
+        there, _ = pulled.minimum(there)
+        rise = near.squares(there) - least
+        away = abs(float(near.values(there)[2, place]) - here) / stderr
         last, multiple = multiple, away / np.sqrt(max(rise, _LEAST_RISE))
         if abs(multiple / last - 1.0) < _NEARLY:
             break
     return there, multiple
+
+
+def _pulled_away(objective: Objective, place: int, tip_K: float, stderr: float) -> Objective:
+    """Return an objective whose optimum has another tip temperature at one bias.
+
+    As if it had been measured there as well, twice as far away, with the error that it is known by:
+    the estimate moves half the way, to `_AWAY` standard errors if everything is linear.
+    """
+    return objective.pulled(Pull(place, tip_K + 2.0 * _AWAY * stderr, stderr))
 
 
 @dataclass(frozen=True)
@@ -204,16 +205,10 @@ def posterior_of_tip(
     processes of its own.
     """
     surrogate = Surrogate(objective, at, others, least=_TELLING)
-    rates = objective.rates(at.probe)
-    scaled = covariance / np.outer(rates, rates)
-    chains = sample(
-        _Density(surrogate),
-        Gaussian(surrogate.origin, scaled),
-        samples=samples,
-        progress=progress,
-    )
+    posterior = Posterior(objective, surrogate.values, surrogate.origin, at.slopes)
+    chains = posterior.sample(samples=samples, progress=progress)
     some, every = _looked_at(at), chains.points.reshape(-1, surrogate.origin.size)
-    tips = np.array([surrogate.predict(point)[0][2] for point in every])
+    tips = np.array([surrogate.values(point)[2] for point in every])
     slopes = at.slopes[2][some][:, objective.columns]
     stderr = np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes))
     low, high = np.percentile(tips[:, some], (2.5, 97.5), axis=0)
@@ -230,69 +225,3 @@ def _looked_at(at: Prediction) -> Index:
     """Return the places of the data at which limits are looked for, the hottest last."""
     order = np.argsort(at.values[2])
     return order[np.linspace(order.size / 2, order.size - 1, _PLACES).astype(int)]
-
-
-@dataclass(frozen=True)
-class _Density:
-    """The logarithm of the posterior density of scaled parameters."""
-
-    surrogate: Surrogate
-
-    def __call__(self, scaled: Array) -> float:
-        low, high = self.surrogate.objective.bounds
-        if np.any(scaled <= low) or np.any(scaled >= high):
-            return -math.inf
-        squares = _squares(self.surrogate.residual(scaled))
-        return -0.5 * squares + self.surrogate.objective.log_volume(scaled)
-
-
-class _Pulled:
-    """An estimate whose tip temperature at one bias is pulled away from what it is at the optimum.
-
-    If it had been measured there as well, twice as far away, with the error that it is known by,
-    the estimate would move half the way: to `_AWAY` standard errors if everything is linear.
-    """
-
-    def __init__(self, surrogate: Surrogate, place: int, tip_K: float, stderr: float) -> None:
-        self._surrogate, self._place, self._stderr = surrogate, place, stderr
-        self._target = tip_K + 2.0 * _AWAY * stderr
-
-    def tip_K(self, scaled: Array) -> float:
-        return float(self._surrogate.predict(scaled)[0][2, self._place])
-
-    def estimate(self, start: Array) -> Array:
-        """Return the scaled parameters of least squares."""
-        objective = self._surrogate.objective
-        low, high = objective.bounds
-        try:
-            self.tip_K(start)
-        except ComputationError:
-            start = self._surrogate.origin
-        found = optimize.least_squares(
-            self._residual,
-            inside(start, low, high),
-            self._jacobian,
-            (low, high),
-            x_scale="jac",
-            ftol=_FOUND,
-            gtol=None,
-            max_nfev=100,
-        )
-        return np.asarray(found.x)
-
-    def _residual(self, scaled: Array) -> Array:
-        known = self._surrogate.residual(scaled)
-        try:
-            return np.append(known, (self.tip_K(scaled) - self._target) / self._stderr)
-        except ComputationError:
-            return np.append(known, UNSOLVED)
-
-    def _jacobian(self, scaled: Array) -> Array:
-        objective = self._surrogate.objective
-        slope = self._surrogate.predict(scaled)[1][2, self._place, objective.columns]
-        row = slope * objective.coordinates.rates(scaled) / self._stderr
-        return np.vstack([self._surrogate.jacobian(scaled), row])
-
-
-def _squares(residual: Array) -> float:
-    return float(residual @ residual)

@@ -9,35 +9,30 @@ import numpy as np
 import pytest
 
 from hotlever.calibration.inference import error_of_model
-from hotlever.calibration.limits import posterior_of_tip, profile_of_tip
+from hotlever.estimation.limits import posterior_of_tip, profile_of_tip
+from hotlever.estimation.objective import Objective
+from hotlever.probe.priors import Prior
 from hotlever.probe.surroundings import Surroundings
 from hotlever.text import BAND
 
 TIPS, SLOPES = np.array([300.0, 500.0, 800.0]), np.array([1.0, 10.0, 20.0])
 
 
-class OneUnknown:
+class OneUnknown(Objective):
     """An objective with one unknown x, of which is known that it is 0 ± 1, and nothing else."""
 
-    names, columns = ("x",), [0]
-    bounds = np.array([[-9.0], [9.0]])
-    coordinates = SimpleNamespace(values=np.copy, rates=np.ones_like)
-    residuals = SimpleNamespace(size=0)
-
-    def point(self, probe):
-        return probe.at(["x"])
-
-    def rates(self, probe):
-        return np.ones(1)
-
-    def log_volume(self, point):
-        return 0.0
-
-    def residual(self, values, scaled):
-        return scaled.copy()
-
-    def jacobian(self, slopes, scaled):
-        return np.ones((1, 1))
+    def __init__(self):
+        self.names, self.varied, self.columns = ("x",), ["x"], [0]
+        self.coordinates = SimpleNamespace(point=np.copy, values=np.copy, rates=np.ones_like)
+        self.bounds = np.array([[-9.0], [9.0]])
+        self.residuals = SimpleNamespace(
+            size=0,
+            present=np.zeros((1, 0), dtype=bool),
+            weighted=lambda values: np.zeros(0),
+            jacobian=lambda slopes: np.zeros((0, 1)),
+        )
+        self.informed, self._joint, self._of_joint, self._pull = True, None, [], None
+        self._priors = {0: Prior(0.0, 1.0, relative=False)}
 
 
 def prediction(bend, at=(0.0,)):
