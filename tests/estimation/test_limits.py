@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from hotlever.calibration.inference import error_of_model
-from hotlever.estimation.limits import posterior_of_tip, profile_of_tip
+from hotlever.estimation.limits import profile_of_tip
 from hotlever.estimation.objective import Objective
+from hotlever.estimation.sampled_limits import posterior_of_tip
 from hotlever.probe.priors import Prior
 from hotlever.probe.surroundings import Surroundings
 from hotlever.text import BAND

@@ -15,6 +15,7 @@ from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit
 from hotlever.estimation.experiment import Experiment, full_experiment
 from hotlever.estimation.inverse_problem import estimate
+from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.residuals import Residuals
@@ -128,7 +129,8 @@ def test_a_search_that_was_ended_says_that_it_has_not_converged(coarse):
     residuals = Residuals(data, ["current"])
     model = full_experiment(coarse, residuals.bias).measuring(residuals.bias, residuals.shown)
     options = SearchOptions(most_branches=2)
-    search = Optimiser(model, residuals, far, list(PARAMETERS), options=options)
+    objective = Objective(residuals, far, model.names, list(PARAMETERS))
+    search = Optimiser(model, objective, options=options)
     optimum = search.solve(far)
     assert not optimum.converged
     assert optimum.decrement > 1e-3 * search.objective.squares(optimum.prediction)

@@ -19,7 +19,7 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, FitOptions, Measurement
 from hotlever.estimation.either_medium import error_of_choice
 from hotlever.estimation.inverse_problem import Estimate, estimate
-from hotlever.estimation.limits import posterior_of_tip, profile_of_tip
+from hotlever.estimation.limits import profile_of_tip
 from hotlever.lever import Branch
 from hotlever.lever.curve import spline_through
 from hotlever.lever.dataset import OBSERVABLES
@@ -346,6 +346,9 @@ def _limits(
     if not objective.informed:
         return (tip - away, tip + away), []
     if samples:
+        # what samples takes a second to load, for which few calibrations have to wait
+        from hotlever.estimation.sampled_limits import posterior_of_tip
+
         posterior = posterior_of_tip(
             objective,
             at,

@@ -8,12 +8,12 @@ portion begins where the last has led, and no candidate is asked for biases that
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from hotlever.errors import ComputationError
 from hotlever.estimation.experiment import Experiment, Prediction
+from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.search_options import SearchOptions
@@ -91,8 +91,8 @@ def grown(
         if has_moved(model.drawn, start):
             model = model.drawn_anew(start)
         of_part = model.measuring(residuals.bias, residuals.shown)
-        search: Any = {"priors": known, "joint": joint, "options": _ROUGHLY, "progress": progress}
-        problem = Optimiser(of_part, residuals, start, varied, **search)
+        objective = Objective(residuals, start, of_part.names, varied, known, joint)
+        problem = Optimiser(of_part, objective, progress=progress, options=_ROUGHLY)
         try:
             start = problem.solve(start).probe
         except ComputationError:

@@ -1,12 +1,9 @@
 """How far the tip temperature may be off either way, where the linearised error may not hold.
 
-The profile: all parameters are estimated anew with the tip temperature at one bias pulled away, on
+All parameters are estimated anew with the tip temperature at one bias pulled away, on
 either side. The sum of squares, of which each unit is a standard deviation squared, then rises by
 the square of how many standard errors away it is. A linearised error is that for small changes.
-Levers that are pulled so far are solved.
-
-The posterior: all parameters are sampled, and the limits are quantiles of their tip temperatures.
-It takes the levers near the optimum from those that were solved in the search.
+Levers that are pulled so far are solved. `hotlever.estimation.sampled_limits` samples instead.
 """
 
 from __future__ import annotations
@@ -17,29 +14,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.errors import ComputationError
-from hotlever.estimation.ensembles import independent_samples, rhat_of_ensembles
 from hotlever.estimation.experiment import Prediction
 from hotlever.estimation.objective import Objective, Pull
-from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.surrogate import Surrogate
 from hotlever.text import BAND
-from hotlever.types import Array, Index, Progress
+from hotlever.types import Array, Index
 
 #: Biases, in the hotter half, at which the tip temperature is pulled away, and by how many
 #: standard errors.
 _PLACES, _AWAY = 3, 2.0
 #: Most times that it is pulled, each with the error found before, unless that changes by less.
 _ROUNDS, _NEARLY = 3, 0.1
-#: Levers that are solved on each side at most, unless the sum of squares is known as well as this.
-_MOST_SOLVED, _KNOWN = 3, 0.4
+#: Levers that are solved on each side at most; one is near enough if the pulled estimate is no
+#: further from it than this share of the way from the optimum: where levers were solved on until
+#: the sum of squares was known within 0.4, the standard error changed by 3 % at most.
+_MOST_SOLVED, _NEAR = 3, 0.3
 #: A rise of the sum of squares below which a side is open.
 _LEAST_RISE = 0.25
 #: A linearised error that is right within this factor holds.
 _ALIKE = 1.25
-#: Standard deviations from which on a solved lever tells of those that samples reach.
-_TELLING = 1.0
-#: R̂ from which on samples are too few.
-_SETTLED = 1.05
 
 
 @dataclass(frozen=True)
@@ -93,7 +86,7 @@ def profile_of_tip(
     covariance : ndarray, shape (p, p)
         Of the varied parameters, linearised.
     """
-    optimum, some = Surrogate(objective, at), _looked_at(at)
+    optimum, some = Surrogate(objective, at), looked_at(at)
     sides = np.ones((2, some.size))
     for side, way in enumerate((-1.0, 1.0)):
         near = _pulled_lever(optimum, covariance, int(some[-1]), way, solved)
@@ -111,20 +104,24 @@ def _pulled_lever(
 ) -> Surrogate | None:
     """Solve the lever whose tip is pulled to one side, and return what is near it.
 
-    It is pulled again from there, until its sum of squares is known; None if that does not end.
-    What the optimum tells of levers so far away does not hold where parameters make up for each
-    other along a bent valley.
+    It is pulled again from there until that moves it little; None if that does not end. What the
+    optimum tells of levers so far away does not hold where parameters make up for each other along
+    a bent valley.
     """
+    # lengths in standard errors of the parameters
+    errors = np.sqrt(np.diag(covariance)) / optimum.objective.rates(optimum.at.probe)
     near = optimum
-    for _ in range(_MOST_SOLVED):
+    for count in range(_MOST_SOLVED + 1):
         there, _ = _pulled(optimum, near, covariance, place, way)
-        expected = near.squares(there)
+        moved, away = there - near.origin, near.origin - optimum.origin
+        if count and np.linalg.norm(moved / errors) < _NEAR * np.linalg.norm(away / errors):
+            return near
+        if count == _MOST_SOLVED:
+            break
         try:
             near = Surrogate(optimum.objective, solved(there, near.at))
         except ComputationError:  # it melts below the highest bias
             break
-        if abs(near.squares(near.origin) - expected) < _KNOWN:
-            return near
     return None
 
 
@@ -144,7 +141,7 @@ def _pulled(
         there = there + way * _AWAY * along / (stderr * objective.rates(near.at.probe))
     for _ in range(_ROUNDS):
         # a negative error is one to the cold side
-        pulled = Surrogate(_pulled_away(objective, place, here, way * multiple * stderr), near.at)
+        pulled = near.of(_pulled_away(objective, place, here, way * multiple * stderr))
         there, _ = pulled.minimum(there)
         rise = near.squares(there) - least
         away = abs(float(near.values(there)[2, place]) - here) / stderr
@@ -163,65 +160,7 @@ def _pulled_away(objective: Objective, place: int, tip_K: float, stderr: float) 
     return objective.pulled(Pull(place, tip_K + 2.0 * _AWAY * stderr, stderr))
 
 
-@dataclass(frozen=True)
-class TipPosterior:
-    """What posterior samples say of the tip temperature.
-
-    Attributes
-    ----------
-    profile : Profile
-        From the quantiles of 2.5 and 97.5 %.
-    effective_samples, rhat : float
-        Of the tip temperature where it is hottest.
-    """
-
-    profile: Profile
-    effective_samples: float
-    rhat: float
-
-    @property
-    def note(self) -> str:
-        """What the limits are from, and whether there are enough samples."""
-        text = (
-            "95 % of the tip temperatures lie between quantiles of posterior samples "
-            f"({self.effective_samples:.0f} effective ones, R̂ {self.rhat:.3f})"
-        )
-        return text + ("" if self.rhat < _SETTLED else "; these are too few, take more samples")
-
-
-def posterior_of_tip(
-    objective: Objective,
-    at: Prediction,
-    others: list[Prediction],
-    covariance: Array,
-    *,
-    samples: int,
-    progress: Progress | None = None,
-) -> TipPosterior:
-    """Sample the parameters of an estimate, and their tip temperatures.
-
-    Parameters are those of `profile_of_tip`, with `others` than the optimum that have been solved,
-    and those of `hotlever.estimation.ensembles.sample`. What is sampled costs too little for
-    processes of its own.
-    """
-    surrogate = Surrogate(objective, at, others, least=_TELLING)
-    posterior = Posterior(objective, surrogate.values, surrogate.origin, at.slopes)
-    chains = posterior.sample(samples=samples, progress=progress)
-    some, every = _looked_at(at), chains.points.reshape(-1, surrogate.origin.size)
-    tips = np.array([surrogate.values(point)[2] for point in every])
-    slopes = at.slopes[2][some][:, objective.columns]
-    stderr = np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes))
-    low, high = np.percentile(tips[:, some], (2.5, 97.5), axis=0)
-    middle = at.values[2, some]
-    hottest = tips[:, some[-1]].reshape(chains.points.shape[:3])
-    return TipPosterior(
-        Profile(middle, (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)),
-        independent_samples(hottest),
-        rhat_of_ensembles(hottest),
-    )
-
-
-def _looked_at(at: Prediction) -> Index:
+def looked_at(at: Prediction) -> Index:
     """Return the places of the data at which limits are looked for, the hottest last."""
     order = np.argsort(at.values[2])
     return order[np.linspace(order.size / 2, order.size - 1, _PLACES).astype(int)]

@@ -8,7 +8,7 @@ Gauss and Newton's step would lower the sum of squares by next to nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -17,11 +17,9 @@ import numpy as np
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.objective import Objective, inverse_or_nan
-from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.search_options import SearchOptions
 from hotlever.estimation.surrogate import Surrogate
 from hotlever.probe import Probe
-from hotlever.probe.priors import JointPrior, Prior
 from hotlever.types import Array, Progress
 
 #: Branches that most searches need, for a progress bar to fill.
@@ -58,16 +56,21 @@ class Optimum:
 class Optimiser:
     """Finds the parameters whose prediction is nearest to a measurement.
 
-    It begins at the probe `start`, where what is not varied stays, or from a prediction for a
-    similar one, `near`; priors by name, or a joint one of all that is varied, count as further
-    data. `progress` is called with the branches solved and how many there usually are, `seen` with
-    each prediction that is compared with the data.
+    Parameters
+    ----------
+    model : Experiment
+        Kept as the attribute `model`, as confirmed last.
+    objective : Objective
+    progress : callable, optional
+        Called with the branches solved and how many there usually are.
+    seen : callable, optional
+        Called with each prediction that is compared with the data.
+    near : Prediction, optional
+        Of a lever similar to that at which the search begins.
+    options : SearchOptions, optional
 
     Attributes
     ----------
-    model : Experiment
-        As confirmed last.
-    objective : Objective
     evaluations, steps : int
         Branches solved, and those of them that led nearer to the optimum.
     """
@@ -75,25 +78,23 @@ class Optimiser:
     def __init__(
         self,
         model: Experiment,
-        residuals: Residuals,
-        start: Probe,
-        varied: list[str],
+        objective: Objective,
+        *,
         progress: Progress | None = None,
-        near: Prediction | None = None,
-        priors: Mapping[str, Prior] | None = None,
-        joint: JointPrior | None = None,
         seen: Callable[[Prediction], None] | None = None,
+        near: Prediction | None = None,
         options: SearchOptions | None = None,
     ) -> None:
-        self.model, self.residuals = model, residuals
-        self._start, self._progress, self._seen = start, progress, seen
-        self.objective = Objective(residuals, start, model.names, varied, priors, joint)
+        self.model, self.objective, self.residuals = model, objective, objective.residuals
+        self._progress, self._seen = progress, seen
         self._at_hand = {} if near is None else {near.probe: near}
         self._options = options or SearchOptions()
         self.evaluations, self.steps = 0, 0
 
-    def solve_and_confirm(self, robust: bool) -> Optimum:
+    def solve_and_confirm(self, start: Probe, robust: bool) -> Optimum:
         """Find the optimum, make the model exact there, and go on until that matters no more.
+
+        A robust search lessens the weight of outliers.
 
         Raises
         ------
@@ -101,13 +102,13 @@ class Optimiser:
             If the lever cannot be solved at the start, or confirmations do not settle.
         """
         options = self._options
-        optimum = self.solve(self._start)
+        optimum = self.solve(start)
         unknown = self.residuals.without_errors.any() and not self.objective.informed
         for _ in range(options.scatter_rounds if unknown else 0):
             self.residuals.take_scatter(optimum.prediction.values)
             optimum = self.solve(optimum.probe)
         if robust:
-            optimum = self._reweighted(optimum)
+            optimum = self._reweighted(start, optimum)
         for _ in range(options.confirmations):
             confirmed = self.model.confirmed(optimum.prediction)
             if confirmed is self.model:
@@ -124,7 +125,7 @@ class Optimiser:
                 return optimum
         return replace(optimum, converged=False)
 
-    def _reweighted(self, optimum: Optimum) -> Optimum:
+    def _reweighted(self, start: Probe, optimum: Optimum) -> Optimum:
         """Lessen the weight of outliers until nothing changes: gently at first.
 
         With priors outliers stand out at once, since these hold a fit that others would pull along;
@@ -137,7 +138,7 @@ class Optimiser:
             for _ in range(most):
                 self.residuals.lessen(optimum.prediction.values, gently)
                 # outliers can drive the first fit onto a bound, where it would stay without priors
-                origin = self._start if gently and not self.objective.informed else optimum.probe
+                origin = start if gently and not self.objective.informed else optimum.probe
                 previous, optimum = optimum, self.solve(origin)
                 if not optimum.converged or self._settled(previous, optimum):
                     break

@@ -86,8 +86,8 @@ def profile_likelihood(
         """Fit the others with the parameter at `value`; return Δχ² and where."""
         nonlocal near
         held = start.moved({name: value})
-        problem = Optimiser(model, residuals, held, others, near=near, priors=of_others)
-        found = problem.solve(held)
+        objective = Objective(residuals, held, model.names, others, of_others)
+        found = Optimiser(model, objective, near=near).solve(held)
         near = found.prediction
         return (whole.squares(near) - least) / variance, found.probe
 

@@ -13,6 +13,7 @@ from hotlever.errors import ComputationError
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.growth import far_from, grown
 from hotlever.estimation.lack_of_fit import undescribed
+from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser, Optimum
 from hotlever.estimation.residuals import Residuals
 from hotlever.measurement import Measurement
@@ -36,7 +37,9 @@ class Search:
     varied : list of str
     robust : bool
         Whether the weight of outliers is lessened.
-    priors, joint, progress, seen
+    priors, joint
+        See `hotlever.estimation.objective.Objective`.
+    progress, seen
         See `hotlever.estimation.optimiser.Optimiser`.
     """
 
@@ -52,19 +55,12 @@ class Search:
     def near(self, forward: Any, start: Probe) -> End:
         """Search from a lever that is not far from the one that was measured."""
         problem = self._problem(forward, start)
-        return problem, problem.solve_and_confirm(self.robust)
+        return problem, problem.solve_and_confirm(start, self.robust)
 
     def _problem(self, forward: Any, start: Probe) -> Optimiser:
-        return Optimiser(
-            forward,
-            self.residuals.afresh(),
-            start,
-            self.varied,
-            progress=self.progress,
-            priors=self.priors,
-            joint=self.joint,
-            seen=self.seen,
-        )
+        residuals = self.residuals.afresh()
+        objective = Objective(residuals, start, forward.names, self.varied, self.priors, self.joint)
+        return Optimiser(forward, objective, progress=self.progress, seen=self.seen)
 
     def from_anywhere(self, forward: Experiment, measurement: Measurement) -> End:
         """Search from a lever of which little may be known.
@@ -82,7 +78,7 @@ class Search:
         problem = self._problem(forward, self.start)
         with suppress(ComputationError):
             if not far_from(self.residuals, problem.predict(self.start)):
-                ends.append((problem, problem.solve_and_confirm(self.robust)))
+                ends.append((problem, problem.solve_and_confirm(self.start, self.robust)))
                 if _describes(*ends[0]):
                     return ends[0]
         again, nearer = grown(

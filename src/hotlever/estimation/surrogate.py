@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from copy import copy
 
 import numpy as np
 from scipy import optimize
@@ -64,6 +65,12 @@ class Surrogate:
                 # the product with this direction is 1 at the other prediction
                 if size > least**2:
                     self._bends.append((along / size, missed))
+
+    def of(self, objective: Objective) -> Surrogate:
+        """Return the same levers, compared with the data by another objective."""
+        other = copy(self)
+        other.objective = objective
+        return other
 
     def predict(self, point: Array) -> tuple[Array, Array]:
         """Return I_h, V_r and T_tip (3, n), and their derivatives by all parameters (3, n, k).
