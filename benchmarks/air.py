@@ -20,7 +20,7 @@ import numpy as np
 from hotlever.air.operator import PanelledAir
 from hotlever.air.surface import PanelOptions
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.estimation.experiment import reduced_experiment
+from hotlever.estimation.experiment_at_rest import reduced_experiment
 from hotlever.lever import Lever
 from hotlever.lever.box import PAPER, Box
 from hotlever.lever.reduction import cached_reduction

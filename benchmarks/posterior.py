@@ -9,7 +9,7 @@ import sys
 import time
 
 from hotlever.estimation import fit, read_measurement
-from hotlever.estimation.posterior import predictive_band, sample_posterior
+from hotlever.estimation.sampling import predictive_band, sample_posterior
 from problems import EXAMPLE, table
 
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimation import fit, read_measurement
-from hotlever.estimation.experiment import full_experiment, reduced_experiment, shown_at_bias
+from hotlever.estimation.experiment_at_rest import full_experiment, reduced_experiment
+from hotlever.estimation.load_lines import Rows, shown_at
 from hotlever.lever import Lever
 from hotlever.lever.box import PAPER, Box
 from hotlever.lever.branch import Reach
@@ -50,7 +51,8 @@ def accuracy(lever, reduced, cases):
         bias = np.sort(rng.uniform(1.0, 11.0, BIASES))
         same = lever.with_material(material)
         branch = reduced.linearised(same.probe, Reach(circuit, bias[-1])).branch
-        u, shown = shown_at_bias(branch, circuit, bias)
+        u, _ = Rows(bias).states(branch, circuit)
+        shown = shown_at(branch, circuit, u)
         guesses = reduced.all_points.expanded(branch.states(u))
         exact = same.dataset(
             [same.polished(x[:, None], v) for x, v in zip(guesses.T, bias, strict=True)]

@@ -12,7 +12,7 @@ import numpy as np
 
 from hotlever.errors import ComputationError
 from hotlever.estimation import Measurement, fit, read_measurement
-from hotlever.estimation.experiment import Experiment, experiment_of
+from hotlever.estimation.experiment_at_rest import ExperimentAtRest, experiment_of
 from hotlever.lever import Lever
 from hotlever.lever.box import PAPER, Box
 from hotlever.lever.lever import COARSE
@@ -87,7 +87,7 @@ def coverage(probe, twins, proportional):
 
 def coarse(probe, bias):
     """Return the model of a geometry never reduced, whose fits start at the probe's material."""
-    return Experiment(Lever(probe, COARSE), Lever(probe), probe.circuit, bias)
+    return ExperimentAtRest(Lever(probe, COARSE), Lever(probe), probe.circuit, bias)
 
 
 def starts(count, model, name):

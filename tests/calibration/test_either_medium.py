@@ -12,7 +12,7 @@ import pytest
 from hotlever.calibration.procedure import calibrate
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.either_medium import InMedium, likelier
+from hotlever.estimation.either_medium import likelier
 from hotlever.estimation.residuals import Residuals
 from synthetic_curves import measured_curve, measurement_of
 
@@ -69,47 +69,62 @@ def test_what_describes_the_data_is_the_answer(reference):
 def answers(of: dict[str, tuple[str, float] | Exception]) -> Any:
     """Answer as told: a reason against it, and how unlikely it is."""
 
-    def answered(medium: str) -> InMedium[str]:
+    def answered(medium: str) -> tuple[Any, Any]:
         told = of[medium]
         if isinstance(told, Exception):
             raise told
-        residuals = SimpleNamespace(rms=lambda _: {"current_mA": 0.00123})
-        estimate: Any = SimpleNamespace(
-            unlikeliness=told[1],
-            problem=SimpleNamespace(residuals=residuals),
-            optimum=SimpleNamespace(prediction=SimpleNamespace(values=None)),
+        reason, deviance = told
+        estimate = SimpleNamespace(
+            posterior=SimpleNamespace(deviance=deviance),
+            residuals=SimpleNamespace(rms=lambda _: {"current_mA": 0.00123}),
+            prediction=SimpleNamespace(values=None),
         )
-        return InMedium(medium, estimate, told[0])
+        return estimate, SimpleNamespace(medium=medium, reason=reason)
 
     return answered
 
 
+def media(found: Any) -> tuple[str, str | None]:
+    """The medium of the answer, and of the other one if there is one."""
+    return found.answer.medium, None if found.other is None else found.other.medium
+
+
 def test_a_described_answer_comes_before_a_likelier_one():
-    best, other, words = likelier(answers({"vacuum": ("", 9.0), "air": ("no such lever", 1.0)}))
-    assert (best, other) == ("vacuum", None)
-    assert words == (
+    found = likelier(answers({"vacuum": ("", 9.0), "air": ("no such lever", 1.0)}))
+    assert media(found) == ("vacuum", None)
+    assert found.words == (
         "the medium is not known: in vacuum a lever describes the data (rms 0.0012 mA); "
         "in air a lever does not describe the data (rms 0.0012 mA)"
     )
 
 
 def test_of_two_described_the_likelier_is_the_answer():
-    best, other, _ = likelier(answers({"vacuum": ("", 9.0), "air": ("", 1.0)}))
-    assert (best, other) == ("air", "vacuum")
+    found = likelier(answers({"vacuum": ("", 9.0), "air": ("", 1.0)}))
+    assert media(found) == ("air", "vacuum")
 
 
 def test_of_two_that_are_not_described_the_nearer_is_shown():
-    best, other, _ = likelier(answers({"vacuum": ("no", 9.0), "air": ("no", 1.0)}))
-    assert (best, other) == ("air", None)
+    found = likelier(answers({"vacuum": ("no", 9.0), "air": ("no", 1.0)}))
+    assert media(found) == ("air", None)
 
 
 def test_what_cannot_be_solved_is_said():
     failure = ComputationError("it melts")
-    best, other, words = likelier(answers({"vacuum": failure, "air": ("", 1.0)}))
-    assert (best, other) == ("air", None)
-    assert words.endswith("in vacuum none can be solved: it melts")
+    found = likelier(answers({"vacuum": failure, "air": ("", 1.0)}))
+    assert media(found) == ("air", None)
+    assert found.words.endswith("in vacuum none can be solved: it melts")
     with pytest.raises(ComputationError, match="it melts"):
         likelier(answers({"vacuum": failure, "air": failure}))
+
+
+def test_the_medium_that_is_asked_for_wins_over_what_the_file_says(cold):
+    """Once a calibration in air of what a file calls vacuum was one in vacuum, without a word."""
+    stated, unsaid = replace(cold, medium="vacuum"), replace(cold, medium=None)
+    asked, own = (calibrate(measured, medium="air") for measured in (stated, unsaid))
+    assert asked.medium == "air"
+    np.testing.assert_array_equal(asked.table.tip_K, own.table.tip_K)
+    said = "medium: air, as asked, although the data file says vacuum"
+    assert [note for note in asked.notes if "medium" in note] == [said]
 
 
 def test_only_data_may_be_of_an_unknown_medium(run, cold):

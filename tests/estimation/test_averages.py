@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever.estimation import Measurement, fit, read_fit
-from hotlever.estimation.experiment import full_experiment
+from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.estimation.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.measurement.averages import MANY, averaged

@@ -10,7 +10,7 @@ from test_fit import TRUTH, twin
 
 from hotlever.estimation import fit
 from hotlever.estimation.drift import Drift
-from hotlever.estimation.experiment import reduced_experiment
+from hotlever.estimation.experiment_at_rest import reduced_experiment
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import pytest
 
 from hotlever.errors import BranchEndError, ComputationError, InputError
 from hotlever.estimation import Measurement, fit, read_measurement
-from hotlever.estimation.experiment import full_experiment, reduced_experiment
+from hotlever.estimation.experiment_at_rest import full_experiment, reduced_experiment
 from hotlever.estimation.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE

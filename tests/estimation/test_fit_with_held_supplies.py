@@ -10,7 +10,7 @@ import pytest
 from hotlever import Lever, Probe, fit
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, read_fit, read_measurement
-from hotlever.estimation.experiment import Experiment
+from hotlever.estimation.experiment_at_rest import ExperimentAtRest
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
@@ -49,13 +49,13 @@ def coarse() -> Lever:
 def test_predictions_are_states_and_their_slopes_have_taylor_order_two(circuit):
     probe, names = wired(circuit), ("base_temperature_K", "heater_width_um")
     similar = SimilarLevers(Lever(probe, COARSE))
-    between = Experiment(similar, None, BIAS, names).predict(probe)
+    between = ExperimentAtRest(similar, None, BIAS, names).predict(probe)
     off = np.abs(between.values - shown(similar.lever(probe), BIAS)).max(axis=1)
     assert np.all(off < [2e-5, 2e-5, 0.02])
     # slopes between the states of the branch are those of nearby ones
     branch = between.linearised.branch
     bias = probe.circuit.bias(*branch.values[2:-2:9, :2].T)
-    at = Experiment(similar, None, bias, names).predict(probe, between)
+    at = ExperimentAtRest(similar, None, bias, names).predict(probe, between)
     start = shown(similar.lever(probe), bias)
     for place, name in enumerate(names):
         (value,) = probe.at([name])
@@ -77,10 +77,10 @@ def test_the_other_polarity_is_that_of_supplies_reversed(coarse):
         Lever(Probe.reference(), COARSE).sweep([-1.0])
 
 
-def corrected(probe: Probe, bias: np.ndarray, full: Lever) -> Experiment:
+def corrected(probe: Probe, bias: np.ndarray, full: Lever) -> ExperimentAtRest:
     """The lever on a very coarse mesh, corrected by another one."""
     fast = SimilarLevers(Lever(probe, MeshOptions(heater=0.8, corner=0.4, lever=0.35)))
-    return Experiment(fast, SimilarLevers(full), bias)
+    return ExperimentAtRest(fast, SimilarLevers(full), bias)
 
 
 def test_a_fit_finds_what_a_file_of_both_polarities_was_made_with(coarse, tmp_path):

@@ -90,19 +90,19 @@ def test_a_narrow_prior_is_a_fixed_parameter(data):
 
 def test_the_shares_add_up_to_the_covariance(solved):
     one = solved
-    shares = one.problem.objective.shares(one.optimum.prediction)
+    shares = one.posterior.shares
     assert set(shares) == {"measurement", *default_priors(NOMINAL)}
     total = np.sum(list(shares.values()), axis=0)
-    scale = np.sqrt(np.diag(one.covariance))
+    scale = np.sqrt(np.diag(one.posterior.covariance))
     np.testing.assert_allclose(
-        total / np.outer(scale, scale), one.covariance / np.outer(scale, scale), atol=1e-6
+        total / np.outer(scale, scale), one.posterior.covariance / np.outer(scale, scale), atol=1e-6
     )
 
 
 def test_how_far_a_prior_is_pulled_is_what_the_others_gain_without_it(solved):
     """Of the linearised estimate, as nearly as a search ends at its optimum."""
     one = solved
-    objective, at = one.problem.objective, one.optimum.prediction
+    objective, at = one.objective, one.prediction
     scaled = objective.point(at.probe)
     residual, jacobian = (
         objective.residual(at.values, scaled),
@@ -116,7 +116,9 @@ def test_how_far_a_prior_is_pulled_is_what_the_others_gain_without_it(solved):
     every, count = np.arange(residual.size), len(one.options.varied)
     for row, name in enumerate(one.options.varied, start=residual.size - count):
         gained = least(every) - least(np.delete(every, row))
-        assert one.moved[name].pull ** 2 == pytest.approx(gained, rel=0.05, abs=0.05), name
+        assert one.posterior.moved[name].pull ** 2 == pytest.approx(gained, rel=0.05, abs=0.05), (
+            name
+        )
 
 
 def test_priors_of_what_does_not_exist_or_is_fixed_are_refused(data):
@@ -162,7 +164,7 @@ def test_scales_are_as_uncertain_as_priors_say(data):
     tip = data[1].tip_K.values
     warm = replace(data[0], tip_K=tip, tip_error_K=0.03 * np.maximum(tip - 293.0, 100.0))
     one = estimate(warm, NOMINAL, FitOptions(priors=default_priors(NOMINAL)))
-    shares = {common.name: common.share for common in one.problem.residuals.common}
+    shares = {common.name: common.share for common in one.residuals.common}
     assert shares == {"current_scale": 1e-3, "raman_scale": pytest.approx(0.03, rel=0.02)}
     known, base = priors_of({"raman_scale": "± 0.5%"}, NOMINAL, "here"), 290.0
     raman = errors_of_scales(warm, ["tip"], known, base)[0]

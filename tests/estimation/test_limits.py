@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hotlever.calibration.inference import error_of_model
-from hotlever.estimation.limits import profile_of_tip
+from hotlever.estimation.coordinates import Coordinates
 from hotlever.estimation.objective import Objective
-from hotlever.estimation.sampled_limits import posterior_of_tip
-from hotlever.probe.priors import Prior
+from hotlever.estimation.posterior import Posterior
+from hotlever.estimation.profile import profile_of_tip
+from hotlever.estimation.quantity import TipTemperature
+from hotlever.estimation.sampling import sample_tip
+from hotlever.probe.priors import Prior, PriorDensity
 from hotlever.probe.surroundings import Surroundings
 from hotlever.text import BAND
 
 TIPS, SLOPES = np.array([300.0, 500.0, 800.0]), np.array([1.0, 10.0, 20.0])
+
+
+class Lever(float):
+    """A lever of which all is said by one number, x."""
+
+    def at(self, names):
+        return np.array([float(self)])
+
+    def moved(self, values):
+        return Lever(values["x"])
 
 
 class OneUnknown(Objective):
@@ -24,43 +36,65 @@ class OneUnknown(Objective):
 
     def __init__(self):
         self.names, self.varied, self.columns = ("x",), ["x"], [0]
-        self.coordinates = SimpleNamespace(point=np.copy, values=np.copy, rates=np.ones_like)
-        self.bounds = np.array([[-9.0], [9.0]])
+        parameter = SimpleNamespace(name="x", unit="1", lower=-9.0, upper=9.0)
+        self.coordinates = Coordinates((parameter,), np.array([False]), np.ones(1))
+        self.bounds = self.coordinates.bounds
         self.residuals = SimpleNamespace(
             size=0,
+            data=np.zeros((1, 0)),
             present=np.zeros((1, 0), dtype=bool),
+            without_errors=np.zeros(1, dtype=bool),
             weighted=lambda values: np.zeros(0),
             jacobian=lambda slopes: np.zeros((0, 1)),
         )
-        self.informed, self._joint, self._of_joint, self._pull = True, None, [], None
-        self._priors = {0: Prior(0.0, 1.0, relative=False)}
+        self.prior = PriorDensity.independent({"x": Prior(0.0, 1.0, relative=False)})
+        self._of_prior, self._pull = [0], None
+
+    def values(self, probe):
+        return probe.at(["x"])
 
 
-def prediction(bend, at=(0.0,)):
-    """Return the prediction T = T₀ + b (x + bend x²) at three biases, at some x."""
+class Bent:
+    """An experiment that shows T = T₀ + b (x + bend x²) at three biases."""
 
-    def predict(x):
-        tip, slope = TIPS + SLOPES * (x[0] + bend * x[0] ** 2), SLOPES * (1 + 2 * bend * x[0])
+    names = ("x",)
+
+    def __init__(self, bend):
+        self._bend = bend
+
+    def predict(self, probe, near=None):
+        values, slopes = self._shown(np.array([float(probe)]))
+        surrogate = SimpleNamespace(predict=self._shown)
+        return SimpleNamespace(values=values, slopes=slopes, probe=probe, surrogate=surrogate)
+
+    def _shown(self, x):
+        tip = TIPS + SLOPES * (x[0] + self._bend * x[0] ** 2)
+        slope = SLOPES * (1 + 2 * self._bend * x[0])
         return np.stack([0 * tip, 0 * tip, tip]), np.stack([0 * tip, 0 * tip, slope])[:, :, None]
 
-    values, slopes = predict(at)
-    probe = SimpleNamespace(at=lambda names: np.array(at))
-    return SimpleNamespace(
-        values=values, slopes=slopes, probe=probe, nearby=SimpleNamespace(predict=predict)
-    )
+
+def posterior(bend):
+    """Return what is known of such a lever."""
+    return Posterior(OneUnknown(), Bent(bend).predict(Lever(0.0)))
 
 
 def profile(bend):
     """Return the profile of such a lever; others are solved as they are."""
-    solved = partial(prediction, bend)
-    return profile_of_tip(OneUnknown(), prediction(bend), lambda x, _: solved(x), np.eye(1))
+    return profile_of_tip(posterior(bend), Bent(bend))
+
+
+def test_a_quantity_is_known_as_well_as_what_it_follows_from():
+    for row, slope in enumerate(SLOPES):
+        value, stderr = posterior(0.1).of(TipTemperature(row))
+        assert value == pytest.approx(TIPS[row])
+        assert stderr == pytest.approx(slope)
 
 
 def test_what_is_linear_has_the_linearised_error():
     found = profile(0.0)
     np.testing.assert_allclose([found.below, found.above], 1.0, rtol=1e-3)
     assert found.linear
-    low, high = found.limits(TIPS, SLOPES, np.zeros(3))
+    low, high = found.credible_interval(TIPS, SLOPES, np.zeros(3))
     np.testing.assert_allclose([TIPS - low, high - TIPS], [BAND * SLOPES] * 2)
 
 
@@ -69,7 +103,7 @@ def test_what_bends_has_other_limits_either_way(bend):
     found = profile(bend)
     assert not found.linear
     # as far as x is pulled, x standard errors away the tip is b |x + bend x²| away
-    low, high = found.limits(TIPS[1:], SLOPES[1:], np.zeros(2))
+    low, high = found.credible_interval(TIPS[1:], SLOPES[1:], np.zeros(2))
     wide, narrow = (high - TIPS[1:], TIPS[1:] - low)[:: 1 if bend > 0 else -1]
     for away, way in ((wide, np.sign(bend)), (narrow, -np.sign(bend))):
         exact = np.abs(way + bend * BAND) * BAND * SLOPES[1:]
@@ -79,17 +113,17 @@ def test_what_bends_has_other_limits_either_way(bend):
 
 
 def test_other_errors_are_the_same_either_way():
-    low, high = profile(0.0).limits(TIPS, np.zeros(3), np.full(3, 2.0))
+    low, high = profile(0.0).credible_interval(TIPS, np.zeros(3), np.full(3, 2.0))
     np.testing.assert_allclose([TIPS - low, high - TIPS], 2.0 * BAND)
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.12])
 def test_quantiles_of_the_posterior_are_those_of_what_is_unknown(bend):
     """x is normal, so that the quantiles of the tip are the tips at 1.96 standard errors."""
-    found = posterior_of_tip(OneUnknown(), prediction(bend), [], np.eye(1), samples=4000)
+    found = sample_tip(posterior(bend), SimpleNamespace(others=lambda at: []), samples=4000)
     assert found.rhat < 1.05
     assert found.effective_samples > 500
-    low, high = found.profile.limits(TIPS[1:], SLOPES[1:], np.zeros(2))
+    low, high = found.profile.credible_interval(TIPS[1:], SLOPES[1:], np.zeros(2))
     x = BAND * np.array([[-1.0], [1.0]])
     expected = TIPS[1:] + SLOPES[1:] * (x + bend * x**2)
     np.testing.assert_allclose([low, high], expected, atol=0.12 * BAND * SLOPES[-1])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.estimation.experiment import experiment_of
-from hotlever.estimation.load_lines import Rows, nearest_states
+from hotlever.estimation.experiment_at_rest import experiment_of
+from hotlever.estimation.load_lines import Rows
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
@@ -34,7 +34,7 @@ def test_rows_stay_on_their_part_of_a_branch_that_folds(folded):
     tips = np.array([400.0, 700.0, 870.0, 960.0, 1100.0, 1250.0])
     rows = rows_on(folded, tips)
     assert rows.bias_V[4] < rows.bias_V[2]  # it folds
-    u, short = nearest_states(folded, folded.equations.circuit, rows)
+    u, short = rows.states(folded, folded.equations.circuit)
     assert np.abs(folded.tip_K(u) - tips).max() < 1e-3
     assert np.all(short == 1.0)
     ramp = folded.read(folded.equations.circuit, rows.bias_V[:3]).u
@@ -46,7 +46,7 @@ def test_beyond_its_highest_bias_a_lever_goes_on_with_the_resistance_it_has_ther
     highest = float(circuit.bias(*folded.curve(np.linspace(0, folded.end_u, 4000))[:, :2].T).max())
     nothing = np.full(2, np.nan)
     rows = Rows(np.array([1.1, 1.3]) * highest, np.stack([[0.9, 1.0], nothing, nothing]))
-    u, short = nearest_states(folded, circuit, rows)
+    u, short = rows.states(folded, circuit)
     assert np.allclose(short, [1.1, 1.3], rtol=1e-6)
     assert u[0] == u[1]
 
@@ -64,7 +64,7 @@ def test_derivatives_by_parameters_are_those_of_the_values(highest):
     start, step = probe.at(NAMES), np.array([0.02, -0.01, 0.01])
     misses = []
     for share in (1.0, 0.5):
-        values = at.nearby.predict(start * (1.0 + share * step))[0]
+        values = at.surrogate.predict(start * (1.0 + share * step))[0]
         expected = at.values + at.slopes @ (start * share * step)
         misses.append(np.abs(values - expected)[0].max())
     assert misses[0] < 0.02 * at.values[0].max()

@@ -11,9 +11,9 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Measurement, fit, uncertainty
 from hotlever.estimation.chains import effective_sample_size, split_rhat
 from hotlever.estimation.ensembles import Gaussian, sample
-from hotlever.estimation.posterior import predictive_band, sample_posterior
+from hotlever.estimation.experiment_at_rest import experiment_of, reduced_experiment
 from hotlever.estimation.profile import profile_likelihood
-from hotlever.estimation.rough import OtherMaterials, SimilarProbes
+from hotlever.estimation.sampling import SampledLever, predictive_band, sample_posterior
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, default_priors
@@ -125,30 +125,32 @@ def test_effective_sample_size_of_an_autoregressive_chain():
     assert effective_sample_size(rng.normal(size=(8, 5000))) == pytest.approx(40_000, rel=0.1)
 
 
-def test_the_rough_model_predicts_nearby_what_the_full_lever_does(coarse, reduced):
-    model = OtherMaterials(coarse, reduced, BIAS)
+def sampled(coarse, reduced, bias=BIAS):
+    """The reduced lever as samples see it, and what it shows of a material."""
+    lever = SampledLever(reduced_experiment(coarse, reduced, bias), coarse.probe)
+    return lambda material: lever.shown(coarse.with_material(material).probe.at(lever.names))
+
+
+def test_the_surrogate_shows_nearby_what_the_full_lever_does(coarse, reduced):
     there = coarse.probe.material.with_(c_kappa=0.70, p=2.70)
     exact = coarse.with_material(there).sweep(BIAS)
-    current, reader, tip = model.predict(coarse.with_material(there).probe)
+    current, reader, tip = sampled(coarse, reduced)(there)
     np.testing.assert_allclose(current, exact.current_mA, rtol=2e-4)
     np.testing.assert_allclose(reader, exact.reader_V, rtol=2e-4)
     np.testing.assert_allclose(tip, exact.tip_K, atol=0.2)
 
 
-def test_the_rough_model_is_exact_at_its_own_material_in_any_order_of_bias(coarse, reduced):
+def test_the_surrogate_is_exact_at_its_own_material_in_any_order_of_bias(coarse, reduced):
     bias = np.array([9.0, 3.0, 9.0, 0.0])
-    model = OtherMaterials(coarse, reduced, bias)
     exact = coarse.sweep(bias)
-    np.testing.assert_allclose(model.predict(coarse.probe)[2], exact.tip_K, atol=0.02)
+    tip = sampled(coarse, reduced, bias)(coarse.probe.material)[2]
+    np.testing.assert_allclose(tip, exact.tip_K, atol=0.02)
 
 
-def test_the_rough_model_serves_far_away_too(coarse, reduced):
-    model = OtherMaterials(coarse, reduced, BIAS)
+def test_the_surrogate_serves_far_away_too(coarse, reduced):
     there = coarse.probe.material.with_(c_kappa=1.0, n_d=6e17, p=2.8)
     exact = coarse.with_material(there).sweep(BIAS)
-    np.testing.assert_allclose(
-        model.predict(coarse.with_material(there).probe)[2], exact.tip_K, atol=5.0
-    )
+    np.testing.assert_allclose(sampled(coarse, reduced)(there)[2], exact.tip_K, atol=5.0)
 
 
 def test_posterior_agrees_with_the_covariance_of_the_fit(fitted, posterior):
@@ -223,11 +225,11 @@ def test_a_profile_counts_priors(informed):
 
 def test_other_probes_are_predicted_by_powers_nearly_as_they_are_solved(coarse):
     names = ("n_d", "heater_length_um", "base_temperature_K")
-    model = SimilarProbes(coarse.probe, names, BIAS)
+    lever = SampledLever(experiment_of(coarse.probe, BIAS, names=names), coarse.probe)
     there = coarse.probe.with_(n_d=5.5e17, heater_length_um=4.1, base_temperature_K=295.0)
-    exact = Lever(there).sweep(BIAS).tip_K.values
-    assert np.abs(model.predict(there)[2] - exact).max() < 2.0
-    assert model.error_K(there) < 2.0
+    exact, parameters = Lever(there).sweep(BIAS).tip_K.values, there.at(names)
+    assert np.abs(lever.shown(parameters)[2] - exact).max() < 2.0
+    assert lever.error_K(parameters) < 2.0
 
 
 def test_what_was_known_to_a_factor_is_compared_in_logarithms():

@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment import full_experiment
+from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.estimation.profile import profile_likelihood
 from hotlever.lever import Lever
 

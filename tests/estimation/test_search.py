@@ -13,7 +13,7 @@ import hotlever
 from hotlever.calibration import calibrate
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment import Experiment, full_experiment
+from hotlever.estimation.experiment_at_rest import ExperimentAtRest, full_experiment
 from hotlever.estimation.inverse_problem import estimate
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser
@@ -54,13 +54,13 @@ def test_data_of_another_lever_are_fitted_to_their_noise_or_not_described():
 
 
 def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
-    def model(probe: Probe, bias: np.ndarray) -> Experiment:
+    def model(probe: Probe, bias: np.ndarray) -> ExperimentAtRest:
         return full_experiment(Lever(probe, COARSE), bias)
 
     found = estimate(reference_curve, Probe.u_shape(), FitOptions(), model=model)
-    objective, at = found.problem.objective, found.optimum.prediction
+    objective, at = found.objective, found.prediction
     least, optimum = objective.squares(at), objective.point(at.probe)
-    noise = found.problem.residuals.noise_squares(at.values)
+    noise = found.residuals.noise_squares(at.values)
     assert found.optimum.converged
     jacobian = objective.jacobian(at.slopes, optimum)
     axes = np.linalg.svd(jacobian)[2]
@@ -70,7 +70,9 @@ def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
             # one standard error along each axis, or as far as powers tell of other levers
             step = min(np.sqrt(noise) / size, 0.2)
             there = objective.at(at.probe, optimum + way * step * axis)
-            assert objective.squares(found.problem.model.predict(there, at)) > least - 0.05 * noise
+            assert (
+                objective.squares(found.optimiser.model.predict(there, at)) > least - 0.05 * noise
+            )
 
 
 def test_a_clipped_current_is_not_described(reference_curve):

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment import reduced_experiment
+from hotlever.estimation.experiment_at_rest import reduced_experiment
 from hotlever.estimation.uncertainty import Uncertainty
 
 BIAS = np.linspace(2, 11, 8)

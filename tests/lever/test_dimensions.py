@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation.experiment import full_experiment
+from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
@@ -120,7 +120,7 @@ def test_predictions_nearby_agree_with_a_new_branch(coarse):
     model = replace(full_experiment(coarse, bias), names=names)
     start = model.predict(coarse.probe)
     values = coarse.probe.at(names) * np.array([1.04, 0.96, 1.01, 1.02])
-    nearby, slopes = start.nearby.predict(values)
+    nearby, slopes = start.surrogate.predict(values)
     moved = coarse.probe.moved(dict(zip(names, values.tolist(), strict=True)))
     exact = model.predict(moved)
     np.testing.assert_allclose(nearby, exact.values, rtol=3e-3)

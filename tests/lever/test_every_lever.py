@@ -14,7 +14,7 @@ import pytest
 from taylor import remainder_orders
 
 from hotlever.errors import BranchEndError
-from hotlever.estimation.experiment import Experiment
+from hotlever.estimation.experiment_at_rest import ExperimentAtRest
 from hotlever.lever import Branch, Lever
 from hotlever.lever.balances import BALANCES, balance_columns
 from hotlever.lever.branch import Reach
@@ -232,12 +232,14 @@ def test_a_model_of_it_refuses_a_bias_beyond_the_fold_in_one_line(one, resistanc
     if one.hottest_V < 9.0:
         pytest.skip("its ramps do not reach the knee")
     probe = one.probe.with_(series_resistance_ohm=resistance)
-    model = Experiment(one.solver, None, np.array([0.0, 1.0, 20.0]), one.names)
+    model = ExperimentAtRest(one.solver, None, np.array([0.0, 1.0, 20.0]), one.names)
     ends = r"no steady state|silicon melts|^the reduced lever ends"
     with pytest.raises(BranchEndError, match=ends):
         model.predict(probe)
     # with biases below it all is well, the row at zero bias included
-    values = Experiment(one.solver, None, np.array([1.0, 0.0]), one.names).predict(probe).values
+    values = (
+        ExperimentAtRest(one.solver, None, np.array([1.0, 0.0]), one.names).predict(probe).values
+    )
     assert values[0, 1] == 0.0
     assert values[2].tolist()[1] == pytest.approx(293.0)
     assert values[2, 0] > 293.0

@@ -10,7 +10,7 @@ import pytest
 
 from hotlever.cache import CACHE_VARIABLE, store_arrays, stored
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment import reduced_experiment
+from hotlever.estimation.experiment_at_rest import reduced_experiment
 from hotlever.lever import Lever
 from hotlever.lever.box import Box
 from hotlever.lever.branch import Reach

@@ -7,7 +7,7 @@ import pytest
 
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimation import FitOptions, Measurement, batch
-from hotlever.estimation.experiment import shown_at_bias
+from hotlever.estimation.load_lines import Rows
 from hotlever.lever import Lever
 from hotlever.lever.box import PAPER, Box, is_papers
 from hotlever.lever.branch import Reach
@@ -37,7 +37,7 @@ def test_it_follows_the_full_lever_and_is_certified(strip, reduced, seed):
     lever = strip.with_probe(box.probe(strip.probe, shares))
     branch = certified_branch(lever, reduced, BIAS[-1], within_K=0.02)
     full = lever.sweep(BIAS)
-    current, _, tip = shown_at_bias(branch, lever.circuit, BIAS)[1]
+    current, _, tip = Rows(BIAS).values(branch, lever.circuit)
     np.testing.assert_allclose(current, full.current_mA, rtol=1e-5)
     np.testing.assert_allclose(tip, full.tip_K, atol=0.02)
     found = reduced.linearised(lever.probe, Reach(lever.circuit, BIAS[-1]))
@@ -55,7 +55,7 @@ def test_boron_doped_silicon_is_as_good():
         there = lever.with_probe(box.probe(lever.probe, shares))
         bias = np.linspace(1.0, 5.0, 9)
         branch = certified_branch(there, reduced, 5.0)
-        tip = shown_at_bias(branch, there.circuit, bias)[1][2]
+        tip = Rows(bias).values(branch, there.circuit)[2]
         np.testing.assert_allclose(tip, there.sweep(bias).tip_K, atol=0.1)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import made_up
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment import full_experiment
+from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.estimation.uncertainty import examine
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.reproduce import LONG_SECTIONS, SECTIONS, TWINS, twins

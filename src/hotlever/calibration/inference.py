@@ -8,29 +8,28 @@ is needed: a lever that was measured below it is less certain above, and that is
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from hotlever.calibration.jumps import jumps_of, not_of_a_ramp
+from hotlever.calibration.jumps import Jump, jumps_of
 from hotlever.calibration.knee import Knee
-from hotlever.calibration.plausibility import misfit
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, FitOptions, Measurement
-from hotlever.estimation.either_medium import error_of_choice
+from hotlever.estimation.experiment_at_rest import PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate, estimate
-from hotlever.estimation.limits import profile_of_tip
+from hotlever.estimation.posterior import Posterior
+from hotlever.estimation.profile import profile_of_tip
+from hotlever.estimation.quantity import TIP
 from hotlever.lever import Branch
 from hotlever.lever.curve import spline_through
-from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import Material
 from hotlever.probe import Probe
 from hotlever.probe.parameters import own_name, usual_parameters
 from hotlever.probe.priors import (
     SCALES,
-    JointPrior,
     Prior,
-    PriorUse,
+    PriorDensity,
     default_priors,
     known_beforehand,
     priors_of,
@@ -59,135 +58,18 @@ _JUMP = 7e-3
 #: The same by the law of the mobility: how far two estimates of a lever are apart, with another law
 #: (MINIMOS) in place of Eq. 8 (rms of seven pairs of twins from number 1000 on).
 _MOBILITY = 4e-3
-#: Share of the measured biases that a lever must reach to show the data.
-_REACHED = 0.98
 #: How far (standard errors) along each axis of the estimate the knee is looked at.
 _ASIDE = 0.5
 
 
-@dataclass(frozen=True)
-class Estimated:
-    """A lever as estimated, and what that says of its tip temperature.
-
-    Attributes
-    ----------
-    probe : Probe
-    bias_V, current_mA, tip_K : ndarray, shape (n,)
-        Even rows over the measured range.
-    parts : dict of str to ndarray
-        Standard error of the tip temperature (K) at the rows, by source; independent of each other.
-    tip_low_K, tip_high_K : ndarray, shape (n,)
-        What 95 % lie between; they are as far away as the errors say, unless these do not hold.
-    priors : dict of str to PriorUse
-    reason : str
-        Why the data are not described, or why that is not known; empty if they are.
-    converged : bool
-        Whether the search came to its end.
-    notes : list of str
-    estimate : Estimate
-        That all this is read from.
-    """
-
-    probe: Probe
-    bias_V: Array
-    current_mA: Array
-    tip_K: Array
-    parts: dict[str, Array]
-    tip_low_K: Array
-    tip_high_K: Array
-    priors: dict[str, PriorUse]
-    reason: str
-    notes: list[str]
-    estimate: Estimate
-    converged: bool = True
-
-    @property
-    def held_mW(self) -> Array:
-        """Power of the held supplies at the rows (mW), within the error of a coarse mesh."""
-        branch = self.branch
-        equations, x = branch.equations, branch.x
-        own = x[-1] * equations.observed(x)[1]
-        u = branch.read(self.probe.circuit, self.bias_V).u
-        return np.asarray(spline_through(branch.u, equations.power(x) - own)(u))
-
-    @property
-    def branch(self) -> Branch:
-        """The lever as far as it was measured, corrected by the full model."""
-        return self.estimate.branch
-
-    def knee_of(self, branch: Branch) -> Knee:
-        """Return the knee of a branch of this lever, with standard errors; NaN without one."""
-        if branch.knee is None:
-            return Knee()
-        point, circuit = branch.knee, self.probe.circuit
-        values = [point.lever_V, point.current_mA, point.power_mW]
-        values.append(float(circuit.bias(point.lever_V, point.current_mA)))
-        return Knee(*values, *np.sqrt(np.sum(self._knee_changes() ** 2, axis=0)).tolist())
-
-    @property
-    def varied(self) -> list[str]:
-        """The parameters that were estimated."""
-        return self.estimate.options.varied
-
-    @property
-    def shares(self) -> dict[str, Array]:
-        """What adds up to their covariance (p, p), by source; independent of each other."""
-        return _shares(self.estimate)
-
-    def directions(self, least: float = 0.0) -> list[dict[str, float]]:
-        """Return changes of the parameters by one standard error, independent of each other.
-
-        They are along the axes of the correlation, those left out whose variance is less than
-        some share of a parameter's.
-        """
-        covariance = self.estimate.covariance
-        scale = np.sqrt(np.diag(covariance))
-        variances, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
-        steps = (axes * np.sqrt(np.maximum(variances, 0.0)) * scale[:, None]).T
-        kept = variances >= least
-        return [dict(zip(self.varied, step.tolist(), strict=True)) for step in steps[kept]]
-
-    def or_else(self, other: Estimated) -> Estimated:
-        """Return what is known of the tip temperature if the lever may as well be another one."""
-        tip, low, high = (
-            np.interp(self.bias_V, other.bias_V, known)
-            for known in (other.tip_K, other.tip_low_K, other.tip_high_K)
-        )
-        return replace(
-            self,
-            parts=self.parts | {"medium": error_of_choice(self.tip_K, tip)},
-            tip_low_K=np.minimum(self.tip_low_K, low),
-            tip_high_K=np.maximum(self.tip_high_K, high),
-        )
-
-    def _knee_changes(self) -> Array:
-        """Return V_l, I_h, P_l and V_b of the knee one standard error away on each axis."""
-        known = self.estimate.problem.model.names
-        at = self.estimate.optimum.prediction
-        origin, circuit = at.probe.at(known), self.probe.circuit
-        changes = []
-        for direction in self.directions():
-            axis = np.array([direction.get(name, 0.0) for name in known])
-            ends = []
-            for way in (_ASIDE, -_ASIDE):
-                knee = at.nearby.branch_at(origin + way * axis).knee
-                if knee is None:  # beyond the measured range
-                    return np.full((1, 4), np.nan)
-                shown = [knee.lever_V, knee.current_mA, knee.power_mW]
-                ends.append([*shown, circuit.bias(knee.lever_V, knee.current_mA)])
-            changes.append((np.array(ends[0]) - np.array(ends[1])) / (2.0 * _ASIDE))
-        return np.array(changes)
-
-
-def estimated(
+def estimate_lever(
     measured: Measurement,
     probe: Probe,
     fit: Fit | None = None,
     priors: Mapping[str, Prior | str] | None = None,
-    samples: int = 0,
     progress: Progress | None = None,
-) -> Estimated:
-    """Estimate a lever from its measurement.
+) -> tuple[Estimate, dict[str, Prior]]:
+    """Estimate a lever from its measurement; return with it what was known beforehand.
 
     Parameters
     ----------
@@ -198,8 +80,6 @@ def estimated(
         Of this lever to other data, or to the same. Its data count, not what it made of them.
     priors : mapping of str to Prior or str, optional
         In place of some of the usual ones; if empty there are none, and dimensions are held.
-    samples : int
-        Of the posterior, from which the limits are then taken; none by default.
     progress : callable, optional
 
     Raises
@@ -207,41 +87,41 @@ def estimated(
     ComputationError
         If no lever near the probe has states at all measured biases.
     """
-    known = known_beforehand(probe, priors)
+    known, medium = known_beforehand(probe, priors), probe.surroundings.medium
     if fit is None:
-        options = FitOptions(priors=known)
-        found = estimate(measured, probe, options, progress=progress)
-        return _put_together(found, measured, known, samples, progress)
-    held = _before(fit, priors)
+        options = FitOptions(priors=known, medium=medium)
+        return estimate(measured, probe, options, progress=progress), known
+    before_fit = _before(fit, priors)
+    fixed = dict.fromkeys(fit.options.fixed)
     options = FitOptions(
         observables=fit.observables,
-        fixed=dict.fromkeys(fit.options.fixed),
-        priors=held,
+        fixed=fixed,
+        priors=before_fit,
+        medium=fit.probe.surroundings.medium,
     )
-    found = estimate(fit.measurement, fit.probe, options, progress=progress)
+    fitted = estimate(fit.measurement, fit.probe, options, progress=progress)
     if _same_data(fit.measurement, measured):
-        return _put_together(found, measured, held, samples, progress)
+        return fitted, before_fit
     # what that leaves of the lever itself is known before the other data; circuit and gas are
     # those of each measurement
-    own = [name for name in found.options.varied if name not in _CIRCUIT]
-    places = [found.options.varied.index(name) for name in own]
-    values = found.optimum.probe.at(own)
-    relative = np.array([name not in held or held[name].relative for name in own])
-    joint = JointPrior(own, values, found.covariance[np.ix_(places, places)], relative)
+    own = [name for name in fitted.options.varied if name not in _CIRCUIT]
+    numbers = [fitted.options.varied.index(name) for name in own]
+    values, covariance = fitted.probe.at(own), fitted.posterior.covariance
+    relative = np.array([name not in before_fit or before_fit[name].relative for name in own])
+    left = PriorDensity.of_estimate(own, values, covariance[np.ix_(numbers, numbers)], relative)
     probe = probe.moved(dict(zip(own, values.tolist(), strict=True)))
     theirs = {name: prior for name, prior in known.items() if name in {*_CIRCUIT, *SCALES}}
-    again = FitOptions(
-        fixed=options.fixed,
-        priors=theirs,
-        free=tuple(name for name in own if name not in usual_parameters(probe)),
-    )
+    free = tuple(name for name in own if name not in usual_parameters(probe))
+    again = FitOptions(fixed=fixed, priors=theirs, free=free, medium=medium)
     try:
-        found = estimate(measured, probe, again, joint=joint, progress=progress)
+        return (
+            estimate(measured, probe, again, before=left, progress=progress),
+            {**before_fit, **theirs},
+        )
     except ComputationError as error:
         raise ComputationError(
             f"no lever like the fitted one shows these data; is it another lever's fit? ({error})"
         ) from error
-    return _put_together(found, measured, {**held, **theirs}, samples, progress)
 
 
 def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Prior]:
@@ -256,117 +136,141 @@ def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Pri
     return {name: prior for name, prior in known.items() if name not in fit.options.fixed}
 
 
-def _same_data(one: Measurement, other: Measurement) -> bool:
-    same = np.array_equal(one.bias_V, other.bias_V, equal_nan=True)
-    return same and np.array_equal(one.current_mA, other.current_mA, equal_nan=True)
+def _same_data(first: Measurement, second: Measurement) -> bool:
+    same = np.array_equal(first.bias_V, second.bias_V, equal_nan=True)
+    return same and np.array_equal(first.current_mA, second.current_mA, equal_nan=True)
 
 
-def _put_together(
-    found: Estimate,
-    measured: Measurement,
-    known: Mapping[str, Prior],
-    samples: int,
-    progress: Progress | None,
-) -> Estimated:
-    best, residuals = found.optimum.probe, found.problem.residuals
+# --- the tip temperature by bias ------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TipByBias:
+    """The tip temperature at even rows over the measured range, and how sure it is.
+
+    Attributes
+    ----------
+    bias_V, current_mA, tip_K : ndarray, shape (n,)
+    parts : dict of str to ndarray
+        Standard error of the tip temperature (K) at the rows, by source; independent of each other.
+    low_K, high_K : ndarray, shape (n,)
+        What 95 % lie between; they are as far away as the errors say, unless these do not hold.
+    jumps : list of Jump
+        Between measured rows.
+    asymmetry : str
+        Where the interval is from, if not from the errors.
+    """
+
+    bias_V: Array
+    current_mA: Array
+    tip_K: Array
+    parts: dict[str, Array]
+    low_K: Array
+    high_K: Array
+    jumps: list[Jump]
+    asymmetry: str
+
+
+def measured_range(estimate: Estimate) -> Array:
+    """Return even biases (V) over the measured range, as far as the lever has states."""
+    measured, circuit = estimate.measurement, estimate.probe.circuit
     # without a bias nothing is known of a lever that is cold then
-    heated = (measured.bias_V > 0) | (not best.circuit.starts_cold)
+    heated = (measured.bias_V > 0) | (not circuit.starts_cold)
     present = measured.bias_V[np.isfinite(measured.current_mA) & heated]
-    at, branch = found.optimum.prediction, found.branch
-    highest = branch.highest_bias(best.circuit, float(residuals.bias.max()))
-    bias = np.linspace(present.min(), min(present.max(), highest), _ROWS)
-    predicted = found.predicted(bias)
-    slopes = found.slopes(predicted)[list(OBSERVABLES).index("tip")]
-    parts: dict[str, Array] = {
+    return np.linspace(present.min(), min(present.max(), highest_bias(estimate)), _ROWS)
+
+
+def highest_bias(estimate: Estimate) -> float:
+    """Return the highest bias (V) up to the highest measured one at which the lever has a state."""
+    measured = float(estimate.residuals.bias.max())
+    return estimate.branch.highest_bias(estimate.probe.circuit, measured)
+
+
+def tip_by_bias(
+    estimate: Estimate, samples: int = 0, progress: Progress | None = None
+) -> TipByBias:
+    """Return the tip temperature of an estimated lever with its error, by bias.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    samples : int
+        Of the posterior, from which the credible interval is then taken; none by default.
+    progress : callable, optional
+
+    Raises
+    ------
+    InputError
+        If samples are asked for of an estimate without priors.
+    """
+    probe, posterior = estimate.probe, estimate.posterior
+    bias = measured_range(estimate)
+    predicted = estimate.predicted(bias)
+    tip, slopes = predicted.values[TIP], predicted.slopes[TIP][:, estimate.objective.columns]
+    variances = {
         source: np.einsum("bi,ij,bj->b", slopes, share, slopes)
-        for source, share in _shares(found).items()
+        for source, share in shares_by_source(posterior).items()
     }
-    tip = predicted.values[2]
-    rise = tip - best.circuit.base_temperature_K
-    of_model = error_of_model(best.surroundings, found.options.varied, bias, rise)
-    stderr = np.sqrt(np.sum(list(parts.values()), axis=0))
-    (low, high), lopsided = _limits(found, tip, stderr, of_model, samples, progress)
-    parts["model"] = of_model**2
-    jumps = jumps_of(branch, best.circuit, residuals.bias, at.values[2])
+    stderr = np.sqrt(np.sum(list(variances.values()), axis=0))
+    rise = tip - probe.circuit.base_temperature_K
+    of_model = error_of_model(probe.surroundings, estimate.options.varied, bias, rise)
+    variances["model"] = of_model**2
+    (low, high), asymmetry = _credible_interval(estimate, tip, stderr, of_model, samples, progress)
+    at_rows = estimate.residuals.bias, estimate.prediction.values[TIP]
+    jumps = jumps_of(estimate.branch, probe.circuit, *at_rows)
     for jump in jumps:
         here = jump.unknown(bias)
-        low, high = (
-            np.where(here, np.minimum(low, jump.cold_K), low),
-            np.where(here, np.maximum(high, jump.hot_K), high),
-        )
-        parts["jump"] = here * ((jump.hot_K - jump.cold_K) / (2.0 * BAND)) ** 2
-    use = found.priors(known)
-    converged, reason = found.verdict(misfit(residuals, at.values, use, found.moved))
-    reason = reason or not_of_a_ramp(branch, best.circuit, residuals.bias, at.values[2])
-    if not reason and highest < _REACHED * float(residuals.bias.max()):
-        reason = f"the lever that comes nearest has no steady state above {highest:.4g} V"
-    return Estimated(
-        probe=best,
-        bias_V=bias,
-        current_mA=predicted.values[0],
-        tip_K=tip,
-        parts={source: np.sqrt(variance) for source, variance in parts.items()},
-        tip_low_K=low,
-        tip_high_K=high,
-        priors=use,
-        reason=reason,
-        notes=[
-            *found.notes,
-            *([] if reason else lopsided),
-            *(jump.note for jump in jumps),
-            *residuals.suspicious(at.values, robust=True),
-        ],
-        estimate=found,
-        converged=converged,
-    )
+        low = np.where(here, np.minimum(low, jump.cold_K), low)
+        high = np.where(here, np.maximum(high, jump.hot_K), high)
+        variances["jump"] = here * ((jump.hot_K - jump.cold_K) / (2.0 * BAND)) ** 2
+    parts = {source: np.sqrt(variance) for source, variance in variances.items()}
+    return TipByBias(bias, predicted.values[0], tip, parts, low, high, jumps, asymmetry)
 
 
-def _shares(found: Estimate) -> dict[str, Array]:
-    """Return what adds up to the covariance of the varied parameters, by source."""
-    shares: dict[str, Array] = {}
-    for name, share in found.problem.objective.shares(found.optimum.prediction).items():
-        source = name if name in ("measurement", "fit") else _source(name)
-        shares[source] = shares.get(source, 0.0) + share
-    return shares
-
-
-def _limits(
-    found: Estimate,
+def _credible_interval(
+    estimate: Estimate,
     tip: Array,
     stderr: Array,
     of_model: Array,
     samples: int,
     progress: Progress | None,
-) -> tuple[tuple[Array, Array], list[str]]:
+) -> tuple[tuple[Array, Array], str]:
     """Return what 95 % of the tip temperatures lie between (K), and words on where that is from."""
-    objective, at = found.problem.objective, found.optimum.prediction
-    away = BAND * np.hypot(stderr, of_model)
-    if samples and not objective.informed:
-        raise InputError("posterior: expected priors, without which it is not that of a fit")
-    if not objective.informed:
-        return (tip - away, tip + away), []
+    posterior, away = estimate.posterior, BAND * np.hypot(stderr, of_model)
+    if not estimate.objective.informed:
+        if samples:
+            raise InputError("posterior: expected priors, without which it is not that of a fit")
+        return (tip - away, tip + away), ""
     if samples:
         # what samples takes a second to load, for which few calibrations have to wait
-        from hotlever.estimation.sampled_limits import posterior_of_tip
+        from hotlever.estimation.sampling import sample_tip
 
-        posterior = posterior_of_tip(
-            objective,
-            at,
-            found.problem.others(at),
-            found.covariance,
-            samples=samples,
-            progress=progress,
-        )
-        return posterior.profile.limits(tip, stderr, of_model), [posterior.note]
-    profile = profile_of_tip(objective, at, found.solved, found.covariance)
+        sampled = sample_tip(posterior, estimate.optimiser, samples=samples, progress=progress)
+        return sampled.profile.credible_interval(tip, stderr, of_model), sampled.note
+    profile = profile_of_tip(posterior, estimate.optimiser.model)
     if profile.linear:
-        return (tip - away, tip + away), []
-    low, high = profile.limits(tip, stderr, of_model)
-    return (low, high), [
+        return (tip - away, tip + away), ""
+    low, high = profile.credible_interval(tip, stderr, of_model)
+    note = (
         "the tip temperature is not a linear function of what is unknown, so that its limits come "
         f"from estimates of hotter and colder levers: at {tip[-1]:.0f} K 95 % lie from "
         f"{low[-1]:.0f} to {high[-1]:.0f} K"
-    ]
+    )
+    return (low, high), note
+
+
+def shares_by_source(posterior: Posterior) -> dict[str, Array]:
+    """Return what adds up to the covariance (p, p), by source of error; independent."""
+    shares: dict[str, Array] = {}
+    for name, share in posterior.shares.items():
+        source = name if name in ("measurement", "fit") else _source(name)
+        shares[source] = shares.get(source, 0.0) + share
+    return shares
+
+
+def _source(name: str) -> str:
+    of_material = "." in name or name in Material.model_fields
+    return _CIRCUIT.get(name, "material" if of_material else "geometry")
 
 
 def error_of_model(around: Surroundings, varied: Sequence[str], bias: Array, rise: Array) -> Array:
@@ -384,6 +288,46 @@ def error_of_model(around: Surroundings, varied: Sequence[str], bias: Array, ris
     return np.asarray(error)
 
 
-def _source(name: str) -> str:
-    of_material = "." in name or name in Material.model_fields
-    return _CIRCUIT.get(name, "material" if of_material else "geometry")
+# --- knee and power -----------------------------------------------------------------------------
+
+
+def knee_of(estimate: Estimate, branch: Branch) -> Knee:
+    """Return the knee of a branch of the estimated lever, with standard errors; NaN without one."""
+    if branch.knee is None:
+        return Knee()
+    values = _knee_values(branch, estimate)
+    return Knee(*values, *np.sqrt(np.sum(_knee_changes(estimate) ** 2, axis=0)).tolist())
+
+
+def _knee_values(branch: Branch, estimate: Estimate) -> list[float]:
+    """Return V_l, I_h, P_l and V_b of the knee of a branch; none beyond the measured range."""
+    point = branch.knee
+    if point is None:
+        return [np.nan] * 4
+    bias = float(estimate.probe.circuit.bias(point.lever_V, point.current_mA))
+    return [point.lever_V, point.current_mA, point.power_mW, bias]
+
+
+def _knee_changes(estimate: Estimate) -> Array:
+    """Return V_l, I_h, P_l and V_b of the knee one standard error away on each axis."""
+    assert isinstance(estimate.prediction, PredictionAtRest)
+    surrogate = estimate.prediction.surrogate
+    origin = estimate.probe.at(surrogate.names)
+    changes = []
+    for step in estimate.posterior.principal_steps():
+        axis = _ASIDE * np.array([step.get(name, 0.0) for name in surrogate.names])
+        after, before = (
+            np.array(_knee_values(surrogate.branch_at(origin + way * axis), estimate))
+            for way in (1.0, -1.0)
+        )
+        changes.append((after - before) / (2.0 * _ASIDE))
+    return np.array(changes)
+
+
+def held_power(estimate: Estimate, bias: Array) -> Array:
+    """Return the power of the held supplies at some biases (mW), within a coarse mesh's error."""
+    branch = estimate.branch
+    equations, x = branch.equations, branch.x
+    own = x[-1] * equations.observed(x)[1]
+    u = branch.read(estimate.probe.circuit, bias).u
+    return np.asarray(spline_through(branch.u, equations.power(x) - own)(u))

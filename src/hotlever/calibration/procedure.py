@@ -15,9 +15,17 @@ from hotlever.calibration.calibration import (
     Calibration,
     table_of,
 )
-from hotlever.calibration.inference import Estimated, estimated
+from hotlever.calibration.inference import (
+    TipByBias,
+    estimate_lever,
+    held_power,
+    highest_bias,
+    knee_of,
+    tip_by_bias,
+)
+from hotlever.calibration.jumps import not_of_a_ramp
 from hotlever.calibration.knee import IVCurve
-from hotlever.calibration.plausibility import check_plausible, remarks
+from hotlever.calibration.plausibility import check_plausible, misfit, remarks
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.power_law_fit import fit_power_law
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
@@ -26,14 +34,16 @@ from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.either_medium import InMedium, likelier
+from hotlever.estimation.either_medium import error_of_choice, likelier
+from hotlever.estimation.inverse_problem import Estimate
 from hotlever.estimation.options import UNKNOWN_MEDIUM
+from hotlever.estimation.quantity import TIP
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import given_measurement, with_measured_circuit
 from hotlever.measurement.averages import averaged, note_on_averages
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.priors import Prior, known_beforehand
+from hotlever.probe.priors import Prior, PriorUse, known_beforehand
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
@@ -43,6 +53,8 @@ _LOOKS_LIKE_AIR = 1.08
 _LAW_TO, _LAW_POINTS = 1.4, 160
 #: Of them at least so many above the knee.
 _LEAST_HOT = 8
+#: Share of the measured biases that a lever must reach to show the data.
+_REACHED = 0.98
 
 
 def calibrate(
@@ -132,65 +144,69 @@ def calibrate(
     if pulse is not None:
         origin.circuit.need_cold_start("a calibration for pulses")
 
-    found = _estimate_of(measured, origin, fit, medium, priors, samples, progress)
-    found = replace(found, notes=[*more, *found.notes])
-    result = _by_estimate(measured, found, route)
+    def within(medium: str | None) -> tuple[Estimate, Calibration]:
+        """Calibrate the lever in a medium."""
+        probe, notes = with_measured_circuit(origin, measured, medium)
+        causes = Diagnosis(measured, probe, priors)
+        check_plausible(measured, probe, causes, known_beforehand(probe, priors))
+        try:
+            estimate, known = estimate_lever(measured, probe, fit, priors, progress)
+            result = _by_estimate(measured, estimate, known, route, samples, progress)
+        except ComputationError as error:
+            raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
+        if result.reason and result.converged:
+            cause = causes.named(fit is not None)
+            result = replace(result, reason=f"{result.reason}; {cause}")
+        return estimate, replace(result, notes=list(dict.fromkeys([*notes, *result.notes])))
+
+    if medium == UNKNOWN_MEDIUM:
+        estimate, result, other, words = likelier(within)
+        if other is not None:
+            result = _in_either(result, other)
+        result = replace(result, notes=[*more, words, *result.notes])
+    else:
+        estimate, result = within(medium)
+        result = replace(result, notes=[*more, *result.notes])
     if pulse is None:
         return result
     if not result.describes_data:
         said = "the pulse was not followed, since it would be that of another lever"
         return replace(result, notes=[*result.notes, said])
-    pulsed = pulse_calibration(found, pulse, progress)
-    return replace(result, pulse=pulsed)
+    return replace(result, pulse=pulse_calibration(estimate, pulse, progress))
 
 
-def _estimate_of(
+# --- by an estimate -----------------------------------------------------------------------------
+
+
+def _by_estimate(
     measured: Measurement,
-    origin: Probe,
-    fit: Fit | None,
-    medium: str | None,
-    priors: Mapping[str, Prior | str] | None,
+    estimate: Estimate,
+    known: Mapping[str, Prior],
+    route: str,
     samples: int,
     progress: Progress | None,
-) -> Estimated:
-    """Estimate a lever in the medium that is asked for; in either if that is not known."""
-
-    def within(medium: str | None) -> InMedium[Estimated]:
-        probe, notes = with_measured_circuit(origin, measured, medium)
-        causes = Diagnosis(measured, probe, priors)
-        check_plausible(measured, probe, causes, known_beforehand(probe, priors))
-        try:
-            found = estimated(measured, probe, fit, priors, samples, progress)
-        except ComputationError as error:
-            raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
-        if found.reason and found.converged:
-            found = replace(found, reason=f"{found.reason}; {causes.named(fit is not None)}")
-        found = replace(found, notes=[*notes, *remarks(measured, found.tip_K), *found.notes])
-        return InMedium(found, found.estimate, found.reason)
-
-    if medium != UNKNOWN_MEDIUM:
-        return within(medium).answer
-    found, other, words = likelier(within)
-    found = found if other is None else found.or_else(other)
-    return replace(found, notes=[words, *found.notes])
-
-
-def _by_estimate(measured: Measurement, found: Estimated, route: str) -> Calibration:
-    notes = found.notes
-    lever, measured_part = Lever(found.probe.in_medium("vacuum"), COARSE), found.branch
-    vacuum, medium = lever.branch(), found.probe.surroundings.medium
+) -> Calibration:
+    probe, circuit, own = estimate.probe, estimate.probe.circuit, estimate.branch
+    medium, use = probe.surroundings.medium, estimate.priors(known)
+    tip = tip_by_bias(estimate, samples, progress)
+    converged, reason = _verdict(estimate, use)
+    notes = [*remarks(measured, tip.tip_K), *estimate.notes]
+    notes += [tip.asymmetry] if tip.asymmetry and not reason else []
+    notes += [jump.note for jump in tip.jumps]
+    notes += estimate.residuals.suspicious(estimate.prediction.values, robust=True)
+    lever = Lever(probe.in_medium("vacuum"), COARSE)
+    vacuum = lever.branch()
     # beyond the measured range a coarse lever says where the knee is
-    own = measured_part
     if own.knee is None:
         own = vacuum if medium == "vacuum" else lever.in_medium(medium).branch()
-    knee, threshold = found.knee_of(own), vacuum.knee
-    k = k_stderr = float("nan")
-    circuit, law, residual = found.probe.circuit, None, float("nan")
+    knee, threshold = knee_of(estimate, own), vacuum.knee
+    k = k_stderr = residual = float("nan")
+    law = None
     # with held supplies, or where the power turns, the tip does not follow from a power
     turns = [] if not circuit.starts_cold else _turns(own, medium) or _turns(vacuum, "vacuum")
     alone = circuit.starts_cold and not turns
     if own.knee is None or (alone and threshold is None):
-        notes = [*notes, f"the model has no knee below {vacuum.hottest_K:.0f} K; none is needed"]
+        notes.append(f"the model has no knee below {vacuum.hottest_K:.0f} K; none is needed")
     elif alone and medium == "vacuum":
         # the law is that of the lever itself
         k, k_stderr, threshold = 1.0, 0.0, own.knee
@@ -198,13 +214,14 @@ def _by_estimate(measured: Measurement, found: Estimated, route: str) -> Calibra
         k = own.knee.power_mW / threshold.power_mW
         k_stderr = k * knee.power_mW_stderr / knee.power_mW
     if turns:
-        notes = [*notes, f"{turns[0]}; there is no power law, and the table is read by bias"]
-    if not found.probe.shape.outline_moves:
-        notes = [*notes, "the outline is taken to be as drawn: no error of it is in the result"]
+        notes.append(f"{turns[0]}; there is no power law, and the table is read by bias")
+    if not probe.shape.outline_moves:
+        notes.append("the outline is taken to be as drawn: no error of it is in the result")
     if alone:
         law, residual = _law_of(vacuum, None if threshold is None else threshold.power_mW)
+    held = None if circuit.starts_cold else held_power(estimate, tip.bias_V)
     return Calibration(
-        table=_table(circuit, found, found.parts, (found.tip_low_K, found.tip_high_K)),
+        table=_table(circuit, tip, tip.parts, (tip.low_K, tip.high_K), held),
         route=route,
         medium=medium,
         power_law=law,
@@ -213,14 +230,47 @@ def _by_estimate(measured: Measurement, found: Estimated, route: str) -> Calibra
         k_stderr=k_stderr,
         knee=knee,
         knee_tip_K=float("nan") if own.knee is None else own.knee.tip_K,
-        measured_rms_K=_rms(measured.tip_K - _tips(measured_part, measured, circuit)),
-        probe=found.probe,
+        measured_rms_K=_rms(measured.tip_K - _tips(estimate.branch, measured, circuit)),
+        probe=probe,
         measurement=measured,
-        priors=found.priors,
-        reason=found.reason,
-        converged=found.converged,
+        priors=use,
+        reason=reason,
+        converged=converged,
         notes=notes,
     )
+
+
+def _verdict(estimate: Estimate, priors: Mapping[str, PriorUse]) -> tuple[bool, str]:
+    """Return whether the search came to an end, and why the data are not described, if so."""
+    residuals, values = estimate.residuals, estimate.prediction.values
+    lack_of_fit = misfit(residuals, values, priors, estimate.posterior.moved)
+    converged, reason = estimate.verdict(lack_of_fit)
+    circuit, bias = estimate.probe.circuit, residuals.bias
+    reason = reason or not_of_a_ramp(estimate.branch, circuit, bias, values[TIP])
+    highest = highest_bias(estimate)
+    if not reason and highest < _REACHED * float(bias.max()):
+        reason = f"the lever that comes nearest has no steady state above {highest:.4g} V"
+    return converged, reason
+
+
+def _in_either(result: Calibration, other: Calibration) -> Calibration:
+    """Return a calibration whose errors hold another of the same data as well."""
+    table, bias = result.table, result.table.bias_V.values
+    tip, low, high = (
+        np.interp(bias, other.table.bias_V.values, other.table[name].values)
+        for name in ("tip_K", "tip_low_K", "tip_high_K")
+    )
+    columns = {name: table[name].values for name in result.columns}
+    parts = {
+        str(source): table.budget_K.sel(source=source).values for source in table.source.values
+    }
+    parts["medium"] = error_of_choice(columns["tip_K"], tip)
+    columns |= {
+        "tip_stderr_K": np.hypot(columns["tip_stderr_K"], parts["medium"]),
+        "tip_low_K": np.minimum(columns["tip_low_K"], low),
+        "tip_high_K": np.maximum(columns["tip_high_K"], high),
+    }
+    return replace(result, table=table_of(columns, parts))
 
 
 def _turns(branch: Branch, medium: str) -> list[str]:
@@ -232,6 +282,9 @@ def _turns(branch: Branch, medium: str) -> list[str]:
         f"in {medium} the power of the lever falls from a tip of {turn:.0f} K on, so that the tip "
         "temperature is no function of it"
     ]
+
+
+# --- by the paper's rule ------------------------------------------------------------------------
 
 
 def _by_rule(
@@ -273,21 +326,41 @@ def _by_rule(
     )
 
 
+def _statements(k: float, tip: Array) -> list[str]:
+    """Say what the user should know."""
+    statements = []
+    if k > _LOOKS_LIKE_AIR:
+        statements.append(
+            f"the lever needs {k:.2f} times the power of the model in vacuum: it seems to be "
+            "in air, where --medium air is more accurate"
+        )
+    beyond = int(np.isnan(tip).sum())
+    if beyond:
+        statements.append(
+            f"{beyond} rows of the table are hotter than the models go, and have no temperature"
+        )
+    return statements
+
+
+# --- both ---------------------------------------------------------------------------------------
+
+
 def _table(
     circuit: Circuit,
-    found: Estimated | ByRule,
+    tip: TipByBias | ByRule,
     parts: dict[str, Array],
     limits: tuple[Array, Array] | None = None,
+    held_mW: Array | None = None,
 ) -> xr.Dataset:
     """Return the table of a calibration; 95 % lie as far away as its errors say without limits."""
-    bias, current, tip = found.bias_V, found.current_mA, found.tip_K
+    bias, current, tip_K = tip.bias_V, tip.current_mA, tip.tip_K
     total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
-    low, high = limits or (tip - BAND * total, tip + BAND * total)
+    low, high = limits or (tip_K - BAND * total, tip_K + BAND * total)
     lever = circuit.lever_voltage(bias, current)
-    values = (bias, lever, current, lever * current, tip, total, low, high)
+    values = (bias, lever, current, lever * current, tip_K, total, low, high)
     columns = dict(zip(TABLE_COLUMNS, values, strict=True))
-    if isinstance(found, Estimated) and not circuit.starts_cold:
-        columns[TOTAL_POWER] = lever * current + found.held_mW
+    if held_mW is not None:
+        columns[TOTAL_POWER] = lever * current + held_mW
     return table_of(columns, parts)
 
 
@@ -308,31 +381,15 @@ def _law_of(vacuum: Branch, threshold: float | None) -> tuple[PowerLaw, float]:
         # the lever melts right above its knee
         power = np.append(power, np.linspace(threshold, highest, _LEAST_HOT + 1)[1:])
         power = np.unique(power)
-    found = fit_power_law(
+    law_fit = fit_power_law(
         power,
         vacuum.tip_temperature(power),
         base_temperature_K=vacuum.base_temperature_K,
         threshold_mW=threshold,
     )
-    return found.law, found.largest_residual_K()
-
-
-def _statements(k: float, tip: Array) -> list[str]:
-    """Say what the user should know."""
-    found = []
-    if k > _LOOKS_LIKE_AIR:
-        found.append(
-            f"the lever needs {k:.2f} times the power of the model in vacuum: it seems to be "
-            "in air, where --medium air is more accurate"
-        )
-    beyond = int(np.isnan(tip).sum())
-    if beyond:
-        found.append(
-            f"{beyond} rows of the table are hotter than the models go, and have no temperature"
-        )
-    return found
+    return law_fit.law, law_fit.largest_residual_K()
 
 
 def _rms(difference: Array) -> float:
-    known = difference[np.isfinite(difference)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+    present = difference[np.isfinite(difference)]
+    return float(np.sqrt(np.mean(present**2))) if present.size else float("nan")

@@ -18,10 +18,11 @@ from numpy.typing import ArrayLike
 from scipy.integrate import simpson
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from hotlever.calibration.inference import Estimated, error_of_model
+from hotlever.calibration.inference import error_of_model, measured_range, shares_by_source
 from hotlever.datasets import csv_text, labelled
 from hotlever.errors import ComputationError, InputError, unknown_name
 from hotlever.estimation.embedded import Number, Section, array
+from hotlever.estimation.inverse_problem import Estimate
 from hotlever.lever import Lever
 from hotlever.lever.equations import BASE
 from hotlever.lever.lever import COARSE
@@ -171,13 +172,13 @@ class PulseSection(Section):
 
 
 def pulse_calibration(
-    found: Estimated, timing: PulseTiming, progress: Progress | None = None
+    estimate: Estimate, timing: PulseTiming, progress: Progress | None = None
 ) -> PulseCalibration:
     """Return what an estimated lever does in a pulse, over the heights of its measured range.
 
     Parameters
     ----------
-    found : Estimated
+    estimate : Estimate
     timing : PulseTiming
     progress : callable, optional
         Called with the pulses followed and how many there are, about.
@@ -187,9 +188,9 @@ def pulse_calibration(
     ComputationError
         If the lever cannot be followed in time.
     """
-    levers = _Pulsed(found, timing, progress)
+    levers = _Pulsed(estimate, timing, progress)
     rise = [levers.rise(place) for place in range(_HEIGHTS)]
-    directions = found.directions(_LEAST_VARIANCE)
+    directions = estimate.posterior.principal_steps(_LEAST_VARIANCE)
     corrections, changes = [], []
     kept: Index = np.arange(len(directions))
     for place in _SOME:
@@ -202,13 +203,13 @@ def pulse_calibration(
         if place == _SOME[0]:
             kept = _main(rows[:-1])
     some = levers.heights[list(_SOME)]
-    bias = found.bias_V
+    bias = measured_range(estimate)
     tip = _interpolated(levers.heights, np.array(rise), bias)
     tip *= 1.0 + _through(some, np.array(corrections), bias)
     slopes = tip[:, None] * _through(some, np.array(changes), bias)
     # with the base the whole lever gets warmer
     slopes[:, :-1] += np.array([[one.get(BASE, 0.0)] for one in directions])
-    return _put_together(found, timing, tip, slopes, directions)
+    return _put_together(estimate, bias, timing, tip, slopes, directions)
 
 
 class _Pulsed:
@@ -217,14 +218,15 @@ class _Pulsed:
     Rises are those of `MOMENTS`, shape (3,); those of other levers are relative to it.
     """
 
-    def __init__(self, found: Estimated, timing: PulseTiming, progress: Progress | None) -> None:
-        self._probe, self._timing, self._progress = found.probe, timing, progress
-        self.heights = np.linspace(found.bias_V[0], found.bias_V[-1], _HEIGHTS)
-        self._coarse = Lever(found.probe, COARSE)
+    def __init__(self, estimate: Estimate, timing: PulseTiming, progress: Progress | None) -> None:
+        self._probe, self._timing, self._progress = estimate.probe, timing, progress
+        lowest, *_, highest = measured_range(estimate).tolist()
+        self.heights = np.linspace(lowest, highest, _HEIGHTS)
+        self._coarse = Lever(estimate.probe, COARSE)
         self._similar = SimilarLevers(self._coarse)
         self._fine: Lever | None = None
         self._known: dict[int, tuple[Array, State | None]] = {}
-        self._done, self._all = 0, 2 * (_HEIGHTS + len(found.varied))
+        self._done, self._all = 0, 2 * (_HEIGHTS + len(estimate.options.varied))
 
     def rise(self, place: int) -> Array:
         """Return the rises of the coarse lever at one of the heights."""
@@ -308,33 +310,34 @@ def _through(heights: Array, values: Array, at: Array) -> Array:
 
 
 def _put_together(
-    found: Estimated,
+    estimate: Estimate,
+    bias: Array,
     timing: PulseTiming,
     rise: Array,
     slopes: Array,
     directions: list[dict[str, float]],
 ) -> PulseCalibration:
     """Make the table, of rises (n, moments) and their changes (n, directions + 1, moments)."""
+    probe, varied = estimate.probe, estimate.options.varied
     # changes by directions to changes by parameters, of which units differ by many orders
-    steps = np.array([[one[name] for name in found.varied] for one in directions])
+    steps = np.array([[one[name] for name in varied] for one in directions])
     scale = np.abs(steps).max(axis=0)
     inverse = np.linalg.pinv(steps / scale) / scale[:, None]
     by_parameter = np.einsum("pd,ndm->nmp", inverse, slopes[:, :-1])
     parts = {
         source: np.sqrt(np.einsum("nmp,pq,nmq->nm", by_parameter, share, by_parameter))
-        for source, share in found.shares.items()
+        for source, share in shares_by_source(estimate.posterior).items()
     }
     slow = np.abs(slopes[:, -1])
     parts["heat capacity"] = slow
-    around = found.probe.surroundings
-    base = found.probe.circuit.base_temperature_K
+    around, base = probe.surroundings, probe.circuit.base_temperature_K
     if around.medium == "air":
-        share = _share_of_air(found.probe, timing.length_us)
+        share = _share_of_air(probe, timing.length_us)
         parts["heat in air"] = slow * _HEAT_IN_AIR_SPREAD * share / HEAT_CAPACITY_SPREAD
-    of_model = [error_of_model(around, found.varied, found.bias_V, column) for column in rise.T]
+    of_model = [error_of_model(around, varied, bias, column) for column in rise.T]
     parts["model"] = np.stack(of_model, axis=1)
     total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
-    columns: dict[str, Array] = {"height_V": found.bias_V}
+    columns: dict[str, Array] = {"height_V": bias}
     for place, moment in enumerate(MOMENTS):
         tip, stderr = base + rise[:, place], total[:, place]
         values = tip, stderr, tip - BAND * stderr, tip + BAND * stderr

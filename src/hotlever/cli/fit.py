@@ -31,7 +31,6 @@ from hotlever.files import Outputs, write_text
 if TYPE_CHECKING:
     from hotlever.estimation import FitOptions, Measurement
     from hotlever.estimation.experiment import Prediction
-    from hotlever.estimation.experiment_in_time import HistoryPrediction
     from hotlever.estimation.uncertainty import Uncertainty
     from hotlever.lever.transient import Waveform
     from hotlever.probe import Probe
@@ -196,9 +195,9 @@ def _fit_one(
         raise ComputationError(f"{data}: {result.doubt}")
 
 
-def _show_curve(found: Prediction | HistoryPrediction) -> None:
+def _show_curve(prediction: Prediction) -> None:
     """Show how near to the data the lever is that was found so far."""
-    columns = found.columns()
+    columns = prediction.columns()
     along, *_ = columns.values()
     some = along.argsort()[:: max(1, along.size // _DRAWN)]
     show("curve", {name: values[some].tolist() for name, values in columns.items()})

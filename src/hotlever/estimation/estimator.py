@@ -13,18 +13,17 @@ import xarray as xr
 from hotlever.errors import unknown_name
 from hotlever.estimation.band import band_dataset
 from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.either_medium import InMedium, error_of_choice, likelier
+from hotlever.estimation.either_medium import error_of_choice, likelier
 from hotlever.estimation.experiment import Experiment, Prediction
-from hotlever.estimation.experiment_in_time import HistoryPrediction
+from hotlever.estimation.experiment_in_time import PredictionInTime
 from hotlever.estimation.inverse_problem import Estimate, estimate
 from hotlever.estimation.lack_of_fit import undescribed
 from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
+from hotlever.estimation.quantity import TIP
 from hotlever.estimation.result import Fit
 from hotlever.estimation.words import undetermined
-from hotlever.lever.dataset import OBSERVABLES
 from hotlever.measurement import Measurement, given_measurement
 from hotlever.probe import Probe
-from hotlever.probe.surroundings import Medium
 from hotlever.types import Array, Progress
 
 
@@ -74,34 +73,31 @@ def fit(
     whole = given_measurement(measurement, given.circuit)
 
     def fitted(options: FitOptions) -> tuple[Estimate, Fit]:
-        found = estimate(whole, given, options, model=model, progress=progress, seen=seen)
-        return found, _fit_of(found)
-
-    def fitted_in(medium: Medium) -> InMedium[tuple[Estimate, Fit]]:
-        found, result = fitted(replace(options, medium=medium))
-        return InMedium((found, result), found, result.reason)
+        solution = estimate(whole, given, options, model=model, progress=progress, seen=seen)
+        return solution, _fit_of(solution)
 
     if options.medium == UNKNOWN_MEDIUM:
-        (found, result), other, words = likelier(fitted_in)
+        solution, result, other, words = likelier(
+            lambda medium: fitted(replace(options, medium=medium))
+        )
         result = replace(result, notes=[words, *result.notes])
         if other is not None:
-            result = replace(result, band=_either(result.band, other[1].band))
+            result = replace(result, band=_either(result.band, other.band))
     else:
-        found, result = fitted(options)
+        solution, result = fitted(options)
     # a search that has not come to its end contradicts nothing
     if result.describes_data is not False or result.in_time or "current" not in result.observables:
         return result
-    stated = options.priors or None
-    cause = Diagnosis(found.measurement, found.stated, stated).named()
+    cause = Diagnosis(solution.measurement, solution.stated, options.priors or None).named()
     return replace(result, reason=f"{result.reason}; {cause}")
 
 
 def _fit_of(estimate: Estimate) -> Fit:
     """Return what users are given of an estimate."""
-    problem, optimum, options = estimate.problem, estimate.optimum, estimate.options
-    residuals, values = problem.residuals, optimum.prediction.values
-    every, covariance = estimate.slopes(optimum.prediction), estimate.covariance
-    notes = residuals.suspicious(values, options.robust) + residuals.zeros(values, every)
+    options, residuals, prediction = estimate.options, estimate.residuals, estimate.prediction
+    values, posterior = prediction.values, estimate.posterior
+    notes = residuals.suspicious(values, options.robust)
+    notes += residuals.zeros(values, posterior.slopes)
     chi_square = residuals.reduced_chi_square(values, len(options.varied))
     converged, reason = estimate.verdict(undescribed(residuals, values))
     if chi_square is not None:
@@ -112,19 +108,19 @@ def _fit_of(estimate: Estimate) -> Fit:
         notes.append(f"{text}; standard errors follow the scatter" if follow else text)
     weighted = residuals.weighted(values)
     result = Fit(
-        probe=optimum.probe,
+        probe=estimate.probe,
         measurement=estimate.measurement,
         options=options,
         names=options.varied,
         observables=residuals.observables,
-        covariance=covariance,
-        common_noise_covariance=optimum.covariance,
+        covariance=posterior.covariance,
+        common_noise_covariance=estimate.optimum.covariance,
         data_weights=residuals.data_weights,
         sum_of_squares=float(weighted @ weighted),
         residual_rms=residuals.rms(values),
         band=_band(estimate),
-        evaluations=problem.evaluations,
-        steps=problem.steps,
+        evaluations=estimate.optimiser.evaluations,
+        steps=estimate.optimiser.steps,
         reason=reason,
         converged=converged,
         seconds=estimate.seconds,
@@ -136,17 +132,16 @@ def _fit_of(estimate: Estimate) -> Fit:
 
 def _band(estimate: Estimate) -> xr.Dataset:
     """Return the tip temperature and its standard error, at the rows or where it was followed."""
-    at, residuals = estimate.optimum.prediction, estimate.problem.residuals
-    values, slopes, along = at.values, estimate.slopes(at), {"bias_V": residuals.bias}
+    at, posterior = estimate.prediction, estimate.posterior
+    values, slopes, along = at.values, at.slopes, {"bias_V": estimate.residuals.bias}
     waveform = estimate.measurement.waveform
-    if waveform is not None and isinstance(at, HistoryPrediction):
-        values, slopes = at.seen, at.seen_by[:, :, estimate.problem.objective.columns]
+    if waveform is not None and isinstance(at, PredictionInTime):
+        values, slopes = at.seen, at.seen_by
         along = {"time_us": at.at, "bias_V": waveform.bias(at.at)}
-    by = slopes[list(OBSERVABLES).index("tip")]
-    shown: dict[str, Array] = dict(zip(OBSERVABLES.values(), values, strict=True))
-    power = estimate.optimum.probe.circuit.power(along["bias_V"], shown["current_mA"])
-    stderr = np.sqrt(np.einsum("bi,ij,bj->b", by, estimate.covariance, by))
-    return band_dataset(**along, power_mW=power, tip_K=shown["tip_K"], tip_stderr_K=stderr)
+    by_tip = slopes[TIP][:, estimate.objective.columns]
+    power = estimate.probe.circuit.power(along["bias_V"], values[0])
+    stderr = np.sqrt(np.einsum("bi,ij,bj->b", by_tip, posterior.covariance, by_tip))
+    return band_dataset(**along, power_mW=power, tip_K=values[TIP], tip_stderr_K=stderr)
 
 
 def chosen_options(options: FitOptions | None, choices: dict[str, Any]) -> FitOptions:

@@ -1,8 +1,8 @@
-"""What a fit compares data in time with: histories of a lever, corrected by the full one.
+"""An experiment in time: histories of a lever, corrected by the full one.
 
-As at rest (`hotlever.estimation.experiment`) the lever on a coarse mesh tells how its history
-changes with the parameters; at the optimum the full one is followed, and the difference added from
-then on.
+As at rest (`hotlever.estimation.experiment_at_rest`) the lever on a coarse mesh tells how its
+history changes with the parameters; at the optimum the full one is followed, and the difference
+added from then on.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from hotlever.errors import InputError
+from hotlever.estimation.surrogate import LinearSurrogate
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
@@ -89,7 +90,7 @@ def _smooth(at: Array, found: Array, rows: Array, start: float) -> Array:
 
 
 @dataclass(frozen=True)
-class HistoryPrediction:
+class PredictionInTime:
     """What an instrument and a thermometer would show in time.
 
     Attributes
@@ -125,19 +126,14 @@ class HistoryPrediction:
         return {"time_us": self.at, "current_mA": current, "reader_V": reader, "tip_K": tip}
 
     @property
-    def nearby(self) -> HistoryPrediction:
+    def surrogate(self) -> LinearSurrogate:
         """Predictions for similar probes."""
-        return self
-
-    def predict(self, parameters: Array) -> tuple[Array, Array]:
-        """Return values and slopes for some values of the parameters, to first order."""
-        away = parameters - self.probe.at(self.names)
-        return self.values + self.slopes @ away, self.slopes.copy()
+        return LinearSurrogate(self.probe.at(self.names), self.values, self.slopes)
 
 
 @dataclass(frozen=True)
 class ExperimentInTime:
-    """Predicts histories of levers similar to one; see `hotlever.estimation.experiment.Experiment`.
+    """Predicts histories of levers similar to one; see `hotlever.estimation.experiment`.
 
     Attributes
     ----------
@@ -179,7 +175,7 @@ class ExperimentInTime:
         full = SimilarLevers(Lever(probe)) if lever is None else None
         return cls(tuple(names), waveform, fast, full, _Times(waveform, rows))
 
-    def predict(self, probe: Probe, near: HistoryPrediction | None = None) -> HistoryPrediction:
+    def predict(self, probe: Probe, near: PredictionInTime | None = None) -> PredictionInTime:
         """Follow the lever of a probe, unless it was followed for the prediction nearby.
 
         Raises
@@ -201,9 +197,9 @@ class ExperimentInTime:
             seen_by = found.sensitivity.values
         right = seen + self.offset
         rows = self.times.at_rows(right), self.times.at_rows(seen_by)
-        return HistoryPrediction(probe, *rows, self.names, self.times.at, right, seen_by, seen)
+        return PredictionInTime(probe, *rows, self.names, self.times.at, right, seen_by, seen)
 
-    def confirmed(self, at: HistoryPrediction) -> ExperimentInTime:
+    def confirmed(self, at: PredictionInTime) -> ExperimentInTime:
         """Return a model that is that of the full lever at the probe of a prediction.
 
         Raises

@@ -1,4 +1,4 @@
-"""Which state of a lever a measured row is compared with: the nearest on its load line.
+"""What the rows of a measurement show of a lever: states of its branch, each on its load line.
 
 A row says that V_l + R_s I_h was the bias. A branch that folds has several such states, or none; a
 slow ramp takes the first. A search must not jump with its candidates from one part of a branch to
@@ -8,6 +8,7 @@ ends before the bias of a row, with that end as if it went on with the resistanc
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,7 +16,9 @@ import numpy as np
 from scipy.interpolate import PPoly
 
 from hotlever.lever.branch import Branch
+from hotlever.lever.curve import spline_through
 from hotlever.lever.ramp import crossing
+from hotlever.lever.sensitivities import at_fixed_bias
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array, Index
 
@@ -39,57 +42,116 @@ class Rows:
     bias_V: Array
     shown: Array | None = None
 
-    def away(self, values: Array, rows: Index) -> Array:
+    def states(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
+        """Return u of the states that the rows are compared with, and how far these fall short.
+
+        By so much, at least one, the values of a state are to be multiplied to reach the bias.
+
+        Raises
+        ------
+        BranchEndError
+            If a slow ramp finds no state at one of the biases.
+        """
+        if self.shown is not None:
+            return self._nearest(branch, circuit)
+        reading = branch.read(circuit, self.bias_V)
+        if np.isnan(reading.u).any():
+            raise branch.ended(reading)
+        return reading.u, np.ones(reading.u.shape)
+
+    def values(self, branch: Branch, circuit: Circuit) -> Array:
+        """Return I_h (mA), V_r (V) and T_tip (K), (3, n); see `states`."""
+        u, short = self.states(branch, circuit)
+        values = shown_at(branch, circuit, u)
+        values[:2] *= short
+        return values
+
+    def differentiated(
+        self, branch: Branch, by_parameter: Array, circuit: Circuit, names: Sequence[str]
+    ) -> tuple[Array, Array]:
+        """Return the same, and their derivatives (3, n, p) by parameters; see `states`.
+
+        Parameters
+        ----------
+        branch : Branch
+        by_parameter : ndarray, shape (k, 3 or 4, p)
+            How its states change, see `hotlever.lever.sensitivities.by_parameter`.
+        circuit : Circuit
+        names : sequence of str
+            The parameters.
+        """
+        u, short = self.states(branch, circuit)
+        values = shown_at(branch, circuit, u)
+        by_state = spline_through(branch.u, by_parameter)(u)
+        of_circuit = np.stack([circuit.bias_by(name, values[0]) for name in names], axis=1)
+        of_base = np.array([circuit.base_by(name) for name in names])
+        along = branch.curve(u, 1)
+        if self.shown is not None:
+            self._steepen(along, circuit, u)
+        slopes = at_fixed_bias(along, circuit, by_state, of_circuit, of_base)
+        ends = np.flatnonzero(short > 1.0)
+        if ends.size:
+            # the end of a branch stays where it is, to first order; what it lacks in bias changes
+            bias_by = circuit.bias(by_state[ends, 0], by_state[ends, 1]) + of_circuit[ends]
+            more = short[ends] / self.bias_V[ends] * short[ends]
+            for row, value in enumerate(values[:2, ends]):
+                slopes[row, ends] = short[ends, None] * by_state[ends, row + 1]
+                slopes[row, ends] -= (value * more)[:, None] * bias_by
+            slopes[2, ends] = of_base + (by_state[ends, 3] if by_state.shape[1] > 3 else 0.0)
+            values[:2, ends] *= short[ends]
+        return values, slopes
+
+    def _nearest(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
+        """Return the states nearest to what was measured; see `states`."""
+        curve = PPoly(circuit.bias(branch.curve.c[..., 0], branch.curve.c[..., 1]), branch.curve.x)
+        cold = branch.equations.circuit.starts_cold
+        start = 0.0 if cold else float(branch.u[0])
+        level = np.sort(curve.derivative().roots(extrapolate=False))
+        ends = [start, *level[(level > start) & (level < branch.end_u)].tolist(), branch.end_u]
+        # a cold lever is told apart from itself by the size of the bias only, and has none without
+        bias = np.abs(self.bias_V) if cold else self.bias_V
+        heated = np.flatnonzero(bias > 0) if cold else np.arange(bias.size)
+        u, distance = np.zeros(bias.shape), np.full(bias.shape, np.inf)
+        u[heated] = np.nan
+        short = np.ones(bias.shape)
+        for low, high in pairwise(ends):
+            first, last = float(curve(low)), float(curve(high))
+            here = heated[(bias[heated] >= min(first, last)) & (bias[heated] <= max(first, last))]
+            if not here.size:
+                continue
+            sign = 1.0 if last >= first else -1.0
+            at = crossing(PPoly(sign * curve.c, curve.x), low, high, sign * bias[here])
+            away = self._distance(shown_at(branch, branch.equations.circuit, at), here)
+            nearer = away < distance[here]
+            u[here[nearer]], distance[here[nearer]] = at[nearer], away[nearer]
+        height = curve(np.array(ends))
+        for row in np.flatnonzero(np.isnan(u)).tolist():
+            end = int(np.argmax(height) if bias[row] >= height.max() else np.argmin(height))
+            u[row] = ends[end]
+            short[row] = bias[row] / height[end] if height[end] * bias[row] > 0 else 1.0
+        if cold:
+            u = np.where(self.bias_V < 0, -np.abs(u), u)
+        return u, short
+
+    def _distance(self, values: Array, rows: Index) -> Array:
         """Return how far predicted values (3, m) are from some rows, as squares of shares, (m,)."""
         assert self.shown is not None
         largest = np.nanmax(np.abs(self.shown), axis=1, keepdims=True, initial=1e-300)
         return np.asarray(np.nansum(((values - self.shown[:, rows]) / largest) ** 2, axis=0))
 
+    def _steepen(self, along: Array, circuit: Circuit, u: Array) -> None:
+        """Let the bias rise where it hardly does, in derivatives by u (n, 5) of what is shown."""
+        slope = circuit.bias(along[:, 0], along[:, 1])
+        least = _LEAST_SLOPE * np.abs(self.bias_V) / np.maximum(np.abs(u), 1e-9)
+        flat = np.abs(slope) < least
+        along[flat, 0] += (np.where(slope < 0, -least, least) - slope)[flat]
 
-def nearest_states(branch: Branch, circuit: Circuit, rows: Rows) -> tuple[Array, Array]:
-    """Return u of the states that rows are compared with, and by how much each falls short, (n,).
 
-    By so much, at least one, the values of a state are to be multiplied to reach the bias.
+def shown_at(branch: Branch, circuit: Circuit, u: Array) -> Array:
+    """Return I_h, V_r and T_tip (3, n) of the states at some u, in the circuit of a similar lever.
+
+    Its base temperature may be another one.
     """
-    curve = PPoly(circuit.bias(branch.curve.c[..., 0], branch.curve.c[..., 1]), branch.curve.x)
-    cold = branch.equations.circuit.starts_cold
-    start = 0.0 if cold else float(branch.u[0])
-    level = np.sort(curve.derivative().roots(extrapolate=False))
-    ends = [start, *level[(level > start) & (level < branch.end_u)].tolist(), branch.end_u]
-    # a cold lever is told apart from itself by the size of the bias only, and has none without
-    bias = np.abs(rows.bias_V) if cold else rows.bias_V
-    heated = np.flatnonzero(bias > 0) if cold else np.arange(bias.size)
-    u, away = np.zeros(bias.shape), np.full(bias.shape, np.inf)
-    u[heated] = np.nan
-    short = np.ones(bias.shape)
-    for low, high in pairwise(ends):
-        first, last = float(curve(low)), float(curve(high))
-        here = heated[(bias[heated] >= min(first, last)) & (bias[heated] <= max(first, last))]
-        if not here.size:
-            continue
-        sign = 1.0 if last >= first else -1.0
-        at = crossing(PPoly(sign * curve.c, curve.x), low, high, sign * bias[here])
-        distance = rows.away(_shown(branch, at), here)
-        nearer = distance < away[here]
-        u[here[nearer]], away[here[nearer]] = at[nearer], distance[nearer]
-    height = curve(np.array(ends))
-    for row in np.flatnonzero(np.isnan(u)).tolist():
-        end = int(np.argmax(height) if bias[row] >= height.max() else np.argmin(height))
-        u[row] = ends[end]
-        short[row] = bias[row] / height[end] if height[end] * bias[row] > 0 else 1.0
-    if cold:
-        u = np.where(rows.bias_V < 0, -np.abs(u), u)
-    return u, short
-
-
-def steepened(along: Array, circuit: Circuit, u: Array, bias: Array) -> None:
-    """Let the bias rise where it hardly does, in derivatives by u (n, 5) of what is shown."""
-    slope = circuit.bias(along[:, 0], along[:, 1])
-    least = _LEAST_SLOPE * np.abs(bias) / np.maximum(np.abs(u), 1e-9)
-    flat = np.abs(slope) < least
-    along[flat, 0] += (np.where(slope < 0, -least, least) - slope)[flat]
-
-
-def _shown(branch: Branch, u: Array) -> Array:
-    shown = branch.shown(u)
-    return np.stack([shown["current_mA"], shown["reader_V"], branch.tip_K(u)])
+    warmer = circuit.base_temperature_K - branch.base_temperature_K
+    shown, tip_K = branch.shown(u), branch.tip_K(u) + warmer
+    return np.stack([shown["current_mA"], shown["reader_V"], tip_K])

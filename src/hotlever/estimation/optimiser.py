@@ -18,7 +18,7 @@ from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.objective import Objective, inverse_or_nan
 from hotlever.estimation.search_options import SearchOptions
-from hotlever.estimation.surrogate import Surrogate
+from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe import Probe
 from hotlever.types import Array, Progress
 
@@ -34,8 +34,6 @@ class Optimum:
     ----------
     probe : Probe
     prediction : Prediction
-    stderr : ndarray, shape (p,)
-        From `covariance`; infinite where there is none.
     covariance : ndarray, shape (p, p)
         If all weighted data had the same noise: the paper's assumption. NaN if it
         could not be estimated.
@@ -47,10 +45,15 @@ class Optimum:
 
     probe: Probe
     prediction: Prediction
-    stderr: Array
     covariance: Array
     decrement: float
     converged: bool
+
+    @property
+    def stderr(self) -> Array:
+        """Standard errors from the covariance, (p,); infinite where there are none."""
+        variance = np.diag(self.covariance)
+        return np.sqrt(np.where(variance > 0, variance, np.inf))
 
 
 class Optimiser:
@@ -169,7 +172,7 @@ class Optimiser:
         most = min(self.evaluations + options.most_branches, in_all)
         at, region = self.predict(start), options.first_region
         while True:
-            near = Surrogate(objective, at, self._bending(at))
+            near = Subproblem(objective, at, self._bending(at))
             room = objective.coordinates.room(near.origin)
             target, least = near.minimum(region=region * room)
             if self._takes_scatter:
@@ -208,11 +211,11 @@ class Optimiser:
 
     def _check_start(self, start: Probe) -> None:
         values = self.objective.values(start).tolist()
-        for known, value in zip(self.objective.coordinates.parameters, values, strict=True):
-            if not known.lower <= value <= known.upper:
+        for parameter, value in zip(self.objective.coordinates.parameters, values, strict=True):
+            if not parameter.lower <= value <= parameter.upper:
                 raise InputError(
-                    f"{known.name} = {value:g} to start from, expected a value between "
-                    f"{known.lower:g} and {known.upper:g} {known.unit}"
+                    f"{parameter.name} = {value:g} to start from, expected a value between "
+                    f"{parameter.lower:g} and {parameter.upper:g} {parameter.unit}"
                 )
 
     def _tolerance(self, at: Prediction, squares: float) -> float:
@@ -236,22 +239,24 @@ class Optimiser:
         noise = 1.0 if self.objective.informed else residuals.noise_squares(at.values)
         return bool(squares > self._options.misfit * residuals.size * noise)
 
+    def _linearised(self, at: Prediction) -> tuple[Array, Array, Array]:
+        """Return the point of a prediction, its residuals, and their Jacobian."""
+        point = self.objective.point(at.probe)
+        residual = self.objective.residual(at.values, point)
+        return point, residual, self.objective.jacobian(at.slopes, point)
+
     def _decrement(self, at: Prediction) -> float:
         """Return by how much Gauss and Newton's step would lower the sum of squares.
 
         Parameters at their bounds, beyond which it leads, stay there.
         """
-        objective = self.objective
-        point = objective.point(at.probe)
-        residual = objective.residual(at.values, point)
-        jacobian = objective.jacobian(at.slopes, point)
-        low, high = objective.bounds
+        point, residual, jacobian = self._linearised(at)
+        low, high = self.objective.bounds
         margin = 1e-5 * (high - low)
         free = np.ones(point.size, dtype=bool)
         for _ in range(point.size):
-            some = jacobian[:, free]
             step = np.zeros(point.size)
-            step[free] = np.linalg.lstsq(some, -residual)[0]
+            step[free] = np.linalg.lstsq(jacobian[:, free], -residual)[0]
             held = ((point <= low + margin) & (step < 0)) | ((point >= high - margin) & (step > 0))
             if not (held & free).any():
                 break
@@ -259,19 +264,14 @@ class Optimiser:
         return float(residual @ residual - np.sum((residual + jacobian @ step) ** 2))
 
     def _optimum(self, at: Prediction, decrement: float, *, converged: bool) -> Optimum:
-        objective = self.objective
-        point = objective.point(at.probe)
-        residual = objective.residual(at.values, point)
-        jacobian = objective.jacobian(at.slopes, point)
+        point, residual, jacobian = self._linearised(at)
         free = residual.size - point.size
-        rates = objective.coordinates.rates(point)
         covariance = np.full((point.size, point.size), np.nan)
         if free > 0:
-            covariance = inverse_or_nan(jacobian.T @ jacobian) * (residual @ residual / free)
-        covariance = covariance * np.outer(rates, rates)
-        variance = np.diag(covariance)
-        stderr = np.sqrt(np.where(variance > 0, variance, np.inf))
-        return Optimum(at.probe, at, stderr, covariance, decrement, converged)
+            rates = self.objective.coordinates.rates(point)
+            variance = residual @ residual / free * np.outer(rates, rates)
+            covariance = inverse_or_nan(jacobian.T @ jacobian) * variance
+        return Optimum(at.probe, at, covariance, decrement, converged)
 
     def _trial(self, at: Prediction, point: Array) -> Prediction | None:
         """Solve the lever of a point; None if it cannot be drawn or solved."""
@@ -280,14 +280,13 @@ class Optimiser:
         except HotleverError:
             return None
 
-    def _with_scatter(self, point: Array, region: Array, near: Surrogate) -> tuple[Array, float]:
+    def _with_scatter(self, point: Array, region: Array, near: Subproblem) -> tuple[Array, float]:
         """Take scatter and optimum in turns, among parameters near those of a prediction."""
         options, least = self._options, np.inf
         for _ in range(options.scatter_rounds):
             values, slopes = near.predict(point)
-            probe = self.objective.at(near.at.probe, point)
-            used_up = self.objective.used_up(probe, slopes)
-            self.residuals.take_scatter(values, used_up, options.usual_scatter)
+            leverage = self.objective.leverage(slopes, point)
+            self.residuals.take_scatter(values, leverage, options.usual_scatter)
             point, least = near.minimum(point, region)
         return point, least
 
@@ -297,14 +296,18 @@ class Optimiser:
 
     def others(self, prediction: Prediction) -> list[Prediction]:
         """Return the predictions at hand beside one."""
-        return [one for one in self._at_hand.values() if one is not prediction]
+        return [other for other in self._at_hand.values() if other is not prediction]
 
     def predict(self, probe: Probe) -> Prediction:
         """Predict with the model, from the latest prediction; what was asked before is at hand."""
-        known = self._at_hand.pop(probe, None)
-        if known is not None:
-            self._at_hand[probe] = known
-            return known
+        if probe not in self._at_hand:
+            self._at_hand[probe] = self._solved(probe)
+        self._at_hand[probe] = self._at_hand.pop(probe)  # the latest
+        if len(self._at_hand) > self._options.kept:
+            del self._at_hand[next(iter(self._at_hand))]
+        return self._at_hand[probe]
+
+    def _solved(self, probe: Probe) -> Prediction:
         near = next(reversed(self._at_hand.values()), None)
         self.evaluations += 1
         try:
@@ -314,9 +317,6 @@ class Optimiser:
                 raise
             # a step too far to be followed from there
             prediction = self.model.predict(probe)
-        self._at_hand[probe] = prediction
-        if len(self._at_hand) > self._options.kept:
-            del self._at_hand[next(iter(self._at_hand))]
         if self._progress is not None:
             self._progress(self.evaluations, max(_USUAL_BRANCHES, self.evaluations))
         if self._seen is not None:

@@ -1,6 +1,13 @@
-"""Profile likelihoods: how much worse the fit gets as one parameter is held off its optimum."""
+"""Profiles: how much worse a fit gets as a quantity is pulled off its optimum.
+
+A quantity is pulled by a further datum (`hotlever.estimation.quantity.Pull`), and all parameters
+are estimated anew; the rise ΔS of the sum of squares says how many standard errors away it is. A
+calibration asks so for the tip temperature, a fit for each of its parameters.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
@@ -9,21 +16,121 @@ from scipy.special import chdtri
 
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation.experiment import Experiment, experiment_of
+from hotlever.estimation.experiment import Experiment, Prediction
+from hotlever.estimation.experiment_at_rest import experiment_of
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser
-from hotlever.estimation.residuals import Residuals
+from hotlever.estimation.posterior import Posterior
+from hotlever.estimation.quantity import ParameterValue, Pull, TipTemperature
 from hotlever.estimation.result import Fit
-from hotlever.probe import Probe
+from hotlever.estimation.search_options import SearchOptions
+from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe.parameters import parameter_of, usual_parameters
-from hotlever.types import Array
+from hotlever.probe.priors import PriorDensity
+from hotlever.text import BAND
+from hotlever.types import Array, Index
 
-#: Confidence levels whose intervals are read off a profile.
+#: Biases, in the hotter half, at which the tip temperature is pulled away, and by how many
+#: standard errors.
+_ROWS, _AWAY = 3, 2.0
+#: How a pulled lever is searched for: it is near enough where the sum of squares would fall by
+#: another third, of the four by which two standard errors raise it. Levers that an optimum knows
+#: little of are further away than a first step of usual length.
+_PULLED = SearchOptions(
+    most_branches=3, decrement=0.3, scatter_rounds=0, first_region=2.0, largest_region=2.0
+)
+#: A rise of the sum of squares below which a side is open.
+_LEAST_RISE = 0.25
+#: A linearised error that is right within this factor holds.
+_ALIKE = 1.25
+#: Confidence levels whose intervals are read off the profile of a parameter.
 LEVELS = (0.68, 0.95)
-#: Standard errors that the first points span on each side.
-_REACH = 2.5
+#: Standard errors that the first points of that span on each side, and the share of a step within
+#: which a parameter is held.
+_REACH, _HELD = 2.5, 1e-3
 #: Longer and longer steps that are added on a side until the interval closes.
 _MORE_STEPS = 6
+
+
+# --- the tip temperature ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ErrorProfile:
+    """Standard errors of the tip temperature on either side, as multiples of the linearised one.
+
+    Attributes
+    ----------
+    tip_K : ndarray, shape (k,)
+        Rising.
+    below, above : ndarray, shape (k,)
+    """
+
+    tip_K: Array
+    below: Array
+    above: Array
+
+    @property
+    def linear(self) -> bool:
+        """Whether the linearised error holds everywhere."""
+        return bool(np.abs(np.log([self.below, self.above])).max() < np.log(_ALIKE))
+
+    def credible_interval(
+        self, tip_K: Array, stderr_K: Array, other_K: Array
+    ) -> tuple[Array, Array]:
+        """Return what 95 % of the tip temperatures lie between (K).
+
+        The profile is that of the linearised error `stderr_K`; an `other_K` is the same either way.
+        """
+        below, above = (np.interp(tip_K, self.tip_K, side) for side in (self.below, self.above))
+        low, high = (BAND * np.hypot(side * stderr_K, other_K) for side in (below, above))
+        return tip_K - low, tip_K + high
+
+
+def profile_of_tip(posterior: Posterior, experiment: Experiment) -> ErrorProfile:
+    """Pull the tip temperature of an estimate with priors away from its optimum.
+
+    On either side the lever is solved whose tip is pulled away where it is hottest; what is near it
+    serves the other biases. What the optimum tells of levers so far away does not hold where
+    parameters make up for each other along a bent valley. Where no such lever is found the
+    linearised error is kept.
+    """
+    objective, at, rows = posterior.objective, posterior.at, hotter_rows(posterior.at)
+    least = objective.squares(at)
+    sides = np.ones((2, rows.size))
+    for side, way in enumerate((-1.0, 1.0)):
+        tips = [TipTemperature(int(row)) for row in rows]
+        pulled = [objective.pulled(_pull(posterior, tip, way)) for tip in tips]
+        optimiser = Optimiser(experiment, pulled[-1], near=at, options=_PULLED)
+        optimum = optimiser.solve(at.probe)
+        if not optimum.converged:
+            continue
+        near = Subproblem(objective, optimum.prediction)
+        for place, (tip, pulled_objective) in enumerate(zip(tips, pulled, strict=True)):
+            there, _ = near.of(pulled_objective).minimum()
+            value, stderr = posterior.of(tip)
+            rise = max(near.squares(there) - least, _LEAST_RISE)
+            away = abs(tip.value(near.shown(there), there) - value)
+            sides[side, place] = away / (stderr * np.sqrt(rise))
+    return ErrorProfile(at.values[2, rows], *sides)
+
+
+def _pull(posterior: Posterior, tip: TipTemperature, way: float) -> Pull:
+    """Return a datum that moves an estimate to `_AWAY` standard errors, if everything is linear.
+
+    It is twice as far away, with the error that the tip is known by: the estimate moves half way.
+    """
+    value, stderr = posterior.of(tip)
+    return Pull(tip, value + 2.0 * way * _AWAY * stderr, stderr)
+
+
+def hotter_rows(at: Prediction) -> Index:
+    """Return the rows of the data at which limits are looked for, the hottest last."""
+    order = np.argsort(at.values[2])
+    return order[np.linspace(order.size / 2, order.size - 1, _ROWS).astype(int)]
+
+
+# --- the parameters of a fit --------------------------------------------------------------------
 
 
 def profile_likelihood(
@@ -61,7 +168,7 @@ def profile_likelihood(
     """
     result.measurement.need_rest("a profile")
     result.need_described("a profile")
-    known = parameter_of(result.probe, name)
+    parameter = parameter_of(result.probe, name)
     if name not in result.names or len(result.names) < 2:
         raise InputError(
             f"no profile of {name}: expected one of several parameters that the fit varied "
@@ -71,74 +178,60 @@ def profile_likelihood(
         raise InputError(f"found points = {points}, expected an odd number of 5 or more")
     if not result.sum_of_squares > 0:
         raise InputError("the fit meets its data exactly: without scatter nothing tells how sure")
-    optimum, residuals = result.parameters[name], result.residuals()
-    others = [other for other in result.names if other != name]
-    model = _model(result, residuals)
-    near = model.predict(result.probe)
-    priors = result.known_before
-    whole = Objective(residuals, result.probe, model.names, result.names, priors)
+    residuals, quantity = result.residuals(), ParameterValue(result.names.index(name))
+    names = tuple(dict.fromkeys([*usual_parameters(result.probe), *result.names]))
+    model = experiment_of(result.probe, residuals.bias, names=names, reduce=True)
+    # exact to first order at the optimum, and used as it is from there
+    model = model.confirmed(model.predict(result.probe))
+    at_optimum = model.predict(result.probe)
+    prior = PriorDensity.independent(result.known_before) if result.known_before else None
+    objective = Objective(residuals, result.probe, model.names, result.names, prior)
     # with priors, residuals are in standard deviations
-    variance = 1.0 if whole.informed else _noise_variance(result, name, residuals.size)
-    least = whole.squares(near) if whole.informed else result.sum_of_squares
-    of_others = {one: prior for one, prior in priors.items() if one != name}
-
-    def refit(value: float, start: Probe) -> tuple[float, Probe]:
-        """Fit the others with the parameter at `value`; return Δχ² and where."""
-        nonlocal near
-        held = start.moved({name: value})
-        objective = Objective(residuals, held, model.names, others, of_others)
-        found = Optimiser(model, objective, near=near).solve(held)
-        near = found.prediction
-        return (whole.squares(near) - least) / variance, found.probe
-
+    variance = 1.0 if objective.informed else _noise_variance(result, name, residuals.size)
+    least = objective.squares(at_optimum) if objective.informed else result.sum_of_squares
+    value, stderr = result.parameters[name].value, result.parameters[name].stderr
     # without a standard error, a tenth of the bounds' distance is a step as good as any
-    step = (optimum.stderr or 0.1 * (known.upper - known.lower)) * _REACH / (points // 2)
-    rows = {optimum.value: (0.0, result.probe)}
+    step = (stderr or 0.1 * (parameter.upper - parameter.lower)) * _REACH / (points // 2)
+    rows = {value: (0.0, result.probe.at(result.names))}
     reasons: dict[str, str] = {}
     for side, sign, way, bound in (
-        ("lower", -1.0, "down", known.lower),
-        ("upper", 1.0, "up", known.upper),
+        ("lower", -1.0, "down", parameter.lower),
+        ("upper", 1.0, "up", parameter.upper),
     ):
-        probe, distance = result.probe, 0.0
+        distance = 0.0
+        near: Prediction = at_optimum
         for count in range(1, points // 2 + _MORE_STEPS + 1):
             distance += step * 2.0 ** max(0, count - points // 2)
-            value = optimum.value + sign * distance
-            if sign * (value - bound) >= 0:
+            target = value + sign * distance
+            if sign * (target - bound) >= 0:
                 reasons[side] = f"{way} to its bound {bound:g}"
                 break
+            pulled = objective.pulled(Pull(quantity, target, _HELD * step))
             try:
-                delta, probe = refit(value, probe)
+                start = near.probe.moved({name: target})
+                near = Optimiser(model, pulled, near=near).solve(start).prediction
             except ComputationError:
-                reasons[side] = f"as far as the lever can be solved ({value:.4g} cannot)"
+                reasons[side] = f"as far as the lever can be solved ({target:.4g} cannot)"
                 break
-            rows[value] = (delta, probe)
+            delta = (objective.squares(near) - least) / variance
+            rows[target] = delta, near.probe.at(result.names)
             if count >= points // 2 and delta > chdtri(1, 1.0 - LEVELS[-1]):
                 break
         else:
-            reasons[side] = f"as far as it was followed ({value:.4g})"
+            reasons[side] = f"as far as it was followed ({target:.4g})"
     return _dataset(result, name, dict(sorted(rows.items())), reasons)
-
-
-def _model(result: Fit, residuals: Residuals) -> Experiment:
-    """Return a model that is exact to first order at the optimum, and used as it is from there."""
-    names = tuple(dict.fromkeys([*usual_parameters(result.probe), *result.names]))
-    model = experiment_of(result.probe, residuals.bias, names=names, reduce=True)
-    return model.confirmed(model.predict(result.probe))
 
 
 def _noise_variance(result: Fit, name: str, size: int) -> float:
     """Return what the sum of squares knows of the noise, corrected by the standard error."""
     variance = result.sum_of_squares / max(size - len(result.names), 1)
-    place, stderr = result.names.index(name), result.parameters[name].stderr
-    common = result.common_noise_covariance[place, place]
+    number, stderr = result.names.index(name), result.parameters[name].stderr
+    common = result.common_noise_covariance[number, number]
     return variance * (1.0 if stderr is None else float(stderr**2 / common))
 
 
 def _dataset(
-    result: Fit,
-    name: str,
-    rows: dict[float, tuple[float, Probe]],
-    reasons: dict[str, str],
+    result: Fit, name: str, rows: dict[float, tuple[float, Array]], reasons: dict[str, str]
 ) -> xr.Dataset:
     optimum = result.parameters[name]
     values = np.array(list(rows))
@@ -153,17 +246,22 @@ def _dataset(
         if np.isnan(end)
     ]
     stderr = np.nan if optimum.stderr is None else optimum.stderr
-    others = [other for other in result.names if other != name]
-    refitted = np.transpose([probe.at(others) for _, probe in rows.values()])
+    refitted = np.transpose([parameters for _, parameters in rows.values()])
+    others = [number for number, other in enumerate(result.names) if other != name]
     return labelled(
         {
             "delta_chi_square": delta,
             "parabola": ((values - optimum.value) / stderr) ** 2,
-            "refitted": (("parameter", "point"), refitted),
+            "refitted": (("parameter", "point"), refitted[others]),
             "interval": (("level", "side"), interval),
         },
         "point",
-        {"value": ("point", values), "parameter": others, "level": list(LEVELS), "side": sides},
+        {
+            "value": ("point", values),
+            "parameter": [result.names[number] for number in others],
+            "level": list(LEVELS),
+            "side": sides,
+        },
         quantity=name,
         optimum=optimum.value,
         notes="\n".join(notes),

@@ -1,27 +1,33 @@
-"""A search for a lever: from where it begins, and which of two ends counts."""
+"""A search for a lever: from where it begins, and which of two ends counts.
+
+The resistance of a cold lever tells its doping and size, whatever it does when hot. So a lever that
+is far from the data is first made to show their coldest rows, then more and more of them; each
+portion begins where the last has led, and no candidate is asked for biases that it cannot take.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from hotlever.errors import ComputationError
 from hotlever.estimation.experiment import Experiment, Prediction
-from hotlever.estimation.growth import far_from, grown
+from hotlever.estimation.experiment_at_rest import ExperimentAtRest
 from hotlever.estimation.lack_of_fit import undescribed
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser, Optimum
 from hotlever.estimation.residuals import Residuals
+from hotlever.estimation.search_options import GROWTH, SearchOptions
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
-from hotlever.probe.priors import JointPrior, Prior
+from hotlever.probe.parameters import dimensions_of, parameters_of
+from hotlever.probe.priors import Prior, PriorDensity, default_priors
 from hotlever.types import Progress
 
-#: The problem as it was solved, and where the search for its solution ended.
+#: The optimiser, as it was left, and where it ended.
 End = tuple[Optimiser, Optimum]
 
 
@@ -37,9 +43,8 @@ class Search:
     varied : list of str
     robust : bool
         Whether the weight of outliers is lessened.
-    priors, joint
-        See `hotlever.estimation.objective.Objective`.
-    progress, seen
+    prior : PriorDensity, optional
+    progress, seen : callable, optional
         See `hotlever.estimation.optimiser.Optimiser`.
     """
 
@@ -47,27 +52,20 @@ class Search:
     start: Probe
     varied: list[str]
     robust: bool
-    priors: Mapping[str, Prior]
-    joint: JointPrior | None = None
+    prior: PriorDensity | None = None
     progress: Progress | None = None
     seen: Callable[[Prediction], None] | None = None
 
-    def near(self, forward: Any, start: Probe) -> End:
+    def near(self, experiment: Experiment, start: Probe) -> End:
         """Search from a lever that is not far from the one that was measured."""
-        problem = self._problem(forward, start)
-        return problem, problem.solve_and_confirm(start, self.robust)
+        optimiser = self._optimiser(experiment, self.residuals.afresh(), start)
+        return optimiser, optimiser.solve_and_confirm(start, self.robust)
 
-    def _problem(self, forward: Any, start: Probe) -> Optimiser:
-        residuals = self.residuals.afresh()
-        objective = Objective(residuals, start, forward.names, self.varied, self.priors, self.joint)
-        return Optimiser(forward, objective, progress=self.progress, seen=self.seen)
-
-    def from_anywhere(self, forward: Experiment, measurement: Measurement) -> End:
+    def from_anywhere(self, experiment: ExperimentAtRest, measurement: Measurement) -> End:
         """Search from a lever of which little may be known.
 
         If it shows something else than the data, or the search leads to a lever that does, it first
-        grows (`hotlever.estimation.growth`); of two ends the one that describes the data better
-        counts.
+        grows; of two ends the one that describes the data better counts.
 
         Raises
         ------
@@ -75,41 +73,113 @@ class Search:
             If the lever cannot be solved at the start.
         """
         ends: list[End] = []
-        problem = self._problem(forward, self.start)
+        optimiser = self._optimiser(experiment, self.residuals.afresh(), self.start)
         with suppress(ComputationError):
-            if not far_from(self.residuals, problem.predict(self.start)):
-                ends.append((problem, problem.solve_and_confirm(self.start, self.robust)))
+            if not _is_far(self.residuals, optimiser.predict(self.start)):
+                ends.append((optimiser, optimiser.solve_and_confirm(self.start, self.robust)))
                 if _describes(*ends[0]):
                     return ends[0]
-        again, nearer = grown(
-            forward,
-            measurement,
-            self.residuals.observables,
-            self.start,
-            self.varied,
-            self.priors,
-            self.joint,
-            self.progress,
-        )
+        grown, nearer = self._grown(experiment, measurement)
         if ends and nearer == self.start:
             # cold rows say nothing else, and the same search would come to the same end
             return ends[0]
         try:
-            ends.append(self.near(again, nearer))
+            ends.append(self.near(grown, nearer))
         except ComputationError:
             if not ends:
                 raise
         return min(ends, key=lambda end: (not _describes(*end), _share(*end)))
 
+    def _optimiser(
+        self,
+        experiment: Experiment,
+        residuals: Residuals,
+        start: Probe,
+        prior: PriorDensity | None = None,
+        options: SearchOptions | None = None,
+    ) -> Optimiser:
+        objective = Objective(residuals, start, experiment.names, self.varied, prior or self.prior)
+        return Optimiser(
+            experiment,
+            objective,
+            progress=self.progress,
+            # what is seen of a portion is not seen at the rows of the measurement
+            seen=self.seen if options is None else None,
+            options=options,
+        )
 
-def _describes(problem: Optimiser, optimum: Optimum) -> bool:
+    def _grown(
+        self, experiment: ExperimentAtRest, measurement: Measurement
+    ) -> tuple[ExperimentAtRest, Probe]:
+        """Return a lever that shows nearly what was measured, up to the hottest portion of rows.
+
+        With it the experiment is returned that is to be searched on with. Without priors the usual
+        ones close what cold rows leave open.
+        """
+        experiment, start = experiment.coarse(), self.start
+        prior = self.prior or PriorDensity.independent(_closing(start, self.varied))
+        bias = np.abs(measurement.bias_V)
+        heated = np.unique(bias[np.isfinite(measurement.current_mA) & (bias > 0)])
+        for portion in range(1, GROWTH.portions):
+            count = max(GROWTH.fewest_rows, -(-heated.size * portion // GROWTH.portions))
+            if count >= heated.size:
+                break
+            part = measurement.part(bias <= heated[count - 1])
+            with_data = set(part.observables)
+            residuals = Residuals(
+                part, [name for name in self.residuals.observables if name in with_data], "errors"
+            )
+            if _has_moved(experiment.drawn, start):
+                experiment = experiment.drawn_anew(start)
+            of_part = experiment.measuring(residuals.bias, residuals.shown)
+            optimiser = self._optimiser(of_part, residuals, start, prior, GROWTH.search)
+            try:
+                start = optimiser.solve(start).probe
+            except ComputationError:
+                if portion == 1:
+                    raise
+                break
+        moved = _has_moved(experiment.drawn, start)
+        return (experiment.drawn_anew(start) if moved else experiment), start
+
+
+def _is_far(residuals: Residuals, at: Prediction) -> bool:
+    """Whether a lever shows something else than the data."""
+    share = residuals.difference(at.values) / residuals.largest
+    # a few wrong rows are no other lever
+    return bool(np.nanmax(np.nanmedian(np.abs(share), axis=1)) > GROWTH.far)
+
+
+def _has_moved(drawn: Probe, probe: Probe) -> bool:
+    """Whether a probe's dimensions are far from those that a mesh was drawn with."""
+    names = dimensions_of(probe)
+    before, now = drawn.at(names), probe.at(names)
+    return bool(np.any(np.abs(now - before) > GROWTH.mesh_follows * np.abs(before)))
+
+
+def _closing(probe: Probe, varied: Sequence[str]) -> dict[str, Prior]:
+    """Return wide priors about a probe for all that is varied."""
+    usual, every = default_priors(probe), parameters_of(probe, anywhere=True)
+    closing = {}
+    for name, value in zip(varied, probe.at(list(varied)).tolist(), strict=True):
+        if name in usual:
+            prior = usual[name]
+            closing[name] = Prior(value, GROWTH.widened * prior.spread, prior.relative)
+        elif every[name].lower > 0:
+            closing[name] = Prior(value, GROWTH.open)
+        else:
+            closing[name] = Prior(value, GROWTH.open * every[name].scale, relative=False)
+    return closing
+
+
+def _describes(optimiser: Optimiser, optimum: Optimum) -> bool:
     """Whether a search has ended at a lever that describes the data."""
     values = optimum.prediction.values
-    return optimum.converged and not undescribed(problem.residuals, values)
+    return optimum.converged and not undescribed(optimiser.residuals, values)
 
 
-def _share(problem: Optimiser, optimum: Optimum) -> float:
+def _share(optimiser: Optimiser, optimum: Optimum) -> float:
     """Return the mean square of differences, as shares of the largest of each observable."""
-    residuals = problem.residuals
+    residuals = optimiser.residuals
     share = residuals.difference(optimum.prediction.values) / residuals.largest
     return float(np.nanmean((residuals.down * share) ** 2))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -77,3 +77,43 @@ class SearchOptions:
     settled_relative: float = 0.03
     confirmations: int = 5
     usual_scatter: float = 1e-3
+
+
+@dataclass(frozen=True)
+class GrowthOptions:
+    """What steers a search that begins with the cold lever.
+
+    Attributes
+    ----------
+    far : float
+        A lever is far from data that differ from what it shows by this share of the largest
+        (median).
+    portions, fewest_rows : int
+        By which a lever grows, the last of which is all of the rows; the least rows of one.
+    widened, open : float
+        By how much the usual priors are widened, and the spread of what has none, where only the
+        directions are to be closed that a few cold rows leave open.
+    mesh_follows : float
+        Share of a dimension by which a mesh follows it well; edges' bias moves all of them.
+    search : SearchOptions
+        A portion is to be met within some per cent: the next moves the lever anyway.
+    """
+
+    far: float = 0.06
+    portions: int = 6
+    fewest_rows: int = 3
+    widened: float = 4.0
+    open: float = 0.5
+    mesh_follows: float = 0.2
+    search: SearchOptions = field(
+        default_factory=lambda: SearchOptions(
+            most_branches=4,
+            decrement=2.0,
+            scatter_rounds=0,
+            first_region=0.7,
+            largest_region=1.2,
+        )
+    )
+
+
+GROWTH = GrowthOptions()

@@ -1,158 +1,173 @@
-"""The surrogate of a lever: what it would show near one that was solved, at next to no cost.
+"""The surrogate of a lever: what it would show for parameters near some, at next to no cost.
 
-To first order voltages and currents are powers of the parameters
-(`hotlever.estimation.experiment.Nearby`); other levers that were solved say how they bend on the
-way there. The search, the profile of the tip temperature and its posterior take their levers from
-here.
+Search, profile, posterior and diagnosis all take the levers that they do not solve from here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import suppress
-from copy import copy
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
-from scipy import optimize
 
-from hotlever.errors import ComputationError
-from hotlever.estimation.experiment import Prediction
-from hotlever.estimation.objective import Objective, inside
+from hotlever.estimation.coordinates import Coordinates
+from hotlever.estimation.load_lines import Rows
+from hotlever.lever.branch import Branch, shifted
+from hotlever.lever.curve import spline_through
+from hotlever.lever.reduced import ReducedLever
+from hotlever.lever.sensitivities import Linearised
+from hotlever.probe import Circuit, Probe
+from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
-#: Relative change of the sum of squares at which a minimum is found; without priors squares count
-#: no standard deviations, so that next to nothing may be left.
-_GAIN, _PRECISE_GAIN = 1e-5, 1e-10
 
+class Surrogate(Protocol):
+    """A local model of what a lever shows, exact at the parameters of one that was solved."""
 
-class Surrogate:
-    """Residuals and their derivatives near a prediction, without solving a lever.
-
-    Other predictions say how values bend on the way to them: by what they differ there from what
-    is expected, growing as the square of the distance. Distances are measured by what data and
-    priors tell, so that those along the narrow valleys that a search follows are kept apart from
-    those across (Schnabel and Frank, SIAM J. Numer. Anal. 21, 815 (1984)).
-
-    Parameters
-    ----------
-    objective : Objective
-    at : Prediction
-    others : sequence of Prediction
-    least : float
-        Standard deviations from which on the others count: what nearer ones differ by would be
-        carried too far by those who look far away.
-    """
-
-    def __init__(
-        self,
-        objective: Objective,
-        at: Prediction,
-        others: Sequence[Prediction] = (),
-        least: float = 0.0,
-    ) -> None:
-        self.objective, self.at = objective, at
-        self.origin = objective.point(at.probe)
-        self._parameters = at.probe.at(objective.names)
-        self._bends: list[tuple[Array, Array]] = []
-        self._latest: tuple[Array, tuple[Array, Array]] | None = None
-        jacobian = objective.jacobian(at.slopes, self.origin)
-        for other in others:
-            there = objective.point(other.probe)
-            along = jacobian.T @ (jacobian @ (there - self.origin))
-            size = float(along @ (there - self.origin))
-            with suppress(ComputationError):
-                missed = other.values - self._predicted(there)[0]
-                # the product with this direction is 1 at the other prediction
-                if size > least**2:
-                    self._bends.append((along / size, missed))
-
-    def of(self, objective: Objective) -> Surrogate:
-        """Return the same levers, compared with the data by another objective."""
-        other = copy(self)
-        other.objective = objective
-        return other
-
-    def predict(self, point: Array) -> tuple[Array, Array]:
-        """Return I_h, V_r and T_tip (3, n), and their derivatives by all parameters (3, n, k).
+    def predict(self, parameters: Array) -> tuple[Array, Array]:
+        """Return I_h, V_r and T_tip (3, n), and their derivatives (3, n, k), by parameters (k,).
 
         Raises
         ------
         ComputationError
-            If the lever has no such states.
+            If such a lever has no such states.
         """
-        # asked for twice, for the residuals and their derivatives
-        if self._latest is None or not np.array_equal(self._latest[0], point):
-            self._latest = point.copy(), self._predicted(point)
-        return self._latest[1]
+        ...
 
-    def _predicted(self, point: Array) -> tuple[Array, Array]:
-        objective = self.objective
-        parameters = self._parameters.copy()
-        parameters[objective.columns] = objective.coordinates.values(point)
-        values, slopes = self.at.nearby.predict(parameters)
-        for along, missed in self._bends:
-            way = float(along @ (point - self.origin))
-            values = values + missed * way**2
-            slopes[:, :, objective.columns] += missed[:, :, None] * (
-                2.0 * way * along / objective.coordinates.rates(point)
-            )
-        return values, slopes
 
-    def values(self, point: Array) -> Array:
-        """Return the first of these alone."""
-        return self.predict(point)[0]
+@dataclass(frozen=True)
+class LinearSurrogate:
+    """What is shown, to first order in the parameters: that of a history in time.
 
-    def _has_states(self, point: Array) -> bool:
-        try:
-            self.predict(point)
-        except ComputationError:
-            return False
-        return True
+    Attributes
+    ----------
+    parameters : ndarray, shape (k,)
+    values, slopes : ndarray, shapes (3, n) and (3, n, k)
+        At the parameters.
+    """
 
-    def residual(self, point: Array) -> Array:
-        """Return the residuals of data and priors; large ones if the lever has no such states."""
-        try:
-            return self.objective.residual(self.values(point), point)
-        except ComputationError:
-            return self.objective.unsolved(point)
+    parameters: Array
+    values: Array
+    slopes: Array
 
-    def jacobian(self, point: Array) -> Array:
-        """Return their derivatives by the coordinates."""
-        return self.objective.jacobian(self.predict(point)[1], point)
+    def predict(self, parameters: Array) -> tuple[Array, Array]:
+        """See `Surrogate`."""
+        return self.values + self.slopes @ (parameters - self.parameters), self.slopes.copy()
 
-    def squares(self, point: Array) -> float:
-        """Return the sum of squares of the residuals."""
-        residual = self.residual(point)
-        return float(residual @ residual)
 
-    def minimum(
-        self, start: Array | None = None, region: Array | None = None
-    ) -> tuple[Array, float]:
-        """Return the point of least squares, and these.
+class CurveSurrogate:
+    """The branch of a lever, and how it changes with the parameters at equal rises of the tip.
 
-        Parameters
-        ----------
-        start : ndarray, shape (p,), optional
-            Where the search begins; at the lever that was solved by default, or if there are no
-            states.
-        region : ndarray, shape (p,), optional
-            How far it may go from that lever; by default to the bounds.
+    There voltages and currents are nearly powers of the parameters, much more so than anything is
+    at a fixed bias. With held supplies they may be of either sign, and go straight.
+
+    Parameters
+    ----------
+    probe : Probe
+    names : tuple of str
+        The parameters.
+    branch : Branch
+        Of this probe.
+    by_parameter : ndarray, shape (k, 3 or 4, p)
+        Its derivatives, see `hotlever.lever.sensitivities.by_parameter`.
+    rows : Rows
+        What is shown of it.
+    """
+
+    def __init__(
+        self, probe: Probe, names: tuple[str, ...], branch: Branch, by_parameter: Array, rows: Rows
+    ) -> None:
+        self.probe, self.names, self.branch, self.rows = probe, names, branch, rows
+        self._origin = probe.at(names)
+        scale = Coordinates.of(probe, names).scale
+        self._unit = np.maximum(np.abs(self._origin), 0.1 * scale)
+        self._rates = by_parameter * self._unit
+        self._straight = not branch.equations.circuit.starts_cold
+        if not self._straight:
+            powers = self._rates[1:] / branch.values[1:, :3, None]
+            # without power everything is zero; its ratios are those of a barely warm lever
+            self._rates = np.concatenate([powers[:1], powers])
+        self._slopes = spline_through(branch.u, self._rates)(branch.u, 1)
+
+    def branch_at(self, parameters: Array) -> Branch:
+        """Return the branch for some values of the parameters (p,)."""
+        away = (parameters - self._origin) / self._unit
+        if self._straight:
+            return shifted(self.branch, self._rates @ away, self._slopes @ away)
+        return multiplied(self.branch, np.exp(self._rates @ away), self._slopes @ away)
+
+    def predict(self, parameters: Array) -> tuple[Array, Array]:
+        """See `Surrogate`."""
+        branch = self.branch_at(parameters)
+        by_parameter = self._rates
+        if not self._straight:
+            by_parameter = branch.values[:, :3, None] * self._rates
+        circuit = self.circuit(parameters)
+        return self.rows.differentiated(branch, by_parameter / self._unit, circuit, self.names)
+
+    def shown(self, parameters: Array) -> Array:
+        """Return the values of `predict` alone."""
+        return self.rows.values(self.branch_at(parameters), self.circuit(parameters))
+
+    def circuit(self, parameters: Array) -> Circuit:
+        """Return the circuit, with those of the parameters that are its own."""
+        named = zip(self.names, parameters.tolist(), strict=True)
+        own = {name: value for name, value in named if name in Circuit.model_fields}
+        return self.probe.circuit.model_copy(update=own)
+
+
+class ReducedSurrogate:
+    """A branch times what a reduced lever changes by at equal rises of the tip: good far away too.
+
+    The reduced lever stays on its few points, and each of its states starts at a root; so this
+    costs little more than powers do.
+
+    Parameters
+    ----------
+    local : CurveSurrogate
+        Of the lever at which it is exact.
+    reduced : ReducedLever
+    linearised : Linearised
+        The reduced lever there.
+    """
+
+    def __init__(
+        self, local: CurveSurrogate, reduced: ReducedLever, linearised: Linearised
+    ) -> None:
+        self._local, self._reduced, self._linearised = local, reduced, linearised
+        self._shown = self._on_few_points(local.probe)
+
+    def _on_few_points(self, probe: Probe) -> Array:
+        """Return V_l, I_h and V_r of the states of a probe, (k, 3)."""
+        guess = self._linearised.states(probe)[:, 1:]
+        u = self._local.branch.u[1:]
+        few, states = self._reduced.solved(probe, u, guess, self._linearised.factors)
+        return np.asarray(few.observed(states.x).T)
+
+    @one_blas_thread
+    def shown(self, parameters: Array) -> Array:
+        """Return I_h, V_r and T_tip (3, n) for some values of the parameters (p,).
+
+        Raises
+        ------
+        ComputationError
+            If such a lever has no such states.
         """
-        objective, (low, high) = self.objective, self.objective.bounds
-        if region is not None:
-            low = np.maximum(low, self.origin - region)
-            high = np.minimum(high, self.origin + region)
-        if start is None or not self._has_states(start):
-            start = self.origin
-        found = optimize.least_squares(
-            self.residual,
-            inside(start, low, high),
-            self.jacobian,
-            (low, high),
-            x_scale="jac",
-            ftol=_GAIN if objective.informed else _PRECISE_GAIN,
-            xtol=1e-10,
-            gtol=None,
-            max_nfev=100,
-        )
-        return found.x, 2.0 * float(found.cost)
+        local = self._local
+        named = zip(local.names, parameters.tolist(), strict=True)
+        ratio = self._on_few_points(local.probe.moved(dict(named))) / self._shown
+        # without power the ratio is that of a barely warm lever
+        ratio = np.concatenate([ratio[:1], ratio])
+        growth = spline_through(local.branch.u, ratio)(local.branch.u, 1) / ratio
+        return local.rows.values(multiplied(local.branch, ratio, growth), local.probe.circuit)
+
+
+def multiplied(branch: Branch, factor: Array, growth: Array) -> Branch:
+    """Return a branch with V_l, I_h and V_r times factors (k, 3).
+
+    `growth` is the derivative of the factors' logarithms by u.
+    """
+    values, slopes = branch.values.copy(), branch.value_slopes.copy()
+    slopes[:, :3] = factor * (slopes[:, :3] + values[:, :3] * growth)
+    values[:, :3] *= factor
+    return replace(branch, values=values, value_slopes=slopes)

@@ -13,9 +13,9 @@ import xarray as xr
 from dask.system import CPU_COUNT
 
 from hotlever.cluster import local_processes
-from hotlever.estimation.posterior import BAND_QUANTILES, predictive_band, sample_posterior
 from hotlever.estimation.profile import profile_likelihood
 from hotlever.estimation.result import Fit
+from hotlever.estimation.sampling import BAND_QUANTILES, predictive_band, sample_posterior
 from hotlever.files import json_text
 from hotlever.probe.parameters import parameters_of
 from hotlever.text import BAND

@@ -8,9 +8,8 @@ and the thickness. The scales of meters and of the Raman thermometer have priors
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -108,10 +107,6 @@ class Prior:
         away = np.log(value / self.value) if self.relative else value - self.value
         return float(away) / self.spread
 
-    def slope(self, value: float) -> float:
-        """Return the derivative of `deviation` by the value."""
-        return 1.0 / (self.spread * (value if self.relative else 1.0))
-
     def used(self, value: float, spread: float) -> PriorUse:
         """Return what data made of it, a value and a standard deviation in the parameter's unit."""
         distribution: Distribution = "log-normal" if self.relative else "normal"
@@ -201,42 +196,73 @@ class Moved(NamedTuple):
 
 
 @dataclass(frozen=True)
-class JointPrior:
-    """A normal distribution of several parameters or their logarithms, as an estimate leaves it.
+class PriorDensity:
+    """A normal density of several parameters or their logarithms: priors, or an earlier estimate.
 
     Attributes
     ----------
-    names : list of str
+    names : tuple of str
     values : ndarray, shape (p,)
-    covariance : ndarray, shape (p, p)
-        In the parameters' own units.
     relative : ndarray of bool, shape (p,)
-        Whose logarithm it is; the others may be of either sign.
+        Whose logarithm is normal; the others may be of either sign.
+    whitening : ndarray, shape (p, p)
+        Makes uncorrelated standard deviations of distances from the values.
+    sources : tuple of str
+        What each of these (p,) deviations is known from: a prior, by its parameter, or ``fit``.
     """
 
-    names: list[str]
+    names: tuple[str, ...]
     values: Array
-    covariance: Array
     relative: NDArray[np.bool_]
+    whitening: Array
+    sources: tuple[str, ...]
 
-    @cached_property
-    def _whitening(self) -> Array:
-        unit = self._unit(self.values)
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.covariance / np.outer(unit, unit))))
+    @classmethod
+    def independent(cls, priors: Mapping[str, Prior]) -> PriorDensity:
+        """Return the density of priors of single parameters."""
+        spreads = np.array([prior.spread for prior in priors.values()])
+        return cls(
+            tuple(priors),
+            np.array([prior.value for prior in priors.values()]),
+            np.array([prior.relative for prior in priors.values()], dtype=bool),
+            np.diag(1.0 / spreads),
+            tuple(priors),
+        )
 
-    def _unit(self, values: Array) -> Array:
-        return np.where(self.relative, values, 1.0)
+    @classmethod
+    def of_estimate(
+        cls, names: Sequence[str], values: Array, covariance: Array, relative: NDArray[np.bool_]
+    ) -> PriorDensity:
+        """Return what an estimate leaves, with its covariance (p, p) in the parameters' units."""
+        unit = np.where(relative, values, 1.0)
+        factor = np.linalg.cholesky(covariance / np.outer(unit, unit))
+        whitening = np.asarray(np.linalg.inv(factor))
+        return cls(tuple(names), values, relative, whitening, ("fit",) * len(names))
+
+    def beside(self, other: PriorDensity) -> PriorDensity:
+        """Return the density of these and of other parameters, independent of each other."""
+        return PriorDensity(
+            self.names + other.names,
+            np.append(self.values, other.values),
+            np.append(self.relative, other.relative),
+            np.block(
+                [
+                    [self.whitening, np.zeros((len(self.names), len(other.names)))],
+                    [np.zeros((len(other.names), len(self.names))), other.whitening],
+                ]
+            ),
+            self.sources + other.sources,
+        )
 
     def deviations(self, values: Array) -> Array:
-        """Return how far values are from the prior's, in uncorrelated standard deviations."""
-        logarithms = np.log(self._unit(values) / self._unit(self.values))
-        return np.asarray(
-            self._whitening @ np.where(self.relative, logarithms, values - self.values)
-        )
+        """Return how far values are from the density's, in uncorrelated standard deviations."""
+        ratio = np.where(self.relative, values, 1.0) / np.where(self.relative, self.values, 1.0)
+        away = np.where(self.relative, np.log(ratio), values - self.values)
+        return np.asarray(self.whitening @ away)
 
     def slopes(self, values: Array) -> Array:
         """Return the derivatives of `deviations` by the values, (p, p)."""
-        return np.asarray(self._whitening / self._unit(values))
+        return np.asarray(self.whitening / np.where(self.relative, values, 1.0))
 
 
 def nuisances(probe: Probe) -> list[str]:

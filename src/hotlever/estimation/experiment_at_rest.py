@@ -1,0 +1,263 @@
+"""An experiment at rest: a lever that is solved fast, corrected by the full one.
+
+The fast lever is a reduced one where the geometry has been reduced before, or else the same lever
+on a coarse mesh. At a material where the full lever is solved too, the difference of the two
+branches is added to the fast one's from then on. Parameters are what
+`hotlever.probe.parameters` names: of the material, dimensions, the series resistance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from hotlever.estimation.load_lines import Rows
+from hotlever.estimation.surrogate import CurveSurrogate
+from hotlever.lever.branch import Branch, Reach, shifted
+from hotlever.lever.curve import spline_through
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.held import at_places_of, followed
+from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.newton import NewtonOptions, find_roots
+from hotlever.lever.pinned import Pinned
+from hotlever.lever.reduced import ReducedLever, ReducedSpace
+from hotlever.lever.reduction import cached_reduction, can_be_reduced, known_reduction
+from hotlever.lever.sensitivities import Linearised, by_parameter
+from hotlever.lever.similar import SimilarLevers
+from hotlever.materials import PARAMETERS
+from hotlever.probe import Probe
+from hotlever.probe.parameters import usual_parameters
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array
+
+#: How far beyond zero bias the branch of a lever goes that does not start cold: share of the range.
+_BEYOND_ZERO = 0.05
+#: States at which the full lever corrects a reduced one.
+_CORRECTED_AT = 10
+
+
+class BranchSolver(Protocol):
+    """A lever that is solved for any similar probe: full, coarse or reduced."""
+
+    def linearised(
+        self,
+        probe: Probe,
+        reach: Reach,
+        near: Linearised | None = None,
+        names: tuple[str, ...] = ...,
+    ) -> Linearised:
+        """Return the branch of a probe, with its derivatives by some parameters."""
+        ...
+
+
+@dataclass(frozen=True)
+class PredictionAtRest:
+    """What an instrument and a thermometer would show.
+
+    Attributes
+    ----------
+    values : ndarray, shape (3, n)
+        I_h (mA), V_r (V) and T_tip (K) at the biases.
+    slopes : ndarray, shape (3, n, p)
+        Derivatives by the model's parameters at fixed bias.
+    linearised : Linearised
+        What they were read from, not corrected.
+    surrogate : CurveSurrogate
+        Predictions for similar probes.
+    """
+
+    values: Array
+    slopes: Array
+    linearised: Linearised
+    surrogate: CurveSurrogate
+
+    @property
+    def probe(self) -> Probe:
+        """The probe it is for."""
+        return self.linearised.probe
+
+    def columns(self) -> dict[str, Array]:
+        """Return what it shows, by the names that a sweep has, each (n,)."""
+        bias, (current, reader, tip) = self.surrogate.rows.bias_V, self.values
+        lever = self.probe.circuit.lever_voltage(bias, current)
+        shown = {"bias_V": bias, "lever_V": lever}
+        return shown | {"current_mA": current, "reader_V": reader, "tip_K": tip}
+
+
+@dataclass(frozen=True)
+class Correction:
+    """What a fast lever lacks, exact to first order at one place among the parameters.
+
+    `values` are those of V_l (V), I_h (mA) and V_r (V), perhaps of the rise of the tip (K) too, by
+    u; `slopes` of their derivatives by the parameters.
+    """
+
+    at: Array
+    values: BSpline
+    slopes: BSpline
+
+    @classmethod
+    def through(cls, at: Array, u: Array, values: Array, slopes: Array) -> Correction:
+        """Make curves through what is lacking at some u."""
+        return cls(at, spline_through(u, values), spline_through(u, slopes))
+
+    def added(self, branch: Branch, at: Array) -> Branch:
+        """Return a branch of the fast lever with what it lacks, for some values of parameters."""
+        moved, u = at - self.at, branch.u
+        changes, slopes = (self.values(u, n) + self.slopes(u, n) @ moved for n in (0, 1))
+        return shifted(branch, changes, slopes)
+
+
+@dataclass(frozen=True)
+class ExperimentAtRest:
+    """Predicts a measurement at some biases (V, in any order) with a lever that is solved fast.
+
+    The full lever corrects the fast one, unless it is None. What is predicted depends on the
+    probe alone: correcting the model makes another one. Derivatives are by ``names``, and
+    are corrected too if ``first_order``. Where it is known what was measured, as ``shown``, each
+    bias stands for the state nearest to that (`hotlever.estimation.load_lines`), otherwise for that
+    of a slow ramp.
+    """
+
+    fast: BranchSolver
+    full: SimilarLevers | None
+    bias: Array
+    names: tuple[str, ...] = tuple(PARAMETERS)
+    first_order: bool = True
+    correction: Correction | None = None
+    shown: Array | None = None
+
+    def measuring(self, bias: Array, shown: Array | None) -> ExperimentAtRest:
+        """Return the model at other biases (V), with what was measured there, if that is known."""
+        return replace(self, bias=bias, shown=shown)
+
+    @property
+    def drawn(self) -> Probe:
+        """The probe whose drawing has the meshes that others move."""
+        similar = self.fast if isinstance(self.fast, SimilarLevers) else self.full
+        assert similar is not None
+        return similar.drawn
+
+    def coarse(self) -> ExperimentAtRest:
+        """Return the model with a lever that is solved for any parameters, not corrected."""
+        if isinstance(self.fast, SimilarLevers):
+            return self
+        return replace(self, fast=SimilarLevers(Lever(self.drawn, COARSE)), correction=None)
+
+    def drawn_anew(self, probe: Probe) -> ExperimentAtRest:
+        """Return the model on meshes of a probe's own drawing, not corrected."""
+        full = None if self.full is None else SimilarLevers(Lever(probe))
+        return replace(self, fast=SimilarLevers(Lever(probe, COARSE)), full=full, correction=None)
+
+    def reach(self, probe: Probe) -> Reach:
+        """Return how far the branch of a probe must go: beyond zero if it does not start cold.
+
+        Similar levers have no bias elsewhere.
+        """
+        lowest, highest = min(float(self.bias.min()), 0.0), max(float(self.bias.max()), 0.0)
+        return Reach(probe.circuit, highest, lowest - _BEYOND_ZERO * (highest - lowest))
+
+    @one_blas_thread
+    def predict(self, probe: Probe, near: PredictionAtRest | None = None) -> PredictionAtRest:
+        """Predict the measurement of a probe, starting from a similar one's.
+
+        Raises
+        ------
+        ComputationError
+            If the lever has no state below the melting point at one of the biases.
+        """
+        linearised = None if near is None else near.linearised
+        if linearised is None or linearised.probe != probe:
+            linearised = self.fast.linearised(probe, self.reach(probe), linearised, self.names)
+        branch, by_parameter = linearised.branch, linearised.shown
+        if self.correction:
+            branch = self.correction.added(branch, probe.at(self.names))
+            by_parameter = by_parameter + self.correction.slopes(branch.u)
+        rows = Rows(self.bias, self.shown)
+        shown = rows.differentiated(branch, by_parameter, probe.circuit, self.names)
+        surrogate = CurveSurrogate(probe, self.names, branch, by_parameter, rows)
+        return PredictionAtRest(*shown, linearised, surrogate)
+
+    @one_blas_thread
+    def confirmed(self, at: PredictionAtRest) -> ExperimentAtRest:
+        """Return a model that is exact at the probe of a prediction, if so wanted to first order.
+
+        Raises
+        ------
+        ComputationError
+            If the full lever cannot be solved there.
+        """
+        if self.full is None:
+            return self
+        fast, probe = at.linearised.branch, at.probe
+        equations = self.full.equations(probe, self.names)
+        u, x = self._full_states(fast, equations, probe)
+        by_fast = at.linearised.shown_at(u)
+        count = by_fast.shape[1]
+        shown = np.vstack([equations.observed(x), equations.space.tip_rise(x)])[:count]
+        values = shown.T - fast.curve(u)[:, :count]
+        slopes = np.zeros(by_fast.shape)
+        if self.first_order:
+            slopes = by_parameter(equations, x, self.names, pin=fast.sections.pin(u)) - by_fast
+        if equations.circuit.starts_cold:
+            # without power nothing is lacking
+            u = np.append(0.0, u)
+            values, slopes = (np.insert(lacking, 0, 0.0, axis=0) for lacking in (values, slopes))
+        correction = Correction.through(probe.at(self.names), u, values, slopes)
+        return replace(self, correction=correction)
+
+    def _full_states(
+        self, fast: Branch, equations: LeverEquations, probe: Probe
+    ) -> tuple[Array, Array]:
+        """Return states of the full lever, (size + 1, k), and u of the fast one's that they match.
+
+        Few suffice to correct a reduced lever, whose errors are small and smooth.
+        """
+        space = fast.equations.space
+        if not isinstance(space, ReducedSpace):
+            branch = at_places_of(fast, followed(equations, self.reach(probe)))
+            return branch.u[branch.solved], branch.x[:, branch.solved]
+        some = np.unique(np.linspace(1, fast.u.size - 1, _CORRECTED_AT).astype(int))
+        u, guess = fast.u[some], space.expanded(fast.x[:, some])
+        return u, find_roots(Pinned(equations, u**2), guess, NewtonOptions(tolerance=1e-5)).x
+
+
+def full_experiment(lever: Lever, bias: Array) -> ExperimentAtRest:
+    """Return a lever as forward model, just as it is."""
+    return ExperimentAtRest(SimilarLevers(lever), None, bias, usual_parameters(lever.probe))
+
+
+def reduced_experiment(lever: Lever, reduced: ReducedLever, bias: Array) -> ExperimentAtRest:
+    """Return a reduced lever, corrected by the full one, as forward model."""
+    return ExperimentAtRest(reduced, SimilarLevers(lever), bias, reduced.names)
+
+
+def experiment_of(
+    probe: Probe,
+    bias: Array,
+    *,
+    names: tuple[str, ...] | None = None,
+    reduce: bool = False,
+) -> ExperimentAtRest:
+    """Return the fastest forward model of a probe.
+
+    Parameters
+    ----------
+    probe : Probe
+    bias : ndarray, shape (n,)
+    names : tuple of str
+        Parameters of the derivatives; by default what a fit usually varies. A reduced lever does
+        not serve all, see `hotlever.lever.reduction.can_be_reduced`.
+    reduce : bool
+        Make and keep a reduced lever (some seconds) if the geometry has none yet: it pays where
+        more than one fit is to come.
+    """
+    lever, reduced = Lever(probe), None
+    names = usual_parameters(probe) if names is None else names
+    if can_be_reduced(probe, names):
+        reduced = cached_reduction(lever, names=names) if reduce else known_reduction(lever, names)
+    fast: BranchSolver = SimilarLevers(Lever(probe, COARSE)) if reduced is None else reduced
+    return ExperimentAtRest(fast, SimilarLevers(lever), bias, names)

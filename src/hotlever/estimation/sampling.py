@@ -1,0 +1,391 @@
+"""Posterior samples of a fit's parameters or a calibration's tip, and what follows from them.
+
+Sampled with emcee from the density of `hotlever.estimation.posterior`; levers are taken from a
+surrogate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import emcee
+import numpy as np
+import xarray as xr
+
+from hotlever.datasets import labelled
+from hotlever.errors import InputError
+from hotlever.estimation.ensembles import (
+    Chains,
+    independent_samples,
+    rhat_of_ensembles,
+    sample,
+)
+from hotlever.estimation.experiment_at_rest import (
+    ExperimentAtRest,
+    PredictionAtRest,
+    experiment_of,
+)
+from hotlever.estimation.objective import Objective
+from hotlever.estimation.optimiser import Optimiser
+from hotlever.estimation.posterior import Noise, Posterior, PosteriorDensity
+from hotlever.estimation.profile import ErrorProfile, hotter_rows
+from hotlever.estimation.quantity import TIP, TipTemperature
+from hotlever.estimation.result import Fit
+from hotlever.estimation.subproblem import Subproblem
+from hotlever.estimation.surrogate import ReducedSurrogate
+from hotlever.lever.certificate import estimated_error
+from hotlever.lever.lever import Lever
+from hotlever.lever.reduced import ReducedLever
+from hotlever.materials import full_name
+from hotlever.probe import Probe
+from hotlever.probe.parameters import parameters_of, usual_parameters
+from hotlever.probe.priors import PriorDensity
+from hotlever.text import BAND, INVERSION
+from hotlever.types import Array, Progress
+
+#: Quantiles (%) of a predictive band: median, 68 % and 95 %.
+BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)
+#: Standard deviations from which on a solved lever tells of those that samples reach.
+_TELLING = 1.0
+#: R̂ from which on samples are too few.
+_SETTLED = 1.05
+
+
+class SampledLever:
+    """A lever near a fit's optimum, for samples: exact at a probe, cheap for others.
+
+    Parameters
+    ----------
+    experiment : ExperimentAtRest
+        Of a lever like it, reduced if it can be.
+    probe : Probe
+
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters in which others differ.
+    at : PredictionAtRest
+        Of the probe.
+    shown : callable
+        Return I_h, V_r and T_tip (3, n) for values of the parameters (k,).
+
+    Raises
+    ------
+    ComputationError
+        If the lever cannot be solved.
+    """
+
+    def __init__(self, experiment: ExperimentAtRest, probe: Probe) -> None:
+        first = experiment.predict(probe)
+        self._experiment = experiment.confirmed(first)
+        self.at: PredictionAtRest = self._experiment.predict(probe, first)
+        self.names = experiment.names
+        self.shown: Callable[[Array], Array] = self.at.surrogate.shown
+        if isinstance(experiment.fast, ReducedLever):
+            reduced = ReducedSurrogate(self.at.surrogate, experiment.fast, self.at.linearised)
+            self.shown = reduced.shown
+
+    def error_K(self, parameters: Array) -> float:
+        """Return by how much the tip temperature may be off for some values (k,) of the names.
+
+        By the lever that is solved there; of a reduced one by what the full one's residual says.
+        """
+        probe = self.at.probe.moved(dict(zip(self.names, parameters.tolist(), strict=True)))
+        solved = self._experiment.predict(probe, self.at)
+        error = float(np.abs(self.shown(parameters) - solved.values)[TIP].max())
+        if isinstance(self._experiment.fast, ReducedLever):
+            branch = solved.linearised.branch
+            u = branch.u[np.linspace(1, branch.u.size - 1, 4).astype(int)]
+            error += float(estimated_error(Lever(probe), branch, u)[TIP].max())
+        return error
+
+
+# --- the tip of a calibration -------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SampledTip:
+    """What posterior samples say of the tip temperature.
+
+    Attributes
+    ----------
+    profile : ErrorProfile
+        From the quantiles of 2.5 and 97.5 %.
+    effective_samples, rhat : float
+        Of the tip temperature where it is hottest.
+    """
+
+    profile: ErrorProfile
+    effective_samples: float
+    rhat: float
+
+    @property
+    def note(self) -> str:
+        """What the limits are from, and whether there are enough samples."""
+        text = (
+            "95 % of the tip temperatures lie between quantiles of posterior samples "
+            f"({self.effective_samples:.0f} effective ones, R̂ {self.rhat:.3f})"
+        )
+        return text + ("" if self.rhat < _SETTLED else "; these are too few, take more samples")
+
+
+def sample_tip(
+    posterior: Posterior,
+    optimiser: Optimiser,
+    *,
+    samples: int,
+    progress: Progress | None = None,
+) -> SampledTip:
+    """Sample the parameters of an estimate, and their tip temperatures.
+
+    Levers that the optimiser has solved far enough from the optimum say how values bend. What is
+    sampled costs too little for processes of its own.
+    """
+    objective, at = posterior.objective, posterior.at
+    near = Subproblem(objective, at, optimiser.others(at), least=_TELLING)
+    density = PosteriorDensity(objective, at, near.shown)
+    chains = sample(
+        density.log_probability, density.approximation, samples=samples, progress=progress
+    )
+    points, rows = chains.points.reshape(-1, near.origin.size), hotter_rows(at)
+    tips = np.array([near.shown(point)[TIP] for point in points])[:, rows]
+    middle, stderr = np.transpose([posterior.of(TipTemperature(int(row))) for row in rows])
+    low, high = np.percentile(tips, (2.5, 97.5), axis=0)
+    hottest = tips[:, -1].reshape(chains.points.shape[:3])
+    return SampledTip(
+        ErrorProfile(middle, (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)),
+        independent_samples(hottest),
+        rhat_of_ensembles(hottest),
+    )
+
+
+# --- the parameters of a fit --------------------------------------------------------------------
+
+
+def _lever_like(fit: Fit, probe: Probe, bias: Array) -> SampledLever:
+    """Return a lever that was fitted, at some biases (V), exact at a probe."""
+    experiment = experiment_of(probe, bias, names=tuple(fit.names), reduce=True)
+    return SampledLever(experiment, probe)
+
+
+def _density_at(fit: Fit, probe: Probe, noise: Noise) -> tuple[PosteriorDensity, SampledLever]:
+    """Return the density of a fit's parameters, approximated about a probe, and levers near it."""
+    residuals = fit.residuals()
+    lever = _lever_like(fit, probe, residuals.bias)
+    prior = PriorDensity.independent(fit.known_before) if fit.known_before else None
+    objective = Objective(residuals, probe, lever.names, fit.names, prior)
+    shown = partial(_shown_at, lever.shown, objective, probe.at(lever.names))
+    return PosteriorDensity(objective, lever.at, shown, noise), lever
+
+
+def _shown_at(
+    shown: Callable[[Array], Array], objective: Objective, parameters: Array, point: Array
+) -> Array:
+    """Return what is shown at a point; a function of the module, so that it can be pickled."""
+    return shown(objective.among(parameters, point))
+
+
+def sample_posterior(
+    fit: Fit,
+    *,
+    samples: int = 10_000,
+    walkers: int | None = None,
+    processes: int = 2,
+    seed: int = 0,
+    noise: Noise = "each",
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Sample the posterior of the parameters that a fit varied, with the priors that it had.
+
+    Parameters
+    ----------
+    fit : Fit
+    samples : int
+        Kept, at least; rounded up to a whole number of steps of all walkers.
+    walkers : int, optional
+        Of each of four independent ensembles; by default 24, or three for each parameter.
+    processes : int
+        Started by spawn: a script that calls this with more than one needs
+        ``if __name__ == "__main__"``. The samples do not depend on their number.
+    seed : int
+    noise : {"each", "common"}
+        One unknown noise scale for each observable (they differ by a factor of ten in real
+        data), or one for all scaled residuals, which is what the fit's standard errors assume.
+    progress : callable, optional
+        Called with the steps done and their number.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dimensions ``chain`` and ``draw``: the varied parameters,
+        ``inversion_temperature`` and ``log_probability``; on ``quantity`` (all of these but the
+        last): ``effective_sample_size``, ``rhat``; ``acceptance_fraction``; the coordinate
+        ``ensemble`` of each chain. Attributes give the fixed parameters, the seed, the noise, and
+        by how much the surrogate may be wrong at the outermost samples (``rough_error_K``).
+
+    Raises
+    ------
+    InputError
+        If a number is too small or `noise` unknown, or the fit does not describe its data.
+    ComputationError
+        If no start is found or a worker process dies.
+    """
+    if noise not in ("each", "common"):
+        raise InputError(f"found noise = {noise!r}, expected 'each' or 'common'")
+    fit.need_described("a posterior")
+    at_optimum, _ = _density_at(fit, fit.probe, noise)
+    # with other weights than the fit's, the posterior lies beside the optimum
+    middle = at_optimum.objective.at(fit.probe, at_optimum.approximation.mean)
+    density, lever = _density_at(fit, middle, noise)
+    chains = sample(
+        density.log_probability,
+        density.approximation,
+        samples=samples,
+        walkers=walkers,
+        processes=processes,
+        seed=seed,
+        progress=progress,
+    )
+    objective = density.objective
+    data = _dataset(fit, chains, objective.coordinates.values)
+    points = chains.points.reshape(-1, density.optimum.size)
+    at_middle = middle.at(lever.names)
+    error = max(
+        lever.error_K(objective.among(at_middle, points[row])) for row in _outermost(points)
+    )
+    data.attrs |= {"seed": seed, "noise": noise, "rough_error_K": error}
+    return data
+
+
+def _outermost(points: Array) -> list[int]:
+    """Return the samples with the smallest and largest value along the widest axis."""
+    away = (points - points.mean(axis=0)) / np.maximum(points.std(axis=0), 1e-300)
+    along = away @ np.linalg.eigh(away.T @ away)[1][:, -1]
+    return [int(np.argmin(along)), int(np.argmax(along))]
+
+
+def _dataset(fit: Fit, chains: Chains, values_of: Callable[[Array], Array]) -> xr.Dataset:
+    ensembles, walkers, draws, _ = chains.points.shape
+    values = values_of(chains.points)
+    columns = {name: values[..., place] for place, name in enumerate(fit.names)}
+    silicon, material = fit.probe.heater_silicon, fit.probe.layout().heater.stack[0].material
+    if silicon is not None:
+        at = {own: columns.get(full_name(material, own)) for own in ("n_d", "p")}
+        moved = silicon.model_copy(update={own: one for own, one in at.items() if one is not None})
+        columns[INVERSION] = np.broadcast_to(moved.inversion_temperature(), values.shape[:3])
+    rhat = [rhat_of_ensembles(column) for column in columns.values()]
+    chained = {
+        name: column.reshape(ensembles * walkers, draws)
+        for name, column in (columns | {"log_probability": chains.log_probability}).items()
+    }
+    size = [independent_samples(column) for column in columns.values()]
+    held = [name for name in usual_parameters(fit.probe) if name not in fit.names]
+    at_rest = zip(held, fit.probe.at(held).tolist(), strict=True)
+    data = labelled(
+        {
+            **chained,
+            "rhat": ("quantity", rhat),
+            "effective_sample_size": ("quantity", size),
+            "acceptance_fraction": ((), chains.accepted),
+        },
+        ("chain", "draw"),
+        {
+            "quantity": list(columns),
+            "ensemble": ("chain", np.repeat(np.arange(ensembles), walkers)),
+        },
+        fixed=", ".join(f"{name} = {value:g}" for name, value in at_rest),
+        observables=", ".join(fit.observables),
+        sampler=f"emcee {emcee.__version__}",
+    )
+    for name, known in parameters_of(fit.probe).items():
+        if name in fit.names:
+            data[name].attrs = {"units": known.unit, "long_name": known.meaning}
+    return data
+
+
+# --- the band of tip temperature ----------------------------------------------------------------
+
+
+def predictive_band(
+    fit: Fit,
+    posterior: xr.Dataset,
+    *,
+    bias: Sequence[float] | Array | None = None,
+    samples: int = 300,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Predict the tip temperature, with quantiles, from posterior samples.
+
+    It is the band of the true temperature, given the model; measured ones scatter about it by
+    their noise as well.
+
+    Parameters
+    ----------
+    fit : Fit
+    posterior : xarray.Dataset
+        From `sample_posterior`.
+    bias : sequence of float, optional
+        V; by default 81 from zero to the highest measured one.
+    samples : int
+        Taken evenly from the posterior.
+    progress : callable, optional
+        Called with the samples done and their number.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``tip_K`` (quantile, bias) and ``tip_at_power_K`` (quantile, power), with the coordinates
+        ``quantile`` (%), ``bias_V`` and ``power_mW``. The powers reach to the highest that all
+        samples reach; they are NaN where a power does not tell the temperature.
+
+    Raises
+    ------
+    InputError
+        If a bias or the number of samples is impossible.
+    ComputationError
+        If the lever cannot be solved at a bias.
+    """
+    if samples < 2:
+        raise InputError(f"found samples = {samples}, expected 2 or more")
+    measured = fit.measurement.bias_V
+    grid = (
+        np.linspace(min(float(measured.min()), 0.0), float(measured.max()), 81)
+        if bias is None
+        else np.unique(np.asarray(bias, float))
+    )
+    lever = _lever_like(fit, fit.probe, grid)
+    origin = fit.probe.at(lever.names)
+    varied = [lever.names.index(name) for name in fit.names]
+    flat = np.stack([posterior[name].values.ravel() for name in fit.names], axis=1)
+    chosen = flat[np.linspace(0, len(flat) - 1, min(samples, len(flat))).round().astype(int)]
+    tips, powers = [], []
+    for done, row in enumerate(chosen, start=1):
+        parameters = origin.copy()
+        parameters[varied] = row
+        current, _, tip = lever.shown(parameters)
+        tips.append(tip)
+        powers.append(lever.at.surrogate.circuit(parameters).power(grid, current))
+        if progress is not None:
+            progress(done, len(chosen))
+    power = np.linspace(np.min(powers, axis=1).max(), np.max(powers, axis=1).min(), grid.size)
+    if np.diff(powers, axis=1).min() < 0:
+        # with held supplies there may be several temperatures at one power
+        power = np.full(grid.size, np.nan)
+    at_power = [_against(power, x, tip) for x, tip in zip(powers, tips, strict=True)]
+    quantiles = partial(np.percentile, q=BAND_QUANTILES, axis=0)
+    return labelled(
+        {
+            "tip_K": (("quantile", "bias"), quantiles(tips)),
+            "tip_at_power_K": (("quantile", "power_mW"), quantiles(at_power)),
+        },
+        coordinates={"quantile": list(BAND_QUANTILES), "bias": grid, "power_mW": power},
+        samples=len(chosen),
+    )
+
+
+def _against(power: Array, powers: Array, tip: Array) -> Array:
+    """Interpolate a tip temperature, which rises with the power, at given powers."""
+    order = np.argsort(powers)
+    return np.interp(power, powers[order], tip[order])
