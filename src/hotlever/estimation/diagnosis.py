@@ -10,22 +10,22 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import attrgetter
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation.hypotheses import Hypothesis, Rows, hypotheses_of
-from hotlever.lever.curve import spline_through
-from hotlever.lever.following import Follower
-from hotlever.lever.lever import COARSE, HOTTEST, Lever
-from hotlever.lever.sensitivities import Linearised
+from hotlever.estimation.hypotheses import Hypothesis, MeasuredRows, hypotheses_of
+from hotlever.estimation.load_lines import Rows
+from hotlever.estimation.surrogate import CurveSurrogate
+from hotlever.lever.branch import Reach
+from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import Prior, known_beforehand
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
 #: What a coarse lever may differ by from what was measured: of each current and of the largest.
@@ -49,7 +49,7 @@ _WIDEST = 30.0
 
 @dataclass(frozen=True)
 class _Curve:
-    """V_l and I_h along the branch of a coarse lever, as powers of its parameters.
+    """V_l and I_h at many points along the branch of a coarse lever, from its surrogate.
 
     Attributes
     ----------
@@ -72,28 +72,25 @@ class _Curve:
     powers: Array
 
     @classmethod
-    @one_blas_thread
     def of(cls, probe: Probe, priors: Mapping[str, Prior]) -> _Curve:
-        """Solve a probe as far as curves are followed."""
+        """Solve a probe as far as it goes."""
         # the resistor is a hypothesis of its own; what is 0 has no logarithm
         names = tuple(
             name
             for name in parameters_of(probe)
             if name in priors and name != "series_resistance_ohm" and priors[name].value > 0
         )
-        known = [priors[name] for name in names]
-        spreads = [one.spread if one.relative else one.spread / abs(one.value) for one in known]
-        equations = SimilarLevers(Lever(probe, COARSE)).equations(probe, names)
-        target = np.sqrt(HOTTEST - probe.circuit.base_temperature_K)
-        branch = Follower(equations).until(lambda known: bool(known.u[-1] >= target))
-        slopes = Linearised.of(probe, names, branch, lambda known: True).shown[1:, :2]
-        powers = slopes * probe.at(names) / branch.values[1:, :2, None]
-        u = np.linspace(float(branch.u[1]), branch.end_u, _POINTS)
-        shown = np.maximum(branch.curve(u)[:, :2], 1e-12)
-        powers = spline_through(branch.u[1:], powers)(u)
+        spreads = [priors[name].absolute / abs(priors[name].value) for name in names]
+        whole = Reach(probe.circuit, np.inf)
+        lever = SimilarLevers(Lever(probe, COARSE)).linearised(probe, whole, names=names)
+        rows = Rows(np.zeros(0))
+        surrogate = CurveSurrogate(probe, names, lever.branch, lever.shown, rows)
+        u = np.linspace(float(lever.branch.u[1]), lever.branch.end_u, _POINTS)
+        shown = np.maximum(lever.branch.curve(u)[:, :2], 1e-12)
+        powers = surrogate.powers(u)[:, :2]
         return cls(probe, np.zeros(len(names)), names, np.array(spreads), np.log(shown), powers)
 
-    def current(self, away: Array, rows: Rows) -> Array:
+    def current(self, away: Array, rows: MeasuredRows) -> Array:
         """Return I_h (mA) at the biases, for logarithms of parameters over the probe's.
 
         Beyond its end the branch stays level: no lever takes such a bias.
@@ -104,8 +101,8 @@ class _Curve:
 
 
 @dataclass(frozen=True)
-class _Found:
-    """Where a search ended: what is left unexplained, the unknown, and the parameters.
+class _Explanation:
+    """Where a search with a hypothesis ended: what is left unexplained, and with what.
 
     These are logarithms over the values of the curve's probe.
     """
@@ -115,6 +112,14 @@ class _Found:
     squares: float
     unknown: float
     away: Array
+
+    @property
+    def question(self) -> str:
+        """What the hypothesis asks; empty if nothing."""
+        return self.hypothesis.asks(self.unknown)
+
+
+_squares = attrgetter("squares")
 
 
 class Diagnosis:
@@ -134,7 +139,7 @@ class Diagnosis:
     ) -> None:
         here = np.isfinite(measured.current_mA) & np.isfinite(measured.bias_V)
         data = measured.bias_V[here], measured.current_mA[here]
-        self._rows = Rows(*data, probe.circuit.series_kohm, np.ones(here.sum(), dtype=bool))
+        self._rows = MeasuredRows(*data, probe.circuit.series_kohm, np.ones(here.sum(), dtype=bool))
         self._probe, self._stated = probe, priors or None
 
     def named(self, fitted: bool = False) -> str:
@@ -154,24 +159,24 @@ class Diagnosis:
         """
         if not self._probe.circuit.starts_cold:
             return ""
-        found = []
+        explanations = []
         for hypothesis in hypotheses_of(self._rows, self._probe, self._curve.names):
             with suppress(ComputationError, InputError):  # there may be no such lever
-                found.append(self._search(hypothesis))
-        found.sort(key=lambda one: one.squares)
-        found = sorted(map(self._again, found[:_AGAIN]), key=lambda one: one.squares)
-        found = [one for one in found if one.hypothesis.asks(one.unknown)]
-        best = found[0] if found else self._without
+                explanations.append(self._search(hypothesis))
+        explanations.sort(key=_squares)
+        explanations = sorted(map(self._again, explanations[:_AGAIN]), key=_squares)
+        explanations = [explained for explained in explanations if explained.question]
+        best = explanations[0] if explanations else self._without
         if best.squares > _BETTER * self._without.squares or not self._explains(best):
             return ""
         limit = max(_AS_LIKELY * best.squares, best.squares + _AS_LIKELY_BY)
-        as_likely = [one for one in found if one.squares <= limit]
-        as_likely.sort(key=lambda one: one.hypothesis.far_fetched)
-        asked = [one.hypothesis.asks(one.unknown) for one in as_likely]
-        return " or: ".join(list(dict.fromkeys(asked))[:_NAMED])
+        as_likely = [explained for explained in explanations if explained.squares <= limit]
+        as_likely.sort(key=lambda explained: explained.hypothesis.far_fetched)
+        asked = dict.fromkeys(explained.question for explained in as_likely)
+        return " or: ".join(list(asked)[:_NAMED])
 
     @cached_property
-    def _without(self) -> _Found:
+    def _without(self) -> _Explanation:
         """What is left unexplained without a hypothesis."""
         return self._again(self._estimated(Hypothesis(lambda _: ""), 0.0, self._curve))
 
@@ -182,33 +187,33 @@ class Diagnosis:
     def _solved(self, probe: Probe) -> _Curve:
         return _Curve.of(probe, known_beforehand(probe, self._stated))
 
-    def _explains(self, found: _Found) -> bool:
-        return found.squares < _EACH * self._rows.kept.size + _ALTOGETHER
+    def _explains(self, explained: _Explanation) -> bool:
+        return explained.squares < _EACH * self._rows.kept.size + _ALTOGETHER
 
-    def _search(self, hypothesis: Hypothesis) -> _Found:
+    def _search(self, hypothesis: Hypothesis) -> _Explanation:
         """Estimate the lever with a hypothesis, from each of its starts; return the best."""
-        found = []
+        ends = []
         for start in hypothesis.starts:
             # as stated, and as near to the data as priors let a lever come
             curves = [self._curve, self._without.curve]
             if hypothesis.probe is not None:
                 curves = [self._solved(hypothesis.probe(self._probe, start))]
-            found += [self._estimated(hypothesis, start, curve) for curve in curves]
-        return min(found, key=lambda one: one.squares)
+            ends += [self._estimated(hypothesis, start, curve) for curve in curves]
+        return min(ends, key=_squares)
 
-    def _again(self, found: _Found) -> _Found:
+    def _again(self, explained: _Explanation) -> _Explanation:
         """Solve the lever where a search has led, and go on from there."""
-        curve = found.curve
-        values = curve.probe.at(curve.names) * np.exp(found.away)
+        curve = explained.curve
+        values = curve.probe.at(curve.names) * np.exp(explained.away)
         try:
             moved = curve.probe.with_(**dict(zip(curve.names, values.tolist(), strict=True)))
-            curve = replace(self._solved(moved), probe=curve.probe, at=found.away)
+            curve = replace(self._solved(moved), probe=curve.probe, at=explained.away)
         except (InputError, ComputationError):
-            return found
-        again = self._estimated(found.hypothesis, found.unknown, curve)
-        return min(found, again, key=lambda one: one.squares)
+            return explained
+        again = self._estimated(explained.hypothesis, explained.unknown, curve)
+        return min(explained, again, key=_squares)
 
-    def _estimated(self, hypothesis: Hypothesis, start: float, curve: _Curve) -> _Found:
+    def _estimated(self, hypothesis: Hypothesis, start: float, curve: _Curve) -> _Explanation:
         """Return the lever that priors and rows make most likely.
 
         The search is for logarithms of parameters in units of their spreads, and for the unknown.
@@ -228,13 +233,13 @@ class Diagnosis:
 
         begin = np.append(curve.at / spreads, [0.0] * hypothesis.free)
         widest = np.append(np.log(_WIDEST) / spreads, [np.inf] * hypothesis.free)
-        found = least_squares(weighted, begin, bounds=(-widest, widest), max_nfev=_STEPS)
-        away, value = found.x[:count] * spreads, start
+        end = least_squares(weighted, begin, bounds=(-widest, widest), max_nfev=_STEPS)
+        away, value = end.x[:count] * spreads, start
         if hypothesis.free:
-            value += float(found.x[-1])
+            value += float(end.x[-1])
         if hypothesis.parameter:
             place = curve.names.index(hypothesis.parameter)
             value = float(curve.probe.at([hypothesis.parameter])[0] * np.exp(away[place]))
         unknowns = hypothesis.free + bool(hypothesis.parameter)
-        squares = 2.0 * float(found.cost) + _UNKNOWN * unknowns
-        return _Found(hypothesis, curve, squares, value, away)
+        squares = 2.0 * float(end.cost) + _UNKNOWN * unknowns
+        return _Explanation(hypothesis, curve, squares, value, away)

@@ -25,8 +25,8 @@ _WARMER = (30.0, 60.0, 100.0)
 
 
 @dataclass(frozen=True)
-class Rows:
-    """Rows of an I-V curve in the order of the file, which of them count, and their resistor."""
+class MeasuredRows:
+    """An I-V curve in the order of its file, which of its rows count, and their resistor."""
 
     bias_V: Array
     current_mA: Array
@@ -58,7 +58,7 @@ class Hypothesis:
     """
 
     asks: Callable[[float], str]
-    rows: Callable[[Rows, float], Rows] | None = None
+    rows: Callable[[MeasuredRows, float], MeasuredRows] | None = None
     probe: Callable[[Probe, float], Probe] | None = None
     starts: Sequence[float] = (0.0,)
     parameter: str = ""
@@ -66,7 +66,7 @@ class Hypothesis:
     far_fetched: bool = False
 
 
-def hypotheses_of(rows: Rows, probe: Probe, names: Sequence[str]) -> list[Hypothesis]:
+def hypotheses_of(rows: MeasuredRows, probe: Probe, names: Sequence[str]) -> list[Hypothesis]:
     """Return all that may be wrong; names are those of the parameters that have priors."""
     return [
         *_of_units(),
@@ -79,16 +79,16 @@ def hypotheses_of(rows: Rows, probe: Probe, names: Sequence[str]) -> list[Hypoth
 
 
 def _of_units() -> list[Hypothesis]:
-    def current(rows: Rows, factor: float) -> Rows:
+    def current(rows: MeasuredRows, factor: float) -> MeasuredRows:
         return replace(rows, current_mA=factor * rows.current_mA)
 
-    def bias(rows: Rows, factor: float) -> Rows:
+    def bias(rows: MeasuredRows, factor: float) -> MeasuredRows:
         return replace(rows, bias_V=factor * rows.bias_V)
 
-    def swapped(rows: Rows, _: float) -> Rows:
+    def swapped(rows: MeasuredRows, _: float) -> MeasuredRows:
         return replace(rows, bias_V=rows.current_mA, current_mA=rows.bias_V)
 
-    def of_the_lever(rows: Rows, _: float) -> Rows:
+    def of_the_lever(rows: MeasuredRows, _: float) -> MeasuredRows:
         return replace(rows, bias_V=rows.bias_V + rows.series_kohm * rows.current_mA)
 
     small, large = (
@@ -107,13 +107,13 @@ def _of_units() -> list[Hypothesis]:
     ]
 
 
-def _of_the_meter(rows: Rows) -> list[Hypothesis]:
+def _of_the_meter(rows: MeasuredRows) -> list[Hypothesis]:
     largest, along = float(rows.current_mA.max()), np.linspace(0.0, 1.0, rows.bias_V.size)
 
-    def scaled(rows: Rows, more: float) -> Rows:
+    def scaled(rows: MeasuredRows, more: float) -> MeasuredRows:
         return replace(rows, current_mA=rows.current_mA / (1.0 + more))
 
-    def raised(pattern: Array | float, rows: Rows, share: float) -> Rows:
+    def raised(pattern: Array | float, rows: MeasuredRows, share: float) -> MeasuredRows:
         return replace(rows, current_mA=rows.current_mA - share * largest * pattern)
 
     def asks(question: str) -> Callable[[float], str]:
@@ -133,11 +133,11 @@ def _of_the_meter(rows: Rows) -> list[Hypothesis]:
     ]
 
 
-def _of_the_resistor(rows: Rows) -> Hypothesis:
+def _of_the_resistor(rows: MeasuredRows) -> Hypothesis:
     stated = rows.series_kohm
     measured = float(np.median(rows.bias_V / np.maximum(np.abs(rows.current_mA), 1e-12)))
 
-    def other(rows: Rows, kohm: float) -> Rows:
+    def other(rows: MeasuredRows, kohm: float) -> MeasuredRows:
         return replace(rows, series_kohm=max(kohm, 0.0))
 
     return Hypothesis(
@@ -150,7 +150,7 @@ def _of_the_resistor(rows: Rows) -> Hypothesis:
     )
 
 
-def _of_the_rows(rows: Rows) -> list[Hypothesis]:
+def _of_the_rows(rows: MeasuredRows) -> list[Hypothesis]:
     bias, current, place = rows.bias_V, rows.current_mA, np.arange(rows.bias_V.size)
     found = []
     level = current >= current.max() * (1.0 - _LEVEL)
@@ -158,7 +158,7 @@ def _of_the_rows(rows: Rows) -> list[Hypothesis]:
         text = f"is the current clipped at {current.max():.3g} mA, by the range of its meter?"
         found.append(Hypothesis(lambda _: text, lambda rows, _: replace(rows, kept=~level)))
 
-    def part(first: bool, rows: Rows, cut: float) -> Rows:
+    def part(first: bool, rows: MeasuredRows, cut: float) -> MeasuredRows:
         return replace(rows, kept=(place < cut) == first)
 
     def asks(cut: float) -> str:

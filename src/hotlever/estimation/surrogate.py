@@ -96,6 +96,13 @@ class CurveSurrogate:
             return shifted(self.branch, self._rates @ away, self._slopes @ away)
         return multiplied(self.branch, np.exp(self._rates @ away), self._slopes @ away)
 
+    def powers(self, u: Array) -> Array:
+        """Return with which powers of the parameters V_l, I_h and V_r go at some u, (n, 3, p).
+
+        Of a lever that only the swept supply heats.
+        """
+        return np.asarray(spline_through(self.branch.u, self._rates)(u) * self._origin / self._unit)
+
     def predict(self, parameters: Array) -> tuple[Array, Array]:
         """See `Surrogate`."""
         branch = self.branch_at(parameters)
