@@ -71,22 +71,23 @@ def check_plausible(
     lever = float(rest.value_slopes[0, 0] / rest.value_slopes[0, 1])
     series = probe.circuit.series_kohm
     added = current[low] - rest.values[0, 1]
-    found = float(np.median(bias[low] / np.where(added == 0.0, np.nan, added)))
-    ratio = found / (lever + series)
-    if found > series and abs(np.log(ratio)) < np.log(_WITHIN):
+    cold_kohm = float(np.median(bias[low] / np.where(added == 0.0, np.nan, added)))
+    ratio = cold_kohm / (lever + series)
+    if cold_kohm > series and abs(np.log(ratio)) < np.log(_WITHIN):
         return
     # an owner who knows little of a lever expects no less of it
     spread = cold_resistance_spread(cold, priors) if alone else 0.0
-    if found > series and abs(np.log((found - series) / lever)) < _PULL * spread:
+    if cold_kohm > series and abs(np.log((cold_kohm - series) / lever)) < _PULL * spread:
         return
     shown = "V_b / I_h" if alone else "the change of V_b over that of I_h"
     cause = causes.likeliest()
-    if not cause and found > _OPEN * (lever + series):
+    if not cause and cold_kohm > _OPEN * (lever + series):
         cause = "hardly any current flows, as if a terminal was open or the meter at another one"
     cause = cause or "no single cause that is known explains it"
     raise InputError(
-        f"{where}: {shown} is {found:.4g} kΩ at low bias, expected about {lever + series:.4g} kΩ "
-        f"({series:g} kΩ in series and {lever:.3g} kΩ of the lever): {cause}"
+        f"{where}: {shown} is {cold_kohm:.4g} kΩ at low bias, expected about "
+        f"{lever + series:.4g} kΩ ({series:g} kΩ in series and {lever:.3g} kΩ of the lever): "
+        f"{cause}"
     )
 
 
@@ -113,11 +114,11 @@ def _check_temperatures(measured: Measurement, probe: Probe, where: str) -> None
         )
 
 
-def remarks(measured: Measurement, tip_K: np.ndarray) -> list[str]:
+def what_data_lack(measured: Measurement, tip_K: np.ndarray) -> list[str]:
     """Say what the data lack, to tell more of a lever."""
-    found, current = [], measured.current_mA[np.isfinite(measured.current_mA)]
+    remarks, current = [], measured.current_mA[np.isfinite(measured.current_mA)]
     if current.size < _FEW:
-        found.append(
+        remarks.append(
             f"{current.size} rows say little of a lever: the answer leans on what was known "
             f"beforehand; {_FEW} or more would tell"
         )
@@ -125,17 +126,17 @@ def remarks(measured: Measurement, tip_K: np.ndarray) -> list[str]:
     step = float(np.diff(levels).min()) if levels.size > 1 else 0.0
     share = step / float(levels[-1])
     if share > _COARSE and np.allclose(levels / step, np.round(levels / step), atol=_EVEN):
-        found.append(
+        remarks.append(
             f"I_h has a resolution of {step:.2g} mA only, {share:.1%} of its largest value, in "
             f"{levels.size} steps"
         )
     hottest = float(np.nanmax(tip_K))
     if hottest < _COLD_K:
-        found.append(
+        remarks.append(
             f"the lever was measured only up to a tip of {hottest:.0f} K; what it does beyond is "
             "not known"
         )
-    return found
+    return remarks
 
 
 def misfit(
@@ -156,8 +157,8 @@ def misfit(
             f"data are {abs(moved[name].pull):.1f} σ from it"
         )
     # as many are free to be away as the data tell of
-    told = sum(one.told for one in moved.values())
-    if told > 0 and chdtrc(told, sum(one.size**2 for one in moved.values())) < _UNLIKELY:
+    told = sum(each.told for each in moved.values())
+    if told > 0 and chdtrc(told, sum(each.size**2 for each in moved.values())) < _UNLIKELY:
         most = sorted(moved, key=lambda name: -abs(moved[name].size))[:3]
         away = ", ".join(f"{name} by {moved[name].size:+.1f} σ" for name in most)
         return f"what was known beforehand would have to be wrong by too much together, {away}"

@@ -25,7 +25,7 @@ from hotlever.calibration.inference import (
 )
 from hotlever.calibration.jumps import not_of_a_ramp
 from hotlever.calibration.knee import IVCurve
-from hotlever.calibration.plausibility import check_plausible, misfit, remarks
+from hotlever.calibration.plausibility import check_plausible, misfit, what_data_lack
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.power_law_fit import fit_power_law
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
@@ -36,6 +36,7 @@ from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
 from hotlever.estimation.either_medium import error_of_choice, likelier
 from hotlever.estimation.inverse_problem import Estimate
+from hotlever.estimation.lack_of_fit import suspicious_points
 from hotlever.estimation.options import UNKNOWN_MEDIUM
 from hotlever.estimation.quantity import TIP
 from hotlever.lever import Branch, Lever
@@ -190,10 +191,11 @@ def _by_estimate(
     medium, use = probe.surroundings.medium, estimate.priors(known)
     tip = tip_by_bias(estimate, samples, progress)
     converged, reason = _verdict(estimate, use)
-    notes = [*remarks(measured, tip.tip_K), *estimate.notes]
+    notes = [*what_data_lack(measured, tip.tip_K), *estimate.notes]
     notes += [tip.asymmetry] if tip.asymmetry and not reason else []
     notes += [jump.note for jump in tip.jumps]
-    notes += estimate.residuals.suspicious(estimate.prediction.values, robust=True)
+    values = estimate.prediction.values
+    notes += suspicious_points(estimate.residuals, values, robust=True)
     lever = Lever(probe.in_medium("vacuum"), COARSE)
     vacuum = lever.branch()
     # beyond the measured range a coarse lever says where the knee is

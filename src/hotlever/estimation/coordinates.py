@@ -40,9 +40,9 @@ class Coordinates:
         every = parameters_of(probe, anywhere=True)
         parameters = tuple(every[name] for name in names)
         positive = np.array(
-            [known.lower > 0 and known.name in relative for known in parameters], dtype=bool
+            [each.lower > 0 and each.name in relative for each in parameters], dtype=bool
         )
-        return cls(parameters, positive, np.array([known.scale for known in parameters]))
+        return cls(parameters, positive, np.array([each.scale for each in parameters]))
 
     def point(self, values: Array) -> Array:
         """Return the point of some values, (..., p)."""
@@ -61,7 +61,7 @@ class Coordinates:
     @property
     def bounds(self) -> Array:
         """The points of the parameters' lower and upper bounds, (2, p)."""
-        return self.point(np.array([[one.lower, one.upper] for one in self.parameters]).T)
+        return self.point(np.array([[each.lower, each.upper] for each in self.parameters]).T)
 
     def room(self, point: Array) -> Array:
         """Return what changes parameters by as much as themselves, or a tenth of their scale."""

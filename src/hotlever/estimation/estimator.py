@@ -17,7 +17,7 @@ from hotlever.estimation.either_medium import error_of_choice, likelier
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.experiment_in_time import PredictionInTime
 from hotlever.estimation.inverse_problem import Estimate, estimate
-from hotlever.estimation.lack_of_fit import undescribed
+from hotlever.estimation.lack_of_fit import suspicious_points, undescribed
 from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
 from hotlever.estimation.quantity import TIP
 from hotlever.estimation.result import Fit
@@ -96,8 +96,8 @@ def _fit_of(estimate: Estimate) -> Fit:
     """Return what users are given of an estimate."""
     options, residuals, prediction = estimate.options, estimate.residuals, estimate.prediction
     values, posterior = prediction.values, estimate.posterior
-    notes = residuals.suspicious(values, options.robust)
-    notes += residuals.zeros(values, posterior.slopes)
+    notes = suspicious_points(residuals, values, options.robust)
+    notes += residuals.drifting_zeros(values, posterior.slopes)
     chi_square = residuals.reduced_chi_square(values, len(options.varied))
     converged, reason = estimate.verdict(undescribed(residuals, values))
     if chi_square is not None:

@@ -18,6 +18,9 @@ _HELD_SCATTER = 0.01
 _NEIGHBOURS, _FAR = 3, 8.0
 #: Fewer rows tell nothing of their neighbours.
 _ROWS = 7
+#: A point is named as suspicious beyond this many standard deviations, and so many of those
+#: furthest off.
+_SUSPICIOUS, _NAMED = 8.0, 10
 
 
 #: What a caption calls the usual scatter.
@@ -34,16 +37,16 @@ def undescribed(residuals: Residuals, values: Array) -> str:
     difference = residuals.difference(values) / residuals.largest
     in_order = np.argsort(residuals.along, kind="stable")
     for name, whole, down in zip(residuals.observables, difference, residuals.down, strict=True):
-        known = np.isfinite(whole)
-        if name == "tip" or known.sum() < _ROWS:
+        present = np.isfinite(whole)
+        if name == "tip" or present.sum() < _ROWS:
             continue
         # what a robust fit has forgotten stands alone, or is seen as a run
-        squares = float(np.sum((down * whole)[known] ** 2))
-        rms = np.sqrt(squares / known.sum())
+        squares = float(np.sum((down * whole)[present] ** 2))
+        rms = np.sqrt(squares / present.sum())
+        ordered = in_order[present[in_order]]
         # a drift shows in the order of the rows, another lever in that of the bias
-        rows = [(down * whole)[order] for order in (known, in_order[known[in_order]])]
+        rows = [(down * whole)[order] for order in (present, ordered)]
         together = max(float(row[1:] @ row[:-1]) for row in rows)
-        ordered = in_order[known[in_order]]
         windows = np.lib.stride_tricks.sliding_window_view(whole[ordered], _RUN)
         runs = np.abs(np.median(windows, axis=1))
         if rms > scatter and together > _TOGETHER * squares:
@@ -76,3 +79,18 @@ def off_together(residuals: Residuals, values: Array) -> str:
             ends = f"{along[first]:.3g} to {along[last]:.3g} {residuals.unit}"
             return f"{name} is off in neighbouring rows, from {ends}"
     return ""
+
+
+def suspicious_points(residuals: Residuals, values: Array, robust: bool) -> list[str]:
+    """Name the points that lie far outside the scatter of the others."""
+    advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
+    size = np.abs(residuals.deviations(values))
+    odd = np.argwhere(size > _SUSPICIOUS)
+    worst = np.sort(np.argsort(-size[tuple(odd.T)], kind="stable")[:_NAMED])
+    named = [
+        f"{residuals.observables[row]} at {residuals.along[place]:g} {residuals.unit} is "
+        f"{size[row, place]:.0f} standard deviations from the fit; {advice}"
+        for row, place in odd[worst].tolist()
+    ]
+    more = len(odd) - len(named)
+    return [*named, f"{more} more data are as far from the fit"] if more else named

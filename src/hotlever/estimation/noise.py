@@ -55,6 +55,6 @@ def relative_noise(difference: Array, shown: Array, used_up: Array, usual: float
     likelihood = -tails.sum(axis=1) - 0.5 * np.log(shape * scale).sum(axis=1)
     chance = np.exp(likelihood - likelihood.max())
     precision = np.average(1.0 / (shape * scale), axis=0, weights=chance)
-    found = np.ones(difference.shape)
-    found[here] = np.sqrt(1.0 / (precision * np.mean(1.0 / precision)))
-    return found
+    relative = np.ones(difference.shape)
+    relative[here] = np.sqrt(1.0 / (precision * np.mean(1.0 / precision)))
+    return relative

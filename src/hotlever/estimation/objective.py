@@ -132,6 +132,11 @@ class Objective:
         residual = self.residual(at.values, self.point(at.probe))
         return float(residual @ residual)
 
+    def linearised(self, at: Prediction) -> tuple[Array, Array, Array]:
+        """Return the point of a prediction, the residuals there, and their Jacobian."""
+        point = self.point(at.probe)
+        return point, self.residual(at.values, point), self.jacobian(at.slopes, point)
+
     def of_data(self, slopes: Array, point: Array) -> Array:
         """Return the derivatives of the weighted differences by the coordinates."""
         rates = self.coordinates.rates(point)

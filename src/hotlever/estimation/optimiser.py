@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.estimation.convergence import decrement, tolerance
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.objective import Objective, inverse_or_nan
 from hotlever.estimation.search_options import SearchOptions
@@ -179,18 +180,17 @@ class Optimiser:
                 target, least = self._with_scatter(target, region * room, near)
             squares, step = objective.squares(at), target - near.origin
             inner = bool(np.all(np.abs(step) < 0.99 * region * room))
-            decrement = self._decrement(at)
-            tolerance = self._tolerance(at, squares)
+            left, enough = decrement(objective, at), tolerance(objective, at, options)
             # a step within the region that gains nothing is as good as none
-            if decrement <= tolerance or (inner and squares - least <= tolerance):
-                return self._optimum(at, decrement, converged=True)
+            if left <= enough or (inner and squares - least <= enough):
+                return self._optimum(at, left, converged=True)
             if region < options.smallest_region or self.evaluations >= most:
                 # only rounding errors are left, if so little is promised
-                precise = decrement <= options.negligible_of_misfit * squares
+                precise = left <= options.negligible_of_misfit * squares
                 precise = precise and region < options.smallest_region
-                return self._optimum(at, decrement, converged=precise or self._is_near(decrement))
-            if region < options.rough_region and self._is_near(decrement):
-                return self._optimum(at, decrement, converged=True)
+                return self._optimum(at, left, converged=precise or self._is_near(left))
+            if region < options.rough_region and self._is_near(left):
+                return self._optimum(at, left, converged=True)
             length = float(np.max(np.abs(step) / room))
             trial = self._trial(at, target)
             better = np.inf if trial is None else objective.squares(trial)
@@ -218,60 +218,19 @@ class Optimiser:
                     f"{parameter.lower:g} and {parameter.upper:g} {parameter.unit}"
                 )
 
-    def _tolerance(self, at: Prediction, squares: float) -> float:
-        """Return by how much the sum of squares may still fall where a search ends."""
-        options, residuals = self._options, self.residuals
-        hopeless = self._is_hopeless(at, squares)
-        least = (options.negligible_of_misfit if hopeless else options.negligible) * squares
-        if self.objective.informed:
-            return max(options.decrement, least)
-        noise = residuals.noise_squares(at.values)
-        precise = residuals.size * (options.precision * residuals.unit_weight) ** 2
-        return max(options.relative_decrement * noise, least, precise)
-
-    def _is_near(self, decrement: float) -> bool:
+    def _is_near(self, left: float) -> bool:
         """Whether an optimum is so near that its errors hold, if values are not smooth there."""
-        return self.objective.informed and decrement <= self._options.decrement_where_rough
+        return self.objective.informed and left <= self._options.decrement_where_rough
 
-    def _is_hopeless(self, at: Prediction, squares: float) -> bool:
-        """Whether a sum of squares is so far above what noise explains that no lever is near."""
-        residuals = self.residuals
-        noise = 1.0 if self.objective.informed else residuals.noise_squares(at.values)
-        return bool(squares > self._options.misfit * residuals.size * noise)
-
-    def _linearised(self, at: Prediction) -> tuple[Array, Array, Array]:
-        """Return the point of a prediction, its residuals, and their Jacobian."""
-        point = self.objective.point(at.probe)
-        residual = self.objective.residual(at.values, point)
-        return point, residual, self.objective.jacobian(at.slopes, point)
-
-    def _decrement(self, at: Prediction) -> float:
-        """Return by how much Gauss and Newton's step would lower the sum of squares.
-
-        Parameters at their bounds, beyond which it leads, stay there.
-        """
-        point, residual, jacobian = self._linearised(at)
-        low, high = self.objective.bounds
-        margin = 1e-5 * (high - low)
-        free = np.ones(point.size, dtype=bool)
-        for _ in range(point.size):
-            step = np.zeros(point.size)
-            step[free] = np.linalg.lstsq(jacobian[:, free], -residual)[0]
-            held = ((point <= low + margin) & (step < 0)) | ((point >= high - margin) & (step > 0))
-            if not (held & free).any():
-                break
-            free &= ~held
-        return float(residual @ residual - np.sum((residual + jacobian @ step) ** 2))
-
-    def _optimum(self, at: Prediction, decrement: float, *, converged: bool) -> Optimum:
-        point, residual, jacobian = self._linearised(at)
+    def _optimum(self, at: Prediction, left: float, *, converged: bool) -> Optimum:
+        point, residual, jacobian = self.objective.linearised(at)
         free = residual.size - point.size
         covariance = np.full((point.size, point.size), np.nan)
         if free > 0:
             rates = self.objective.coordinates.rates(point)
             variance = residual @ residual / free * np.outer(rates, rates)
             covariance = inverse_or_nan(jacobian.T @ jacobian) * variance
-        return Optimum(at.probe, at, covariance, decrement, converged)
+        return Optimum(at.probe, at, covariance, left, converged)
 
     def _trial(self, at: Prediction, point: Array) -> Prediction | None:
         """Solve the lever of a point; None if it cannot be drawn or solved."""

@@ -11,7 +11,7 @@ from hotlever.errors import InputError
 from hotlever.estimation.drift import Drift
 from hotlever.estimation.noise import relative_noise
 from hotlever.estimation.options import Weights
-from hotlever.estimation.scales import CommonError
+from hotlever.estimation.scales import CommonCovariance, CommonError
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.measurement import Measurement
 from hotlever.measurement.scatter import noise_about_neighbours
@@ -24,10 +24,6 @@ _HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
 #: What is smooth is no noise: data scatter by so many times as much as about their neighbours at
 #: most, or a search would be content with a wrong lever and noisy data. So many data tell.
 _OF_NOISE, _TELLING = 4.0, 7
-#: A point is named as suspicious beyond this many standard deviations.
-_SUSPICIOUS = 8.0
-#: So many of them are named, those furthest off.
-_NAMED = 10
 
 
 class Residuals:
@@ -107,16 +103,17 @@ class Residuals:
             self.present = self.present & (self.down > 0)
         self._lines = Drift(observables, self.present)
         self.common, self._common = common, np.zeros((*self.data.shape, len(common)))
-        for number, one in enumerate(common):
-            self._common[self.observables.index(one.observable), :, number] = one.errors[self._used]
+        for number, error in enumerate(common):
+            row = self.observables.index(error.observable)
+            self._common[row, :, number] = error.errors[self._used]
 
     def _measured_errors(self) -> Array:
         """Return the standard error of every datum; a hundredth of the largest where unknown."""
         errors = np.stack([self._measurement.error(n)[self._used] for n in self.observables])
         usable = errors > 0
-        for place, name in enumerate(self.observables):
-            missing = self.along[self.present[place] & ~usable[place]]
-            if usable[place].any() and missing.size:
+        for row, name in enumerate(self.observables):
+            missing = self.along[self.present[row] & ~usable[row]]
+            if usable[row].any() and missing.size:
                 raise InputError(
                     f"{self._where}: {name} has no error above 0 at {missing[0]:g} {self.unit}, "
                     "expected one for each of its values or none at all"
@@ -168,11 +165,11 @@ class Residuals:
 
     def weighted(self, values: Array) -> Array:
         """Return the weighted differences, prediction minus data, shape (N,)."""
-        return self._decorrelated(self._each(values))
+        return self._common_covariance.decorrelated(self._each(values))
 
     def jacobian(self, slopes: Array) -> Array:
         """Return the derivatives of `weighted`, shape (N, p)."""
-        return self._decorrelated(self._each_by(slopes))
+        return self._common_covariance.decorrelated(self._each_by(slopes))
 
     def _each(self, values: Array) -> Array:
         """Return weighted differences as if data had no errors in common, (N,)."""
@@ -184,36 +181,17 @@ class Residuals:
         return self._lines.removed(jacobian, self.by) if self._drift else np.asarray(jacobian)
 
     @property
-    def _pattern(self) -> Array:
-        """What errors in common, of one standard deviation, add to `_each`, (N, errors)."""
-        return np.nan_to_num((self.by[..., None] * self._common)[self.present])
-
-    def _decorrelated(self, rows: Array) -> Array:
-        """Return weighted rows (N, ...) less what errors that data share explain.
-
-        With unit variances beside them the covariance is 1 + A Aᵀ; this is its inverse root.
-        """
-        if not self.common:
-            return np.asarray(rows)
-        pattern = self._pattern
-        # one for each observable, so that they have no rows in common
-        size = np.linalg.norm(pattern, axis=0)
-        along = pattern / np.maximum(size, 1e-300)
-        kept = 1.0 / np.sqrt(1.0 + size**2) - 1.0
-        return np.asarray(rows + along @ (kept * (along.T @ rows).T).T)
+    def _common_covariance(self) -> CommonCovariance:
+        pattern = np.nan_to_num((self.by[..., None] * self._common)[self.present])
+        return CommonCovariance(self.common, pattern)
 
     def in_common(self, values: Array, slopes: Array, covariance: Array) -> dict[str, Moved]:
         """Return the errors that data have in common as the data tell them.
 
         The slopes (3, n, p) are those by parameters of which the fit leaves this covariance.
         """
-        pattern = self._pattern
-        own = np.linalg.inv(np.eye(len(self.common)) + pattern.T @ pattern)
-        size = -own @ pattern.T @ self._each(values)
-        by = own @ pattern.T @ self._each_by(slopes)
-        left = np.sqrt(np.diag(own + by @ covariance @ by.T))
-        told = map(Moved, size.tolist(), left.tolist())
-        return dict(zip((one.name for one in self.common), told, strict=True))
+        each = self._each(values), self._each_by(slopes)
+        return self._common_covariance.told(*each, covariance)
 
     def deviations(self, values: Array) -> Array:
         """Return differences in units of the scatter of their observable; 0 where nothing is.
@@ -231,6 +209,15 @@ class Residuals:
     def has_outliers(self, values: Array) -> bool:
         """Whether weights that forget outliers would lessen that of any datum."""
         return bool((np.abs(self.deviations(values)) > _FULL).any())
+
+    def drifting_zeros(self, values: Array, slopes: Array) -> list[str]:
+        """Say how the zeros drift, or that they seem to."""
+        if self._drift:
+            return self._lines.in_words(self._lines.line(self.data - values[self.rows], self.by))
+        if self.size <= slopes.shape[2] + 2 * len(self.rows):
+            return []
+        noticed = self._lines.noticed(-self.weighted(values), self.jacobian(slopes), self.by)
+        return [f"{text}; --drift would take that out" for text in noticed]
 
     def lessen(self, values: Array, gently: bool) -> None:
         """Lessen the weight of data far from a prediction.
@@ -307,9 +294,9 @@ class Residuals:
         Infinite where few data do not tell.
         """
         ordered = (difference / self._relative)[:, np.argsort(self.along, kind="stable")]
-        known = [row[np.isfinite(row)] for row in ordered]
-        found = [noise_about_neighbours(row) if row.size >= _TELLING else np.inf for row in known]
-        return np.array(found)[:, None]
+        present = [row[np.isfinite(row)] for row in ordered]
+        noise = [noise_about_neighbours(row) if row.size >= _TELLING else np.inf for row in present]
+        return np.array(noise)[:, None]
 
     def rms(self, values: Array) -> dict[str, float]:
         """Return the rms of data minus prediction by column, for every observable with data."""
@@ -325,31 +312,6 @@ class Residuals:
         """Return that of the observables with measurement errors; None without."""
         if not self.errors_known or self.without_errors.all():
             return None
-        known = (self.difference(values) / self._scale)[~self.without_errors]
-        count = np.isfinite(known).sum()
-        return float(np.nansum(known**2) / max(count - varied * count / self.size, 1.0))
-
-    # --- in words -------------------------------------------------------------------------------
-
-    def suspicious(self, values: Array, robust: bool) -> list[str]:
-        """Name the points that lie far outside the scatter of the others."""
-        advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
-        size = np.abs(self.deviations(values))
-        odd = np.argwhere(size > _SUSPICIOUS)
-        worst = np.sort(np.argsort(-size[tuple(odd.T)], kind="stable")[:_NAMED])
-        found = [
-            f"{self.observables[row]} at {self.along[place]:g} {self.unit} is "
-            f"{size[row, place]:.0f} standard deviations from the fit; {advice}"
-            for row, place in odd[worst].tolist()
-        ]
-        more = len(odd) - len(found)
-        return [*found, f"{more} more data are as far from the fit"] if more else found
-
-    def zeros(self, values: Array, slopes: Array) -> list[str]:
-        """Say how the zeros drift, or that they seem to."""
-        if self._drift:
-            return self._lines.in_words(self._lines.line(self.data - values[self.rows], self.by))
-        if self.size <= slopes.shape[2] + 2 * len(self.rows):
-            return []
-        noticed = self._lines.noticed(-self.weighted(values), self.jacobian(slopes), self.by)
-        return [f"{text}; --drift would take that out" for text in noticed]
+        weighted = (self.difference(values) / self._scale)[~self.without_errors]
+        count = np.isfinite(weighted).sum()
+        return float(np.nansum(weighted**2) / max(count - varied * count / self.size, 1.0))
