@@ -89,7 +89,7 @@ def test_comments_may_give_the_circuit(tmp_path, comment, ohm, kelvin):
         ("V_b (V),I_h (foo)\n1,2\n", r"unit 'foo' is not understood"),
         ("V_b (V),I_h (mA)\n1,x\n", r"line 2: I_h: found 'x', expected a number"),
         ("V_b (V),I_h (mA)\n1,2\n1,2,3\n", r"line 3: 3 cells, expected 2"),
-        ("V_b (V),I_h (mA)\n,2\n", r"line 2: V_b is '', expected a bias of 0 or more"),
+        ("V_b (V),I_h (mA)\n,2\n", r"line 2: V_b is '', expected a bias"),
         ("V_b (V),I_h (mA)\n-1,2\n", r"line 2: V_b is '-1'"),
         ("V_b (V),I_h (mA)\n1,inf\n", r"found 'inf', expected a number"),
         ("V_b (V),I_h (mA)\n1,\n", r"no values in any of the columns"),
