@@ -119,13 +119,9 @@ def _symbol_and_unit(quantity: str, where: str) -> tuple[str, str | None]:
 
 def is_heading(name: str, told: Mapping[str, str]) -> bool:
     """Whether a heading is that of a known quantity, or of a column that one is told of."""
-    return symbol_of(name_and_unit(name)[0]) is not None or _is_one_of(name, told.values())
-
-
-def _is_one_of(name: str, headings: Iterable[str]) -> bool:
-    """Whether a heading, with or without its unit, is one of some."""
-    both = {name.casefold(), name_and_unit(name)[0].casefold()}
-    return any(heading.casefold() in both for heading in headings)
+    bare = name_and_unit(name)[0]
+    headings = {heading.casefold() for heading in told.values()}
+    return symbol_of(bare) is not None or bool({name.casefold(), bare.casefold()} & headings)
 
 
 def find_columns(table: Table, told: Mapping[str, str]) -> dict[str, Column]:
@@ -170,15 +166,15 @@ def _quantity_of(heading: str) -> str | None:
 def _place(table: Table, heading: str, where: str) -> int:
     """Return the place of a column by its heading, with or without unit, or by its number."""
     width = len(table.rows[0])
-    places = [at for at, name in enumerate(table.names) if name.casefold() == heading.casefold()]
-    places = places or [at for at, name in enumerate(table.names) if _is_one_of(name, [heading])]
-    if len(places) > 1:
-        raise InputError(
-            f"{where}: column {quoted(heading)} stands {len(places)} times, expected its number "
-            f"(1 to {width})"
-        )
-    if places:
-        return places[0]
+    for names in (table.names, [name_and_unit(name)[0] for name in table.names]):
+        places = [at for at, name in enumerate(names) if name.casefold() == heading.casefold()]
+        if len(places) > 1:
+            raise InputError(
+                f"{where}: column {quoted(heading)} stands {len(places)} times, expected its "
+                f"number (1 to {width})"
+            )
+        if places:
+            return places[0]
     if heading.isdecimal() and len(heading) < 5 and 1 <= int(heading) <= width:
         return int(heading) - 1
     if table.names and not heading.isdecimal():

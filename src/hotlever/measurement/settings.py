@@ -14,28 +14,27 @@ from hotlever.probe import Circuit
 from hotlever.tables import Table
 from hotlever.units import conversion, key_and_value, name_and_unit, quantity, unknown_unit
 
-#: Settings that are numbers: name, attribute, unit inside.
-_NUMBERS = {
-    "R_s": ("series_resistance_ohm", "ohm"),
-    "base temperature": ("base_temperature_K", "K"),
-    "pressure": ("pressure_mbar", "mbar"),
-}
-#: How settings are shown: name and unit, and those that a probe has where a file is silent.
-_SHOWN = {
+#: Settings: attribute of a `Measurement`, name and unit.
+_SETTINGS = {
     "series_resistance_ohm": ("R_s", "ohm"),
     "base_temperature_K": ("T_base", "K"),
     "medium": ("medium", ""),
     "pressure_mbar": ("pressure", "mbar"),
     "gas_conductivity": ("gas conductivity", "of air's"),
 }
-_OF_EVERY_PROBE = ("series_resistance_ohm", "base_temperature_K", "medium")
-#: Names of settings as people write them, without case, blanks and underscores.
+#: Those that the probe gives where a file is silent.
+_OF_THE_PROBE = ("series_resistance_ohm", "base_temperature_K", "medium")
+#: Their names as people write them, without case, blanks and underscores.
 _SPELLINGS = {
-    **dict.fromkeys(("rs", "rseries", "seriesresistance", "seriesresistor"), "R_s"),
-    **dict.fromkeys(("basetemperature", "basetemp", "tbase", "t0"), "base temperature"),
-    "p": "pressure",
+    **dict.fromkeys(
+        ("rs", "rseries", "seriesresistance", "seriesresistor"), "series_resistance_ohm"
+    ),
+    **dict.fromkeys(("basetemperature", "basetemp", "tbase", "t0"), "base_temperature_K"),
     **dict.fromkeys(("medium", "gas", "atmosphere", "environment", "surroundings"), "medium"),
+    "p": "pressure_mbar",
 }
+#: Where a comment is split: at ``; ``, and at ``, `` and tabs where another setting follows.
+_BETWEEN = re.compile(r";\s|, (?=(?:[^,=:]|,(?! ))*[=:])|\t(?=[^\t=:]*[=:])")
 #: What seems to be a setting, and is said to be unclear unless it is read as one.
 _LIKE_A_SETTING = re.compile(
     r"(?:series.?resist|base.?temp|(?:medium|pressure)\b)"
@@ -106,7 +105,7 @@ class Settings:
                     f"{where}: more than {_LONGEST_COMMENT} characters, no settings"
                 )
                 continue
-            for part in _parts(text):
+            for part in _BETWEEN.split(text):
                 given = _setting(part, where)
                 if given is None:
                     settings.notes.append(
@@ -137,12 +136,12 @@ class Settings:
 
     def understood(self) -> Iterator[tuple[str, str, str]]:
         """Give what is set, to what, and where it was said."""
-        for attribute, (name, unit) in _SHOWN.items():
+        for attribute, (name, unit) in _SETTINGS.items():
             value = self.values.get(attribute)
             if value is not None:
                 text = value if isinstance(value, str) else f"{value:g} {unit}"
                 yield name, text, self.origin[attribute]
-            elif attribute in _OF_EVERY_PROBE:
+            elif attribute in _OF_THE_PROBE:
                 yield name, "not said", "the probe's counts"
 
     def _settle(self, path: str) -> None:
@@ -169,20 +168,6 @@ class Settings:
             self.put("gas_conductivity", NITROGEN, f"{self.origin['medium']}, nitrogen")
 
 
-def _parts(text: str) -> Iterator[str]:
-    """Split a comment at ``; ``, and at ``, `` and tabs where another setting follows."""
-    for part in re.split(r";\s", text):
-        mark = "\t" if "\t" in part else ", "
-        first, *others = part.split(mark)
-        for other in others:
-            if "=" in other or ":" in other:
-                yield first
-                first = other
-            else:
-                first += mark + other
-        yield first
-
-
 def _setting(text: str, where: str) -> dict[str, Any] | None:
     """Return what a comment sets, nothing where it is another comment, None where it is unclear."""
     key, value = key_and_value(text)
@@ -194,26 +179,24 @@ def _setting(text: str, where: str) -> dict[str, Any] | None:
         key, value = (part.strip(' ,"') for part in (*key.split(",", 1), "")[:2])
     name, unit = name_and_unit(key)
     bare = re.sub(r"[\W_]+", "", name[:40]).lower()
-    setting = "pressure" if bare.endswith("pressure") else _SPELLINGS.get(bare)
-    if value and setting == "medium":
+    attribute = "pressure_mbar" if bare.endswith("pressure") else _SPELLINGS.get(bare)
+    if value and attribute == "medium":
         return _gas(value, where) if bare == "medium" or _words(value) & _GASES else None
-    if value and setting:
-        attribute, inside = _NUMBERS[setting]
+    if value and attribute:
+        setting, inside = _SETTINGS[attribute]
         where = f"{where}: {setting}"
         converted = _value(_powers(value), unit, inside, where)
         if converted is None:
             return None
-        if setting != "pressure":
+        if attribute != "pressure_mbar":
             Circuit.of({attribute: converted}, where)
         return {attribute: converted}
     # a resistance, temperature or pressure may be meant for one
     number, rest = quantity(value or key)
-    has_unit = (number is not None or key[-1:] in (")", "]")) and any(
-        conversion(each, inside)
-        for each in (unit or "", _unit_of(rest))
-        for _, inside in _NUMBERS.values()
-    )
-    return None if has_unit or _LIKE_A_SETTING.match(text.strip(' \t#"')) else {}
+    units = unit or "", _unit_of(rest)
+    measured = any(conversion(each, inside) for each in units for inside in ("ohm", "K", "mbar"))
+    measured = measured and (number is not None or key[-1:] in (")", "]"))
+    return None if measured or _LIKE_A_SETTING.match(text.strip(' \t#"')) else {}
 
 
 def _words(text: str) -> set[str]:
@@ -228,22 +211,20 @@ def _gas(text: str, where: str) -> dict[str, Any]:
     InputError
         If it is another medium than the known ones, unless its pressure is that of a vacuum.
     """
-    pressure = _pressure(text, where)
-    words = _words(text)
+    pressure, words = _pressure(text, where), _words(text)
     media = {_MEDIA[word] for word in words & set(_MEDIA)}
+    given: dict[str, Any] = {} if pressure is None else {"pressure_mbar": pressure}
     if pressure is not None and pressure <= VACUUM_MBAR:
         media &= {"vacuum"}
     else:
         first = re.match(r"[\W\d_]*([a-z]+\d?)", text[:_LONGEST].lower())
         denied = words & _NOT and (first is None or first[1] not in _MEDIA)
-        nothing = not media and pressure is None
-        if len(media) > 1 or denied or words & _OTHER_GASES or nothing:
+        if len(media) > 1 or denied or words & _OTHER_GASES or not (media or given):
             raise InputError(
                 f"{where}: medium is '{shown(text)}', expected vacuum, air or nitrogen, with its "
                 "pressure; for other gases say air, and gas_conductivity in the probe file"
             )
-    given = {"pressure_mbar": pressure, "medium": next(iter(media), None)}
-    return {name: value for name, value in given.items() if value is not None}
+    return {**given, "medium": media.pop()} if media else given
 
 
 def _powers(text: str) -> str:
@@ -272,17 +253,16 @@ def _value(text: str, unit: str | None, inside: str, where: str) -> float | None
     """
     number, rest = quantity(text.replace("deg C", "degC").replace("° C", "°C"))
     behind = conversion(_unit_of(rest), inside)
-    odd = behind is None and rest[:1].strip(" ,;([±")
-    if odd or "=" in rest or ":" in rest or _THOUSANDS.match(text):
-        number = None  # as in 5.6x, or with another setting behind it
-    named = behind if unit is None else conversion(unit, inside)
-    if unit is not None and named is None:
+    scale = behind if unit is None else conversion(unit, inside)
+    if unit is not None and scale is None:
         raise unknown_unit(unit, inside, where)
-    if unit is not None and number is None:
-        raise InputError(f"{where}: found '{shown(text)}', expected a number")
-    if number is None or named is None or behind not in (None, named):
+    # as in 5.6x, or with another setting behind it
+    odd = (behind is None and rest[:1].strip(" ,;([±")) or re.search("[=:]", rest)
+    if number is None or odd or _THOUSANDS.match(text):
+        if unit is not None:
+            raise InputError(f"{where}: found '{shown(text)}', expected a number")
         return None
-    return named[0] * number + named[1]
+    return None if scale is None or behind not in (None, scale) else scale[0] * number + scale[1]
 
 
 def _unit_of(text: str) -> str:
