@@ -118,16 +118,16 @@ class Measurement:
         """
         times = checked_times(time_us)
         nothing = np.full(times.shape, np.nan)
-        given = {
-            name: nothing if values is None else np.asarray(values, dtype=float)
-            for name, values in (("current_mA", current_mA), ("reader_V", reader_V))
-        }
-        if not np.array_equal(times, np.ravel(time_us)) or any(
-            values.shape != times.shape for values in given.values()
-        ):
+        current, reader = (
+            nothing if values is None else np.asarray(values, dtype=float)
+            for values in (current_mA, reader_V)
+        )
+        if not (np.array_equal(times, time_us) and times.shape == current.shape == reader.shape):
             raise InputError("expected times that rise, and one current and reader voltage each")
-        columns: Any = {"tip_K": nothing, "tip_error_K": nothing, **given, **more}
-        return cls(waveform.bias(times), time_us=times, waveform=waveform, **columns)
+        columns: Any = {"tip_K": nothing, "tip_error_K": nothing, **more}
+        return cls(
+            waveform.bias(times), current, reader, **columns, time_us=times, waveform=waveform
+        )
 
     @property
     def along(self) -> tuple[Array, str]:
@@ -202,11 +202,8 @@ class Measurement:
 
     def part(self, rows: NDArray[np.bool_]) -> Measurement:
         """Return some rows, (n,) of bool, as a measurement."""
-        columns: Any = {
-            name: values[rows]
-            for name, values in vars(self).items()
-            if isinstance(values, np.ndarray)
-        }
+        arrays = {name: v for name, v in vars(self).items() if isinstance(v, np.ndarray)}
+        columns: Any = {name: values[rows] for name, values in arrays.items()}
         return replace(self, **columns)
 
     @property
