@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from hotlever.errors import InputError
 from hotlever.measurement.contents import Contents
 from hotlever.measurement.data import COLUMNS
-from hotlever.measurement.settings import plausible
 from hotlever.probe import Circuit
 from hotlever.types import Array
+from hotlever.units import plausible
 
 #: Where the largest value of a column can lie, in the unit inside; else its unit is wrong.
 _PLAUSIBLE = {"V_b": (1e-3, 1e3), "I_h": (1e-9, 1e3), "V_r": (1e-9, 1e3), "T_tip": (0.0, 5e3)}
@@ -54,8 +54,9 @@ def check(contents: Contents, *, signed: bool = False) -> None:
         elif not np.isnan(data).all():
             if symbol == "T_tip":
                 contents.refuse(data <= 0.0, "a temperature above 0 K", symbol)
-            for largest in (size,) if signed else (np.nanmax(data), size):
-                plausible(f"{contents.table.path}: the largest {symbol}", unit, largest, low, high)
+            where = f"{contents.table.path}: the largest {symbol}"
+            plausible(where, unit, size if signed else np.nanmax(data), low, high)
+            plausible(where, unit, size, low, high)
             negative = (data < -NOISE * size) & (not signed)
             contents.note_rows(negative, f"{symbol} is negative")
 
@@ -88,21 +89,17 @@ def _likely_mistakes(bias: Array, current: Array, series_kohm: float) -> str:
 
     Of biases (V) and currents (mA) that leave none.
     """
-    hypotheses = {
-        "is V_b the lever's own voltage, not the bias?": (
-            bias + series_kohm * current,
-            current,
-            series_kohm,
-        ),
-        "are the columns of V_b and I_h swapped?": (current, bias, series_kohm),
-        "is the unit of I_h wrong (µA labelled mA)?": (bias, current / 1000.0, series_kohm),
-        "is the unit of V_b wrong (V labelled mV)?": (bias * 1000.0, current, series_kohm),
-        "is the unit of R_s wrong (ohm labelled kOhm)?": (bias, current, series_kohm / 1000.0),
+    heated = (bias > 0) & (current > 0)
+    if not heated.any():
+        return ""
+    kohm = bias[heated] / current[heated]
+    lever_kohm = {
+        "is V_b the lever's own voltage, not the bias?": kohm,
+        "are the columns of V_b and I_h swapped?": 1.0 / kohm - series_kohm,
+        "is the unit of I_h wrong (µA labelled mA)?": 1000.0 * kohm - series_kohm,
+        "is the unit of V_b wrong (V labelled mV)?": 1000.0 * kohm - series_kohm,
+        "is the unit of R_s wrong (ohm labelled kOhm)?": kohm - series_kohm / 1000.0,
     }
-    questions = []
-    for question, (volts, milliampere, kohm) in hypotheses.items():
-        heated = (milliampere > 0) & (volts > 0)
-        lever_kohm = volts[heated] / milliampere[heated] - kohm
-        if heated.any() and _LEVER_KOHM[0] < lever_kohm.min() <= lever_kohm.max() < _LEVER_KOHM[1]:
-            questions.append(question)
+    low, high = _LEVER_KOHM
+    questions = [ask for ask, of in lever_kohm.items() if low < of.min() and of.max() < high]
     return f": {' or: '.join(questions)}" if questions else ""

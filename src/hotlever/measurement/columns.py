@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from hotlever.cells import text_lines
-from hotlever.errors import InputError, quoted, shown, unknown_name
+from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_bytes
 from hotlever.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, TIME
 from hotlever.tables import Table
@@ -40,19 +40,18 @@ _LARGEST = 100_000
 
 @dataclass(frozen=True)
 class Column:
-    """Place of a quantity in a table, and its unit."""
+    """Place of a quantity in a table, its unit, and what this is in the unit inside."""
 
     symbol: str
     place: int
-    unit: str
     heading: str
+    unit: str
+    factor: float
+    offset: float
 
     def values(self, table: Table) -> Array:
         """Return the data in the unit used inside; raises InputError (see `Table.numbers`)."""
-        inside = UNITS[self.symbol]
-        scale = conversion(self.unit, inside, difference=self.symbol[0] == "d")
-        assert scale is not None
-        return scale[0] * table.numbers(self.place, self.symbol) + scale[1]
+        return self.factor * table.numbers(self.place, self.symbol) + self.offset
 
 
 def symbol_of(name: str) -> str | None:
@@ -136,7 +135,7 @@ def find_columns(table: Table, told: Mapping[str, str]) -> dict[str, Column]:
     columns: dict[str, Column] = {}
     for quantity, heading in told.items():
         symbol, unit = _symbol_and_unit(quantity, where)
-        columns[symbol] = _column(table, symbol, _place(table, heading, where), unit)
+        columns[symbol] = _column(table, symbol, table.place(heading), unit)
     taken = {column.place for column in columns.values()}
     places = defaultdict[str, list[int]](list)
     for place, heading in enumerate(table.names):
@@ -163,28 +162,6 @@ def _quantity_of(heading: str) -> str | None:
     return symbol_of(name)
 
 
-def _place(table: Table, heading: str, where: str) -> int:
-    """Return the place of a column by its heading, with or without unit, or by its number."""
-    width = len(table.rows[0])
-    for names in (table.names, [name_and_unit(name)[0] for name in table.names]):
-        places = [at for at, name in enumerate(names) if name.casefold() == heading.casefold()]
-        if len(places) > 1:
-            raise InputError(
-                f"{where}: column {quoted(heading)} stands {len(places)} times, expected its "
-                f"number (1 to {width})"
-            )
-        if places:
-            return places[0]
-    if heading.isdecimal() and len(heading) < 5 and 1 <= int(heading) <= width:
-        return int(heading) - 1
-    if table.names and not heading.isdecimal():
-        raise unknown_name("column", heading, [shown(name) for name in table.names[:9]], where)
-    raise InputError(
-        f"{where}: no column {quoted(heading)}, expected its number (1 to {width})"
-        + " or heading" * bool(table.names)
-    )
-
-
 def _column(table: Table, symbol: str, place: int, told: str | None) -> Column:
     """Return a column with its unit, which the file or the user gives."""
     heading, inside = table.names[place] if table.names else "", UNITS[symbol]
@@ -198,12 +175,13 @@ def _column(table: Table, symbol: str, place: int, told: str | None) -> Column:
             f"{where} has no unit, expected '{symbol} ({inside})' or another unit in parentheses; "
             f"{_told(symbol, heading or str(place + 1))} gives one"
         )
-    scale = conversion(unit, inside)
+    difference = symbol.startswith("d")
+    scale = conversion(unit, inside, difference)
     if scale is None:
         raise unknown_unit(unit, inside, f"{table.where(-1)}: {shown(heading)}")
-    if told and written and conversion(written, inside) not in (None, scale):
+    if told and written and conversion(written, inside, difference) not in (None, scale):
         raise InputError(f"{where}: its unit is {written}, expected {told} as --column says")
-    return Column(symbol, place, unit, heading)
+    return Column(symbol, place, heading, unit, *scale)
 
 
 def _told(symbol: str, heading: str = "HEADING") -> str:
@@ -232,22 +210,16 @@ def require(table: Table, columns: Mapping[str, Column], *, driven: bool = False
     InputError
         If either is missing.
     """
-    in_time = TIME in columns
-    observed = {*OBSERVABLE_SYMBOLS.values(), *([LEVER] if in_time else [])} & columns.keys()
-    if observed and (driven or "V_b" in columns or {LEVER, "I_h"} <= columns.keys()):
+    observed = {*OBSERVABLE_SYMBOLS.values(), *([LEVER] if TIME in columns else [])}
+    has_bias = driven or "V_b" in columns or {LEVER, "I_h"} <= columns.keys()
+    if has_bias and observed & columns.keys():
         return
-    if in_time:
-        expected = (
-            "'V_b (V)', or a wave form such as --pulse 10V,5us, and at least one of 'I_h (mA)', "
-            "'V_l (V)', 'V_r (mV)', 'T_tip (K)' beside the time"
-        )
-    else:
-        voltages = (name for name in table.names if conversion(name_and_unit(name)[1] or "", "V"))
-        example = next(voltages, "HEADING" if table.names else "1")
-        expected = (
-            "'V_b (V)' and at least one of 'I_h (mA)', 'V_r (mV)', 'T_tip (K)', or 'V_l (V)' and "
-            f"'I_h (mA)'; other names with {_told('V_b', example)}"
-        )
     names = ", ".join(repr(shown(name)) for name in table.names[:9])
     given = f"the header names {names}" if table.names else "numbers without a header row"
-    raise InputError(f"{table.where(-1)}: {given}; expected {expected}")
+    voltages = (name for name in table.names if conversion(name_and_unit(name)[1] or "", "V"))
+    example = next(voltages, "HEADING" if table.names else "1")
+    raise InputError(
+        f"{table.where(-1)}: {given}; expected 'V_b (V)' and at least one of 'I_h (mA)', "
+        "'V_r (mV)', 'T_tip (K)', or 'V_l (V)' and 'I_h (mA)'; beside a time V_b, or a wave form "
+        f"such as --pulse 10V,5us, and any of them; other names with {_told('V_b', example)}"
+    )

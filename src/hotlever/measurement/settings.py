@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,7 +11,17 @@ from hotlever.errors import InputError, shown
 from hotlever.materials.air import ATMOSPHERE
 from hotlever.probe import Circuit
 from hotlever.tables import Table
-from hotlever.units import conversion, key_and_value, name_and_unit, quantity, unknown_unit
+from hotlever.units import (
+    amount,
+    conversion,
+    key_and_value,
+    may_be_thousands,
+    name_and_unit,
+    plain_powers,
+    plausible,
+    quantity,
+    unit_behind,
+)
 
 #: Settings: attribute of a `Measurement`, name and unit.
 _SETTINGS = {
@@ -44,11 +53,9 @@ _LIKE_A_SETTING = re.compile(
 )
 #: Media by their names; other gases, whose conductivity is another; and all of these.
 _MEDIA = {
-    "vacuum": "vacuum",
-    "evacuated": "vacuum",
+    **dict.fromkeys(("vacuum", "evacuated"), "vacuum"),
+    **dict.fromkeys(("nitrogen", "n2"), "nitrogen"),
     "air": "air",
-    "nitrogen": "nitrogen",
-    "n2": "nitrogen",
 }
 _OTHER_GASES = {
     *("helium", "he", "argon", "ar", "hydrogen", "h2", "oxygen", "o2", "co2", "neon", "ne"),
@@ -67,12 +74,8 @@ VACUUM_MBAR = 0.05
 _LARGEST_MBAR = 1e6
 #: A number with a unit, in text of a limited length.
 _WITH_UNIT = re.compile(r"([-+]?\d[\d.,]*(?:e[-+]?\d+)?)\s*([A-Za-z]+)", re.I | re.ASCII)
-#: What may be ten or ten thousand.
-_THOUSANDS = re.compile(r"[-+]?\d{1,3},\d{3}(?!\d)", re.ASCII)
 _LONGEST = 200  # characters of a medium
 _LONGEST_COMMENT = 2000
-#: Units a thousand times smaller.
-_SMALLER = {"V": "mV", "mA": "µA"}
 
 
 @dataclass
@@ -100,11 +103,6 @@ class Settings:
         mentioned: list[tuple[str, str]] = []
         for line, text in table.comments:
             where = f"{table.path}: line {line}"
-            if len(text) > _LONGEST_COMMENT:
-                settings.notes.append(
-                    f"{where}: more than {_LONGEST_COMMENT} characters, no settings"
-                )
-                continue
             for part in _BETWEEN.split(text):
                 given = _setting(part, where)
                 if given is None:
@@ -170,6 +168,8 @@ class Settings:
 
 def _setting(text: str, where: str) -> dict[str, Any] | None:
     """Return what a comment sets, nothing where it is another comment, None where it is unclear."""
+    if len(text) > _LONGEST_COMMENT:
+        return None
     key, value = key_and_value(text)
     words = _words(key)
     if not value and words & {*_MEDIA, *_PRESSURES} and words <= _GASES | _PRESSURES | _PLAIN:
@@ -185,7 +185,7 @@ def _setting(text: str, where: str) -> dict[str, Any] | None:
     if value and attribute:
         setting, inside = _SETTINGS[attribute]
         where = f"{where}: {setting}"
-        converted = _value(_powers(value), unit, inside, where)
+        converted = amount(value[:_LONGEST], unit, inside, where)
         if converted is None:
             return None
         if attribute != "pressure_mbar":
@@ -193,7 +193,7 @@ def _setting(text: str, where: str) -> dict[str, Any] | None:
         return {attribute: converted}
     # a resistance, temperature or pressure may be meant for one
     number, rest = quantity(value or key)
-    units = unit or "", _unit_of(rest)
+    units = unit or "", unit_behind(rest)
     measured = any(conversion(each, inside) for each in units for inside in ("ohm", "K", "mbar"))
     measured = measured and (number is not None or key[-1:] in (")", "]"))
     return None if measured or _LIKE_A_SETTING.match(text.strip(' \t#"')) else {}
@@ -227,66 +227,12 @@ def _gas(text: str, where: str) -> dict[str, Any]:
     return {**given, "medium": media.pop()} if media else given
 
 
-def _powers(text: str) -> str:
-    """Write 1x10^-5, 10⁻⁵ and the like as 1e-5."""
-    text = re.sub(r"10(?=[⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹])", "10^", text[:_LONGEST])
-    text = unicodedata.normalize("NFKC", text).replace("−", "-")
-    text = re.sub(r"\s?[x×*·]\s?10\^?(?=[-+]?\d)", "e", text)
-    return re.sub(r"(?<![\d.,])10\^(?=[-+]?\d)", "1e", text)
-
-
 def _pressure(text: str, where: str) -> float | None:
     """Return the pressure (mbar) that a text names, None if there is none."""
-    for number, unit in _WITH_UNIT.findall(_powers(text)):
+    for number, unit in _WITH_UNIT.findall(plain_powers(text[:_LONGEST])):
         scale, value = conversion(unit, "mbar"), quantity(number)[0]
         if scale is not None and value is not None:
-            if _THOUSANDS.match(number):
+            if may_be_thousands(number):
                 raise InputError(f"{where}: found '{number} {unit}', expected no mark of thousands")
             return float(scale[0] * value)
     return ATMOSPHERE if "atmospheric pressure" in text.lower() else None
-
-
-def _value(text: str, unit: str | None, inside: str, where: str) -> float | None:
-    """Return a setting's value in the unit used inside; None if that is not clear.
-
-    The unit stands behind the name, in brackets, or behind the number.
-    """
-    number, rest = quantity(text.replace("deg C", "degC").replace("° C", "°C"))
-    behind = conversion(_unit_of(rest), inside)
-    scale = behind if unit is None else conversion(unit, inside)
-    if unit is not None and scale is None:
-        raise unknown_unit(unit, inside, where)
-    # as in 5.6x, or with another setting behind it
-    odd = (behind is None and rest[:1].strip(" ,;([±")) or re.search("[=:]", rest)
-    if number is None or odd or _THOUSANDS.match(text):
-        if unit is not None:
-            raise InputError(f"{where}: found '{shown(text)}', expected a number")
-        return None
-    return None if scale is None or behind not in (None, scale) else scale[0] * number + scale[1]
-
-
-def _unit_of(text: str) -> str:
-    """Return the first word behind a number."""
-    return re.split(r"[\s,;()\[\]]", text.lstrip(" (["), maxsplit=1)[0]
-
-
-def plausible(where: str, unit: str, value: float, low: float, high: float) -> None:
-    """Refuse a value out of bounds, with the likeliest cause.
-
-    Raises
-    ------
-    InputError
-        If it is smaller than `low` or larger than `high`.
-    """
-    if low <= value <= high:
-        return
-    smaller = _SMALLER.get(unit)
-    if value < 0:
-        cause = "is the sign wrong?"
-    elif smaller and high < value <= 1e3 * high:
-        cause = f"is it in {smaller}, which would be {value / 1e3:g} {unit}?"
-    else:
-        cause = "is the unit wrong?"
-    raise InputError(
-        f"{where}: found {value:g} {unit}, expected {low:g} to {high:g} {unit}; {cause}"
-    )
