@@ -8,7 +8,9 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from hotlever.cells import text_lines
+import numpy as np
+
+from hotlever.cells import number, text_lines
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_bytes
 from hotlever.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, TIME
@@ -32,6 +34,9 @@ _NAMES = {
     **dict.fromkeys(("dih", "δih"), "dI_h"),
     **dict.fromkeys(("dvr", "δvr"), "dV_r"),
 }
+#: µs that a table in time lasts at most, unless one says that it is one: longer ones are slow
+#: sweeps with the time of each row.
+BRIEF = 1e4
 #: First heading of a B1500's table, whose units are those of SI without a prefix.
 _IN_SI = "DataName"
 #: Bytes of a file of column names.
@@ -99,9 +104,9 @@ def _lines(text: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
     if "=" in str(text):
         yield f"--column {text!s}", str(text)
         return
-    for number, line in enumerate(text_lines(read_bytes(text, _LARGEST), str(text)), start=1):
+    for row, line in enumerate(text_lines(read_bytes(text, _LARGEST), str(text)), start=1):
         if line.strip() and not line.lstrip().startswith("#"):
-            yield f"{text}: line {number}", line
+            yield f"{text}: line {row}", line
 
 
 def _symbol_and_unit(quantity: str, where: str) -> tuple[str, str | None]:
@@ -123,13 +128,24 @@ def is_heading(name: str, told: Mapping[str, str]) -> bool:
     return symbol_of(bare) is not None or bool({name.casefold(), bare.casefold()} & headings)
 
 
-def find_columns(table: Table, told: Mapping[str, str]) -> dict[str, Column]:
-    """Find the column of each quantity.
+def find_columns(
+    table: Table, told: Mapping[str, str], *, driven: bool = False
+) -> dict[str, Column]:
+    """Find the column of each quantity, that of the time only in a table of what is in time.
+
+    Parameters
+    ----------
+    table : Table
+    told : mapping of str to str
+        From `parse_columns`.
+    driven : bool
+        Whether a wave form is given, so that the table needs times and no bias.
 
     Raises
     ------
     InputError
-        If a unit is missing or unknown, or two columns are the same quantity.
+        If a unit is missing or unknown, two columns are the same quantity, or there is no column
+        of the bias, or of anything that depends on it.
     """
     where = table.where(-1)
     columns: dict[str, Column] = {}
@@ -151,6 +167,9 @@ def find_columns(table: Table, told: Mapping[str, str]) -> dict[str, Column]:
                 f"{where}: column '{symbol}' stands twice; {_told(symbol)} says which it is"
             )
         columns[symbol] = _column(table, symbol, first, None)
+    if not _is_in_time(table, columns, told, driven):
+        columns.pop(TIME, None)
+    _require(table, columns, driven)
     return columns
 
 
@@ -188,28 +207,28 @@ def _told(symbol: str, heading: str = "HEADING") -> str:
     return f"--column '{symbol} ({UNITS[symbol]})={shown(heading)}'"
 
 
-def unused_columns(table: Table, columns: Mapping[str, Column]) -> list[str]:
-    """Return a note on each column that is no quantity, with the one that it may be."""
-    notes = []
-    used = {column.place for column in columns.values()}
-    missing = [symbol for symbol in COLUMNS if symbol not in columns]
-    for place, heading in enumerate(table.names):
-        if place not in used and heading != _IN_SI and heading.strip():
-            unit = name_and_unit(heading)[1] or ""
-            likely = next((symbol for symbol in missing if conversion(unit, UNITS[symbol])), None)
-            hint = f"; if it is {likely}, name it '{likely} ({unit})'" if likely else ""
-            notes.append(f"{table.path}: column '{shown(heading)}' is not used{hint}")
-    return notes
+def _is_in_time(
+    table: Table, columns: Mapping[str, Column], told: Mapping[str, str], driven: bool
+) -> bool:
+    """Whether a table is of what was measured in time, by the column of its times."""
+    if TIME not in columns:
+        if driven:
+            raise InputError(
+                f"{table.where(-1)}: no column of the time, expected one like 'time (us)' beside "
+                "a wave form"
+            )
+        return False
+    if driven or any(name_and_unit(quantity)[0].casefold() in TIMES for quantity in told):
+        return True
+    column = columns[TIME]
+    if number(table.rows[0][column.place], table.decimal_comma) is None:
+        return False  # clocks show no numbers
+    times = column.values(table)
+    return bool(0.0 < np.nanmax(times, initial=-np.inf) - np.nanmin(times, initial=np.inf) <= BRIEF)
 
 
-def require(table: Table, columns: Mapping[str, Column], *, driven: bool = False) -> None:
-    """Refuse a table without bias, unless it is `driven`, or without anything that depends on it.
-
-    Raises
-    ------
-    InputError
-        If either is missing.
-    """
+def _require(table: Table, columns: Mapping[str, Column], driven: bool) -> None:
+    """Refuse a table without bias, or without anything that depends on it."""
     observed = {*OBSERVABLE_SYMBOLS.values(), *([LEVER] if TIME in columns else [])}
     has_bias = driven or "V_b" in columns or {LEVER, "I_h"} <= columns.keys()
     if has_bias and observed & columns.keys():
@@ -223,3 +242,17 @@ def require(table: Table, columns: Mapping[str, Column], *, driven: bool = False
         "'V_r (mV)', 'T_tip (K)', or 'V_l (V)' and 'I_h (mA)'; beside a time V_b, or a wave form "
         f"such as --pulse 10V,5us, and any of them; other names with {_told('V_b', example)}"
     )
+
+
+def unused_columns(table: Table, columns: Mapping[str, Column]) -> list[str]:
+    """Return a note on each column that is no quantity, with the one that it may be."""
+    notes = []
+    used = {column.place for column in columns.values()}
+    missing = [symbol for symbol in COLUMNS if symbol not in columns]
+    for place, heading in enumerate(table.names):
+        if place not in used and heading != _IN_SI and heading.strip():
+            unit = name_and_unit(heading)[1] or ""
+            likely = next((symbol for symbol in missing if conversion(unit, UNITS[symbol])), None)
+            hint = f"; if it is {likely}, name it '{likely} ({unit})'" if likely else ""
+            notes.append(f"{table.path}: column '{shown(heading)}' is not used{hint}")
+    return notes

@@ -1,25 +1,17 @@
-"""Rows that were measured in time: which they are, and the wave form that their biases follow."""
+"""Rows that were measured in time, and the wave form that their biases follow."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 
 from hotlever.errors import InputError
 from hotlever.lever.transient.waveform import Polyline, Waveform
-from hotlever.measurement.columns import Column
 from hotlever.measurement.contents import Contents
 from hotlever.measurement.data import OBSERVABLE_SYMBOLS, TIME
 from hotlever.measurement.scatter import noise_about_neighbours
-from hotlever.tables import Table, number
 from hotlever.types import Array
-from hotlever.units import TIMES, name_and_unit
 
-#: µs that a table in time lasts at most, unless one says that it is one: longer ones are slow
-#: sweeps with the time of each row.
-BRIEF = 1e4
 #: By what a bias may differ from straight lines: a share of the largest, and so many standard
 #: deviations of its noise, but no larger a share.
 _STRAIGHT, _NOISE, _MOST_NOISE = 1e-3, 5.0, 0.03
@@ -29,31 +21,6 @@ _SAME = 1e-9
 _JUMP = 0.1
 #: Straight lines that a wave form may have at most.
 _MOST_LINES = 500
-
-
-def is_in_time(
-    table: Table, column: Column | None, told: Mapping[str, str], *, expected: bool
-) -> bool:
-    """Return whether a table is of what was measured in time, by the column of its times.
-
-    Raises
-    ------
-    InputError
-        If no time is found although it is `expected`, or one is no number.
-    """
-    if column is None:
-        if expected:
-            raise InputError(
-                f"{table.where(-1)}: no column of the time, expected one like 'time (us)' beside "
-                "a wave form"
-            )
-        return False
-    if expected or any(name_and_unit(quantity)[0].casefold() in TIMES for quantity in told):
-        return True
-    if number(table.rows[0][column.place], table.decimal_comma) is None:
-        return False  # clocks show no numbers
-    times = column.values(table)
-    return bool(0.0 < np.nanmax(times, initial=-np.inf) - np.nanmin(times, initial=np.inf) <= BRIEF)
 
 
 def check_times(contents: Contents) -> None:

@@ -19,12 +19,11 @@ from hotlever.measurement.columns import (
     find_columns,
     is_heading,
     parse_columns,
-    require,
     unused_columns,
 )
 from hotlever.measurement.contents import Contents
 from hotlever.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, TIME, Measurement
-from hotlever.measurement.histories import check_times, find_waveform, is_in_time, leave_out_jumps
+from hotlever.measurement.histories import check_times, find_waveform, leave_out_jumps
 from hotlever.measurement.settings import Settings
 from hotlever.measurement.sweeps import described, disagreements, sweeps_of
 from hotlever.probe import Circuit
@@ -51,7 +50,7 @@ def read_measurement(
     negative bias are mirrored: lever and circuit are symmetric, but for held supplies.
 
     A table with a column ``time (us)``, in any unit of time, is of what was measured in time if it
-    lasts `hotlever.measurement.histories.BRIEF` at most, or a wave form or the column are
+    lasts `hotlever.measurement.columns.BRIEF` at most, or a wave form or the column are
     told of; it begins with a cold lever.
 
     Parameters
@@ -76,11 +75,7 @@ def read_measurement(
     known = partial(is_heading, told=told)
     table = read_table(path, "one like 'V_b (V),I_h (mA),V_r (mV)'", known=known)
     settings = Settings.of(table)
-    quantities = find_columns(table, told)
-    driven = waveform is not None
-    if not is_in_time(table, quantities.get(TIME), told, expected=driven):
-        quantities.pop(TIME, None)
-    require(table, quantities, driven=driven)
+    quantities = find_columns(table, told, driven=waveform is not None)
     remarks = (
         f"{table.path}: line {line}: '{shown(text)}' is taken for a comment"
         for line, text in table.remarks
