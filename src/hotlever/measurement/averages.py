@@ -48,7 +48,7 @@ def averaged(measurement: Measurement, robust: bool = False) -> Measurement:
     columns = {name: values for name, values in columns.items() if values is not None}
     step = _steps(measurement.bias_V)
     if robust:
-        for name in OBSERVABLES.values():
+        for name in (OBSERVABLES[observable] for observable in measurement.observables):
             columns[name] = np.where(_far_off(columns[name], step), np.nan, columns[name])
     shown = np.isfinite([columns[name] for name in OBSERVABLES.values()]).any(axis=0)
     used = {name: values[shown] for name, values in columns.items()}
