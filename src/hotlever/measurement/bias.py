@@ -38,7 +38,7 @@ def find_bias(contents: Contents, circuit: Circuit | None, waveform: Waveform | 
         before = values[TIME] < 0.0
         contents.refuse(before, "times from 0 on, where the wave form begins", TIME)
         values["V_b"] = waveform.bias(values[TIME])
-        contents.derived["V_b"] = "the wave form"
+        contents.origin["V_b"] = "the wave form"
     elif "V_b" in columns:
         contents.refuse(np.isnan(values["V_b"]), "a bias", "V_b")
     else:
@@ -65,7 +65,7 @@ def _bias_of_lever_voltage(contents: Contents, circuit: Circuit | None) -> None:
         _put_resistance(contents, 1000.0 * kohm, what, "reckoned with")
     bias = contents.values["V_b"] = lever + kohm * current
     contents.refuse(np.abs(bias) > MOST_BIAS, f"a bias of at most {MOST_BIAS:g} V", LEVER)
-    contents.derived["V_b"] = f"{LEVER} + R_s I_h"
+    contents.origin["V_b"] = f"{LEVER} + R_s I_h"
 
 
 def _current_of_voltages(contents: Contents, circuit: Circuit | None) -> None:
@@ -74,7 +74,7 @@ def _current_of_voltages(contents: Contents, circuit: Circuit | None) -> None:
     if kohm == 0.0:
         raise InputError(f"{contents.table.path}: {how}, which is 0 ohm, expected more")
     contents.values["I_h"] = (contents.values["V_b"] - contents.values[LEVER]) / kohm
-    contents.derived["I_h"] = f"(V_b - {LEVER}) / R_s"
+    contents.origin["I_h"] = f"(V_b - {LEVER}) / R_s"
     contents.note(f"{how} = {1000.0 * kohm:g} ohm, which counts as known")
 
 

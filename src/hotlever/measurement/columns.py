@@ -54,6 +54,13 @@ class Column:
     factor: float
     offset: float
 
+    @property
+    def origin(self) -> str:
+        """Its heading or number, with the unit where that stands elsewhere."""
+        heading = f"'{shown(self.heading)}'" if self.heading else f"column {self.place + 1}"
+        written = name_and_unit(self.heading)[1] == self.unit
+        return heading if written else f"{heading} in {self.unit}"
+
     def values(self, table: Table) -> Array:
         """Return the data in the unit used inside; raises InputError (see `Table.numbers`)."""
         return self.factor * table.numbers(self.place, self.symbol) + self.offset
@@ -152,6 +159,7 @@ def find_columns(
     for quantity, heading in told.items():
         symbol, unit = _symbol_and_unit(quantity, where)
         columns[symbol] = _column(table, symbol, table.place(heading), unit)
+    in_time = driven or TIME in columns
     taken = {column.place for column in columns.values()}
     places = defaultdict[str, list[int]](list)
     for place, heading in enumerate(table.names):
@@ -167,8 +175,8 @@ def find_columns(
                 f"{where}: column '{symbol}' stands twice; {_told(symbol)} says which it is"
             )
         columns[symbol] = _column(table, symbol, first, None)
-    if not _is_in_time(table, columns, told, driven):
-        columns.pop(TIME, None)
+    if TIME in columns and not (in_time or _are_brief(table, columns[TIME])):
+        del columns[TIME]
     _require(table, columns, driven)
     return columns
 
@@ -207,20 +215,8 @@ def _told(symbol: str, heading: str = "HEADING") -> str:
     return f"--column '{symbol} ({UNITS[symbol]})={shown(heading)}'"
 
 
-def _is_in_time(
-    table: Table, columns: Mapping[str, Column], told: Mapping[str, str], driven: bool
-) -> bool:
-    """Whether a table is of what was measured in time, by the column of its times."""
-    if TIME not in columns:
-        if driven:
-            raise InputError(
-                f"{table.where(-1)}: no column of the time, expected one like 'time (us)' beside "
-                "a wave form"
-            )
-        return False
-    if driven or any(name_and_unit(quantity)[0].casefold() in TIMES for quantity in told):
-        return True
-    column = columns[TIME]
+def _are_brief(table: Table, column: Column) -> bool:
+    """Whether times are numbers, and close enough to each other for what is measured in time."""
     if number(table.rows[0][column.place], table.decimal_comma) is None:
         return False  # clocks show no numbers
     times = column.values(table)
@@ -228,7 +224,12 @@ def _is_in_time(
 
 
 def _require(table: Table, columns: Mapping[str, Column], driven: bool) -> None:
-    """Refuse a table without bias, or without anything that depends on it."""
+    """Refuse a table without bias or times, or without anything that depends on them."""
+    if driven and TIME not in columns:
+        raise InputError(
+            f"{table.where(-1)}: no column of the time, expected one like 'time (us)' beside a "
+            "wave form"
+        )
     observed = {*OBSERVABLE_SYMBOLS.values(), *([LEVER] if TIME in columns else [])}
     has_bias = driven or "V_b" in columns or {LEVER, "I_h"} <= columns.keys()
     if has_bias and observed & columns.keys():

@@ -13,7 +13,6 @@ from hotlever.measurement.data import TIME
 from hotlever.measurement.settings import Settings
 from hotlever.tables import Table
 from hotlever.types import Array
-from hotlever.units import name_and_unit
 
 
 @dataclass
@@ -30,8 +29,8 @@ class Contents:
         What of the file was not used or not understood, and what looks wrong in it.
     values : dict of str to ndarray, shape (n,)
         Every quantity by its symbol, in the unit inside; NaN where nothing is known.
-    derived : dict of str to str
-        What quantities follow from that are not those of a column.
+    origin : dict of str to str
+        The column of a quantity, or what it follows from.
 
     Raises
     ------
@@ -44,9 +43,10 @@ class Contents:
     settings: Settings
     notes: list[str]
     values: dict[str, Array] = field(init=False)
-    derived: dict[str, str] = field(default_factory=dict)
+    origin: dict[str, str] = field(init=False)
 
     def __post_init__(self) -> None:
+        self.origin = {symbol: column.origin for symbol, column in self.columns.items()}
         self.values = dict.fromkeys(UNITS, np.full(len(self.table.rows), np.nan))
         for symbol, column in self.columns.items():
             self.values[symbol] = column.values(self.table)
@@ -54,15 +54,6 @@ class Contents:
                 filled = np.array([bool(row[column.place]) for row in self.table.rows])
                 missing = np.isnan(self.values[symbol]) & filled
                 self.note_rows(missing, f"{symbol} is written as missing")
-
-    def origin(self, symbol: str) -> str:
-        """Say what a quantity follows from: a column, or others."""
-        if symbol in self.derived:
-            return self.derived[symbol]
-        column = self.columns[symbol]
-        heading = f"'{shown(column.heading)}'" if column.heading else f"column {column.place + 1}"
-        written = name_and_unit(column.heading)[1] == column.unit
-        return heading if written else f"{heading} in {column.unit}"
 
     def cell(self, symbol: str, row: int) -> str:
         """Return a cell as it stands in the file, to quote it."""

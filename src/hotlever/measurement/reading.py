@@ -148,7 +148,7 @@ def _understood(contents: Contents, order: str) -> tuple[tuple[str, ...], ...]:
         if count > 0:
             limits = f"{np.nanmin(values):.5g} to {np.nanmax(values):.5g} {unit}"
             some = f", {count} values" if count < values.size else ""
-            rows.append((symbol, limits + some, f"{MEANINGS[name][1]}, {contents.origin(symbol)}"))
+            rows.append((symbol, limits + some, f"{MEANINGS[name][1]}, {contents.origin[symbol]}"))
     return (*rows, *contents.settings.understood())
 
 
