@@ -99,7 +99,11 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
             raise InputError(
                 f"{where}: found '{shown(line)}', expected one like 'I_h (uA)=Current'"
             )
-        symbol, _ = _symbol_and_unit(quantity, where)
+        symbol, unit = _quantity(quantity, told=True)
+        if symbol is None:
+            raise unknown_name("quantity", name_and_unit(quantity)[0], UNITS, where)
+        if unit is not None and conversion(unit, UNITS[symbol]) is None:
+            raise unknown_unit(unit, UNITS[symbol], f"{where}: {symbol}")
         if symbol in headings:
             raise InputError(f"{where}: {symbol} is given twice, expected once")
         headings[symbol] = quantity, heading
@@ -116,16 +120,14 @@ def _lines(text: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
             yield f"{text}: line {row}", line
 
 
-def _symbol_and_unit(quantity: str, where: str) -> tuple[str, str | None]:
-    """Return symbol and unit of what a column is told to be."""
-    name, unit = name_and_unit(quantity)
-    # no heading of that name alone is a time: settings of instruments are called so too
-    symbol = TIME if name.casefold() in TIMES else symbol_of(name)
-    if symbol is None:
-        raise unknown_name("quantity", name, UNITS, where)
-    if unit is not None and conversion(unit, UNITS[symbol]) is None:
-        raise unknown_unit(unit, UNITS[symbol], f"{where}: {symbol}")
-    return symbol, unit
+def _quantity(heading: str, told: bool = False) -> tuple[str | None, str | None]:
+    """Return the quantity that a heading names, None if that is not known, and its unit.
+
+    The name alone is no time, unless it is told: settings of instruments are called so too.
+    """
+    name, unit = name_and_unit(heading)
+    is_time = name.casefold() in TIMES and (told or conversion(unit or "", UNITS[TIME]))
+    return TIME if is_time else symbol_of(name), unit
 
 
 def is_heading(name: str, told: Mapping[str, str]) -> bool:
@@ -157,13 +159,14 @@ def find_columns(
     where = table.where(-1)
     columns: dict[str, Column] = {}
     for quantity, heading in told.items():
-        symbol, unit = _symbol_and_unit(quantity, where)
+        symbol, unit = _quantity(quantity, told=True)
+        assert symbol is not None
         columns[symbol] = _column(table, symbol, table.place(heading), unit)
     in_time = driven or TIME in columns
     taken = {column.place for column in columns.values()}
     places = defaultdict[str, list[int]](list)
     for place, heading in enumerate(table.names):
-        named = _quantity_of(heading)
+        named, _ = _quantity(heading)
         if named is not None and named not in columns and place not in taken:
             places[named].append(place)
     for symbol, alike in places.items():
@@ -179,14 +182,6 @@ def find_columns(
         del columns[TIME]
     _require(table, columns, driven)
     return columns
-
-
-def _quantity_of(heading: str) -> str | None:
-    """Return the quantity that a heading names, a time only with its unit."""
-    name, unit = name_and_unit(heading)
-    if name.casefold() in TIMES and conversion(unit or "", UNITS[TIME]):
-        return TIME
-    return symbol_of(name)
 
 
 def _column(table: Table, symbol: str, place: int, told: str | None) -> Column:
