@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hotlever.cells import cells_of, number, text_lines
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, quoted, shown, unknown_name
 from hotlever.files import read_bytes
 from hotlever.types import Array
 from hotlever.units import (
@@ -63,6 +63,32 @@ class Table:
     def where(self, row: int) -> str:
         """Name file and line of a row (-1: the header row), to begin an error with."""
         return f"{self.path}: line {self.lines[row - len(self.rows)]}"
+
+    def place(self, heading: str) -> int:
+        """Return the place of a column by its heading, with or without unit, or by its number.
+
+        Raises
+        ------
+        InputError
+            If there is no such column, or several have this heading.
+        """
+        width = f"its number (1 to {len(self.rows[0])})"
+        for names in (self.names, [name_and_unit(name)[0] for name in self.names]):
+            places = [at for at, name in enumerate(names) if name.casefold() == heading.casefold()]
+            if len(places) > 1:
+                raise InputError(
+                    f"{self.where(-1)}: column {quoted(heading)} stands {len(places)} times, "
+                    f"expected {width}"
+                )
+            if places:
+                return places[0]
+        if not heading.isdecimal() and self.names:
+            names = [shown(name) for name in self.names[:9]]
+            raise unknown_name("column", heading, names, self.where(-1))
+        if heading.isdecimal() and len(heading) < 5 and 1 <= int(heading) <= len(self.rows[0]):
+            return int(heading) - 1
+        hint = " or heading" if self.names else ""
+        raise InputError(f"{self.where(-1)}: no column {quoted(heading)}, expected {width}{hint}")
 
     def numbers(self, column: int, name: str) -> Array:
         """Return a column's numbers as they stand there, NaN where there is none.

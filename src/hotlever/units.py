@@ -106,6 +106,8 @@ _MISREAD = {
     "�‹C": "°C",
     "¡C": "°C",
 }
+#: Units a thousand times smaller, with which one is confused.
+_SMALLER = {"V": "mV", "mA": "µA"}
 #: Marks between a name and its unit, where there are no brackets.
 _BETWEEN = ("/", ",", " in ", " ", "_")
 
@@ -233,6 +235,67 @@ def quantity(text: str) -> tuple[float | None, str]:
     return value if abs(value) <= LARGEST_NUMBER else None, text[found.end() :]
 
 
+def unit_behind(text: str) -> str:
+    """Return the first word of what follows a number, which may be its unit."""
+    return re.split(r"[\s,;()\[\]]", text.lstrip(" (["), maxsplit=1)[0]
+
+
+def plain_powers(text: str) -> str:
+    """Write 1x10^-5, 10⁻⁵ and the like as 1e-5.
+
+    Examples
+    --------
+    >>> plain_powers("2 x 10^-6 mbar"), plain_powers("10⁻⁴ Pa")
+    ('2e-6 mbar', '1e-4 Pa')
+    """
+    text = re.sub(r"10(?=[⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹])", "10^", text)
+    text = unicodedata.normalize("NFKC", text).replace("−", "-")
+    text = re.sub(r"\s?[x×*·]\s?10\^?(?=[-+]?\d)", "e", text)
+    return re.sub(r"(?<![\d.,])10\^(?=[-+]?\d)", "1e", text)
+
+
+def may_be_thousands(number: str) -> bool:
+    """Whether a number such as ``10,000`` may be ten or ten thousand."""
+    return re.match(r"[-+]?\d{1,3},\d{3}(?!\d)", number, re.ASCII) is not None
+
+
+def amount(text: str, unit: str | None, inside: str, where: str) -> float | None:
+    """Return what a text such as ``5.6 kOhm (four wires)`` is in another unit; None if unclear.
+
+    Parameters
+    ----------
+    text : str
+        Begins with a number.
+    unit : str or None
+        If it is not, or not only, behind the number.
+    inside, where : str
+        The unit wanted, and what an error begins with.
+
+    Raises
+    ------
+    InputError
+        If there is a `unit`, and it is another one, or there is no number to it.
+
+    Examples
+    --------
+    >>> amount("5.6 kOhm (four wires)", None, "ohm", "R_s"), amount("5.6k", None, "ohm", "R_s")
+    (5600.0, None)
+    """
+    text = plain_powers(text)
+    number, rest = quantity(text.replace("deg C", "degC").replace("° C", "°C"))
+    behind = conversion(unit_behind(rest), inside)
+    scale = behind if unit is None else conversion(unit, inside)
+    if unit is not None and scale is None:
+        raise unknown_unit(unit, inside, where)
+    # as in 5.6x, or with a setting of something else behind it
+    odd = (behind is None and rest[:1].strip(" ,;([±")) or re.search("[=:]", rest)
+    if number is None or odd or may_be_thousands(text):
+        if unit is not None:
+            raise InputError(f"{where}: found '{shown(text)}', expected a number")
+        return None
+    return None if scale is None or behind not in (None, scale) else scale[0] * number + scale[1]
+
+
 def setting(text: str, inside: str, where: str, *, bare: bool = False) -> float:
     """Return a voltage, a time or a frequency such as ``5us`` in another unit.
 
@@ -259,3 +322,25 @@ def setting(text: str, inside: str, where: str, *, bare: bool = False) -> float:
     # whole powers are exact: 250 ns are 0.25 µs to the last digit
     power = theirs - ours
     return value * 10.0**power if power >= 0 else value / 10.0**-power
+
+
+def plausible(where: str, unit: str, value: float, low: float, high: float) -> None:
+    """Refuse a value out of bounds, with the likeliest cause.
+
+    Raises
+    ------
+    InputError
+        If it is smaller than `low` or larger than `high`.
+    """
+    if low <= value <= high:
+        return
+    smaller = _SMALLER.get(unit)
+    if value < 0:
+        cause = "is the sign wrong?"
+    elif smaller and high < value <= 1e3 * high:
+        cause = f"is it in {smaller}, which would be {value / 1e3:g} {unit}?"
+    else:
+        cause = "is the unit wrong?"
+    raise InputError(
+        f"{where}: found {value:g} {unit}, expected {low:g} to {high:g} {unit}; {cause}"
+    )

@@ -5,8 +5,12 @@ surroundings, `sweeps` polarities and the order of the rows, `checks` what no le
 """
 
 from hotlever.measurement.columns import parse_columns
-from hotlever.measurement.conditions import with_measured_circuit
-from hotlever.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, Measurement
+from hotlever.measurement.data import (
+    COLUMNS,
+    OBSERVABLE_SYMBOLS,
+    Measurement,
+    with_measured_circuit,
+)
 from hotlever.measurement.reading import given_measurement, read_measurement
 
 __all__ = [

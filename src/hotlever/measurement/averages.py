@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median
 
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.measurement.data import COLUMNS, Measurement
@@ -40,39 +41,32 @@ def averaged(measurement: Measurement, robust: bool = False) -> Measurement:
         As it was, if it has few rows, is one of averages or in time. Else its ``rows`` say of how
         many each is the mean; in the order of the file.
     """
-    as_it_is = measurement.rows is not None or measurement.time_us is not None
-    if measurement.bias_V.size <= MANY or as_it_is:
+    averaged_before = measurement.rows is not None
+    if measurement.bias_V.size <= MANY or averaged_before or measurement.time_us is not None:
         return measurement
-    columns: dict[str, Array] = {
-        name: np.array(values)
-        for name, _ in COLUMNS.values()
-        if (values := getattr(measurement, name)) is not None
-    }
-    bias = columns["bias_V"]
-    levels, step = np.unique(bias, return_inverse=True)
-    if levels.size > STEPS:
-        width = (levels[-1] - levels[0]) / STEPS
-        step = np.minimum((bias - levels[0]) / width, STEPS - 1).astype(int)
+    columns = {name: getattr(measurement, name) for name, _ in COLUMNS.values()}
+    columns = {name: values for name, values in columns.items() if values is not None}
+    step = _steps(measurement.bias_V)
     if robust:
-        for name in OBSERVABLES.values():
-            columns[name][_far_off(columns[name], step)] = np.nan
-    known = np.isfinite([values for name, values in columns.items() if name != "bias_V"])
-    data = np.isfinite([columns[name] for name in OBSERVABLES.values()]).any(axis=0)
+        for name in (OBSERVABLES[observable] for observable in measurement.observables):
+            columns[name] = np.where(_far_off(columns[name], step), np.nan, columns[name])
+    shown = np.isfinite([columns[name] for name in OBSERVABLES.values()]).any(axis=0)
+    used = {name: values[shown] for name, values in columns.items()}
     # rows with the same columns filled have the same mean bias for all of them
-    alike = np.unique([step[data], *known[:, data]], axis=1, return_inverse=True)[1]
-    count = np.bincount(alike)
+    filled = np.isfinite(list(used.values()))
+    group = np.unique([step[shown], *filled], axis=1, return_inverse=True)[1]
+    count = np.bincount(group)
+    order = np.argsort(np.bincount(group, np.flatnonzero(shown)) / count, kind="stable")
+    rows = count[order].astype(float)
 
-    def mean(values: NDArray[Any]) -> Array:
-        return np.asarray(np.bincount(alike, values) / count)
+    def mean(values: Array) -> Array:
+        return np.asarray(np.bincount(group, values)[order] / rows)
 
-    order = np.argsort(mean(np.flatnonzero(data)), kind="stable")
-    found: dict[str, Any] = {
-        name: (np.sqrt(mean(values[data] ** 2) / count) if "error" in name else mean(values[data]))[
-            order
-        ]
-        for name, values in columns.items()
+    means: Any = {
+        name: np.sqrt(mean(values**2) / rows) if "error" in name else mean(values)
+        for name, values in used.items()
     }
-    return replace(measurement, **found, rows=count[order].astype(float))
+    return replace(measurement, **means, rows=rows)
 
 
 def note_on_averages(whole: Measurement, used: Measurement) -> list[str]:
@@ -85,15 +79,24 @@ def note_on_averages(whole: Measurement, used: Measurement) -> list[str]:
     ]
 
 
+def _steps(bias: Array) -> NDArray[np.intp]:
+    """Return for each row the number of its bias, or of its step if there are too many biases."""
+    levels, step = np.unique(bias, return_inverse=True)
+    if levels.size <= STEPS:
+        return step
+    width = (levels[-1] - levels[0]) / STEPS
+    return np.minimum((bias - levels[0]) / width, STEPS - 1).astype(np.intp)
+
+
 def _far_off(values: Array, step: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return which data are far off the others of their step."""
-    places = np.argsort(step, kind="stable")
-    places = places[np.isfinite(values[places])]
-    away = np.zeros(values.size)
-    scatter = np.zeros(values.size)
-    for some in np.split(places, np.flatnonzero(np.diff(step[places])) + 1):
-        if some.size >= _FEWEST:
-            away[some] = np.abs(values[some] - np.median(values[some]))
-            scatter[some] = 1.4826 * np.median(away[some])
-    usual = np.median(scatter[scatter > 0]) if np.any(scatter > 0) else 0.0
-    return np.asarray(away > _OUTLIER * np.maximum(scatter, usual))
+    finite = np.isfinite(values)
+    data, (steps, group) = values[finite], np.unique(step[finite], return_inverse=True)
+    numbers = np.arange(steps.size)
+    away = np.abs(data - median(data, group, numbers)[group])
+    scatter = 1.4826 * median(away, group, numbers)[group]
+    enough = np.bincount(group)[group] >= _FEWEST
+    usual = np.median(scatter[enough & (scatter > 0)]) if np.any(enough & (scatter > 0)) else 0.0
+    far = np.zeros(values.size, dtype=bool)
+    far[finite] = enough & (away > _OUTLIER * np.maximum(scatter, usual))
+    return far

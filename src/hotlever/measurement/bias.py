@@ -1,15 +1,16 @@
-"""The bias of each row: as measured, or from the voltage over the lever; of either polarity."""
+"""The bias of each row: measured, of a wave form, or from the voltage over the lever."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from hotlever.errors import InputError, shown
-from hotlever.measurement.checks import NOISE, note_rows
-from hotlever.measurement.columns import LEVER, Column
-from hotlever.measurement.settings import Settings
+from hotlever.errors import InputError
+from hotlever.lever.transient.waveform import MOST_BIAS, Waveform
+from hotlever.measurement.checks import NOISE
+from hotlever.measurement.columns import LEVER
+from hotlever.measurement.contents import Contents
+from hotlever.measurement.data import TIME
 from hotlever.probe import Circuit
-from hotlever.tables import Table
 from hotlever.types import Array
 
 #: Times the largest resistance of a lever: in series, it makes the bias rise along its curve.
@@ -22,55 +23,80 @@ _COLD = 0.1
 _VOLTAGES_AGREE = 0.05
 
 
-def find_bias(
-    table: Table,
-    columns: dict[str, Column],
-    values: dict[str, Array],
-    settings: Settings,
-    circuit: Circuit | None,
-    notes: list[str],
-) -> None:
-    """Find the bias of each row, where need be from the voltage over the lever and R_s."""
-    symbol = "V_b" if "V_b" in columns else LEVER
-    for needed in ("V_b",) if symbol == "V_b" else (LEVER, "I_h"):
-        missing = np.isnan(values[needed])
-        if missing.any():
-            row = int(np.argmax(missing))
-            cell = shown(table.rows[row][columns[needed].place])
-            expected = "a bias" if needed == "V_b" else f"a number, since V_b follows from {LEVER}"
-            raise InputError(
-                f"{table.where(row)}: {needed} is '{cell}', expected {expected}"
-                + " of 0 or more" * (needed == "V_b")
-            )
-    ohm = settings.values.get("series_resistance_ohm")
-    lever, current = values[LEVER], values["I_h"]
-    if symbol == "V_b":
-        if LEVER in columns:
-            compare_voltages(table, values, settings, notes)
-        return
-    if ohm is None:
+def find_bias(contents: Contents, circuit: Circuit | None, waveform: Waveform | None) -> None:
+    """Complete bias, current and R_s from the voltage over the lever and the wave form, if given.
+
+    Raises
+    ------
+    InputError
+        If a bias is missing, R_s is needed and not given, or voltages disagree.
+    """
+    columns, values = contents.columns, contents.values
+    if waveform is not None:
+        if "V_b" in columns:
+            contents.note("V_b is not used beside the wave form that was given")
+        before = values[TIME] < 0.0
+        contents.refuse(before, "times from 0 on, where the wave form begins", TIME)
+        values["V_b"] = waveform.bias(values[TIME])
+        contents.origin["V_b"] = "the wave form"
+    elif "V_b" in columns:
+        contents.refuse(np.isnan(values["V_b"]), "a bias", "V_b")
+    else:
+        _bias_of_lever_voltage(contents, circuit)
+    if LEVER in columns and TIME in columns and "I_h" not in columns:
+        _current_of_voltages(contents, circuit)
+    elif LEVER in columns and "V_b" in columns and waveform is None:
+        _compare_voltages(contents)
+
+
+def _bias_of_lever_voltage(contents: Contents, circuit: Circuit | None) -> None:
+    lever, current = contents.values[LEVER], contents.values["I_h"]
+    for symbol, missing in ((LEVER, np.isnan(lever)), ("I_h", np.isnan(current))):
+        contents.refuse(missing, f"a number, since V_b follows from {LEVER}", symbol)
+    kohm = _series_kohm(contents, circuit, f"{LEVER} without R_s, from which the bias follows")
+    if TIME not in contents.columns and (more := _telling_kohm(lever, current, kohm)) > kohm:
+        contents.note(
+            f"V_b = V_l + R_s I_h with R_s = {1000.0 * kohm:g} ohm does not tell the points beyond "
+            f"the knee apart; {more:g} kOhm are reckoned with instead, which changes nothing that "
+            "a lever shows"
+        )
+        kohm = more
+        what = f"the resistance that {LEVER} over I_h asks for"
+        _put_resistance(contents, 1000.0 * kohm, what, "reckoned with")
+    bias = contents.values["V_b"] = lever + kohm * current
+    contents.refuse(np.abs(bias) > MOST_BIAS, f"a bias of at most {MOST_BIAS:g} V", LEVER)
+    contents.origin["V_b"] = f"{LEVER} + R_s I_h"
+
+
+def _current_of_voltages(contents: Contents, circuit: Circuit | None) -> None:
+    how = f"I_h follows from V_b - {LEVER} and R_s"
+    kohm = _series_kohm(contents, circuit, f"{how} alone")
+    if kohm == 0.0:
+        raise InputError(f"{contents.table.path}: {how}, which is 0 ohm, expected more")
+    contents.values["I_h"] = (contents.values["V_b"] - contents.values[LEVER]) / kohm
+    contents.origin["I_h"] = f"(V_b - {LEVER}) / R_s"
+    contents.note(f"{how} = {1000.0 * kohm:g} ohm, which counts as known")
+
+
+def _series_kohm(contents: Contents, circuit: Circuit | None, needed: str) -> float:
+    """Return R_s (kΩ) of the file, or of the circuit, which then counts; refuse a file without."""
+    settings = contents.settings
+    if "series_resistance_ohm" not in settings.values:
         if circuit is None:
             raise InputError(
-                f"{table.path}: {LEVER} without R_s, from which the bias follows, expected a line "
-                "like '# R_s (kOhm): 5.6'"
+                f"{contents.table.path}: {needed}, expected a line like '# R_s (kOhm): 5.6'"
             )
-        ohm = circuit.series_resistance_ohm
-        settings.origin["series_resistance_ohm"] = "of the probe"
-    kohm = _load(lever, current, ohm / 1000.0)
-    if kohm != ohm / 1000.0:
-        notes.append(
-            f"{table.path}: V_b = V_l + R_s I_h with R_s = {ohm:g} ohm does not tell the points "
-            f"beyond the knee apart; {kohm:g} kOhm are reckoned with instead, which changes "
-            "nothing that a lever shows"
-        )
-        settings.origin["series_resistance_ohm"] = "reckoned with"
-    found = {"series_resistance_ohm": kohm * 1000.0}
-    Circuit.of(found, f"{table.path}: the resistance that {LEVER} over I_h asks for")
-    settings.values.update(found)
-    values["V_b"] = lever + kohm * current
+        settings.put("series_resistance_ohm", circuit.series_resistance_ohm, "of the probe")
+    return float(settings.values["series_resistance_ohm"]) / 1000.0
 
 
-def _load(lever: Array, current: Array, kohm: float) -> float:
+def _put_resistance(contents: Contents, ohm: float, what: str, origin: str) -> None:
+    """Let a resistance that follows from the data count as R_s, if it may be one."""
+    Circuit.of({"series_resistance_ohm": ohm}, f"{contents.table.path}: {what}")
+    contents.settings.put("series_resistance_ohm", ohm, origin)
+
+
+def _telling_kohm(lever: Array, current: Array, kohm: float) -> float:
     """Return a resistance behind which no two points of a curve have one bias: its own if it can.
 
     Beyond the knee voltage and current fall and rise again, each on its own; behind a resistance
@@ -84,63 +110,44 @@ def _load(lever: Array, current: Array, kohm: float) -> float:
     return float(f"{enough:.2g}") if falls and enough > kohm else kohm
 
 
-def compare_voltages(
-    table: Table, values: dict[str, Array], settings: Settings, notes: list[str]
-) -> None:
-    """Where a file has bias and lever voltage, take R_s from them, or check that it agrees.
+def _compare_voltages(contents: Contents) -> None:
+    """Take R_s from bias and lever voltage, or check that the one given agrees with them."""
+    path, values = contents.table.path, contents.values
+    settings = contents.settings.values
+    behind, current = values["V_b"] - values[LEVER], values["I_h"]
+    warm = np.abs(current) > _COLD * np.nanmax(np.abs(current), initial=0.0)
+    warm &= np.isfinite(behind)
+    if not warm.any():
+        contents.note(f"{LEVER} is not used beside V_b without I_h")
+        return
+    kohm = float(np.median(behind[warm] / current[warm]))
+    ohm = settings.get("series_resistance_ohm", 1000.0 * kohm)
+    off = np.abs(behind[warm] - ohm / 1000.0 * current[warm])
+    if kohm < 0.0 or np.median(off) > _VOLTAGES_AGREE * np.abs(values["V_b"]).max():
+        raise InputError(
+            f"{path}: V_b - {LEVER} is {kohm:.4g} kOhm times I_h, expected R_s = "
+            f"{ohm:.4g} ohm; is a unit wrong?"
+        )
+    if "series_resistance_ohm" not in settings:
+        origin = f"V_b - {LEVER} over I_h"
+        _put_resistance(contents, float(f"{1000.0 * kohm:.4g}"), origin, origin)
+
+
+def mirror(contents: Contents) -> None:
+    """Turn rows of negative bias into those of the other polarity.
 
     Raises
     ------
     InputError
-        If it does not.
+        If current or voltages have another sign than the bias.
     """
-    behind, current = values["V_b"] - values[LEVER], values["I_h"]
-    known = np.isfinite(behind) & (
-        np.abs(current) > _COLD * np.nanmax(np.abs(current), initial=0.0)
-    )
-    if not known.any():
-        notes.append(f"{table.path}: {LEVER} is not used beside V_b without I_h")
+    values = contents.values
+    sign = np.where(values["V_b"] < 0.0, -1.0, 1.0)
+    if (sign > 0.0).all():
         return
-    kohm = float(np.median(behind[known] / current[known]))
-    ohm = settings.values.get("series_resistance_ohm", 1000.0 * kohm)
-    off = np.abs(behind[known] - ohm / 1000.0 * current[known])
-    if kohm < 0.0 or np.median(off) > _VOLTAGES_AGREE * np.abs(values["V_b"]).max():
-        raise InputError(
-            f"{table.path}: V_b - {LEVER} is {kohm:.4g} kOhm times I_h, expected R_s = "
-            f"{ohm:.4g} ohm; is a unit wrong?"
-        )
-    if "series_resistance_ohm" not in settings.values:
-        found = {"series_resistance_ohm": float(f"{1000.0 * kohm:.4g}")}
-        Circuit.of(found, f"{table.path}: V_b - {LEVER} over I_h")
-        settings.values.update(found)
-        settings.origin["series_resistance_ohm"] = f"V_b - {LEVER} over I_h"
-
-
-def mirror(
-    table: Table,
-    columns: dict[str, Column],
-    values: dict[str, Array],
-    symmetric: bool,
-    notes: list[str],
-) -> Array:
-    """Turn rows of negative bias into those of the other polarity; return the signs of all.
-
-    They stay as they are if the circuit is not symmetric.
-    """
-    sign = np.where((values["V_b"] < 0.0) & symmetric, -1.0, 1.0)
-    if not (sign < 0.0).any():
-        return sign
+    bias = "V_b" if "V_b" in contents.columns else LEVER
     for symbol in ("V_b", LEVER, "I_h", "V_r"):
         values[symbol] = sign * values[symbol]
         size = np.nanmax(np.abs(values[symbol]), initial=0.0)
-        wrong = values[symbol] < -NOISE * size
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            bias = "V_b" if "V_b" in columns else LEVER
-            cells = [shown(table.rows[row][columns[name].place]) for name in (bias, symbol)]
-            raise InputError(
-                f"{table.where(row)}: {bias} is '{cells[0]}' and {symbol} is '{cells[1]}', "
-                "expected the same sign"
-            )
-    note_rows(notes, table, sign < 0.0, "V_b is negative, and counts as positive with I_h and V_r")
-    return sign
+        contents.refuse(values[symbol] < -NOISE * size, "the same sign", bias, symbol)
+    contents.note_rows(sign < 0.0, "V_b is negative, and counts as positive with I_h and V_r")

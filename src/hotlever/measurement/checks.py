@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from hotlever.errors import InputError, shown
-from hotlever.measurement.columns import Column
+from hotlever.errors import InputError
+from hotlever.measurement.contents import Contents
 from hotlever.measurement.data import COLUMNS
-from hotlever.measurement.settings import plausible
 from hotlever.probe import Circuit
-from hotlever.tables import Table
 from hotlever.types import Array
+from hotlever.units import plausible
 
 #: Where the largest value of a column can lie, in the unit inside; else its unit is wrong.
 _PLAUSIBLE = {"V_b": (1e-3, 1e3), "I_h": (1e-9, 1e3), "V_r": (1e-9, 1e3), "T_tip": (0.0, 5e3)}
@@ -35,86 +32,74 @@ def colder_than_base(tip_K: Array, error_K: Array, base_K: float) -> NDArray[np.
     return np.asarray(tip_K < base_K - margin)
 
 
-def note_rows(notes: list[str], table: Table, odd: NDArray[np.bool_], text: str) -> None:
-    """Note what is odd about some rows, if there are any."""
-    if odd.any():
-        others = f", and in {odd.sum() - 1} more rows" if odd.sum() > 1 else ""
-        notes.append(f"{table.where(int(np.argmax(odd)))}: {text}{others}")
-
-
-def check(
-    table: Table,
-    columns: dict[str, Column],
-    values: dict[str, Array],
-    settings: dict[str, Any],
-    notes: list[str],
-    *,
-    signed: bool = False,
-) -> None:
+def check(contents: Contents, *, signed: bool = False) -> None:
     """Refuse what no lever can show, and note what it hardly can.
 
     What may be of either sign is asked less: in time a current goes on or off before the bias is
     known to, and other supplies drive a current of their own.
+
+    Raises
+    ------
+    InputError
+        If a value cannot be, or the largest of a quantity shows that its unit is wrong.
     """
-    for symbol in (symbol for symbol in COLUMNS if symbol in columns):
+    values, settings = contents.values, contents.settings.values
+    for symbol in (symbol for symbol in COLUMNS if symbol in contents.columns):
         of, data = symbol.removeprefix("d"), values[symbol]
         unit, (low, high) = COLUMNS[of][1], _PLAUSIBLE[of]
         size = np.nanmax(np.abs(values[of]), initial=0.0)
         if symbol != of:
-            wrong = (data <= _LEAST_ERROR * size) | (data > high)
             expected = f"a standard error above 0 and up to {high:g} {unit}, or an empty cell"
-        else:
-            wrong, expected = (data <= 0.0) & (symbol == "T_tip"), "a temperature above 0 K"
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            cell = shown(table.rows[row][columns[symbol].place])
-            raise InputError(f"{table.where(row)}: {symbol} is '{cell}', expected {expected}")
-        if symbol == of and not np.isnan(data).all():
-            for largest in (size,) if signed else (np.nanmax(data), size):
-                plausible(f"{table.path}: the largest {symbol}", unit, largest, low, high)
+            contents.refuse((data <= _LEAST_ERROR * size) | (data > high), expected, symbol)
+        elif not np.isnan(data).all():
+            if symbol == "T_tip":
+                contents.refuse(data <= 0.0, "a temperature above 0 K", symbol)
+            where = f"{contents.table.path}: the largest {symbol}"
+            plausible(where, unit, size if signed else np.nanmax(data), low, high)
+            plausible(where, unit, size, low, high)
             negative = (data < -NOISE * size) & (not signed)
-            note_rows(notes, table, negative, f"{symbol} is negative")
+            contents.note_rows(negative, f"{symbol} is negative")
 
     base = settings.get("base_temperature_K", _COLDEST_BASE_K)
-    colder = colder_than_base(values["T_tip"], values["dT_tip"], base)
-    text = f"T_tip is below the base temperature ({base:g} K), perhaps in another unit"
-    note_rows(notes, table, colder, text)
-    if signed:
-        return
+    contents.note_rows(
+        colder_than_base(values["T_tip"], values["dT_tip"], base),
+        f"T_tip is below the base temperature ({base:g} K), perhaps in another unit",
+    )
+    if not signed:
+        _check_lever_voltage(contents)
 
-    bias, current = values["V_b"], values["I_h"]
-    ohm = settings.get("series_resistance_ohm", 0.0)
+
+def _check_lever_voltage(contents: Contents) -> None:
+    """Refuse rows whose series resistor leaves no voltage for the lever."""
+    bias, current = contents.values["V_b"], contents.values["I_h"]
+    ohm = contents.settings.values.get("series_resistance_ohm", 0.0)
     lever = Circuit(series_resistance_ohm=ohm).lever_voltage(bias, current)
     below = lever < -NOISE * bias.max()
     if below.any():
         row = int(np.argmax(below))
         raise InputError(
-            f"{table.where(row)}: V_b = {bias[row]:g} V and I_h = {current[row]:g} mA leave "
-            f"{lever[row]:.3g} V for the lever behind R_s = {ohm:g} ohm, expected a voltage above "
-            f"0{_likely(bias, current, ohm / 1000.0)}"
+            f"{contents.table.where(row)}: V_b = {bias[row]:g} V and I_h = {current[row]:g} mA "
+            f"leave {lever[row]:.3g} V for the lever behind R_s = {ohm:g} ohm, expected a voltage "
+            f"above 0{_likely_mistakes(bias, current, ohm / 1000.0)}"
         )
 
 
-def _likely(bias: Array, current: Array, series_kohm: float) -> str:
+def _likely_mistakes(bias: Array, current: Array, series_kohm: float) -> str:
     """Ask after what would leave a lever of some kilo-ohm behind a series resistance; or nothing.
 
     Of biases (V) and currents (mA) that leave none.
     """
-    hypotheses = {
-        "is V_b the lever's own voltage, not the bias?": (bias + series_kohm * current, current),
-        "are the columns of V_b and I_h swapped?": (current, bias),
-        "is the unit of I_h wrong (µA labelled mA)?": (bias, current / 1000.0),
-        "is the unit of V_b wrong (V labelled mV)?": (bias * 1000.0, current),
-        "is the unit of R_s wrong (ohm labelled kOhm)?": None,
+    heated = (bias > 0) & (current > 0)
+    if not heated.any():
+        return ""
+    kohm = bias[heated] / current[heated]
+    lever_kohm = {
+        "is V_b the lever's own voltage, not the bias?": kohm,
+        "are the columns of V_b and I_h swapped?": 1.0 / kohm - series_kohm,
+        "is the unit of I_h wrong (µA labelled mA)?": 1000.0 * kohm - series_kohm,
+        "is the unit of V_b wrong (V labelled mV)?": 1000.0 * kohm - series_kohm,
+        "is the unit of R_s wrong (ohm labelled kOhm)?": kohm - series_kohm / 1000.0,
     }
-    asked = []
-    for question, rows in hypotheses.items():
-        volts, milliampere = rows or (bias, current)
-        behind = series_kohm / 1000.0 if rows is None else series_kohm
-        heated = (milliampere > 0) & (volts > 0)
-        if not heated.any():
-            continue
-        ratio = volts[heated] / milliampere[heated] - behind
-        if ratio.min() > _LEVER_KOHM[0] and ratio.max() < _LEVER_KOHM[1]:
-            asked.append(question)
-    return f": {' or: '.join(asked)}" if asked else ""
+    low, high = _LEVER_KOHM
+    questions = [ask for ask, of in lever_kohm.items() if low < of.min() and of.max() < high]
+    return f": {' or: '.join(questions)}" if questions else ""

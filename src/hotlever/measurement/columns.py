@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from hotlever.cells import text_lines
-from hotlever.errors import InputError, quoted, shown, unknown_name
+import numpy as np
+
+from hotlever.cells import number, text_lines
+from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_bytes
 from hotlever.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, TIME
 from hotlever.tables import Table
@@ -17,19 +20,9 @@ from hotlever.units import TIMES, conversion, name_and_unit, unknown_unit
 
 #: The voltage over the lever, from which the bias follows.
 LEVER = "V_l"
-#: Quantities that a column can be, with the unit inside.
-QUANTITIES = {symbol: unit for symbol, (_, unit) in COLUMNS.items()} | {LEVER: "V", TIME: "us"}
-MEANING = {
-    "V_b": "bias",
-    "I_h": "heater current",
-    "V_r": "reader voltage",
-    "T_tip": "tip temperature",
-    LEVER: "voltage over the lever",
-    TIME: "time",
-    "dT_tip": "standard error",
-    "dI_h": "standard error",
-    "dV_r": "standard error",
-}
+#: Quantities that a column can be: symbol, name in datasets, unit inside.
+QUANTITIES = {TIME: ("time_us", "us"), LEVER: ("lever_V", "V"), **COLUMNS}
+UNITS = {symbol: unit for symbol, (_, unit) in QUANTITIES.items()}
 #: Their other names, in small letters without blanks and marks.
 _NAMES = {
     **dict.fromkeys(("vb", "ub", "vbias", "ubias", "bias", "biasvoltage"), "V_b"),
@@ -38,11 +31,12 @@ _NAMES = {
     **dict.fromkeys(("vr", "ur", "vreader", "ureader", "reader", "readervoltage"), "V_r"),
     **dict.fromkeys(("ttip", "tip", "tiptemperature"), "T_tip"),
     **dict.fromkeys(("dttip", "δttip"), "dT_tip"),
-    "dih": "dI_h",
-    "δih": "dI_h",
-    "dvr": "dV_r",
-    "δvr": "dV_r",
+    **dict.fromkeys(("dih", "δih"), "dI_h"),
+    **dict.fromkeys(("dvr", "δvr"), "dV_r"),
 }
+#: µs that a table in time lasts at most, unless one says that it is one: longer ones are slow
+#: sweeps with the time of each row.
+BRIEF = 1e4
 #: First heading of a B1500's table, whose units are those of SI without a prefix.
 _IN_SI = "DataName"
 #: Bytes of a file of column names.
@@ -51,19 +45,25 @@ _LARGEST = 100_000
 
 @dataclass(frozen=True)
 class Column:
-    """Place of a quantity in a table, and its unit."""
+    """Place of a quantity in a table, its unit, and what this is in the unit inside."""
 
     symbol: str
     place: int
-    unit: str
     heading: str
+    unit: str
+    factor: float
+    offset: float
+
+    @property
+    def origin(self) -> str:
+        """Its heading or number, with the unit where that stands elsewhere."""
+        heading = f"'{shown(self.heading)}'" if self.heading else f"column {self.place + 1}"
+        written = name_and_unit(self.heading)[1] == self.unit
+        return heading if written else f"{heading} in {self.unit}"
 
     def values(self, table: Table) -> Array:
         """Return the data in the unit used inside; raises InputError (see `Table.numbers`)."""
-        inside = QUANTITIES[self.symbol]
-        scale = conversion(self.unit, inside, difference=self.symbol[0] == "d")
-        assert scale is not None
-        return scale[0] * table.numbers(self.place, self.symbol) + scale[1]
+        return self.factor * table.numbers(self.place, self.symbol) + self.offset
 
 
 def symbol_of(name: str) -> str | None:
@@ -92,170 +92,163 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
     >>> parse_columns(["I_h (uA)=Current", "V_b (V)=2"])
     {'I_h (uA)': 'Current', 'V_b (V)': '2'}
     """
-    lines: list[tuple[str, str]] = []
-    for text in texts:
-        if "=" in str(text):
-            lines.append((f"--column {text!s}", str(text)))
-            continue
-        for place, line in enumerate(text_lines(read_bytes(text, _LARGEST), str(text)), start=1):
-            if line.strip() and not line.lstrip().startswith("#"):
-                lines.append((f"{text}: line {place}", line))
-    found: dict[str, str] = {}
-    seen: set[str] = set()
-    for where, line in lines:
-        quantity, equals, heading = (part.strip(' \t"') for part in line.partition("="))
-        if not equals or not heading:
+    headings: dict[str, tuple[str, str]] = {}
+    for where, line in (line for text in texts for line in _lines(text)):
+        quantity, _, heading = (part.strip(' \t"') for part in line.partition("="))
+        if not heading:
             raise InputError(
                 f"{where}: found '{shown(line)}', expected one like 'I_h (uA)=Current'"
             )
-        symbol, _ = _asked(quantity, where)
-        if symbol in seen:
+        symbol, unit = _quantity(quantity, told=True)
+        if symbol is None:
+            raise unknown_name("quantity", name_and_unit(quantity)[0], UNITS, where)
+        if unit is not None and conversion(unit, UNITS[symbol]) is None:
+            raise unknown_unit(unit, UNITS[symbol], f"{where}: {symbol}")
+        if symbol in headings:
             raise InputError(f"{where}: {symbol} is given twice, expected once")
-        seen.add(symbol)
-        found[quantity] = heading
-    return found
+        headings[symbol] = quantity, heading
+    return dict(headings.values())
 
 
-def _asked(quantity: str, where: str) -> tuple[str, str | None]:
-    """Return symbol and unit of what a column is told to be."""
-    name, unit = name_and_unit(quantity)
-    # no heading of that name alone is a time: settings of instruments are called so too
-    symbol = TIME if name.casefold() in TIMES else symbol_of(name)
-    if symbol is None:
-        raise unknown_name("quantity", name, QUANTITIES, where)
-    if unit is not None and conversion(unit, QUANTITIES[symbol]) is None:
-        raise unknown_unit(unit, QUANTITIES[symbol], f"{where}: {symbol}")
-    return symbol, unit
+def _lines(text: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
+    """Give an assignment, or those of a file, and where each stands."""
+    if "=" in str(text):
+        yield f"--column {text!s}", str(text)
+        return
+    for row, line in enumerate(text_lines(read_bytes(text, _LARGEST), str(text)), start=1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            yield f"{text}: line {row}", line
+
+
+def _quantity(heading: str, told: bool = False) -> tuple[str | None, str | None]:
+    """Return the quantity that a heading names, None if that is not known, and its unit.
+
+    The name alone is no time, unless it is told: settings of instruments are called so too.
+    """
+    name, unit = name_and_unit(heading)
+    is_time = name.casefold() in TIMES and (told or conversion(unit or "", UNITS[TIME]))
+    return TIME if is_time else symbol_of(name), unit
 
 
 def is_heading(name: str, told: Mapping[str, str]) -> bool:
     """Whether a heading is that of a known quantity, or of a column that one is told of."""
     bare = name_and_unit(name)[0]
-    return symbol_of(bare) is not None or _same(told.values(), name)
+    headings = {heading.casefold() for heading in told.values()}
+    return symbol_of(bare) is not None or bool({name.casefold(), bare.casefold()} & headings)
 
 
-def _same(headings: Iterable[str], name: str) -> bool:
-    """Whether a heading, with or without its unit, is one of some."""
-    both = {name.casefold(), name_and_unit(name)[0].casefold()}
-    return any(heading.casefold() in both for heading in headings)
+def find_columns(
+    table: Table, told: Mapping[str, str], *, driven: bool = False
+) -> dict[str, Column]:
+    """Find the column of each quantity, that of the time only in a table of what is in time.
 
-
-def find_columns(table: Table, told: Mapping[str, str], notes: list[str]) -> dict[str, Column]:
-    """Find the columns of each quantity; a note on each column that is none.
+    Parameters
+    ----------
+    table : Table
+    told : mapping of str to str
+        From `parse_columns`.
+    driven : bool
+        Whether a wave form is given, so that the table needs times and no bias.
 
     Raises
     ------
     InputError
-        If a unit is missing or unknown, or two columns are the same quantity.
+        If a unit is missing or unknown, two columns are the same quantity, or there is no column
+        of the bias, or of anything that depends on it.
     """
     where = table.where(-1)
-    found: dict[str, Column] = {}
+    columns: dict[str, Column] = {}
     for quantity, heading in told.items():
-        symbol, unit = _asked(quantity, where)
-        place = _place(table, heading, where)
-        found[symbol] = _column(table, symbol, place, unit)
-    exact = {symbol.lower(): symbol for symbol in QUANTITIES if symbol != TIME}
-    used = {column.place for column in found.values()}
-    # its own symbol names a quantity before any other name
-    for names in (exact, _NAMES):
-        taken = set(found)
-        for place, heading in enumerate(table.names):
-            name = name_and_unit(heading)[0].lower()
-            symbol = names.get(name if names is exact else re.sub(r"[\W_]+", "", name[:40]), "")
-            if symbol == "" or symbol in taken or place in used:
-                continue
-            if symbol in found:
-                raise InputError(
-                    f"{where}: column '{symbol}' stands twice; {_told(symbol)} says which it is"
-                )
-            found[symbol] = _column(table, symbol, place, None)
-            used.add(place)
+        symbol, unit = _quantity(quantity, told=True)
+        assert symbol is not None
+        columns[symbol] = _column(table, symbol, table.place(heading), unit)
+    in_time = driven or TIME in columns
+    taken = {column.place for column in columns.values()}
+    places = defaultdict[str, list[int]](list)
     for place, heading in enumerate(table.names):
-        name, unit = name_and_unit(heading)
-        of_time = name.casefold() in TIMES and conversion(unit or "", QUANTITIES[TIME])
-        if of_time and TIME not in found and place not in used:
-            found[TIME] = _column(table, TIME, place, None)
-            used.add(place)
-    for place, heading in enumerate(table.names):
-        if place not in used and heading != _IN_SI and heading.strip():
-            unit = name_and_unit(heading)[1] or ""
-            alike = (s for s, u in QUANTITIES.items() if s not in found and conversion(unit, u))
-            likely = next((s for s in alike if s not in (LEVER, TIME)), None)
-            hint = f"; if it is {likely}, name it '{likely} ({unit})'" if likely else ""
-            notes.append(f"{table.path}: column '{shown(heading)}' is not used{hint}")
-    return found
-
-
-def _place(table: Table, heading: str, where: str) -> int:
-    """Return the place of a column by its heading, with or without unit, or by its number."""
-    width = len(table.rows[0])
-    places = [at for at, name in enumerate(table.names) if name.casefold() == heading.casefold()]
-    places = places or [at for at, name in enumerate(table.names) if _same([heading], name)]
-    if len(places) > 1:
-        raise InputError(
-            f"{where}: column {quoted(heading)} stands {len(places)} times, expected its number "
-            f"(1 to {width})"
-        )
-    if places:
-        return places[0]
-    if heading.isdecimal() and len(heading) < 5 and 1 <= int(heading) <= width:
-        return int(heading) - 1
-    if not table.names or heading.isdecimal():
-        raise InputError(
-            f"{where}: no column {quoted(heading)}, expected its number (1 to {width})"
-            + " or heading" * bool(table.names)
-        )
-    raise unknown_name("column", heading, [shown(name) for name in table.names[:9]], where)
+        named, _ = _quantity(heading)
+        if named is not None and named not in columns and place not in taken:
+            places[named].append(place)
+    for symbol, alike in places.items():
+        # its own symbol names a quantity before any other name
+        own = [p for p in alike if name_and_unit(table.names[p])[0].lower() == symbol.lower()]
+        first, *others = own or alike
+        if others and symbol != TIME:
+            raise InputError(
+                f"{where}: column '{symbol}' stands twice; {_told(symbol)} says which it is"
+            )
+        columns[symbol] = _column(table, symbol, first, None)
+    if TIME in columns and not (in_time or _are_brief(table, columns[TIME])):
+        del columns[TIME]
+    _require(table, columns, driven)
+    return columns
 
 
 def _column(table: Table, symbol: str, place: int, told: str | None) -> Column:
     """Return a column with its unit, which the file or the user gives."""
-    heading, inside = table.names[place] if table.names else "", QUANTITIES[symbol]
+    heading, inside = table.names[place] if table.names else "", UNITS[symbol]
     where = f"{table.where(-1)}: column '{shown(heading or str(place + 1))}'"
     written = name_and_unit(heading)[1]
     if table.names[:1] == [_IN_SI]:
-        written = written or {"mA": "A"}.get(inside, inside)
+        written = written or inside[-1]
     unit = told or written
     if unit is None:
         raise InputError(
             f"{where} has no unit, expected '{symbol} ({inside})' or another unit in parentheses; "
             f"{_told(symbol, heading or str(place + 1))} gives one"
         )
-    scale = conversion(unit, inside)
+    difference = symbol.startswith("d")
+    scale = conversion(unit, inside, difference)
     if scale is None:
         raise unknown_unit(unit, inside, f"{table.where(-1)}: {shown(heading)}")
-    if told and written and conversion(written, inside) not in (None, scale):
+    if told and written and conversion(written, inside, difference) not in (None, scale):
         raise InputError(f"{where}: its unit is {written}, expected {told} as --column says")
-    return Column(symbol, place, unit, heading)
+    return Column(symbol, place, heading, unit, *scale)
 
 
 def _told(symbol: str, heading: str = "HEADING") -> str:
-    return f"--column '{symbol} ({QUANTITIES[symbol]})={shown(heading)}'"
+    return f"--column '{symbol} ({UNITS[symbol]})={shown(heading)}'"
 
 
-def require(table: Table, found: Mapping[str, Column], *, driven: bool = False) -> None:
-    """Refuse a table without bias, unless it is `driven`, or without anything that depends on it.
+def _are_brief(table: Table, column: Column) -> bool:
+    """Whether times are numbers, and close enough to each other for what is measured in time."""
+    if number(table.rows[0][column.place], table.decimal_comma) is None:
+        return False  # clocks show no numbers
+    times = column.values(table)
+    return bool(0.0 < np.nanmax(times, initial=-np.inf) - np.nanmin(times, initial=np.inf) <= BRIEF)
 
-    Raises
-    ------
-    InputError
-        If either is missing.
-    """
-    shows = {*OBSERVABLE_SYMBOLS.values()} | ({LEVER} if TIME in found else set())
-    given = driven or "V_b" in found or {LEVER, "I_h"} <= set(found)
-    if given and found.keys() & shows:
-        return
-    where = table.where(-1)
-    names = ", ".join(repr(shown(name)) for name in table.names[:9])
-    what = f"the header names {names}" if table.names else "numbers without a header row"
-    if TIME in found:
+
+def _require(table: Table, columns: Mapping[str, Column], driven: bool) -> None:
+    """Refuse a table without bias or times, or without anything that depends on them."""
+    if driven and TIME not in columns:
         raise InputError(
-            f"{where}: {what}; expected 'V_b (V)', or a wave form such as --pulse 10V,5us, and at "
-            "least one of 'I_h (mA)', 'V_l (V)', 'V_r (mV)', 'T_tip (K)' beside the time"
+            f"{table.where(-1)}: no column of the time, expected one like 'time (us)' beside a "
+            "wave form"
         )
-    voltage = (name for name in table.names if conversion(name_and_unit(name)[1] or "", "V"))
-    first = next(voltage, "HEADING" if table.names else "1")
+    observed = {*OBSERVABLE_SYMBOLS.values(), *([LEVER] if TIME in columns else [])}
+    has_bias = driven or "V_b" in columns or {LEVER, "I_h"} <= columns.keys()
+    if has_bias and observed & columns.keys():
+        return
+    names = ", ".join(repr(shown(name)) for name in table.names[:9])
+    given = f"the header names {names}" if table.names else "numbers without a header row"
+    voltages = (name for name in table.names if conversion(name_and_unit(name)[1] or "", "V"))
+    example = next(voltages, "HEADING" if table.names else "1")
     raise InputError(
-        f"{where}: {what}; expected 'V_b (V)' and at least one of 'I_h (mA)', 'V_r (mV)', "
-        f"'T_tip (K)', or 'V_l (V)' and 'I_h (mA)'; other names with {_told('V_b', first)}"
+        f"{table.where(-1)}: {given}; expected 'V_b (V)' and at least one of 'I_h (mA)', "
+        "'V_r (mV)', 'T_tip (K)', or 'V_l (V)' and 'I_h (mA)'; beside a time V_b, or a wave form "
+        f"such as --pulse 10V,5us, and any of them; other names with {_told('V_b', example)}"
     )
+
+
+def unused_columns(table: Table, columns: Mapping[str, Column]) -> list[str]:
+    """Return a note on each column that is no quantity, with the one that it may be."""
+    notes = []
+    used = {column.place for column in columns.values()}
+    missing = [symbol for symbol in COLUMNS if symbol not in columns]
+    for place, heading in enumerate(table.names):
+        if place not in used and heading != _IN_SI and heading.strip():
+            unit = name_and_unit(heading)[1] or ""
+            likely = next((symbol for symbol in missing if conversion(unit, UNITS[symbol])), None)
+            hint = f"; if it is {likely}, name it '{likely} ({unit})'" if likely else ""
+            notes.append(f"{table.path}: column '{shown(heading)}' is not used{hint}")
+    return notes

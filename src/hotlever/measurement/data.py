@@ -1,4 +1,4 @@
-"""Measured data sets: bias, current, reader voltage and tip temperature of one lever."""
+"""Measured data sets of one lever, and a probe in the circuit and surroundings of one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.lever.dataset import OBSERVABLES, circuit_of
 from hotlever.lever.transient.history import checked_times
 from hotlever.lever.transient.waveform import Waveform
-from hotlever.probe import Circuit
+from hotlever.probe import Circuit, Probe
 from hotlever.probe.surroundings import Medium
 from hotlever.types import Array
 
@@ -32,6 +32,8 @@ COLUMNS = {
 }
 #: The columns a fit can compare, by the name users give it.
 OBSERVABLE_SYMBOLS = {"current": "I_h", "reader": "V_r", "tip": "T_tip"}
+#: mbar; between these the pressure is no matter to a lever without a temperature jump.
+_DENSE_MBAR = 700.0, 1200.0
 
 
 @dataclass(frozen=True)
@@ -118,16 +120,16 @@ class Measurement:
         """
         times = checked_times(time_us)
         nothing = np.full(times.shape, np.nan)
-        given = {
-            name: nothing if values is None else np.asarray(values, dtype=float)
-            for name, values in (("current_mA", current_mA), ("reader_V", reader_V))
-        }
-        if not np.array_equal(times, np.ravel(time_us)) or any(
-            values.shape != times.shape for values in given.values()
-        ):
+        current, reader = (
+            nothing if values is None else np.asarray(values, dtype=float)
+            for values in (current_mA, reader_V)
+        )
+        if not (np.array_equal(times, time_us) and times.shape == current.shape == reader.shape):
             raise InputError("expected times that rise, and one current and reader voltage each")
-        columns: Any = {"tip_K": nothing, "tip_error_K": nothing, **given, **more}
-        return cls(waveform.bias(times), time_us=times, waveform=waveform, **columns)
+        columns: Any = {"tip_K": nothing, "tip_error_K": nothing, **more}
+        return cls(
+            waveform.bias(times), current, reader, **columns, time_us=times, waveform=waveform
+        )
 
     @property
     def along(self) -> tuple[Array, str]:
@@ -202,14 +204,53 @@ class Measurement:
 
     def part(self, rows: NDArray[np.bool_]) -> Measurement:
         """Return some rows, (n,) of bool, as a measurement."""
-        columns: Any = {
-            name: values[rows]
-            for name, values in vars(self).items()
-            if isinstance(values, np.ndarray)
-        }
+        arrays = {name: v for name, v in vars(self).items() if isinstance(v, np.ndarray)}
+        columns: Any = {name: values[rows] for name, values in arrays.items()}
         return replace(self, **columns)
 
     @property
     def observables(self) -> tuple[str, ...]:
         """Names of the observables that have any data."""
         return tuple(name for name in OBSERVABLES if np.isfinite(self.observable(name)).any())
+
+
+def with_measured_circuit(
+    probe: Probe, measurement: Measurement, medium: str | None = None
+) -> tuple[Probe, list[str]]:
+    """Return the probe in circuit and medium of the measurement, and a note on each difference.
+
+    A `medium` that is asked for wins over both.
+
+    Raises
+    ------
+    InputError
+        If the pressure matters, and the probe does not say how the temperature jumps.
+    """
+    notes = []
+    measured_in, assumed_in = measurement.medium, probe.surroundings.medium
+    changes: dict[str, Any] = {"medium": medium or measured_in or assumed_in}
+    if measured_in not in (None, changes["medium"]):
+        notes.append(f"medium: {medium}, as asked, although the data file says {measured_in}")
+    elif medium is None and changes["medium"] != assumed_in:
+        notes.append(f"medium: the data file's {measured_in} is used, not the probe's {assumed_in}")
+    names = ["series_resistance_ohm", "base_temperature_K"]
+    if changes["medium"] == measured_in == "air":
+        names.append("gas_conductivity")
+        low, high = _DENSE_MBAR
+        if probe.surroundings.accommodation is not None:
+            names.append("pressure_mbar")
+        elif not low <= (measurement.pressure_mbar or low) <= high:
+            raise InputError(
+                f"{measurement.path}: the pressure is {measurement.pressure_mbar:g} mbar, expected "
+                "accommodation in [surroundings] of the probe file, with which it counts, such as "
+                "accommodation = 0.9"
+            )
+    values = {**dict(probe.circuit), **dict(probe.surroundings)}
+    for name in names:
+        measured, assumed = getattr(measurement, name), values[name]
+        if measured is not None and not np.isclose(measured, assumed, rtol=1e-9):
+            changes[name] = measured
+            notes.append(
+                f"{name}: the data file's {measured:g} is used, not the probe's {assumed:g}"
+            )
+    return probe.with_(**changes), notes

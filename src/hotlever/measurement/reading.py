@@ -9,28 +9,25 @@ from typing import Any
 
 import numpy as np
 
+from hotlever.datasets import QUANTITIES as MEANINGS
 from hotlever.errors import InputError, shown
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.measurement.bias import find_bias, mirror
-from hotlever.measurement.checks import check, note_rows
+from hotlever.measurement.checks import check
 from hotlever.measurement.columns import (
-    LEVER,
-    MEANING,
     QUANTITIES,
-    Column,
     find_columns,
     is_heading,
     parse_columns,
-    require,
+    unused_columns,
 )
+from hotlever.measurement.contents import Contents
 from hotlever.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, TIME, Measurement
-from hotlever.measurement.histories import find_waveform, take_time
+from hotlever.measurement.histories import check_times, find_waveform, leave_out_jumps
 from hotlever.measurement.settings import Settings
 from hotlever.measurement.sweeps import described, disagreements, sweeps_of
 from hotlever.probe import Circuit
-from hotlever.tables import Table, read_table
-from hotlever.types import Array
-from hotlever.units import name_and_unit
+from hotlever.tables import read_table
 
 _MOST_NOTES = 20
 
@@ -53,7 +50,7 @@ def read_measurement(
     negative bias are mirrored: lever and circuit are symmetric, but for held supplies.
 
     A table with a column ``time (us)``, in any unit of time, is of what was measured in time if it
-    lasts `hotlever.measurement.histories.BRIEF` at most, or a wave form or the column are
+    lasts `hotlever.measurement.columns.BRIEF` at most, or a wave form or the column are
     told of; it begins with a cold lever.
 
     Parameters
@@ -77,104 +74,82 @@ def read_measurement(
     told = parse_columns(f"{name}={heading}" for name, heading in (columns or {}).items())
     known = partial(is_heading, told=told)
     table = read_table(path, "one like 'V_b (V),I_h (mA),V_r (mV)'", known=known)
-    notes: list[str] = []
-    settings = Settings.of(table, notes)
-    unused: list[str] = []
-    found = find_columns(table, told, unused)
-    for line, text in table.remarks:
-        notes.append(f"{table.path}: line {line}: '{shown(text)}' is taken for a comment")
-    values = dict.fromkeys(QUANTITIES, np.full(len(table.rows), np.nan))
-    in_time = take_time(table, found, told, unused, expected=waveform is not None)
-    require(table, found, driven=waveform is not None)
-    for symbol, column in found.items():
-        values[symbol] = column.values(table)
-        written = np.isnan(values[symbol]) & [bool(row[column.place]) for row in table.rows]
-        if symbol not in ("V_b", LEVER, TIME):
-            note_rows(notes, table, written, f"{symbol} is written as missing")
-    if in_time:
-        history = find_waveform(table, found, values, settings, circuit, waveform, notes)
-        check(table, found, values, settings.values, notes, signed=True)
-        order = f"in time, {len(table.rows)} rows; {history['waveform'].text}"
+    settings = Settings.of(table)
+    quantities = find_columns(table, told, driven=waveform is not None)
+    remarks = (
+        f"{table.path}: line {line}: '{shown(text)}' is taken for a comment"
+        for line, text in table.remarks
+    )
+    contents = Contents(table, quantities, settings, [*settings.notes, *remarks])
+    if TIME in quantities:
+        waveform, order = _complete_in_time(contents, circuit, waveform)
     else:
-        history = {}
-        find_bias(table, found, values, settings, circuit, notes)
-        symmetric = circuit is None or circuit.starts_cold
-        sign = mirror(table, found, values, symmetric, notes)
-        check(table, found, values, settings.values, notes, signed=not symmetric)
-        bias = sign * values["V_b"]
-        parts = sweeps_of(bias)
-        order = described(bias, parts)
-        if len(parts) > 1:
-            notes.append(f"{path}: {len(parts)} sweeps, all of them used: {order}")
-            data = {symbol: values[symbol] for symbol in OBSERVABLE_SYMBOLS.values()}
-            notes += [f"{path}: {text}" for text in disagreements(bias, parts, data, symmetric)]
-    notes += unused
+        order = _complete_at_rest(contents, circuit)
+    notes = contents.notes + unused_columns(table, quantities)
     more = len(notes) - _MOST_NOTES
     if more > 0:
         notes[_MOST_NOTES:] = [f"{path}: {more} more such notes"]
-    content: dict[str, Any] = {name: values[symbol] for symbol, (name, _) in COLUMNS.items()}
+    rows: dict[str, Any] = {name: contents.values[symbol] for symbol, (name, _) in COLUMNS.items()}
     measurement = Measurement(
-        **content,
+        **rows,
         **settings.values,
-        **history,
+        time_us=contents.values[TIME] if TIME in quantities else None,
+        waveform=waveform,
         path=table.path,
         sha256=table.sha256,
         notes=tuple(notes),
-        understood=_understood(table, found, values, settings, order),
+        understood=_understood(contents, order),
     )
     if not measurement.observables:
         raise InputError(f"{path}: no values in any of the columns I_h, V_r, T_tip")
     return measurement
 
 
-def _understood(
-    table: Table,
-    columns: dict[str, Column],
-    values: dict[str, Array],
-    settings: Settings,
-    sweeps: str,
-) -> tuple[tuple[str, ...], ...]:
+def _complete_in_time(
+    contents: Contents, circuit: Circuit | None, waveform: Waveform | None
+) -> tuple[Waveform, str]:
+    """Complete what was measured in time; return its wave form, and its order in words."""
+    check_times(contents)
+    find_bias(contents, circuit, waveform)
+    if waveform is None:
+        waveform = find_waveform(contents)
+    else:
+        leave_out_jumps(contents, waveform)
+    check(contents, signed=True)
+    return waveform, f"in time, {len(contents.table.rows)} rows; {waveform.text}"
+
+
+def _complete_at_rest(contents: Contents, circuit: Circuit | None) -> str:
+    """Complete a slow sweep, of either polarity; return the order of its rows in words."""
+    symmetric = circuit is None or circuit.starts_cold
+    find_bias(contents, circuit, None)
+    bias = contents.values["V_b"]
+    if symmetric:
+        mirror(contents)
+    check(contents, signed=not symmetric)
+    sweeps = sweeps_of(bias)
+    order = described(bias, sweeps)
+    if len(sweeps) > 1:
+        contents.note(f"{len(sweeps)} sweeps, all of them used: {order}")
+        data = {symbol: contents.values[symbol] for symbol in OBSERVABLE_SYMBOLS.values()}
+        for text in disagreements(bias, sweeps, data, symmetric):
+            contents.note(text)
+    return order
+
+
+def _understood(contents: Contents, order: str) -> tuple[tuple[str, ...], ...]:
     """Return what was understood, as rows of a table: what, as what, and where it stands."""
+    table = contents.table
     separator = {"\t": "tabs", ";": "semicolons", ",": "commas", None: "blanks"}[table.separator]
-    rows = [
-        (table.path, f"{separator}, decimal comma" if table.decimal_comma else separator, sweeps)
-    ]
-    reckoned = {
-        "V_b": ("V", f"bias, {LEVER} + R_s I_h" if LEVER in columns else "bias, the wave form"),
-        "I_h": ("mA", f"heater current, (V_b - {LEVER}) / R_s"),
-    }
-    every = (TIME, LEVER, *COLUMNS)
-    for symbol in (symbol for symbol in every if np.isfinite(values[symbol]).any()):
-        if symbol not in columns:
-            unit, how = reckoned[symbol]
-            rows.append((symbol, _range(values[symbol], unit), how))
-            continue
-        column = columns[symbol]
-        heading = f"'{shown(column.heading)}'" if column.heading else f"column {column.place + 1}"
-        told = "" if name_and_unit(column.heading)[1] == column.unit else f" in {column.unit}"
-        found = _range(values[symbol], QUANTITIES[symbol])
-        rows.append((symbol, found, f"{MEANING[symbol]}, {heading}{told}"))
-    named = {
-        "series_resistance_ohm": ("R_s", "ohm"),
-        "base_temperature_K": ("T_base", "K"),
-        "medium": ("medium", ""),
-        "pressure_mbar": ("pressure", "mbar"),
-        "gas_conductivity": ("gas conductivity", "of air's"),
-    }
-    for attribute, (name, unit) in named.items():
-        value = settings.values.get(attribute)
-        if value is not None:
-            text = value if isinstance(value, str) else f"{value:g} {unit}"
-            rows.append((name, text, settings.origin.get(attribute, "")))
-        elif attribute in ("series_resistance_ohm", "base_temperature_K", "medium"):
-            rows.append((name, "not said", "the probe's counts"))
-    return tuple(rows)
-
-
-def _range(values: Array, unit: str) -> str:
-    count = np.isfinite(values).sum()
-    some = "" if count == values.size else f", {count} values"
-    return f"{np.nanmin(values):.5g} to {np.nanmax(values):.5g} {unit}{some}"
+    rows = [(table.path, separator + ", decimal comma" * table.decimal_comma, order)]
+    for symbol, (name, unit) in QUANTITIES.items():
+        values = contents.values[symbol]
+        count = int(np.isfinite(values).sum())
+        if count > 0:
+            limits = f"{np.nanmin(values):.5g} to {np.nanmax(values):.5g} {unit}"
+            some = f", {count} values" if count < values.size else ""
+            rows.append((symbol, limits + some, f"{MEANINGS[name][1]}, {contents.origin[symbol]}"))
+    return (*rows, *contents.settings.understood())
 
 
 def given_measurement(

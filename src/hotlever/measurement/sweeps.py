@@ -27,18 +27,15 @@ def sweeps_of(bias: Array) -> list[slice]:
     >>> sweeps_of(np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0]))
     [slice(0, 4, None), slice(4, 7, None)]
     """
-    ends = sorted({0, *_turns(bias), *_crossings(bias), bias.size})
+    # rows at which the bias has another sign than before
+    signed = np.flatnonzero(bias != 0.0)
+    crossings = signed[1:][np.diff(np.sign(bias[signed])) != 0.0].tolist()
+    ends = sorted({0, *_turns(bias), *crossings, bias.size})
     if np.median(np.diff(ends)) < _FEWEST:
         return [slice(0, bias.size)]
     # what is too short for a sweep belongs to the one before
     begins = [at for at, end in pairwise(ends) if at == 0 or end - at >= _FEWEST]
     return [slice(begin, end) for begin, end in pairwise([*begins, bias.size])]
-
-
-def _crossings(bias: Array) -> list[int]:
-    """Rows at which the bias has another sign than before."""
-    known = np.flatnonzero(bias != 0.0)
-    return [int(known[at + 1]) for at in np.flatnonzero(np.diff(np.sign(bias[known])))]
 
 
 def _turns(bias: Array) -> list[int]:
@@ -61,59 +58,54 @@ def _turns(bias: Array) -> list[int]:
     return turns
 
 
-def described(bias: Array, parts: list[slice]) -> str:
+def described(bias: Array, sweeps: list[slice]) -> str:
     """Say in words which sweeps there are."""
     words = []
-    for part in parts:
-        first, last = bias[part][0], bias[part][-1]
+    for sweep in sweeps:
+        first, last = bias[sweep][0], bias[sweep][-1]
         way = "up" if abs(last) >= abs(first) else "down"
         sign = "negative, " if min(first, last) < 0.0 else ""
-        count = part.stop - part.start
+        count = sweep.stop - sweep.start
         words.append(f"{sign}{way} ({count} row{'s' * (count != 1)})")
     return ", ".join(words) if len(words) < 7 else f"{len(words)} sweeps"
 
 
 def disagreements(
-    bias: Array, parts: list[slice], data: dict[str, Array], symmetric: bool = True
+    bias: Array, sweeps: list[slice], data: dict[str, Array], symmetric: bool = True
 ) -> list[str]:
     """Say by how much sweeps differ from the first, if by more than noise.
 
     Polarities are compared if the circuit is symmetric.
     """
-    found, along = [], np.abs(bias) if symmetric else bias
+    texts, along = [], np.abs(bias) if symmetric else bias
     for name, values in data.items():
         largest = np.nanmax(np.abs(values), initial=0.0)
-        worst, which = 0.0, 0
-        for number, part in enumerate(parts[1:], start=2):
-            difference = _difference(along, values, parts[0], part)
-            if difference.size < _ENOUGH:
-                continue
-            noise = np.sqrt(0.5 * np.mean(np.diff(difference) ** 2))
-            size = np.sqrt(np.mean(difference**2))
-            if size > max(_BEYOND_NOISE * noise, _DIFFERENT * largest) and size > worst:
-                worst, which = size, number
-        if which:
-            found.append(
-                f"{name} of sweep {which} differs from that of sweep 1 by {worst / largest:.1%} of "
-                "its largest value (rms), which is more than noise: hysteresis or drift?"
+        sizes = [_difference(along, values, sweeps[0], sweep, largest) for sweep in sweeps[1:]]
+        if max(sizes, default=0.0) > 0.0:
+            texts.append(
+                f"{name} of sweep {2 + np.argmax(sizes)} differs from that of sweep 1 by "
+                f"{max(sizes) / largest:.1%} of its largest value (rms), which is more than noise: "
+                "hysteresis or drift?"
             )
-    return found
+    return texts
 
 
-def _difference(along: Array, values: Array, one: slice, other: slice) -> Array:
-    """Return what one sweep has beside another, rising in what is along both."""
-    known = np.isfinite(values)
-    (x, y), (at, found) = (
-        _rising(along[part][known[part]], values[part][known[part]]) for part in (one, other)
-    )
-    if x.size < _FEWEST or at.size == 0:
-        return np.empty(0)
-    inside = (at >= x[0]) & (at <= x[-1])
-    return np.asarray(found[inside] - np.interp(at[inside], x, y))
+def _difference(along: Array, values: Array, first: slice, other: slice, largest: float) -> float:
+    """Return what one sweep has beside another (rms); 0 where that is noise, or next to nothing."""
+    (x, y), (at, others) = (_rising(along[rows], values[rows]) for rows in (first, other))
+    if x.size < _FEWEST:
+        return 0.0
+    difference = others - np.interp(at, x, y, np.nan, np.nan)
+    difference = difference[np.isfinite(difference)]
+    if difference.size < _ENOUGH:
+        return 0.0
+    noise = np.sqrt(0.5 * np.mean(np.diff(difference) ** 2))
+    size = float(np.sqrt(np.mean(difference**2)))
+    return size if size > max(_BEYOND_NOISE * noise, _DIFFERENT * largest) else 0.0
 
 
 def _rising(x: Array, y: Array) -> tuple[Array, Array]:
     """Sort by bias; rows at the same bias count as their mean."""
-    bias, place = np.unique(x, return_inverse=True)
-    count = np.bincount(place, minlength=bias.size)
-    return bias, np.bincount(place, weights=y, minlength=bias.size) / np.fmax(count, 1)
+    finite = np.isfinite(y)
+    bias, place, count = np.unique(x[finite], return_inverse=True, return_counts=True)
+    return bias, np.bincount(place, weights=y[finite], minlength=bias.size) / count
