@@ -21,7 +21,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from hotlever.calibration.inference import Estimated, error_of_model
 from hotlever.datasets import csv_text, labelled
 from hotlever.errors import ComputationError, InputError, unknown_name
-from hotlever.estimation.embedded import Number, Section, array
+from hotlever.estimation.result_file import Number, Section, array
 from hotlever.lever import Lever
 from hotlever.lever.equations import BASE
 from hotlever.lever.lever import COARSE
