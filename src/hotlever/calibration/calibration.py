@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from pydantic import Field, ValidationInfo, field_serializer, model_validator
+from pydantic import Field, PlainSerializer, ValidationInfo, field_serializer, model_validator
 
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.power_law import PowerLaw
@@ -250,7 +250,8 @@ class CalibrationFile(ResultFile):
     power_law_residual_K: Number
     k: Number
     k_stderr: Number
-    knee: dict[str, bool | Number]
+    # beside numbers, whether it was measured
+    knee: Annotated[dict[str, Number], PlainSerializer(dict)]
     tip_temperature_uncertainty_K: Number = np.nan
     uncertainty_budget_K: dict[str, Number] = Field(default_factory=dict)
     base_temperature_K: Number = np.nan

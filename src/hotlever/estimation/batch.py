@@ -147,7 +147,7 @@ def fit_many(
     if waiting:
         local = min(processes or CPU_COUNT, len(waiting))
         with local_client(local) if scheduler is None else remote_client(scheduler) as client:
-            for name, reason in _not_reduced(probe, options, waiting, reducing):
+            for name, reason in _not_reduced(probe, options, waiting, reducing).items():
                 batch.fail(waiting.pop(name).path, reason)
             names = list(waiting)
             tasks = ((measurement, probe, options) for measurement in waiting.values())
@@ -156,10 +156,8 @@ def fit_many(
                 try:
                     if isinstance(result, HotleverError):
                         raise result
-                    request = _request(measurement, asked)
-                    file = result.file().model_copy(update={"request": request})
                     output_folder(target)
-                    write_text(files[name], file.to_json())
+                    write_text(files[name], result.file(_request(measurement, asked)).to_json())
                     batch.fits[name] = result
                 except HotleverError as error:
                     batch.fail(measurement.path, error)
@@ -223,26 +221,31 @@ def _not_reduced(
     options: FitOptions,
     waiting: Mapping[str, Measurement],
     progress: Progress | None,
-) -> list[tuple[str, HotleverError]]:
+) -> dict[str, HotleverError]:
     """Reduce each geometry once, before the workers need it; return why some levers have none.
 
     Base temperature and medium are part of a geometry.
     """
-    results: dict[object, HotleverError | None] = {}
-
-    def reduce_lever(measurement: Measurement) -> HotleverError | None:
+    results: dict[object, Any] = {}
+    failures: dict[str, HotleverError] = {}
+    for name, measurement in waiting.items():
+        try:
+            probes = [
+                with_measured_circuit(probe, measurement, medium)[0] for medium in options.media
+            ]
+        except InputError as error:
+            failures[name] = error
+            continue
         errors = []
-        for medium in options.media:
-            measured, _ = with_measured_circuit(probe, measurement, medium)
+        for measured in probes:
             geometry = measured.circuit.base_temperature_K, measured.surroundings.medium
             if geometry not in results:
                 results[geometry] = guarded(_reduce, (measured, options, progress))
             errors.append(results[geometry])
         # of two media one will do
-        return None if None in errors else errors[0]
-
-    tried = {name: guarded(reduce_lever, (measurement,)) for name, measurement in waiting.items()}
-    return [(name, error) for name, error in tried.items() if error is not None]
+        if None not in errors:
+            failures[name] = errors[0]
+    return failures
 
 
 def _reduce(probe: Probe, options: FitOptions, progress: Progress | None) -> None:

@@ -10,7 +10,7 @@ from scipy.special import chdtri
 
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
-from hotlever.estimation.result import Fit, FittedParameter
+from hotlever.estimation.result import Fit
 from hotlever.materials import PARAMETERS
 from hotlever.text import INVERSION, parameter_named
 
@@ -53,65 +53,61 @@ def compare_levers(fits: Mapping[str, Fit]) -> xr.Dataset:
     if not fits:
         raise InputError("no fits to compare, expected one or more")
     compared = {lever: _quantities(fit) for lever, fit in fits.items()}
-    names = list(next(iter(compared.values())))
+    first, names = next((lever, list(quantities)) for lever, quantities in compared.items())
     for lever, quantities in compared.items():
         if missing := [name for name in names if name not in quantities]:
             raise InputError(
                 f"{lever}: {_listed(missing)} is missing, expected a lever of the same materials "
-                f"as {next(iter(fits))}"
+                f"as {first}"
             )
-    rows = [[quantities[name] for name in names] for quantities in compared.values()]
-    coordinates = {"lever": list(fits), "quantity": names}
+    numbers = [[quantities[name] for name in names] for quantities in compared.values()]
     described = xr.DataArray([fit.describes_data is True for fit in fits.values()], dims="lever")
     value, stderr = (
-        xr.DataArray(np.array(numbers, dtype=float), coordinates, list(coordinates)).where(
-            described
-        )
-        for numbers in (
-            [[quantity.value for quantity in row] for row in rows],
-            [[quantity.stderr for quantity in row] for row in rows],
-        )
+        xr.DataArray(column, dims=("lever", "quantity")).where(described)
+        for column in np.moveaxis(np.array(numbers, dtype=float), -1, 0)
     )
-    positive = [parameter_named(name).lower >= 0 for name in names]
     stated = stderr > 0
-    undetermined = stated & xr.DataArray(positive, dims="quantity") & (stderr >= np.abs(value))
+    positive = xr.DataArray([parameter_named(name).lower >= 0 for name in names], dims="quantity")
+    undetermined = stated & positive & (stderr >= np.abs(value))
     counts = value.notnull() & ~undetermined & (stated | ~stated.any("lever"))
     counting, count = value.where(counts), counts.sum("lever")
     freedom = (count - 1).where(count > 1)
     weight = (1.0 / stderr.where(stated, 1.0) ** 2).where(counts)
-    total = weight.sum("lever").where(count > 0)
-    has_errors = stated.any("lever") & (count > 0)
+    total = weight.sum("lever", min_count=1)
     mean = (weight * counting).sum("lever") / total
-    chi_square = (weight * (counting - mean) ** 2).sum("lever").where(has_errors)
+    chi_square = (weight * (counting - mean) ** 2).sum("lever", min_count=1)
+    chi_square = chi_square.where(stated.any("lever"))
     birge_ratio = (chi_square / freedom) ** 0.5
-    squares = (counting - counting.sum("lever") / count.where(count > 0)) ** 2
+    mean_stderr = (total**-0.5).where(stated.any("lever")) * np.fmax(birge_ratio, 1.0)
+    squares = ((counting - counting.mean("lever")) ** 2).sum("lever")
     columns: dict[str, xr.DataArray] = {
         "value": value,
         "stderr": stderr,
         "counts": counts,
         "described": described,
         "mean": mean,
-        "mean_stderr": (total**-0.5).where(has_errors) * np.fmax(birge_ratio, 1.0),
-        "scatter": (squares.sum("lever") / freedom) ** 0.5,
+        "mean_stderr": mean_stderr,
+        "scatter": (squares / freedom) ** 0.5,
         "chi_square": chi_square,
         "birge_ratio": birge_ratio,
     }
-    units = [quantity.unit for quantity in rows[0]]
+    units = ["K" if name == INVERSION else parameter_named(name).unit for name in names]
     return labelled(
         {name: (column.dims, column.values) for name, column in columns.items()},
-        coordinates={**coordinates, "unit": ("quantity", units)},
+        coordinates={"lever": list(fits), "quantity": names, "unit": ("quantity", units)},
     )
 
 
-def _quantities(fit: Fit) -> dict[str, FittedParameter]:
-    """Return what a lever is compared by: its materials, and the inversion temperature."""
+def _quantities(fit: Fit) -> dict[str, tuple[float, float | None]]:
+    """Return what a lever is compared by, with errors: its materials, the inversion temperature."""
     # dimensions and the like are varied within priors: their scatter is not the levers'
     quantities = {
-        name: fitted for name, fitted in fit.parameters.items() if name in PARAMETERS or "." in name
+        name: (fitted.value, fitted.stderr)
+        for name, fitted in fit.parameters.items()
+        if name in PARAMETERS or "." in name
     }
     if np.isfinite(fit.inversion_temperature_K):
-        inversion = fit.inversion_temperature_K, fit.inversion_temperature_stderr_K
-        quantities[INVERSION] = FittedParameter(*inversion, "K", False)
+        quantities[INVERSION] = fit.inversion_temperature_K, fit.inversion_temperature_stderr_K
     return quantities
 
 
@@ -120,7 +116,14 @@ def statements(levers: xr.Dataset) -> list[str]:
     count = levers.counts.sum("lever").values
     chi_square = np.where(count > 1, levers.chi_square.values, np.nan)
     limit = chdtri(np.maximum(count - 1, 1), _RARE)
-    texts = _left_out(levers)
+    texts = [
+        f"{lever} is left out: its data are not described"
+        for lever in levers.lever.values[~levers.described.values]
+    ]
+    texts += [
+        f"{lever} is left out of the mean of {quantities}, which its data do not determine"
+        for lever, quantities in _by_lever(~levers.counts & levers.value.notnull())
+    ]
     for index in np.flatnonzero(chi_square > limit):
         quantity = levers.isel(quantity=index)
         texts.append(
@@ -136,40 +139,21 @@ def statements(levers: xr.Dataset) -> list[str]:
             "errors explain"
         )
     many = levers.isel(quantity=np.isfinite(chi_square) & (count >= _FEWEST))
-    return texts + _apart(many)
-
-
-def _left_out(levers: xr.Dataset) -> list[str]:
-    """Name the levers that do not count, or not in every mean."""
-    missing = ~levers.counts & levers.value.notnull()
-    return [
-        *(
-            f"{lever} is left out: its data are not described"
-            for lever in levers.lever.values[~levers.described.values]
-        ),
-        *(
-            f"{lever} is left out of the mean of {quantities}, which its data do not determine"
-            for lever, quantities in _listed_by_lever(missing)
-        ),
-    ]
-
-
-def _apart(levers: xr.Dataset) -> list[str]:
-    """Name the levers far from the median of those that count, and in what."""
-    value = levers.value.where(levers.counts)
+    value = many.value.where(many.counts)
     away = np.abs(value - value.median("lever"))
+    # the standard deviation of a normal distribution that has this median
     spread = 1.4826 * away.median("lever")
-    return [
+    return texts + [
         f"{lever} stands apart from the other levers in {quantities}"
-        for lever, quantities in _listed_by_lever(away > _APART * np.hypot(spread, levers.stderr))
+        for lever, quantities in _by_lever(away > _APART * np.hypot(spread, many.stderr))
     ]
 
 
-def _listed_by_lever(chosen: xr.DataArray) -> list[tuple[str, str]]:
-    """Return each lever of which some quantities are chosen, and these in words."""
+def _by_lever(chosen: xr.DataArray) -> list[tuple[str, str]]:
+    """Return the levers of which some quantities are chosen, with these in words."""
     return [
         (str(row.lever.item()), _listed(row.quantity.values[row.values]))
-        for row in chosen.transpose("lever", "quantity")
+        for row in chosen
         if row.any()
     ]
 
@@ -182,11 +166,9 @@ def _listed(names: Iterable[str]) -> str:
 def levers_csv(levers: xr.Dataset) -> str:
     """Return a table with one row for each lever: value and standard error of each quantity."""
     columns = {
-        f"{name}{kind}{'_K' if name == INVERSION else ''}": column.sel(quantity=name).values
+        f"{name}{kind}{'_K' if name == INVERSION else ''}": column.sel(quantity=name, drop=True)
         for name in levers.quantity.values
         for kind, column in (("", levers.value), ("_stderr", levers.stderr))
     }
-    table = xr.Dataset(
-        {name: ("lever", column) for name, column in columns.items()}, {"lever": levers.lever.data}
-    )
-    return frame_text(table.to_dataframe(), float_format="%.8g")
+    table = xr.Dataset(columns).drop_vars("unit").to_dataframe()
+    return frame_text(table, float_format="%.8g")

@@ -151,17 +151,17 @@ class Fit(Outcome):
     @cached_property
     def parameters(self) -> dict[str, FittedParameter]:
         """Value and standard error of what is usually varied, and of what else was."""
-        spread = dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-        known = parameters_of(self.probe, in_time=True)
-        names = dict.fromkeys([*usual_parameters(self.probe), *self.names])
+        errors = np.sqrt(np.diag(self.covariance)).tolist()
+        stderr = {
+            name: error
+            for name, error in zip(self.names, errors, strict=True)
+            if np.isfinite(error)
+        }
+        units = parameters_of(self.probe, in_time=True)
+        names = list(dict.fromkeys([*usual_parameters(self.probe), *self.names]))
         return {
-            name: FittedParameter(
-                value=value,
-                stderr=spread[name] if np.isfinite(spread.get(name, np.nan)) else None,
-                unit=known[name].unit,
-                vary=name in self.names,
-            )
-            for name, value in zip(names, self.probe.at(list(names)).tolist(), strict=True)
+            name: FittedParameter(value, stderr.get(name), units[name].unit, name in self.names)
+            for name, value in zip(names, self.probe.at(names).tolist(), strict=True)
         }
 
     @cached_property
@@ -228,11 +228,11 @@ class Fit(Outcome):
             common=common,
         )
 
-    def file(self) -> FitFile:
-        """Return what the fit file holds."""
+    def file(self, request: dict[str, JsonValue] | None = None) -> FitFile:
+        """Return what the fit file holds; `request` is what a batch was asked."""
         correlation = _Correlation.model_construct(names=self.names, matrix=self.correlation)
         data = _FittedData.of(self.measurement, weights=self.data_weights)
-        return FitFile.holding(self, correlation=correlation, data=data)
+        return FitFile.holding(self, correlation=correlation, data=data, request=request)
 
 
 class _Correlation(Section):
@@ -247,7 +247,7 @@ class _FittedData(MeasurementSection):
 class FitFile(ResultFile):
     """What a fit file holds: the schema that it is written and read by.
 
-    Beside what a `Fit` has: the batch, if any, tells by ``request`` what was asked of it.
+    ``request`` is what a batch was asked that the fit is of.
     """
 
     parameters: dict[str, FittedParameter]

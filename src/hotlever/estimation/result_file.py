@@ -12,15 +12,7 @@ from dataclasses import fields
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    PositiveInt,
-    ValidationError,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, model_validator
 
 from hotlever import __version__
 from hotlever.errors import InputError
@@ -60,10 +52,6 @@ def _matrix(values: list[list[float]]) -> Array:
     return np.array(values, dtype=float)
 
 
-def _counts(values: list[int]) -> Array:
-    return np.array(values, dtype=float)
-
-
 def _probe(sections: dict[str, dict[str, Any]], info: ValidationInfo) -> Probe:
     return Probe.from_values(sections, f"{info.context}: probe")
 
@@ -83,9 +71,9 @@ Vector = Annotated[Array, stored_as(list[Number])]
 Matrix = Annotated[Array, stored_as(list[list[Number]], _matrix)]
 # Columns of a table, of which files hold the rows.
 Columns = Annotated[dict[str, Array], stored_as(list[dict[str, Number]], _columns, _rows)]
+_Count = Annotated[float, Field(ge=1, multiple_of=1)]
 _Counts = Annotated[
-    Array,
-    stored_as(list[PositiveInt], _counts, lambda counts: counts.astype(int).tolist()),
+    Array, stored_as(list[_Count], write=lambda counts: counts.astype(int).tolist())
 ]
 _Times = Annotated[Array, stored_as(list[float])]
 _Probe = Annotated[Probe, stored_as(dict[str, dict[str, Any]], _probe, Probe.values)]
@@ -137,10 +125,11 @@ class MeasurementSection(Section):
     def of(cls, measurement: Measurement, **others: Any) -> Self:
         """Return the section of a measurement."""
         columns = {
-            name: getattr(measurement, attribute) for name, (attribute, _) in COLUMNS.items()
+            name: values
+            for name, (attribute, _) in COLUMNS.items()
+            if (values := getattr(measurement, attribute)) is not None
         }
-        present = {name: values for name, values in columns.items() if values is not None}
-        return cls.holding(measurement, columns=present, **others)
+        return cls.holding(measurement, columns=columns, **others)
 
     @model_validator(mode="after")
     def _columns_belong_together(self, info: ValidationInfo) -> Self:
@@ -213,9 +202,8 @@ class ResultFile(Section):
     def content(self) -> dict[str, Any]:
         """Return what is written, in plain values: first what only files of this kind hold."""
         values = without_nan(self.model_dump())
-        return {
-            key: values[key] for key in sorted(values, key=ResultFile.model_fields.__contains__)
-        }
+        own = values.keys() - ResultFile.model_fields.keys()
+        return dict(sorted(values.items(), key=lambda entry: entry[0] not in own))
 
     def to_json(self) -> str:
         """Return the text of the file."""

@@ -45,19 +45,6 @@ class Quantity:
     rhat: float
     unit: str
 
-    @classmethod
-    def of(cls, samples: xr.DataArray, chains: xr.Dataset) -> Quantity:
-        """Summarise samples, and how far to trust their chains."""
-        quantiles = np.percentile(samples, BAND_QUANTILES).tolist()
-        return cls(
-            samples.values.mean().item(),
-            samples.values.std().item(),
-            {f"{q:g}": value for q, value in zip(BAND_QUANTILES, quantiles, strict=True)},
-            round(chains.effective_sample_size.item(), 1),
-            round(chains.rhat.item(), 5),
-            samples.attrs["units"],
-        )
-
 
 @dataclass(frozen=True)
 class Uncertainty:
@@ -105,12 +92,23 @@ class Uncertainty:
     @property
     def quantities(self) -> dict[str, Quantity]:
         """What the posterior says of each quantity, by name."""
+        quantities: dict[str, Quantity] = {}
         if self.posterior is None:
-            return {}
-        return {
-            name: Quantity.of(self.posterior[name], self.posterior.sel(quantity=name))
-            for name in self.posterior.quantity.values.tolist()
-        }
+            return quantities
+        for name in self.posterior.quantity.values.tolist():
+            samples, chains = self.posterior[name], self.posterior.sel(quantity=name)
+            values = np.percentile(samples, BAND_QUANTILES).tolist()
+            quantities[name] = Quantity(
+                mean=samples.mean().item(),
+                standard_deviation=samples.std().item(),
+                quantiles={
+                    f"{q:g}": value for q, value in zip(BAND_QUANTILES, values, strict=True)
+                },
+                effective_sample_size=round(chains.effective_sample_size.item(), 1),
+                rhat=round(chains.rhat.item(), 5),
+                unit=samples.attrs["units"],
+            )
+        return quantities
 
     def to_json(self) -> str:
         """Return the fit file with the keys ``posterior`` and ``profiles`` beside its own."""
