@@ -313,4 +313,7 @@ def _correlation(covariance: Array) -> Array:
     spread = np.sqrt(np.diag(covariance))
     product = np.outer(spread, spread)
     # data that a model made itself leave no errors that could be correlated
-    return np.divide(covariance, product, out=np.eye(spread.size), where=product != 0)
+    correlation = np.divide(covariance, product, out=np.eye(spread.size), where=product != 0)
+    # without what rounding leaves, so that files keep the standard errors as they are
+    np.fill_diagonal(correlation, np.round(np.diag(correlation)))
+    return correlation
