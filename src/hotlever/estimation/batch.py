@@ -217,10 +217,7 @@ def _written_before(file: Path, request: dict[str, Any]) -> Fit | None:
 
 
 def _not_reduced(
-    probe: Probe,
-    options: FitOptions,
-    waiting: Mapping[str, Measurement],
-    progress: Progress | None,
+    probe: Probe, options: FitOptions, waiting: Mapping[str, Measurement], progress: Progress | None
 ) -> dict[str, HotleverError]:
     """Reduce each geometry once, before the workers need it; return why some levers have none.
 

@@ -12,8 +12,8 @@ import xarray as xr
 from numpy.typing import ArrayLike
 from pydantic import Field, JsonValue, PlainSerializer, ValidationInfo, model_validator
 
+from hotlever.datasets import labelled
 from hotlever.errors import InputError
-from hotlever.estimation.band import Band
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.outcome import Outcome
 from hotlever.estimation.residuals import Residuals
@@ -23,6 +23,7 @@ from hotlever.estimation.result_file import (
     MeasurementSection,
     ResultFile,
     Section,
+    Vector,
     array,
 )
 from hotlever.estimation.scales import errors_of_scales
@@ -30,15 +31,14 @@ from hotlever.lever.lever import Lever
 from hotlever.materials import full_name
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
-from hotlever.probe.parameters import (
-    parameter_of,
-    parameters_of,
-    usual_parameters,
-)
+from hotlever.probe.parameters import parameter_of, parameters_of, usual_parameters
 from hotlever.probe.priors import Prior, PriorUse, priors_of
-from hotlever.records import Number
+from hotlever.records import Number, stored_as
 from hotlever.text import value_with_error
 from hotlever.types import Array
+
+#: Variables of a fit's band at rest.
+_OF_BAND = {"bias_V", "power_mW", "tip_K", "tip_stderr_K"}
 
 
 @dataclass(frozen=True)
@@ -235,6 +235,27 @@ class Fit(Outcome):
         return FitFile.holding(self, correlation=correlation, data=data, request=request)
 
 
+def band_dataset(**columns: Array) -> xr.Dataset:
+    """Return the `band` of a fit: one row per bias or, with ``time_us``, time; rising in it."""
+    along, name = ("time", "time_us") if "time_us" in columns else ("bias", "bias_V")
+    rising, order = np.unique(columns[name], return_index=True)
+    ordered = {name: values[order] for name, values in columns.items()}
+    return labelled(ordered, along, {along: rising})
+
+
+def _read_band(columns: dict[str, Array]) -> xr.Dataset:
+    if not columns.keys() >= _OF_BAND or len({values.size for values in columns.values()}) > 1:
+        raise ValueError(f"expected {', '.join(sorted(_OF_BAND))}, as many of each")
+    return band_dataset(**columns)
+
+
+def _written_band(band: xr.Dataset) -> dict[str, list[float]]:
+    return {str(name): values.values.tolist() for name, values in band.data_vars.items()}
+
+
+_Band = Annotated[xr.Dataset, stored_as(dict[str, Vector], _read_band, _written_band)]
+
+
 class _Correlation(Section):
     names: list[str]
     matrix: Matrix
@@ -263,7 +284,7 @@ class FitFile(ResultFile):
     options: Annotated[FitOptions, PlainSerializer(FitOptions.values)]
     common_noise_covariance: Matrix
     sum_of_squares: float
-    band: Band
+    band: _Band
     request: dict[str, JsonValue] | None = IF_ANY
 
     @model_validator(mode="after")
