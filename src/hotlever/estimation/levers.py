@@ -170,5 +170,4 @@ def levers_csv(levers: xr.Dataset) -> str:
         for name in levers.quantity.values
         for kind, column in (("", levers.value), ("_stderr", levers.stderr))
     }
-    table = xr.Dataset(columns).drop_vars("unit").to_dataframe()
-    return frame_text(table, float_format="%.8g")
+    return frame_text(xr.Dataset(columns).to_dataframe(), float_format="%.8g")
