@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from hotlever.datasets import labelled
+from hotlever.estimation import FittedParameter
 from hotlever.estimation.levers import compare_levers
 from hotlever.materials import PARAMETERS
 from hotlever.studies.twins import WAYS, together
@@ -30,25 +33,36 @@ def damaged(content: dict[str, Any], *keys: Any, value: Any) -> dict[str, Any]:
     return changed
 
 
+def fit_of(
+    values: Mapping[str, float],
+    stderr: Mapping[str, float | None],
+    inversion: tuple[float, float] = (830.0, np.nan),
+    described: bool | None = True,
+) -> Any:
+    """Return what of a fit is compared with those of other levers."""
+    return SimpleNamespace(
+        parameters={
+            name: FittedParameter(values[name], stderr.get(name), known.unit, True)
+            for name, known in PARAMETERS.items()
+        },
+        inversion_temperature_K=inversion[0],
+        inversion_temperature_stderr_K=inversion[1],
+        describes_data=described,
+        doubt="" if described else "no such lever shows these data: current differs by 5%",
+    )
+
+
 def levers(count: int, held: tuple[str, ...] = ()) -> xr.Dataset:
     """Return the table of some levers, with parameters that were not fitted."""
     rng = np.random.default_rng(0)
-    return compare_levers(
-        {
-            f"lever-{number}": {
-                "parameters": {
-                    name: {
-                        "value": known.scale * (2 + 0.1 * rng.normal()),
-                        "stderr": None if name in held else 0.05 * known.scale,
-                    }
-                    for name, known in PARAMETERS.items()
-                },
-                "inversion_temperature_K": 830.0 + 5 * rng.normal(),
-                "inversion_temperature_stderr_K": 3.0,
-            }
-            for number in range(count)
+    stderr = {name: 0.05 * known.scale for name, known in PARAMETERS.items() if name not in held}
+    fits = {}
+    for number in range(count):
+        values = {
+            name: known.scale * (2 + 0.1 * rng.normal()) for name, known in PARAMETERS.items()
         }
-    )
+        fits[f"lever-{number}"] = fit_of(values, stderr, (830.0 + 5 * rng.normal(), 3.0))
+    return compare_levers(fits)
 
 
 def twins(other_law: bool = False) -> xr.Dataset:

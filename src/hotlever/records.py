@@ -3,14 +3,51 @@
 from __future__ import annotations
 
 import inspect
-from typing import Any, Self
+import math
+from collections.abc import Callable
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    GetPydanticSchema,
+    PlainSerializer,
+    ValidationError,
+    WrapValidator,
+)
 
 from hotlever.errors import InputError, quoted, shown, unknown_name
 
 #: Characters of a key that an error names.
 _LONGEST_KEY = 120
+
+# A number of a result file; NaN where the file has none.
+Number = Annotated[
+    float, WrapValidator(lambda value, check: math.nan if value is None else check(value))
+]
+
+
+def stored_as(
+    written: Any,
+    read: Callable[..., Any] = np.array,
+    write: Callable[[Any], Any] = np.ndarray.tolist,
+) -> GetPydanticSchema:
+    """Return the annotation of a type that stands in files as another one; by default an array.
+
+    Parameters
+    ----------
+    written : type
+        What a file holds, checked before it is read.
+    read : callable
+        Makes a value of what was written; given pydantic's validation information too, if it takes
+        two arguments.
+    write : callable
+        Makes what is written of a value.
+    """
+    schema = Annotated[written, AfterValidator(read), PlainSerializer(write)]
+    return GetPydanticSchema(lambda _, handler: handler(schema))
 
 
 class Record(BaseModel):

@@ -63,7 +63,7 @@ def workers() -> list[psutil.Process]:
 
 
 def found(batch: Batch) -> list[float]:
-    return [one["parameters"]["c_kappa"]["value"] for one in batch.fits.values()]
+    return [fit.parameters["c_kappa"].value for fit in batch.fits.values()]
 
 
 def test_killing_a_worker_loses_nothing(levers, tmp_path):

@@ -74,7 +74,7 @@ def test_a_fit_file_of_it_is_read_back(found, tmp_path):
     content = json.loads((tmp_path / "fit.json").read_text())
     assert content["parameters"]["film.tcr"]["unit"] == "K⁻¹"
     assert content["inversion_temperature_K"] is None
-    table = compare_levers({"one": content, "other": content})
+    table = compare_levers({"one": found, "other": again})
     assert list(table.quantity.values) == found.names
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,17 +14,7 @@ from hotlever.estimation.levers import INVERSION, compare_levers, levers_csv, st
 from hotlever.estimation.words import lever_rows
 from hotlever.materials import PARAMETERS
 from hotlever.spieser2017 import PUBLISHED
-
-
-def content(values: dict[str, float], stderr: dict[str, float | None], inversion=830.0):
-    return {
-        "parameters": {
-            name: {"value": values[name], "stderr": stderr.get(name), "unit": "", "vary": True}
-            for name in PARAMETERS
-        },
-        "inversion_temperature_K": inversion,
-        "inversion_temperature_stderr_K": None,
-    }
+from made_up import fit_of
 
 
 def wafer(count: int, scatter: float, stderr: float, seed: int = 0):
@@ -33,14 +24,14 @@ def wafer(count: int, scatter: float, stderr: float, seed: int = 0):
     fits = {}
     for number in range(count):
         found = base["c_kappa"] + rng.normal(0, np.hypot(scatter, stderr))
-        fits[f"lever-{number}"] = content({**base, "c_kappa": found}, {"c_kappa": stderr})
+        fits[f"lever-{number}"] = fit_of({**base, "c_kappa": found}, {"c_kappa": stderr})
     return fits
 
 
 def test_the_published_levers():
     """Table II: n_d scatters by far more than the other parameters."""
     fits = {
-        name: content(PUBLISHED[name].material.model_dump(), {})
+        name: fit_of(PUBLISHED[name].material.model_dump(), {})
         for name in ("lever 1", "lever 2", "lever 3", "lever 4")
     }
     data = compare_levers(fits)
@@ -77,7 +68,9 @@ def test_equal_levers_are_rarely_said_to_differ():
 
 def test_a_lever_that_stands_apart_is_named():
     fits = wafer(12, scatter=0.01, stderr=0.005)
-    fits["lever-7"]["parameters"]["c_kappa"]["value"] += 0.3
+    parameters = fits["lever-7"].parameters
+    away = parameters["c_kappa"].value + 0.3
+    parameters["c_kappa"] = replace(parameters["c_kappa"], value=away)
     assert "lever-7 stands apart from the other levers in c_kappa" in statements(
         compare_levers(fits)
     )
@@ -85,8 +78,9 @@ def test_a_lever_that_stands_apart_is_named():
 
 def test_the_mean_is_weighted_and_its_error_that_of_the_scatter():
     fits = wafer(3, scatter=0.0, stderr=0.005)
-    for one, value, stderr in zip(fits.values(), (0.7, 0.72, 0.9), (0.01, 0.02, 0.05), strict=True):
-        one["parameters"]["c_kappa"] |= {"value": value, "stderr": stderr}
+    for fit, value, stderr in zip(fits.values(), (0.7, 0.72, 0.9), (0.01, 0.02, 0.05), strict=True):
+        changed = replace(fit.parameters["c_kappa"], value=value, stderr=stderr)
+        fit.parameters["c_kappa"] = changed
     data = compare_levers(fits).sel(quantity="c_kappa")
     weights = np.array([1e4, 2.5e3, 4e2])
     mean = (weights @ [0.7, 0.72, 0.9]) / weights.sum()
@@ -106,7 +100,7 @@ def test_a_lever_that_determines_nothing_spoils_neither_mean_nor_verdict():
     """c_kappa = 0.719 ± 300 was written as 0(300), and all levers were said to be alike."""
     fits = wafer(4, scatter=0.05, stderr=0.005)
     before = compare_levers(fits)
-    fits["dull"] = content(
+    fits["dull"] = fit_of(
         {**PUBLISHED["option III"].material.model_dump(), "c_kappa": 0.719}, {"c_kappa": 300.0}
     )
     data = compare_levers(fits)
@@ -121,12 +115,12 @@ def test_a_lever_that_determines_nothing_spoils_neither_mean_nor_verdict():
     assert statements(before)[0].startswith("the levers differ in c_kappa")
 
 
-@pytest.mark.parametrize("answer", [{"describes_data": None}, {"describes_data": False}, {}])
+@pytest.mark.parametrize("answer", [None, False])
 def test_a_lever_that_is_not_described_is_left_out_and_named(answer):
     fits = wafer(3, scatter=0.0, stderr=0.005)
     before = compare_levers(fits)
-    wrong = {**answer, "reason": "current differs by 5%"}
-    fits["other"] = content({**dict.fromkeys(PARAMETERS, 1.0)}, {"c_kappa": 0.001}) | wrong
+    values = dict.fromkeys(PARAMETERS, 1.0)
+    fits["other"] = fit_of(values, {"c_kappa": 0.001}, described=answer)
     data = compare_levers(fits)
     assert data["mean"].equals(before["mean"])
     assert "other is left out: its data are not described" in statements(data)
@@ -157,7 +151,10 @@ def test_csv_has_empty_cells_for_what_is_not_known():
     assert cells[4] == ""
 
 
-@pytest.mark.parametrize("fits", [{}, {"a": {"parameters": {}}}, {"a": []}])
-def test_what_is_no_fit_file_is_refused(fits):
-    with pytest.raises(InputError, match=r"no fits to compare|not a fit file"):
+def test_what_cannot_be_compared_is_refused():
+    with pytest.raises(InputError, match="no fits to compare"):
+        compare_levers({})
+    fits = wafer(2, 0.01, 0.005)
+    del fits["lever-1"].parameters["n_d"]
+    with pytest.raises(InputError, match="lever-1: n_d is missing, expected a lever of the same"):
         compare_levers(fits)

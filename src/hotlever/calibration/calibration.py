@@ -3,34 +3,32 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Self
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from pydantic import Field
+from pydantic import Field, PlainSerializer, ValidationInfo, field_serializer, model_validator
 
-from hotlever import __version__
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseCalibration, PulseSection
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
-from hotlever.estimation.embedded import (
-    EmbeddedMeasurement,
-    Number,
-    UsedPrior,
+from hotlever.estimation.outcome import Outcome
+from hotlever.estimation.result_file import (
+    IF_ANY,
+    Columns,
+    MeasurementSection,
+    ResultFile,
+    Vector,
     array,
-    embed,
-    prior_uses,
-    without_spread,
 )
-from hotlever.estimation.verdict import Outcome, Verdict
-from hotlever.files import without_nan
 from hotlever.measurement import Measurement
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import PriorUse
+from hotlever.records import Number, stored_as
 from hotlever.text import value_with_error
 from hotlever.types import Array
 
@@ -113,7 +111,6 @@ class Calibration(Outcome):
             "table": self.table.assign(unknown),
             "knee": self.knee.without_errors,
             "k_stderr": np.nan,
-            "priors": without_spread(self.priors),
             "pulse": None,
         }
 
@@ -194,38 +191,21 @@ class Calibration(Outcome):
         said = self.doubt or f"{tip} K at {hottest.bias_V.item():.4g} V in {self.medium}"
         return f"<Calibration of {self.measurement.path or 'a measurement'}: {said}>"
 
-    # --- the file -------------------------------------------------------------------------------
-
-    def content(self) -> dict[str, Any]:
-        """Return the content of the calibration file."""
-        law, budget = self.power_law, self.table.budget_K.transpose("source", "bias")
-        sources = dict(zip(budget.source.values.tolist(), budget.values.tolist(), strict=True))
-        content = {
-            "route": self.route,
-            "medium": self.medium,
-            "power_law": law and law.values(self.base_temperature_K),
-            "power_law_residual_K": self.law_residual_K,
-            "k": self.k,
-            "k_stderr": self.k_stderr,
-            "knee": vars(self.knee) | {"tip_K": self.knee_tip_K, "measured": self.knee_measured},
-            "tip_temperature_uncertainty_K": self.tip_temperature_uncertainty_K,
-            "uncertainty_budget_K": dict(
-                zip(sources, budget.max("bias").values.tolist(), strict=True)
-            ),
-            "base_temperature_K": self.base_temperature_K,
-            "table": self.table[self.columns].to_dataframe().to_dict("records"),
-            "budget_K": sources,
-            "measured_rms_K": self.measured_rms_K,
-            "priors": {name: vars(use) for name, use in self.priors.items()},
-            "describes_data": self.describes_data,
-            "reason": self.reason,
-            **({} if self.pulse is None else {"pulse": self.pulse.content()}),
-            "probe": self.probe.values(),
-            "data": embed(self.measurement),
-            "notes": self.notes,
-            "software": f"hotlever {__version__}",
+    def file(self) -> CalibrationFile:
+        """Return what the calibration file holds."""
+        budget = {
+            source: self.table.budget_K.sel(source=source)
+            for source in self.table.source.values.tolist()
         }
-        return dict(without_nan(content))
+        return CalibrationFile.holding(
+            self,
+            power_law_residual_K=self.law_residual_K,
+            knee=vars(self.knee) | {"tip_K": self.knee_tip_K, "measured": self.knee_measured},
+            uncertainty_budget_K={source: part.max().item() for source, part in budget.items()},
+            table={name: self.table[name].values for name in self.columns},
+            budget_K={source: part.values for source, part in budget.items()},
+            data=MeasurementSection.of(self.measurement),
+        )
 
     def table_csv(self) -> str:
         """Return the table as CSV, to load into an instrument; that of the pulse if there is."""
@@ -244,24 +224,70 @@ def table_of(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:
     )
 
 
-class _CalibrationFile(Verdict):
-    """What a calibration file must hold; see `Calibration.content`."""
+def _law(values: dict[str, float], info: ValidationInfo) -> PowerLaw:
+    coefficients = {name: value for name, value in values.items() if name != "threshold_K"}
+    return PowerLaw.of(coefficients, f"{info.context}: power_law")
+
+
+def _pulse(section: PulseSection, info: ValidationInfo) -> PulseCalibration:
+    return section.calibration(f"{info.context}: pulse")
+
+
+_Law = Annotated[PowerLaw, stored_as(dict[str, float], _law, PowerLaw.values)]
+_Pulse = Annotated[PulseCalibration, stored_as(PulseSection, _pulse, PulseCalibration.content)]
+
+
+class CalibrationFile(ResultFile):
+    """What a calibration file holds: the schema that it is written and read by.
+
+    Beside what a `Calibration` has: of the knee ``tip_K`` and whether it was measured, and the
+    largest errors in the table, all in all and by source.
+    """
 
     route: str
     medium: str
-    power_law: dict[str, float] | None
+    power_law: _Law | None
     power_law_residual_K: Number
     k: Number
     k_stderr: Number
-    knee: dict[str, Number]
-    table: list[dict[str, Number]]
-    budget_K: dict[str, list[Number]]
+    # beside numbers, whether it was measured
+    knee: Annotated[dict[str, Number], PlainSerializer(dict)]
+    tip_temperature_uncertainty_K: Number = np.nan
+    uncertainty_budget_K: dict[str, Number] = Field(default_factory=dict)
+    base_temperature_K: Number = np.nan
+    table: Columns
+    budget_K: dict[str, Vector]
     measured_rms_K: Number = np.nan
-    priors: dict[str, UsedPrior] = Field(default_factory=dict)
-    probe: dict[str, dict[str, Any]]
-    data: EmbeddedMeasurement
-    notes: list[str]
-    pulse: PulseSection | None = None
+    pulse: _Pulse | None = IF_ANY
+
+    @field_serializer("power_law")
+    def _with_threshold(self, law: PowerLaw | None) -> dict[str, float] | None:
+        return None if law is None else law.values(self.base_temperature_K)
+
+    @model_validator(mode="after")
+    def _rows_belong_together(self, info: ValidationInfo) -> Self:
+        path, bias = info.context, self.table.get("bias_V", np.array([]))
+        if not bias.size or not self.budget_K or not np.all(np.diff(bias) > 0):
+            raise InputError(
+                f"{path}: table: expected rows of rising bias, and a budget of their errors"
+            )
+        for source, errors in self.budget_K.items():
+            array(errors, bias.shape, f"{path}: budget_K: {source}")
+        return self
+
+    def calibration(self) -> Calibration:
+        """Return the calibration, to go on with as if it had just been made."""
+        nothing = np.full_like(self.table["bias_V"], np.nan)
+        columns = dict.fromkeys(TABLE_COLUMNS, nothing) | {
+            name: self.table[name] for name in (*TABLE_COLUMNS, TOTAL_POWER) if name in self.table
+        }
+        knee = {name: self.knee[name] for name in Knee.__dataclass_fields__ if name in self.knee}
+        return Calibration(
+            law_residual_K=self.power_law_residual_K,
+            knee_tip_K=self.knee.get("tip_K", np.nan),
+            **self.attributes_of(Calibration)
+            | {"knee": Knee(**knee), "table": table_of(columns, self.budget_K)},
+        )
 
 
 def read_calibration(path: str | os.PathLike[str]) -> Calibration:
@@ -277,37 +303,4 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     >>> read_calibration("calibration.json").bias_for(600.0)  # doctest: +SKIP
     array(7.74)
     """
-    found = _CalibrationFile.read(path, "calibration")
-    where, rows = f"{path}: table", len(found.table)
-    probe = Probe.from_values(found.probe, f"{path}: probe")
-    columns = {
-        name: array([row.get(name) for row in found.table], (rows,), f"{where}: {name}")
-        for name in (*TABLE_COLUMNS, TOTAL_POWER)
-        if name in TABLE_COLUMNS or any(name in row for row in found.table)
-    }
-    if not rows or not found.budget_K or not np.all(np.diff(columns["bias_V"]) > 0):
-        raise InputError(f"{where}: expected rows of rising bias, and a budget of their errors")
-    budget = {
-        source: array(errors, (rows,), f"{path}: budget_K: {source}")
-        for source, errors in found.budget_K.items()
-    }
-    law = {name: value for name, value in (found.power_law or {}).items() if name != "threshold_K"}
-    knee = {one.name: found.knee[one.name] for one in fields(Knee) if one.name in found.knee}
-    return Calibration(
-        route=found.route,
-        medium=found.medium,
-        power_law=None if found.power_law is None else PowerLaw.of(law, f"{path}: power_law"),
-        law_residual_K=found.power_law_residual_K,
-        k=found.k,
-        k_stderr=found.k_stderr,
-        knee=Knee(**knee),
-        knee_tip_K=found.knee.get("tip_K", np.nan),
-        table=table_of(columns, budget),
-        measured_rms_K=found.measured_rms_K,
-        probe=probe,
-        measurement=found.data.measurement(f"{path}: data", probe.circuit),
-        priors=prior_uses(found.priors),
-        **found.verdict,
-        notes=found.notes,
-        pulse=None if found.pulse is None else found.pulse.calibration(f"{path}: pulse"),
-    )
+    return CalibrationFile.read(path, "calibration").calibration()

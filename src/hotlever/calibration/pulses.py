@@ -21,8 +21,8 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from hotlever.calibration.inference import error_of_model, measured_range, shares_by_source
 from hotlever.datasets import csv_text, labelled
 from hotlever.errors import ComputationError, InputError, unknown_name
-from hotlever.estimation.embedded import Number, Section, array
 from hotlever.estimation.inverse_problem import Estimate
+from hotlever.estimation.result_file import Number, Section, array
 from hotlever.lever import Lever
 from hotlever.lever.equations import BASE
 from hotlever.lever.lever import COARSE

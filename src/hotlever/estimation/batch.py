@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -16,10 +15,9 @@ from hotlever import __version__
 from hotlever.cluster import guarded, local_client, remote_client, run_all
 from hotlever.errors import HotleverError, InputError
 from hotlever.estimation.estimator import fit
-from hotlever.estimation.levers import described
 from hotlever.estimation.options import FitOptions
-from hotlever.estimation.verdict import doubt
-from hotlever.files import Outputs, json_text, output_folder, read_json, write_text
+from hotlever.estimation.result import Fit, FitFile
+from hotlever.files import Outputs, output_folder, without_nan, write_text
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduction import cached_reduction, can_be_reduced
 from hotlever.measurement import Measurement, read_measurement, with_measured_circuit
@@ -33,15 +31,15 @@ class Batch:
 
     Attributes
     ----------
-    fits : dict of str to dict
-        Contents of the fit files, by the name of the lever, in the order of the data files.
+    fits : dict of str to Fit
+        By the name of the lever, in the order of the data files.
     failures : dict of str to HotleverError
         By data file: why it could not be read or fitted.
     reused : int
         Fits that had been written before from the same data, probe, options and version.
     """
 
-    fits: dict[str, dict[str, Any]] = field(default_factory=dict)
+    fits: dict[str, Fit] = field(default_factory=dict)
     failures: dict[str, HotleverError] = field(default_factory=dict)
     reused: int = 0
 
@@ -57,10 +55,12 @@ class Batch:
     @property
     def undescribed(self) -> dict[str, str]:
         """By lever: that its data are not described, and why."""
-        said = {
-            name: doubt(described(one), one.get("reason", "")) for name, one in self.fits.items()
-        }
-        return {name: f"{name}: {text}" for name, text in said.items() if text}
+        return {name: f"{name}: {fit.doubt}" for name, fit in self.fits.items() if fit.doubt}
+
+    def fail(self, path: str | os.PathLike[str], error: HotleverError) -> None:
+        """Note why a data file could not be read or fitted."""
+        path, text = str(path), str(error)
+        self.failures[path] = error if text.startswith(path) else type(error)(f"{path}: {text}")
 
 
 def fit_many(
@@ -117,13 +117,10 @@ def fit_many(
     outputs, target, data = Outputs(*paths), Path(folder), lever_names(paths)
     outputs.folder(target)
     files = {name: target / f"{name}.json" for name in data}
-    batch, waiting = Batch(), {}
-
-    def failed(path: str | Path, error: HotleverError) -> None:
-        text = str(error)
-        batch.failures[str(path)] = (
-            error if text.startswith(str(path)) else type(error)(f"{path}: {text}")
-        )
+    asked = {"probe": probe.values(), "options": options.values(), "version": __version__}
+    if columns:
+        asked["columns"] = dict(columns)
+    batch, waiting = Batch(), dict[str, Measurement]()
 
     def tell() -> None:
         if progress is not None:
@@ -138,33 +135,32 @@ def fit_many(
             if target.is_dir():
                 outputs.target(files[name])
         except InputError as error:
-            failed(path, error)
+            batch.fail(path, error)
             continue
-        content = _written_before(files[name], _request(measurement, probe, options, columns))
-        if content is None:
+        earlier = _written_before(files[name], _request(measurement, asked))
+        if earlier is None:
             waiting[name] = measurement
         else:
-            batch.fits[name] = content
+            batch.fits[name] = earlier
             batch.reused += 1
     tell()
     if waiting:
         local = min(processes or CPU_COUNT, len(waiting))
         with local_client(local) if scheduler is None else remote_client(scheduler) as client:
-            for name, reason in _reduced(probe, options, waiting, reducing).items():
-                failed(waiting.pop(name).path, reason)
+            for name, reason in _not_reduced(probe, options, waiting, reducing).items():
+                batch.fail(waiting.pop(name).path, reason)
             names = list(waiting)
             tasks = ((measurement, probe, options) for measurement in waiting.values())
-            for number, result in run_all(client, _fitted, tasks):
+            for number, result in run_all(client, fit, tasks):
                 name, measurement = names[number], waiting[names[number]]
                 try:
                     if isinstance(result, HotleverError):
                         raise result
-                    content = {**result, "request": _request(measurement, probe, options, columns)}
                     output_folder(target)
-                    write_text(files[name], json_text(content))
-                    batch.fits[name] = content
+                    write_text(files[name], result.file(_request(measurement, asked)).to_json())
+                    batch.fits[name] = result
                 except HotleverError as error:
-                    failed(measurement.path, error)
+                    batch.fail(measurement.path, error)
                 tell()
     batch.fits = {name: batch.fits[name] for name in files if name in batch.fits}
     return batch
@@ -190,7 +186,7 @@ def lever_names(paths: Sequence[str | os.PathLike[str]]) -> dict[str, Path]:
         name = path.stem if alone else "_".join(path.relative_to(path.anchor).parts)
         # a file name need not be text; and not all disks tell a from A
         name = name.encode(errors="backslashreplace").decode()
-        taken, number, plain = {one.casefold() for one in names}, 2, name
+        taken, number, plain = {other.casefold() for other in names}, 2, name
         while name.casefold() in taken:
             name, number = f"{plain}-{number}", number + 1
         names[name] = path
@@ -200,63 +196,53 @@ def lever_names(paths: Sequence[str | os.PathLike[str]]) -> dict[str, Path]:
 def _identity(path: Path) -> object:
     """Return what two names of one file have in common."""
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError:
         return os.path.realpath(path)
-    return found.st_dev, found.st_ino
+    return status.st_dev, status.st_ino
 
 
-def _written_before(file: Path, record: dict[str, Any]) -> dict[str, Any] | None:
-    """Return a fit file that was made from the same; None if there is none."""
+def _request(measurement: Measurement, asked: dict[str, Any]) -> dict[str, Any]:
+    """Return all that a fit depends on, for its file: the same again need not be fitted."""
+    return dict(without_nan({"sha256": measurement.sha256, **asked}))
+
+
+def _written_before(file: Path, request: dict[str, Any]) -> Fit | None:
+    """Return a fit of a file that was made from the same; None if there is none."""
     try:
-        content = read_json(file)
+        content = FitFile.read(file, "fit")
     except InputError:
         return None
-    return content if content.get("request") == record else None
+    return content.fit() if content.request == request else None
 
 
-def _request(
-    measurement: Measurement,
-    probe: Probe,
-    options: FitOptions,
-    columns: Mapping[str, str] | None,
-) -> dict[str, Any]:
-    """Return all that a fit depends on, for its file: the same again need not be fitted."""
-    record = {
-        "sha256": measurement.sha256,
-        "probe": probe.values(),
-        "options": options.values(),
-        "version": __version__,
-        **({"columns": dict(columns)} if columns else {}),
-    }
-    return dict(json.loads(json.dumps(record)))
-
-
-def _reduced(
-    probe: Probe,
-    options: FitOptions,
-    waiting: Mapping[str, Measurement],
-    progress: Progress | None,
+def _not_reduced(
+    probe: Probe, options: FitOptions, waiting: Mapping[str, Measurement], progress: Progress | None
 ) -> dict[str, HotleverError]:
     """Reduce each geometry once, before the workers need it; return why some levers have none.
 
     Base temperature and medium are part of a geometry.
     """
-    known: dict[object, HotleverError | None] = {}
-
-    def reduce_one(measurement: Measurement) -> HotleverError | None:
-        failed = []
-        for medium in options.media:
-            measured, _ = with_measured_circuit(probe, measurement, medium)
+    results: dict[object, Any] = {}
+    failures: dict[str, HotleverError] = {}
+    for name, measurement in waiting.items():
+        try:
+            probes = [
+                with_measured_circuit(probe, measurement, medium)[0] for medium in options.media
+            ]
+        except InputError as error:
+            failures[name] = error
+            continue
+        errors = []
+        for measured in probes:
             geometry = measured.circuit.base_temperature_K, measured.surroundings.medium
-            if geometry not in known:
-                known[geometry] = guarded(_reduce, (measured, options, progress))
-            failed.append(known[geometry])
+            if geometry not in results:
+                results[geometry] = guarded(_reduce, (measured, options, progress))
+            errors.append(results[geometry])
         # of two media one will do
-        return None if None in failed else failed[0]
-
-    results = {name: guarded(reduce_one, (data,)) for name, data in waiting.items()}
-    return {name: error for name, error in results.items() if error is not None}
+        if None not in errors:
+            failures[name] = errors[0]
+    return failures
 
 
 def _reduce(probe: Probe, options: FitOptions, progress: Progress | None) -> None:
@@ -264,8 +250,3 @@ def _reduce(probe: Probe, options: FitOptions, progress: Progress | None) -> Non
     names = {*own.usual, *own.varied}
     if can_be_reduced(probe, names):
         cached_reduction(Lever(probe), progress, names)
-
-
-def _fitted(measurement: Measurement, probe: Probe, options: FitOptions) -> dict[str, Any]:
-    """Fit one lever, in a worker; return the content of its fit file."""
-    return fit(measurement, probe, options).content()

@@ -7,7 +7,7 @@ doi:10.1214/20-BA1221.
 from __future__ import annotations
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.signal import fftconvolve
 from scipy.special import ndtri
 from scipy.stats import rankdata
 
@@ -31,9 +31,9 @@ def split_rhat(chains: Array) -> float:
     1.0
     """
     half = chains.shape[1] // 2
-    halves = np.concatenate([chains[:, :half], chains[:, chains.shape[1] - half :]])
+    halves = np.concatenate([chains[:, :half], chains[:, -half:]])
     folded = np.abs(halves - np.median(halves))
-    return max(_rhat(_normal_ranks(halves)), _rhat(_normal_ranks(folded)))
+    return max(_rhat_of_ranks(halves), _rhat_of_ranks(folded))
 
 
 def effective_sample_size(chains: Array) -> float:
@@ -46,41 +46,27 @@ def effective_sample_size(chains: Array) -> float:
     ----------
     chains : ndarray, shape (chains, draws)
     """
-    count, draws = chains.shape
-    covariance = _autocovariance(chains).mean(axis=0)
-    within = covariance[0] * draws / (draws - 1)
-    between = chains.mean(axis=1).var(ddof=1) if count > 1 else 0.0
-    total = within * (draws - 1) / draws + between
+    draws = chains.shape[1]
+    centred = chains - chains.mean(axis=1, keepdims=True)
+    # at every lag: divided by all draws, and by one less as a variance is
+    products = fftconvolve(centred, centred[:, ::-1], axes=1)[:, draws - 1 :].mean(axis=0)
+    biased, covariance = products / draws, products / (draws - 1)
+    total = biased[0] + (chains.mean(axis=1).var(ddof=1) if len(chains) > 1 else 0.0)
     if total == 0.0:
         return float(chains.size)
-    correlation = 1.0 - (within - covariance * draws / (draws - 1)) / total
-    correlation[0] = 1.0
+    correlation = 1.0 - (covariance[0] - covariance) / total
     pairs = correlation[: draws // 2 * 2].reshape(-1, 2).sum(axis=1)
-    ends = np.flatnonzero(pairs < 0)
-    pairs = pairs[: ends[0]] if ends.size else pairs
-    time = 2.0 * np.minimum.accumulate(pairs).sum() - 1.0
+    positive = np.logical_and.accumulate(pairs >= 0)
+    time = 2.0 * np.minimum.accumulate(pairs)[positive].sum() - 1.0
     # chains that alternate can do better than independent draws, but not without limit
-    time = max(time, 1.0 / np.log10(chains.size))
-    return float(chains.size / time)
+    return float(chains.size / max(time, 1.0 / np.log10(chains.size)))
 
 
-def _rhat(chains: Array) -> float:
+def _rhat_of_ranks(chains: Array) -> float:
+    """Return R̂ of the normal scores of the ranks."""
     draws = chains.shape[1]
-    within = chains.var(axis=1, ddof=1).mean()
-    between = chains.mean(axis=1).var(ddof=1)
+    ranks = rankdata(chains).reshape(chains.shape)
+    scores = ndtri((ranks - 0.375) / (chains.size + 0.25))
+    within = scores.var(axis=1, ddof=1).mean()
+    between = scores.mean(axis=1).var(ddof=1)
     return float(np.sqrt((draws - 1) / draws + between / within))
-
-
-def _normal_ranks(values: Array) -> Array:
-    """Replace values by the normal scores of their ranks."""
-    scores: Array = ndtri((rankdata(values).reshape(values.shape) - 0.375) / (values.size + 0.25))
-    return scores
-
-
-def _autocovariance(chains: Array) -> Array:
-    """Return the autocovariance of each chain at every lag, shape (chains, draws)."""
-    draws = chains.shape[1]
-    length = next_fast_len(2 * draws)
-    spectrum = rfft(chains - chains.mean(axis=1, keepdims=True), n=length, axis=1)
-    covariance: Array = irfft(np.abs(spectrum) ** 2, n=length, axis=1)[:, :draws] / draws
-    return covariance

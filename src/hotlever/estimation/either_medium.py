@@ -9,7 +9,7 @@ import numpy as np
 
 from hotlever.errors import ComputationError
 from hotlever.estimation.inverse_problem import Estimate
-from hotlever.estimation.verdict import Outcome
+from hotlever.estimation.outcome import Outcome
 from hotlever.probe.surroundings import Medium
 from hotlever.types import Array
 

@@ -34,19 +34,38 @@ _TAILS = 5.0
 
 @dataclass(frozen=True)
 class Gaussian:
-    """A normal approximation of a density of d quantities."""
+    """A normal approximation of a density of d quantities.
+
+    What is drawn from it has its middle and shape, but the wide tails of a Student's t.
+    """
 
     mean: Array
     covariance: Array
 
+    def wide_draws(self, count: int, random: Any) -> Array:
+        """Draw points, shape (count, d)."""
+        normal = random.normal(size=(count, self.mean.size))
+        stretch = np.sqrt(_TAILS / random.chisquare(_TAILS, size=(count, 1)))
+        return np.asarray(self.mean + stretch * (normal @ np.linalg.cholesky(self.covariance).T))
+
+    def wide_log_density(self, points: Array) -> Array:
+        """Return the logarithm of the density of such draws, up to a constant."""
+        away = points - self.mean
+        lengths = np.einsum("ij,jk,ik->i", away, np.linalg.inv(self.covariance), away)
+        return np.asarray(-0.5 * (_TAILS + self.mean.size) * np.log1p(lengths / _TAILS))
+
 
 @dataclass(frozen=True)
 class Chains:
-    """Points (ensembles, walkers, draws, d), their density, and the share of accepted proposals."""
+    """Points (ensembles, walkers, draws, d) and the logarithm of their density."""
 
     points: Array
     log_probability: Array
-    accepted: float
+
+    @property
+    def accepted(self) -> float:
+        """Share of the proposals that were accepted: a walker stands still otherwise."""
+        return float(np.diff(self.points, axis=2).any(axis=-1).mean())
 
 
 def sample(
@@ -93,30 +112,25 @@ def sample(
             raise InputError(f"found {name} = {value}, expected {least} or more")
     # R̂ splits the chains and needs a variance of each half
     draws = max(math.ceil(samples / (ENSEMBLES * walkers)), 4)
-    blocks = [
-        min(_BLOCK, steps - first)
-        for steps in (_WARM_UP, draws)
-        for first in range(0, steps, _BLOCK)
-    ]
-    points, logs, accepted, done = [], [], 0.0, 0
+    total = _WARM_UP + draws
     seeds = np.random.SeedSequence(seed).generate_state(ENSEMBLES).tolist()
+    points, densities = [], []
     with local_processes(min(processes, ENSEMBLES)) as (run, share):
         density = share(log_density)
-        tasks = [(density, approximation, walkers, number) for number in seeds]
-        states = run(_started, tasks)
-        for steps in blocks:
-            tasks = [(density, approximation, state, steps) for state in states]
-            moved = run(_advanced, tasks)
-            states = [state for state, *_ in moved]
-            done += steps
-            if done > _WARM_UP:
-                points.append([chain for _, chain, _, _ in moved])
-                logs.append([log for _, _, log, _ in moved])
-                accepted += steps * np.mean([rate for *_, rate in moved])
+        states = run(_started, [(density, approximation, walkers, number) for number in seeds])
+        for done in range(0, total, _BLOCK):
+            steps = min(_BLOCK, total - done)
+            moved = run(_advanced, [(density, approximation, state, steps) for state in states])
+            states = [state for state, _, _ in moved]
+            points.append([positions for _, positions, _ in moved])
+            densities.append([logarithms for _, _, logarithms in moved])
             if progress is not None:
-                progress(done, _WARM_UP + draws)
-    chains, densities = (np.concatenate(kept, axis=1).swapaxes(1, 2) for kept in (points, logs))
-    return Chains(chains, densities, float(accepted / draws))
+                progress(done + steps, total)
+    kept = (
+        np.concatenate(values, axis=1)[:, _WARM_UP:].swapaxes(1, 2)
+        for values in (points, densities)
+    )
+    return Chains(*kept)
 
 
 def independent_samples(values: Array) -> float:
@@ -132,35 +146,33 @@ def rhat_of_ensembles(values: Array) -> float:
 def _started(
     log_density: LogDensity, approximation: Gaussian, walkers: int, seed: int
 ) -> emcee.State:
-    """Place the walkers of an ensemble where the density does not vanish."""
+    """Put the walkers of an ensemble where the density does not vanish."""
     random = np.random.RandomState(seed)
-    coords: list[Array] = []
-    logs: list[float] = []
+    started: list[tuple[Array, float]] = []
     for _ in range(50 * walkers):
-        point = _wide_draws(approximation, 1, random)[0]
-        value = log_density(point)
-        if np.isfinite(value):
-            coords.append(point)
-            logs.append(value)
-        if len(coords) == walkers:
-            state = emcee.State(np.array(coords), log_prob=np.array(logs))
-            state.random_state = random.get_state()
-            return state
+        (point,) = approximation.wide_draws(1, random)
+        density = log_density(point)
+        if np.isfinite(density):
+            started.append((point, density))
+        if len(started) == walkers:
+            points, densities = map(np.array, zip(*started, strict=True))
+            return emcee.State(points, log_prob=densities, random_state=random.get_state())
     raise ComputationError(
-        f"only {len(coords)} of {50 * walkers} starting points of the posterior can be solved "
+        f"only {len(started)} of {50 * walkers} starting points of the posterior can be solved "
         "within the bounds of the parameters; fix those that the data do not determine"
     )
 
 
 def _advanced(
     log_density: LogDensity, approximation: Gaussian, state: emcee.State, steps: int
-) -> tuple[emcee.State, Array, Array, float]:
-    """Move an ensemble; return it, its points (steps, walkers, d), their density, acceptance."""
+) -> tuple[emcee.State, Array, Array]:
+    """Move an ensemble; return it, its points (steps, walkers, d), and their density."""
 
     def proposed(coords: Array, random: Any) -> tuple[Array, Array]:
         """Return new points, wherever the walkers are, and the logarithm of q(old) / q(new)."""
-        points = _wide_draws(approximation, len(coords), random)
-        return points, _log_density(approximation, coords) - _log_density(approximation, points)
+        points = approximation.wide_draws(len(coords), random)
+        density = approximation.wide_log_density
+        return points, density(coords) - density(points)
 
     sampler = emcee.EnsembleSampler(
         *state.coords.shape,
@@ -171,21 +183,4 @@ def _advanced(
         ],
     )
     state = sampler.run_mcmc(state, steps, skip_initial_state_check=True)
-    accepted = float(np.mean(sampler.acceptance_fraction))
-    return state, sampler.get_chain(), sampler.get_log_prob(), accepted
-
-
-def _log_density(approximation: Gaussian, points: Array) -> Array:
-    """Return the logarithm of the density of `_wide_draws`, up to a constant."""
-    away = points - approximation.mean
-    lengths = np.einsum("ij,jk,ik->i", away, np.linalg.inv(approximation.covariance), away)
-    return np.asarray(-0.5 * (_TAILS + away.shape[1]) * np.log1p(lengths / _TAILS))
-
-
-def _wide_draws(approximation: Gaussian, count: int, random: Any) -> Array:
-    """Draw from a multivariate Student's t, shape (count, d)."""
-    factor = np.linalg.cholesky(approximation.covariance)
-    normal = random.normal(size=(count, approximation.mean.size))
-    stretch = np.sqrt(_TAILS / random.chisquare(_TAILS, size=(count, 1)))
-    draws: Array = approximation.mean + stretch * (normal @ factor.T)
-    return draws
+    return state, sampler.get_chain(), sampler.get_log_prob()

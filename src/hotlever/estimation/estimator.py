@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from hotlever.errors import unknown_name
-from hotlever.estimation.band import band_dataset
 from hotlever.estimation.diagnosis import Diagnosis
 from hotlever.estimation.either_medium import error_of_choice, likelier
 from hotlever.estimation.experiment import Experiment, Prediction
@@ -20,7 +19,7 @@ from hotlever.estimation.inverse_problem import Estimate, estimate
 from hotlever.estimation.lack_of_fit import suspicious_points, undescribed
 from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
 from hotlever.estimation.quantity import TIP
-from hotlever.estimation.result import Fit
+from hotlever.estimation.result import Fit, band_dataset
 from hotlever.estimation.words import undetermined
 from hotlever.measurement import Measurement, given_measurement
 from hotlever.probe import Probe

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import xarray as xr
@@ -11,6 +10,7 @@ from scipy.special import chdtri
 
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
+from hotlever.estimation.result import Fit
 from hotlever.materials import PARAMETERS
 from hotlever.text import INVERSION, parameter_named
 
@@ -21,7 +21,7 @@ _RARE = 0.01
 _APART, _FEWEST = 5.0, 6
 
 
-def compare_levers(fits: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
+def compare_levers(fits: Mapping[str, Fit]) -> xr.Dataset:
     """Put the fits of several levers side by side.
 
     Levers whose data are not described have no values. Means are weighted by the inverse variance;
@@ -30,8 +30,8 @@ def compare_levers(fits: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
 
     Parameters
     ----------
-    fits : mapping of str to mapping
-        The contents of fit files (`hotlever.estimation.result.Fit.content`), by lever.
+    fits : mapping of str to Fit
+        By lever.
 
     Returns
     -------
@@ -48,157 +48,126 @@ def compare_levers(fits: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
     Raises
     ------
     InputError
-        If there is no fit, one is no fit file, or they are of levers of different materials.
+        If there is no fit, or they are of levers of different materials.
     """
     if not fits:
         raise InputError("no fits to compare, expected one or more")
-    units = _units(fits)
-    quantities = list(units)
-    rows = np.array([_row(name, one, quantities) for name, one in fits.items()], dtype=float)
-    answered = np.array([described(one) is True for one in fits.values()])
-    rows[~answered] = np.nan
-    value, stderr = rows[..., 0], rows[..., 1]
-    stated = np.isfinite(stderr) & (stderr > 0)
-    positive = np.array([parameter_named(name).lower >= 0 for name in quantities])
+    compared = {lever: _quantities(fit) for lever, fit in fits.items()}
+    first, names = next((lever, list(quantities)) for lever, quantities in compared.items())
+    for lever, quantities in compared.items():
+        if missing := [name for name in names if name not in quantities]:
+            raise InputError(
+                f"{lever}: {_listed(missing)} is missing, expected a lever of the same materials "
+                f"as {first}"
+            )
+    numbers = [[quantities[name] for name in names] for quantities in compared.values()]
+    described = xr.DataArray([fit.describes_data is True for fit in fits.values()], dims="lever")
+    value, stderr = (
+        xr.DataArray(column, dims=("lever", "quantity")).where(described)
+        for column in np.moveaxis(np.array(numbers, dtype=float), -1, 0)
+    )
+    stated = stderr > 0
+    positive = xr.DataArray([parameter_named(name).lower >= 0 for name in names], dims="quantity")
     undetermined = stated & positive & (stderr >= np.abs(value))
-    counts = np.isfinite(value) & ~undetermined & (stated | ~stated.any(axis=0))
-    weight = np.where(counts, 1.0 / np.where(stated, stderr, 1.0) ** 2, 0.0)
-    count, known = counts.sum(axis=0), np.where(counts, value, 0.0)
-    with np.errstate(invalid="ignore", divide="ignore"):  # what no lever tells is NaN
-        mean = (weight * known).sum(axis=0) / weight.sum(axis=0)
-        away = np.where(counts, value - mean, 0.0)
-        middle = known.sum(axis=0) / count
-        squares = np.where(counts, (value - middle) ** 2, 0.0).sum(axis=0)
-        scatter = np.where(count > 1, np.sqrt(squares / (count - 1)), np.nan)
-        has_errors = stated.any(axis=0) & (count > 0)
-        chi_square = np.where(has_errors, (weight * away**2).sum(axis=0), np.nan)
-        birge = np.where(count > 1, np.sqrt(chi_square / (count - 1)), np.nan)
-        mean_stderr = np.where(has_errors, 1.0 / np.sqrt(weight.sum(axis=0)), np.nan)
-    both = ("lever", "quantity")
+    counts = value.notnull() & ~undetermined & (stated | ~stated.any("lever"))
+    counting, count = value.where(counts), counts.sum("lever")
+    freedom = (count - 1).where(count > 1)
+    weight = (1.0 / stderr.where(stated, 1.0) ** 2).where(counts)
+    total = weight.sum("lever", min_count=1)
+    mean = (weight * counting).sum("lever") / total
+    chi_square = (weight * (counting - mean) ** 2).sum("lever", min_count=1)
+    chi_square = chi_square.where(stated.any("lever"))
+    birge_ratio = (chi_square / freedom) ** 0.5
+    mean_stderr = (total**-0.5).where(stated.any("lever")) * np.fmax(birge_ratio, 1.0)
+    squares = ((counting - counting.mean("lever")) ** 2).sum("lever")
+    columns: dict[str, xr.DataArray] = {
+        "value": value,
+        "stderr": stderr,
+        "counts": counts,
+        "described": described,
+        "mean": mean,
+        "mean_stderr": mean_stderr,
+        "scatter": (squares / freedom) ** 0.5,
+        "chi_square": chi_square,
+        "birge_ratio": birge_ratio,
+    }
+    units = ["K" if name == INVERSION else parameter_named(name).unit for name in names]
     return labelled(
-        {
-            "value": (both, value),
-            "stderr": (both, stderr),
-            "counts": (both, counts),
-            "described": ("lever", answered),
-            "mean": mean,
-            "mean_stderr": mean_stderr * np.fmax(birge, 1.0),
-            "scatter": scatter,
-            "chi_square": chi_square,
-            "birge_ratio": birge,
-        },
-        "quantity",
-        {"lever": list(fits), "quantity": quantities, "unit": ("quantity", list(units.values()))},
+        {name: (column.dims, column.values) for name, column in columns.items()},
+        coordinates={"lever": list(fits), "quantity": names, "unit": ("quantity", units)},
     )
 
 
-def described(content: Mapping[str, Any]) -> bool | None:
-    """Whether the data of a fit file are described; former versions have a reason if not."""
-    return content.get("describes_data", not content.get("reason"))
-
-
-def _units(fits: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Return the quantities that the levers are compared by, with their units."""
-    name, first = next(iter(fits.items()))
-    try:
-        # dimensions and the like are varied within priors: their scatter is not the levers'
-        names = [key for key in first["parameters"] if key in PARAMETERS or "." in key]
-        has_inversion = first["inversion_temperature_K"] is not None
-    except (KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{name}: not a fit file, {error} is missing") from error
-    units = {key: parameter_named(key).unit for key in names}
-    return {**units, **({INVERSION: "K"} if has_inversion else {})}
-
-
-def _row(
-    name: str, content: Mapping[str, Any], quantities: Sequence[str]
-) -> list[tuple[float | None, float | None]]:
-    """Return value and standard error of each quantity in a fit file."""
-    try:
-        known = {
-            **{key: (one["value"], one["stderr"]) for key, one in content["parameters"].items()},
-            INVERSION: (
-                content["inversion_temperature_K"],
-                content["inversion_temperature_stderr_K"],
-            ),
-        }
-        return [known[quantity] for quantity in quantities]
-    except (KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{name}: not a fit file, {error} is missing") from error
-
-
-def statements(data: xr.Dataset) -> list[str]:
-    """Say in words which levers are left out, whether the others differ, and which stand apart."""
-    found, count = _left_out(data), data.counts.sum("lever").values
-    chi_square = np.where(count > 1, data.chi_square.values, np.nan)
-    limit = chdtri(np.maximum(count - 1, 1), _RARE)
-    for place in np.flatnonzero(chi_square > limit):
-        one = data.isel(quantity=place)
-        found.append(
-            f"the levers differ in {_said(str(one.quantity.item()))}: they scatter by "
-            f"{one.scatter.item() / abs(one['mean'].item()):.1%}, χ² is {chi_square[place]:.3g} "
-            f"for {count[place] - 1} degrees of freedom (Birge ratio "
-            f"{one.birge_ratio.item():.1f})"
-        )
-    alike = data.quantity.values[chi_square <= limit]
-    if alike.size:
-        found.append(
-            f"the scatter of {_listed([_said(name) for name in alike])} between the levers is no "
-            "larger than the standard errors explain"
-        )
-    many = data.isel(quantity=np.isfinite(chi_square) & (count >= _FEWEST))
-    return found + [
-        f"{lever} stands apart from the other levers in {_listed(names)}"
-        for lever, names in _apart(many).items()
-    ]
-
-
-def _left_out(data: xr.Dataset) -> list[str]:
-    """Name the levers that do not count, or not in every mean."""
-    found = [
-        f"{lever} is left out: its data are not described"
-        for lever in data.lever.values[~data.described.values]
-    ]
-    missing = ~data.counts.values & np.isfinite(data.value.values)
-    return found + [
-        f"{lever} is left out of the mean of {_listed([_said(name) for name in names])}, which "
-        "its data do not determine"
-        for lever, row in zip(data.lever.values, missing, strict=True)
-        if (names := data.quantity.values[row].tolist())
-    ]
-
-
-def _apart(data: xr.Dataset) -> dict[str, list[str]]:
-    """Return the levers far from the median of those that count, and in what."""
-    if not data.sizes["quantity"]:
-        return {}
-    value = data.value.where(data.counts).values
-    away = np.abs(value - np.nanmedian(value, axis=0))
-    spread = 1.4826 * np.nanmedian(away, axis=0)
-    far = away > _APART * np.hypot(spread, data.stderr.values)
-    names = data.quantity.values
-    return {
-        str(lever): [_said(name) for name in names[row]]
-        for lever, row in zip(data.lever.values, far, strict=True)
-        if row.any()
+def _quantities(fit: Fit) -> dict[str, tuple[float, float | None]]:
+    """Return what a lever is compared by, with errors: its materials, the inversion temperature."""
+    # dimensions and the like are varied within priors: their scatter is not the levers'
+    quantities = {
+        name: (fitted.value, fitted.stderr)
+        for name, fitted in fit.parameters.items()
+        if name in PARAMETERS or "." in name
     }
+    if np.isfinite(fit.inversion_temperature_K):
+        quantities[INVERSION] = fit.inversion_temperature_K, fit.inversion_temperature_stderr_K
+    return quantities
 
 
-def _said(name: str) -> str:
-    return name.replace("_", " ") if name == INVERSION else str(name)
+def statements(levers: xr.Dataset) -> list[str]:
+    """Say in words which levers are left out, whether the others differ, and which stand apart."""
+    count = levers.counts.sum("lever").values
+    chi_square = np.where(count > 1, levers.chi_square.values, np.nan)
+    limit = chdtri(np.maximum(count - 1, 1), _RARE)
+    texts = [
+        f"{lever} is left out: its data are not described"
+        for lever in levers.lever.values[~levers.described.values]
+    ]
+    texts += [
+        f"{lever} is left out of the mean of {quantities}, which its data do not determine"
+        for lever, quantities in _by_lever(~levers.counts & levers.value.notnull())
+    ]
+    for index in np.flatnonzero(chi_square > limit):
+        quantity = levers.isel(quantity=index)
+        texts.append(
+            f"the levers differ in {_listed([quantity.quantity.item()])}: they scatter by "
+            f"{quantity.scatter.item() / abs(quantity['mean'].item()):.1%}, χ² is "
+            f"{chi_square[index]:.3g} for {count[index] - 1} degrees of freedom (Birge ratio "
+            f"{quantity.birge_ratio.item():.1f})"
+        )
+    alike = levers.quantity.values[chi_square <= limit]
+    if alike.size:
+        texts.append(
+            f"the scatter of {_listed(alike)} between the levers is no larger than the standard "
+            "errors explain"
+        )
+    many = levers.isel(quantity=np.isfinite(chi_square) & (count >= _FEWEST))
+    value = many.value.where(many.counts)
+    away = np.abs(value - value.median("lever"))
+    # the standard deviation of a normal distribution that has this median
+    spread = 1.4826 * away.median("lever")
+    return texts + [
+        f"{lever} stands apart from the other levers in {quantities}"
+        for lever, quantities in _by_lever(away > _APART * np.hypot(spread, many.stderr))
+    ]
 
 
-def _listed(names: Sequence[str]) -> str:
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
+def _by_lever(chosen: xr.DataArray) -> list[tuple[str, str]]:
+    """Return the levers of which some quantities are chosen, with these in words."""
+    return [
+        (str(row.lever.item()), _listed(row.quantity.values[row.values]))
+        for row in chosen
+        if row.any()
+    ]
 
 
-def levers_csv(data: xr.Dataset) -> str:
+def _listed(names: Iterable[str]) -> str:
+    *first, last = ["inversion temperature" if name == INVERSION else name for name in names]
+    return f"{', '.join(first)} and {last}" if first else str(last)
+
+
+def levers_csv(levers: xr.Dataset) -> str:
     """Return a table with one row for each lever: value and standard error of each quantity."""
     columns = {
-        f"{name}{kind}{'_K' if name == INVERSION else ''}": ("lever", of.sel(quantity=name).data)
-        for name in data.quantity.values
-        for kind, of in (("", data.value), ("_stderr", data.stderr))
+        f"{name}{kind}{'_K' if name == INVERSION else ''}": column.sel(quantity=name, drop=True)
+        for name in levers.quantity.values
+        for kind, column in (("", levers.value), ("_stderr", levers.stderr))
     }
-    table = xr.Dataset(columns, {"lever": data.lever.data})
-    return frame_text(table.to_dataframe(), float_format="%.8g")
+    return frame_text(xr.Dataset(columns).to_dataframe(), float_format="%.8g")

@@ -5,50 +5,40 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from pydantic import Field
+from pydantic import Field, JsonValue, PlainSerializer, ValidationInfo, model_validator
 
-from hotlever import __version__
+from hotlever.datasets import labelled
 from hotlever.errors import InputError
-from hotlever.estimation.band import band_dataset, band_names
-from hotlever.estimation.embedded import (
-    EmbeddedMeasurement,
-    Number,
-    Section,
-    Spread,
-    UsedPrior,
-    array,
-    embed,
-    prior_uses,
-    without_spread,
-)
 from hotlever.estimation.options import FitOptions
+from hotlever.estimation.outcome import Outcome
 from hotlever.estimation.residuals import Residuals
+from hotlever.estimation.result_file import (
+    IF_ANY,
+    Matrix,
+    MeasurementSection,
+    ResultFile,
+    Section,
+    Vector,
+    array,
+)
 from hotlever.estimation.scales import errors_of_scales
-from hotlever.estimation.verdict import Outcome, Verdict
-from hotlever.files import without_nan
 from hotlever.lever.lever import Lever
 from hotlever.materials import full_name
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
-from hotlever.probe.parameters import (
-    parameter_of,
-    parameters_of,
-    usual_parameters,
-)
+from hotlever.probe.parameters import parameter_of, parameters_of, usual_parameters
 from hotlever.probe.priors import Prior, PriorUse, priors_of
+from hotlever.records import Number, stored_as
 from hotlever.text import value_with_error
 from hotlever.types import Array
 
-#: What a fit file holds just as a fit does.
-_AS_THEY_ARE = (
-    *("options", "residual_rms", "sum_of_squares"),
-    *("evaluations", "steps", "seconds", "notes"),
-)
+#: Variables of a fit's band at rest.
+_OF_BAND = {"bias_V", "power_mW", "tip_K", "tip_stderr_K"}
 
 
 @dataclass(frozen=True)
@@ -59,7 +49,7 @@ class FittedParameter:
     """
 
     value: float
-    stderr: float | None
+    stderr: Annotated[float, Field(ge=0)] | None
     unit: str
     vary: bool
 
@@ -141,7 +131,6 @@ class Fit(Outcome):
             "covariance": np.full_like(self.covariance, np.nan),
             "common_noise_covariance": np.full_like(self.covariance, np.nan),
             "band": self.band.assign(tip_stderr_K=stderr),
-            "priors": without_spread(self.priors),
         }
 
     def __repr__(self) -> str:
@@ -162,17 +151,17 @@ class Fit(Outcome):
     @cached_property
     def parameters(self) -> dict[str, FittedParameter]:
         """Value and standard error of what is usually varied, and of what else was."""
-        spread = dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-        known = parameters_of(self.probe, in_time=True)
-        names = dict.fromkeys([*usual_parameters(self.probe), *self.names])
+        errors = np.sqrt(np.diag(self.covariance)).tolist()
+        stderr = {
+            name: error
+            for name, error in zip(self.names, errors, strict=True)
+            if np.isfinite(error)
+        }
+        units = parameters_of(self.probe, in_time=True)
+        names = list(dict.fromkeys([*usual_parameters(self.probe), *self.names]))
         return {
-            name: FittedParameter(
-                value=value,
-                stderr=spread[name] if np.isfinite(spread.get(name, np.nan)) else None,
-                unit=known[name].unit,
-                vary=name in self.names,
-            )
-            for name, value in zip(names, self.probe.at(list(names)).tolist(), strict=True)
+            name: FittedParameter(value, stderr.get(name), units[name].unit, name in self.names)
+            for name, value in zip(names, self.probe.at(names).tolist(), strict=True)
         }
 
     @cached_property
@@ -239,67 +228,90 @@ class Fit(Outcome):
             common=common,
         )
 
-    # --- the file -------------------------------------------------------------------------------
-
-    def content(self) -> dict[str, Any]:
-        """Return the content of the fit file."""
-        content = {
-            "parameters": {name: vars(p) for name, p in self.parameters.items()},
-            "correlation": {"names": self.names, "matrix": self.correlation.tolist()},
-            "priors": {name: vars(use) for name, use in self.priors.items()},
-            "observables": list(self.observables),
-            "inversion_temperature_K": self.inversion_temperature_K,
-            "inversion_temperature_stderr_K": self.inversion_temperature_stderr_K,
-            "residual_rms": self.residual_rms,
-            "evaluations": self.evaluations,
-            "steps": self.steps,
-            "seconds": round(self.seconds, 3),
-            "describes_data": self.describes_data,
-            "reason": self.reason,
-            "probe": self.probe.values(),
-            "data": {**embed(self.measurement), "weights": self.data_weights.tolist()},
-            "options": self.options.values(),
-            "common_noise_covariance": self.common_noise_covariance.tolist(),
-            "sum_of_squares": self.sum_of_squares,
-            "band": {name: self.band[name].values.tolist() for name in band_names(self.in_time)},
-            "notes": self.notes,
-            "software": f"hotlever {__version__}",
-        }
-        return dict(without_nan(content))
+    def file(self, request: dict[str, JsonValue] | None = None) -> FitFile:
+        """Return what the fit file holds; `request` is what a batch was asked."""
+        correlation = _Correlation.model_construct(names=self.names, matrix=self.correlation)
+        data = _FittedData.of(self.measurement, weights=self.data_weights)
+        return FitFile.holding(self, correlation=correlation, data=data, request=request)
 
 
-class _Parameter(Section):
-    value: float
-    stderr: Spread = np.nan
+def band_dataset(**columns: Array) -> xr.Dataset:
+    """Return the `band` of a fit: one row per bias or, with ``time_us``, time; rising in it."""
+    along, name = ("time", "time_us") if "time_us" in columns else ("bias", "bias_V")
+    rising, order = np.unique(columns[name], return_index=True)
+    ordered = {name: values[order] for name, values in columns.items()}
+    return labelled(ordered, along, {along: rising})
+
+
+def _read_band(columns: dict[str, Array]) -> xr.Dataset:
+    if not columns.keys() >= _OF_BAND or len({values.size for values in columns.values()}) > 1:
+        raise ValueError(f"expected {', '.join(sorted(_OF_BAND))}, as many of each")
+    return band_dataset(**columns)
+
+
+def _written_band(band: xr.Dataset) -> dict[str, list[float]]:
+    return {str(name): values.values.tolist() for name, values in band.data_vars.items()}
+
+
+_Band = Annotated[xr.Dataset, stored_as(dict[str, Vector], _read_band, _written_band)]
 
 
 class _Correlation(Section):
     names: list[str]
-    matrix: list[list[Number]]
+    matrix: Matrix
 
 
-class _Data(EmbeddedMeasurement):
-    weights: list[list[float]]
+class _FittedData(MeasurementSection):
+    weights: Matrix
 
 
-class _FitFile(Verdict):
-    """What a fit file must hold; see `Fit.content`."""
+class FitFile(ResultFile):
+    """What a fit file holds: the schema that it is written and read by.
 
-    parameters: dict[str, _Parameter]
+    ``request`` is what a batch was asked that the fit is of.
+    """
+
+    parameters: dict[str, FittedParameter]
     correlation: _Correlation
-    observables: list[Literal["current", "reader", "tip"]]
+    observables: tuple[Literal["current", "reader", "tip"], ...]
+    inversion_temperature_K: Number = np.nan
+    inversion_temperature_stderr_K: Number = np.nan
     residual_rms: dict[str, float]
     evaluations: int
     steps: int
-    seconds: float
-    probe: dict[str, dict[str, Any]]
-    data: _Data
-    options: FitOptions
-    common_noise_covariance: list[list[Number]]
+    seconds: Annotated[float, PlainSerializer(lambda seconds: round(seconds, 3))]
+    data: _FittedData
+    options: Annotated[FitOptions, PlainSerializer(FitOptions.values)]
+    common_noise_covariance: Matrix
     sum_of_squares: float
-    band: dict[str, list[Number]]
-    priors: dict[str, UsedPrior] = Field(default_factory=dict)
-    notes: list[str]
+    band: _Band
+    request: dict[str, JsonValue] | None = IF_ANY
+
+    @model_validator(mode="after")
+    def _belongs_together(self, info: ValidationInfo) -> Self:
+        path, names, in_time = info.context, self.correlation.names, self.data.time_us is not None
+        if not self.parameters.keys() >= set(names):
+            raise InputError(f"{path}: parameters and correlation do not belong together")
+        for name in names:
+            parameter_of(self.probe, name, f"{path}: correlation", in_time=in_time)
+        if in_time != ("time_us" in self.band):
+            raise InputError(f"{path}: band: expected time_us in it of data in time, and only then")
+        square, weights = (len(names),) * 2, (len(self.observables), self.data.columns["V_b"].size)
+        array(self.correlation.matrix, square, f"{path}: correlation")
+        array(self.common_noise_covariance, square, f"{path}: common_noise_covariance")
+        array(self.data.weights, weights, f"{path}: data: weights")
+        return self
+
+    def fit(self) -> Fit:
+        """Return the fit, to go on with as if it had just been made."""
+        names = self.correlation.names
+        stderr = np.array([self.parameters[name].stderr for name in names], dtype=float)
+        return Fit(
+            names=names,
+            covariance=self.correlation.matrix * np.outer(stderr, stderr),
+            data_weights=self.data.weights,
+            **self.attributes_of(Fit),
+        )
 
 
 def read_fit(path: str | os.PathLike[str]) -> Fit:
@@ -315,41 +327,14 @@ def read_fit(path: str | os.PathLike[str]) -> Fit:
     >>> read_fit("fit.json").parameters["p"].value  # doctest: +SKIP
     2.65
     """
-    found = _FitFile.read(path, "fit")
-    names, rows = found.correlation.names, len(found.observables)
-    if not found.parameters.keys() >= set(names):
-        raise InputError(f"{path}: parameters and correlation do not belong together")
-    probe = Probe.from_values(found.probe, f"{path}: probe")
-    measurement = found.data.measurement(f"{path}: data", probe.circuit)
-    in_time = measurement.time_us is not None
-    for name in names:
-        parameter_of(probe, name, f"{path}: correlation", in_time=in_time)
-    stderr = [found.parameters[name].stderr for name in names]
-    size = (len(names), len(names))
-    correlation = array(found.correlation.matrix, size, f"{path}: correlation")
-    noise = array(found.common_noise_covariance, size, f"{path}: common_noise_covariance")
-    weights = (rows, measurement.bias_V.size)
-    band = {name: found.band.get(name, []) for name in band_names(in_time)}
-    length = (len(band["bias_V"]),)
-    return Fit(
-        probe=probe,
-        measurement=measurement,
-        names=names,
-        observables=tuple(found.observables),
-        covariance=correlation * np.outer(stderr, stderr),
-        common_noise_covariance=noise,
-        data_weights=array(found.data.weights, weights, f"{path}: data: weights"),
-        band=band_dataset(
-            **{name: array(values, length, f"{path}: band") for name, values in band.items()}
-        ),
-        priors=prior_uses(found.priors),
-        **found.verdict,
-        **{name: getattr(found, name) for name in _AS_THEY_ARE},
-    )
+    return FitFile.read(path, "fit").fit()
 
 
 def _correlation(covariance: Array) -> Array:
     spread = np.sqrt(np.diag(covariance))
     product = np.outer(spread, spread)
     # data that a model made itself leave no errors that could be correlated
-    return np.divide(covariance, product, out=np.eye(spread.size), where=product != 0)
+    correlation = np.divide(covariance, product, out=np.eye(spread.size), where=product != 0)
+    # without what rounding leaves, so that files keep the standard errors as they are
+    np.fill_diagonal(correlation, np.round(np.diag(correlation)))
+    return correlation

@@ -6,7 +6,6 @@ In numbers for the fit file, and in words.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -36,6 +35,18 @@ _DIFFERENT = 0.5
 
 
 @dataclass(frozen=True)
+class Quantity:
+    """What a posterior says of a quantity, as it stands in a fit file."""
+
+    mean: float
+    standard_deviation: float
+    quantiles: dict[str, float]
+    effective_sample_size: float
+    rhat: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Uncertainty:
     """What was sampled and profiled of a fit.
 
@@ -55,34 +66,61 @@ class Uncertainty:
 
     def statements(self) -> list[str]:
         """Say in words what the data leave open, and what that means for the tip temperature."""
-        found = []
+        texts = []
         if self.posterior is not None:
-            found += _unsettled(self.posterior)
+            texts += _unsettled(self.posterior)
             error = self.posterior.attrs["rough_error_K"]
             if error > _ROUGH_ERROR_K:
-                found.append(
+                texts.append(
                     f"the lever that was sampled is off by up to {error:.1f} K at the outermost "
                     "samples of the posterior"
                 )
             for name in self.fit.names:
-                found += _about(self.fit, name, self.posterior[name].values.ravel())
+                texts += _about(self.fit, name, self.posterior[name].values.ravel())
         for profile in self.profiles.values():
-            found += profile.attrs["notes"].splitlines()
+            texts += profile.attrs["notes"].splitlines()
         if self.band is not None:
             low, *_, high = self.band.tip_K.values
             widest = int(np.argmax(high - low))
-            found.append(
+            texts.append(
                 "the predicted tip temperature is uncertain by at most "
                 f"{(high - low)[widest] / 2:.1f} K (half of the 95 % band, at "
                 f"{self.band.bias.values[widest]:.3g} V), the model taken as exact"
             )
-        return found
+        return texts
+
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """What the posterior says of each quantity, by name."""
+        quantities: dict[str, Quantity] = {}
+        if self.posterior is None:
+            return quantities
+        for name in self.posterior.quantity.values.tolist():
+            samples, chains = self.posterior[name], self.posterior.sel(quantity=name)
+            values = np.percentile(samples, BAND_QUANTILES).tolist()
+            quantities[name] = Quantity(
+                mean=samples.mean().item(),
+                standard_deviation=samples.std().item(),
+                quantiles={
+                    f"{q:g}": value for q, value in zip(BAND_QUANTILES, values, strict=True)
+                },
+                effective_sample_size=round(chains.effective_sample_size.item(), 1),
+                rhat=round(chains.rhat.item(), 5),
+                unit=samples.attrs["units"],
+            )
+        return quantities
 
     def to_json(self) -> str:
         """Return the fit file with the keys ``posterior`` and ``profiles`` beside its own."""
         content = self.fit.content()
         if self.posterior is not None:
-            content["posterior"] = _posterior_content(self.posterior)
+            content["posterior"] = {
+                "samples": self.posterior.sizes["chain"] * self.posterior.sizes["draw"],
+                "seed": self.posterior.attrs["seed"],
+                "noise": self.posterior.attrs["noise"],
+                "acceptance_fraction": round(self.posterior.acceptance_fraction.item(), 4),
+                "quantities": {name: vars(said) for name, said in self.quantities.items()},
+            }
         if self.band is not None:
             content["posterior"]["band"] = {
                 name.replace("bias", "bias_V"): self.band[name].values.tolist()
@@ -90,10 +128,18 @@ class Uncertainty:
             }
         if self.profiles:
             content["profiles"] = {
-                name: _profile_content(profile) for name, profile in self.profiles.items()
+                name: {
+                    "value": profile.value.values.tolist(),
+                    "delta_chi_square": profile.delta_chi_square.values.tolist(),
+                    "interval": {
+                        f"{100 * level:.0f}": profile.interval.sel(level=level).values.tolist()
+                        for level in profile.level.values
+                    },
+                    "notes": profile.attrs["notes"].splitlines(),
+                }
+                for name, profile in self.profiles.items()
             }
-        content["uncertainty_notes"] = self.statements()
-        return json_text(content)
+        return json_text({**content, "uncertainty_notes": self.statements()})
 
 
 def examine(
@@ -134,8 +180,8 @@ def examine(
         tasks = [(fit, name) for name in fit.names]
         # some at a time, in processes of their own
         with local_processes(min(processes, len(tasks))) as (run, _):
-            found = run(profile_likelihood, tasks, profiling)
-        curves = dict(zip(fit.names, found, strict=True))
+            results = run(profile_likelihood, tasks, profiling)
+        curves = dict(zip(fit.names, results, strict=True))
     if samples is not None:
         posterior = sample_posterior(fit, samples=samples, processes=processes, progress=sampling)
         band = predictive_band(fit, posterior, progress=banding)
@@ -158,59 +204,25 @@ def _unsettled(posterior: xr.Dataset) -> list[str]:
 
 def _about(fit: Fit, name: str, values: Array) -> list[str]:
     """Say whether a parameter is undetermined, or its interval not that of its standard error."""
-    known, fitted = parameters_of(fit.probe)[name], fit.parameters[name]
-    span, undetermined = known.upper - known.lower, f"{name} is not determined by these data: its"
-    for bound, inwards in ((known.lower, 1.0), (known.upper, -1.0)):
-        if np.mean(inwards * (values - bound) < _NEAR * span) > _AT_BOUND:
-            unit = "" if known.unit == "1" else f" {known.unit}"
-            return [f"{undetermined} posterior reaches its bound {bound:g}{unit}"]
+    parameter, fitted = parameters_of(fit.probe)[name], fit.parameters[name]
+    span = parameter.upper - parameter.lower
+    undetermined = f"{name} is not determined by these data: its posterior"
+    for bound in (parameter.lower, parameter.upper):
+        if np.mean(np.abs(values - bound) < _NEAR * span) > _AT_BOUND:
+            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+            return [f"{undetermined} reaches its bound {bound:g}{unit}"]
     prior = fit.known_before.get(name)
     if prior is not None and np.std([*map(prior.deviation, values)]) > _AS_KNOWN:
         return [f"{name} is as known before: these data do not tell"]
     if values.std() > _AS_WIDE * span / np.sqrt(12.0):
-        return [f"{undetermined} posterior is about as wide as its bounds"]
-    if not fitted.stderr:
-        return []
+        return [f"{undetermined} is about as wide as its bounds"]
     # two standard errors, nearly: the quantile of the normal distribution
-    reach = BAND * fitted.stderr
-    said = np.array([fitted.value - reach, fitted.value + reach])
-    found = np.percentile(values, (2.5, 97.5))
-    if np.abs(found - said).max() <= _DIFFERENT * reach:
+    reach = BAND * (fitted.stderr or 0.0)
+    expected = np.array([fitted.value - reach, fitted.value + reach])
+    sampled = np.percentile(values, (2.5, 97.5))
+    if not reach or np.abs(sampled - expected).max() <= _DIFFERENT * reach:
         return []
     return [
-        f"{name}: 95 % of the posterior lies between {found[0]:.4g} and {found[1]:.4g}, not "
-        f"between {said[0]:.4g} and {said[1]:.4g} as its standard error says"
+        f"{name}: 95 % of the posterior lies between {sampled[0]:.4g} and {sampled[1]:.4g}, not "
+        f"between {expected[0]:.4g} and {expected[1]:.4g} as its standard error says"
     ]
-
-
-def _posterior_content(posterior: xr.Dataset) -> dict[str, Any]:
-    quantities = {}
-    for name in posterior.quantity.values.tolist():
-        one, values = posterior.sel(quantity=name), posterior[name].values
-        quantities[name] = {
-            "mean": float(values.mean()),
-            "standard_deviation": float(values.std()),
-            "quantiles": {f"{q:g}": float(np.percentile(values, q)) for q in BAND_QUANTILES},
-            "effective_sample_size": round(one.effective_sample_size.item(), 1),
-            "rhat": round(one.rhat.item(), 5),
-            "unit": posterior[name].attrs["units"],
-        }
-    return {
-        "samples": posterior.sizes["chain"] * posterior.sizes["draw"],
-        "seed": posterior.attrs["seed"],
-        "noise": posterior.attrs["noise"],
-        "acceptance_fraction": round(posterior.acceptance_fraction.item(), 4),
-        "quantities": quantities,
-    }
-
-
-def _profile_content(profile: xr.Dataset) -> dict[str, Any]:
-    return {
-        "value": profile.value.values.tolist(),
-        "delta_chi_square": profile.delta_chi_square.values.tolist(),
-        "interval": {
-            f"{100 * level:.0f}": profile.interval.sel(level=level).values.tolist()
-            for level in profile.level.values
-        },
-        "notes": profile.attrs["notes"].splitlines(),
-    }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,49 +59,46 @@ def parameter_rows(fit: Fit) -> list[tuple[str, str, str, str]]:
 
 def conclusions(fit: Fit) -> list[str]:
     """Say what follows from the parameters of a fit, and how well it describes the data."""
-    inversion = value_with_error(fit.inversion_temperature_K, fit.inversion_temperature_stderr_K)
-    has_one = np.isfinite(fit.inversion_temperature_K)
-    rms = (
-        f"{name.rsplit('_', 1)[0]} {value:.3g} {name.rsplit('_', 1)[1]}"
-        for name, value in fit.residual_rms.items()
-    )
+    lines = [_tip_in_time(fit.band)] if fit.in_time else []
+    if np.isfinite(fit.inversion_temperature_K):
+        inversion = fit.inversion_temperature_K, fit.inversion_temperature_stderr_K
+        lines.append(f"inversion temperature: {value_with_error(*inversion)} K")
+    rms = []
+    for column, value in fit.residual_rms.items():
+        name, _, unit = column.rpartition("_")
+        rms.append(f"{name} {value:.3g} {unit}")
     return [
-        *_tip_in_time(fit),
-        *([f"inversion temperature: {inversion} K"] if has_one else []),
+        *lines,
         f"rms of data - model: {', '.join(rms)}",
         f"fitted to {', '.join(fit.observables)} in {fit.steps} steps, {fit.seconds:.1f} s",
     ]
 
 
-def _tip_in_time(fit: Fit) -> list[str]:
-    """Say how hot the tip became, if it was followed in time."""
-    if not fit.in_time:
-        return []
-    hottest, last = fit.band.isel(time=fit.band.tip_K.argmax("time")), fit.band.isel(time=-1)
-    said = [
-        f"{value_with_error(one.tip_K.item(), one.tip_stderr_K.item())} K after "
-        f"{one.time_us.item():.4g} µs"
-        for one in (hottest, last)
-    ]
-    if hottest.time_us.item() == last.time_us.item():
-        return [f"tip temperature: {said[0]}, at its hottest and last"]
-    return [f"tip temperature: {said[0]}, at its hottest, {said[1]}, at last"]
+def _tip_in_time(band: xr.Dataset) -> str:
+    """Say how hot the tip became."""
+    hottest, last = (
+        f"{value_with_error(row.tip_K.item(), row.tip_stderr_K.item())} K after "
+        f"{row.time_us.item():.4g} µs"
+        for row in (band.isel(time=band.tip_K.argmax("time")), band.isel(time=-1))
+    )
+    if hottest == last:
+        return f"tip temperature: {last}, at its hottest and last"
+    return f"tip temperature: {hottest}, at its hottest, {last}, at last"
 
 
 def prior_lines(priors: Mapping[str, PriorUse]) -> list[str]:
     """Say which priors an answer leans on, and which the data moved far."""
-    leaned, moved = [], []
-    for name, use in priors.items():
-        if use.left > _LEANED_ON:
-            leaned.append(name)
-        if abs(use.moved) > _MOVED:
-            moved.append(f"{name} by {use.moved:+.1f} σ to {use.posterior_value:.4g}")
-    lines = []
-    if moved:
-        lines.append(f"moved by the data beyond what was known before: {', '.join(moved)}")
-    if leaned:
-        lines.append(f"as known before, since the data do not tell: {', '.join(leaned)}")
-    return lines
+    leaned = [name for name, use in priors.items() if use.left > _LEANED_ON]
+    moved = [
+        f"{name} by {use.moved:+.1f} σ to {use.posterior_value:.4g}"
+        for name, use in priors.items()
+        if abs(use.moved) > _MOVED
+    ]
+    lines = {
+        "moved by the data beyond what was known before": moved,
+        "as known before, since the data do not tell": leaned,
+    }
+    return [f"{text}: {', '.join(names)}" for text, names in lines.items() if names]
 
 
 def fit_text(fit: Fit) -> str:
@@ -113,71 +110,75 @@ def fit_text(fit: Fit) -> str:
 
 def undetermined(fit: Fit) -> list[str]:
     """Say in words what the data do not determine, and what that means for the tip temperature."""
-    found, declared = [], parameters_of(fit.probe, in_time=True)
+    texts, declared = [], parameters_of(fit.probe, in_time=True)
     for name in fit.names:
-        fitted = fit.parameters[name]
+        fitted, bounds = fit.parameters[name], declared[name].bounds
         if fitted.stderr is None:
             if fit.describes_data:
-                found.append(f"{name}: no standard error could be estimated")
+                texts.append(f"{name}: no standard error could be estimated")
         elif fitted.stderr >= abs(fitted.value):
-            said = value_with_error(fitted.value, fitted.stderr, bounds=declared[name].bounds)
+            value = value_with_error(fitted.value, fitted.stderr, bounds=bounds)
             unit = "" if fitted.unit == "1" else f" {fitted.unit}"
-            found.append(
+            texts.append(
                 f"{name} is not determined by these data: its standard error is larger than its "
                 "value"
-                if said == NOT_DETERMINED
-                else f"{name} is only bounded by these data: {said}{unit} (95 %)"
+                if value == NOT_DETERMINED
+                else f"{name} is only bounded by these data: {value}{unit} (95 %)"
             )
         elif (share := fitted.stderr / abs(fitted.value)) > _POOR:
-            found.append(
+            texts.append(
                 f"{name} is poorly determined by these data: its standard error is {share:.0%} of "
                 "its value"
             )
-    for name, known in of_materials(fit.probe, in_time=True).items():
-        if name not in fit.names:
-            continue
-        value = fit.parameters[name].value
-        for bound in (known.lower, known.upper):
-            if abs(value - bound) < _AT_THE_BOUND * abs(bound):
-                found.append(
-                    f"{name} ended at the bound of what it may be, {bound:g} {known.unit}: these "
-                    "data would have it beyond"
-                )
+    of_material = [name for name in of_materials(fit.probe, in_time=True) if name in fit.names]
+    texts += [
+        f"{name} ended at the bound of what it may be, {bound:g} {declared[name].unit}: these "
+        "data would have it beyond"
+        for name in of_material
+        for bound in declared[name].bounds
+        if abs(fit.parameters[name].value - bound) < _AT_THE_BOUND * abs(bound)
+    ]
     correlation = np.tril(fit.correlation, -1)
-    for first, second in np.argwhere(np.abs(correlation) > _ENTANGLED):
-        found.append(
-            f"{fit.names[second]} and {fit.names[first]} are hardly told apart by these "
-            f"data (correlation {correlation[first, second]:+.2f})"
-        )
+    texts += [
+        f"{fit.names[second]} and {fit.names[first]} are hardly told apart by these "
+        f"data (correlation {correlation[first, second]:+.2f})"
+        for first, second in np.argwhere(np.abs(correlation) > _ENTANGLED)
+    ]
     largest = float(fit.band.tip_stderr_K.max())
-    if found and np.isfinite(largest):
-        found.append(
+    if texts and np.isfinite(largest):
+        texts.append(
             "the tip temperature that follows has nevertheless a standard error of at most "
             f"{largest:.1f} K from the fitted parameters"
         )
-    return found
+    return texts
 
 
 def lever_rows(levers: xr.Dataset) -> list[list[str]]:
     """Return the table of `compare_levers`: columns, levers, then the mean and the scatter."""
     names = levers.quantity.values.tolist()
-    scales = np.array([scale_of(name) for name in names])
-    bounds = [parameter_named(name).bounds for name in names]
     rows = [["lever", *map(heading, names)]]
-    means = levers["mean"].values, levers.mean_stderr.values
-    of_levers = zip(levers.value.values, levers.stderr.values, strict=True)
-    labels = [*map(str, levers.lever.values), "weighted mean"]
-    for label, (values, errors) in zip(labels, [*of_levers, means], strict=True):
-        cells = zip(values, errors, scales, bounds, strict=True)
-        rows.append([label, *("" if np.isnan(one[0]) else value_with_error(*one) for one in cells)])
+    labels = [*levers.lever.values.tolist(), "weighted mean"]
+    values = np.vstack([levers.value, levers["mean"]])
+    errors = np.vstack([levers.stderr, levers.mean_stderr])
+    for label, *numbers in zip(labels, values.tolist(), errors.tolist(), strict=True):
+        cells = zip(names, *numbers, strict=True)
+        rows.append([str(label), *(_with_error(*cell) for cell in cells)])
     scatter = levers.scatter.values
     for label, numbers, form in (
-        ("scatter between levers", scatter / scales, ".3g"),
+        ("scatter between levers", scatter / [scale_of(name) for name in names], ".3g"),
         ("scatter, relative", scatter / np.abs(levers["mean"].values), ".1%"),
         ("Birge ratio", levers.birge_ratio.values, ".2g"),
     ):
-        rows.append([label, *("" if np.isnan(one) else f"{one:{form}}" for one in numbers)])
+        rows.append(
+            [label, *("" if np.isnan(number) else f"{number:{form}}" for number in numbers)]
+        )
     return rows
+
+
+def _with_error(name: str, value: float, stderr: float) -> str:
+    if np.isnan(value):
+        return ""
+    return value_with_error(value, stderr, scale_of(name), parameter_named(name).bounds)
 
 
 def levers_text(levers: xr.Dataset) -> str:
@@ -187,36 +188,40 @@ def levers_text(levers: xr.Dataset) -> str:
     return "\n".join(lines + statements(levers))
 
 
-def uncertainty_tables(found: Uncertainty) -> Iterator[Table]:
+def uncertainty_tables(uncertainty: Uncertainty) -> Iterator[Table]:
     """Give the intervals of profiles and the quantiles of a posterior as tables."""
-    if found.profiles:
-        first = next(iter(found.profiles.values()))
+    if uncertainty.profiles:
+        first = next(iter(uncertainty.profiles.values()))
         columns = ["profile likelihood"]
         for level in first.level.values:
             columns += [f"{100 * level:.0f} % from", "to"]
         rows = [
             [heading(name), *_cells(profile.interval.values.ravel(), name, "open")]
-            for name, profile in found.profiles.items()
+            for name, profile in uncertainty.profiles.items()
         ]
         yield "Confidence intervals of the profile likelihoods.", columns, rows
-    if found.posterior is not None and found.band is not None:
-        posterior, quantiles = found.posterior, found.band["quantile"].values
-        columns = ["posterior", *(f"{quantile:g} %" for quantile in quantiles)]
-        columns += ["effective samples", "R̂"]
-        rows = []
-        for name in posterior.quantity.values.tolist():
-            one, cells = posterior.sel(quantity=name), np.percentile(posterior[name], quantiles)
-            settled = f"{one.effective_sample_size.item():.0f}", f"{one.rhat.item():.3f}"
-            rows.append([heading(name), *_cells(cells, name), *settled])
-        count = posterior.sizes["chain"] * posterior.sizes["draw"]
+    if uncertainty.posterior is not None:
+        quantities, sizes = uncertainty.quantities, uncertainty.posterior.sizes
+        levels = next(iter(quantities.values())).quantiles
+        columns = ["posterior", *(f"{level} %" for level in levels), "effective samples", "R̂"]
+        rows = [
+            [
+                heading(name),
+                *_cells(quantity.quantiles.values(), name),
+                f"{quantity.effective_sample_size:.0f}",
+                f"{quantity.rhat:.3f}",
+            ]
+            for name, quantity in quantities.items()
+        ]
+        count = sizes["chain"] * sizes["draw"]
         yield f"Quantiles of {count} posterior samples.", columns, rows
 
 
-def _cells(values: np.ndarray, name: str, unknown: str = "") -> list[str]:
+def _cells(values: Iterable[float], name: str, unknown: str = "") -> list[str]:
     return [unknown if np.isnan(value) else f"{value / scale_of(name):.4g}" for value in values]
 
 
-def uncertainty_text(found: Uncertainty) -> str:
+def uncertainty_text(uncertainty: Uncertainty) -> str:
     """Return the intervals of profiles and the quantiles of a posterior as lines of text."""
-    tables = (aligned([columns, *rows]) for _, columns, rows in uncertainty_tables(found))
+    tables = (aligned([columns, *rows]) for _, columns, rows in uncertainty_tables(uncertainty))
     return "\n".join(line for table in tables for line in table)

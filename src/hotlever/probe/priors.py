@@ -27,6 +27,7 @@ from hotlever.probe.parameters import (
 )
 from hotlever.probe.prior_texts import Written, parsed
 from hotlever.probe.shapes import EDGE_BIAS
+from hotlever.records import Number
 from hotlever.spieser2017 import published
 from hotlever.types import Array
 
@@ -140,7 +141,7 @@ class PriorUse:
     value: float
     spread: float
     posterior_value: float
-    posterior_spread: float
+    posterior_spread: Number
     distribution: Distribution = "normal"
 
     @property

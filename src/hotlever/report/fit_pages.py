@@ -163,7 +163,7 @@ def _add_uncertainty(page: Page, found: Uncertainty) -> None:
 def levers_page(batch: Batch) -> Page:
     """Return the report page of many levers, of which one is fitted or more."""
     levers = compare_levers(batch.fits)
-    observables = {tuple(one["observables"]) for one in batch.fits.values()}
+    observables = {fit.observables for fit in batch.fits.values()}
     page = Page(
         f"Fits of {levers.sizes['lever']} levers",
         "Material parameters of levers from their measured "
@@ -179,7 +179,7 @@ def levers_page(batch: Batch) -> Page:
     columns, *rows = lever_rows(levers)
     page.table(columns, rows, "Standard errors in units of the last digits.")
     noted = [*batch.undescribed.items()]
-    noted += [(name, text) for name, one in batch.fits.items() for text in one["notes"]]
+    noted += [(name, text) for name, fit in batch.fits.items() for text in fit.notes]
     if noted:
         page.heading("What single fits say")
         page.table(("lever", "note"), noted)
