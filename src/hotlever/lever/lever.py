@@ -72,6 +72,7 @@ class Lever:
 
     space: FullSpace
 
+    @one_blas_thread
     def __init__(
         self,
         probe: Probe | str | os.PathLike[str],
@@ -186,6 +187,7 @@ class Lever:
             raise
         return self._branch
 
+    @one_blas_thread
     def branch_to(
         self, bias: float, progress: Progress | None = None, lowest: float | None = None
     ) -> Branch:
