@@ -159,7 +159,8 @@ def labelled(
     Parameters
     ----------
     columns : mapping of str to array_like
-        Of `QUANTITIES`; a tuple gives the dimensions of its own before the values.
+        Of `QUANTITIES`; a tuple gives the dimensions of its own before the values, and unit and
+        meaning of any other after them.
     dimensions : str or sequence of str
         Of the other columns.
     coordinates : mapping, optional
@@ -177,7 +178,7 @@ def labelled(
 
 
 def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> xr.Variable:
-    """Return a variable with its unit and meaning; a tuple gives the dimensions of its own.
+    """Return a variable with its unit and meaning; for tuples see `labelled`.
 
     Of other arrays xarray would ask whether they are Dask's, and import Dask for that where it is
     installed: a third of a second.
@@ -185,11 +186,11 @@ def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> xr.Vari
     import pandas as pd
     import xarray as xr
 
-    own, array = values if isinstance(values, tuple) else (dimensions, values)
-    array = np.asarray(array)
+    own, array, *stated = values if isinstance(values, tuple) else (dimensions, values)
+    array, attributes = np.asarray(array), stated[0] if stated else _meaning(name)
     if own == name and array.dtype.kind in "if":
-        return xr.Variable(own, pd.Index(array), _meaning(name))
-    return xr.Variable(own, array, _meaning(name), fastpath=True)
+        return xr.Variable(own, pd.Index(array), attributes)
+    return xr.Variable(own, array, attributes, fastpath=True)
 
 
 def _meaning(name: str) -> dict[str, str]:
