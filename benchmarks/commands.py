@@ -1,5 +1,9 @@
 """What each command costs: processor seconds of a process of its own, the cache empty at first.
 
+How much of it is start-up says a second table: the import of the lever, and a whole sweep, beside
+the import of what nothing can do without, each several times in turn. Python's compiled modules
+count as there: where PYTHONDONTWRITEBYTECODE is set, hotlever's own are compiled each time.
+
 Run: python benchmarks/commands.py
 """
 
@@ -10,8 +14,10 @@ import shlex
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
+from statistics import median
 
 from hotlever.cache import CACHE_VARIABLE
 from problems import table
@@ -28,6 +34,22 @@ fit {examples}/lever-a.csv -o fit.json --report fit
 calibrate {examples}/lever-a.csv -o calibration.json --plot calibration.png
 raman {examples}/raman/tip --calibrate-from {examples}/raman/hot-plate
 """
+#: What start-up is compared with, and of what, by Python's arguments; and how often each runs.
+LEAST = ("-c", "import numpy, scipy.sparse.linalg")
+STARTING = (
+    ("-c", "import hotlever; hotlever.Lever"),
+    ("-m", "hotlever", "sweep", "--bias", "1:11:25", "-o", "sweep.csv"),
+)
+ROUNDS = 7
+
+
+def seconds(arguments: Sequence[str], folder: str, surroundings: Mapping[str, str]) -> float:
+    """Return the processor seconds that Python takes for some arguments."""
+    before = getrusage(RUSAGE_CHILDREN)
+    command = [sys.executable, *arguments]
+    subprocess.run(command, cwd=folder, env=surroundings, check=True, capture_output=True)
+    after = getrusage(RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def main() -> None:
@@ -36,14 +58,20 @@ def main() -> None:
         surroundings = {**os.environ, CACHE_VARIABLE: str(Path(folder, "cache"))}
         for line in COMMANDS.strip().splitlines():
             words = shlex.split(line.format(examples=EXAMPLES))
-            before = getrusage(RUSAGE_CHILDREN)
-            command = [sys.executable, "-m", "hotlever", *words]
-            subprocess.run(command, cwd=folder, env=surroundings, check=True, capture_output=True)
-            after = getrusage(RUSAGE_CHILDREN)
-            used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            used = seconds(["-m", "hotlever", *words], folder, surroundings)
             rows.append((line.format(examples="examples"), f"{used:.1f}"))
             print(f"{used:6.1f} s  {line}", file=sys.stderr, flush=True)
+        rounds = [
+            [seconds(arguments, folder, surroundings) for arguments in (LEAST, *STARTING)]
+            for _ in range(ROUNDS)
+        ]
     table(("command", "processor seconds"), rows)
+    medians = [median(used) for used in zip(*rounds, strict=True)]
+    starts = [
+        (shlex.join(arguments), f"{used:.2f}", f"{used / medians[0]:.1f}")
+        for arguments, used in zip((LEAST, *STARTING), medians, strict=True)
+    ]
+    table(("python", "processor seconds", "ratio"), starts)
 
 
 if __name__ == "__main__":

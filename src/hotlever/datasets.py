@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hotlever import __version__
 from hotlever.errors import InputError
 from hotlever.files import whole_file, write_text
@@ -157,7 +159,8 @@ def labelled(
     Parameters
     ----------
     columns : mapping of str to array_like
-        Of `QUANTITIES`; a tuple gives the dimensions of its own before the values.
+        Of `QUANTITIES`; a tuple gives the dimensions of its own before the values, and unit and
+        meaning of any other after them.
     dimensions : str or sequence of str
         Of the other columns.
     coordinates : mapping, optional
@@ -167,22 +170,38 @@ def labelled(
     """
     import xarray as xr  # takes half a second, which not every command has to wait for
 
-    data = xr.Dataset(
-        {
-            name: values if isinstance(values, tuple) else (dimensions, values)
-            for name, values in columns.items()
-        },
-        coordinates,
+    return xr.Dataset(
+        {name: quantity(name, dimensions, values) for name, values in columns.items()},
+        {name: quantity(name, name, values) for name, values in (coordinates or {}).items()},
         {**attributes, "software": f"hotlever {__version__}"},
     )
-    for name in data.variables:
-        if name in QUANTITIES:
-            unit, meaning = QUANTITIES[str(name)]
-            data[name].attrs = {"units": unit, "long_name": meaning}
-        elif "." in str(name):  # a parameter of a named material
-            known = parameter_named(str(name))
-            data[name].attrs = {"units": known.unit, "long_name": known.meaning}
-    return data
+
+
+def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> xr.Variable:
+    """Return a variable with its unit and meaning; for tuples see `labelled`.
+
+    Of other arrays xarray would ask whether they are Dask's, and import Dask for that where it is
+    installed: a third of a second.
+    """
+    import pandas as pd
+    import xarray as xr
+
+    own, array, *stated = values if isinstance(values, tuple) else (dimensions, values)
+    array, attributes = np.asarray(array), stated[0] if stated else _meaning(name)
+    if own == name and array.dtype.kind in "if":
+        return xr.Variable(own, pd.Index(array), attributes)
+    return xr.Variable(own, array, attributes, fastpath=True)
+
+
+def _meaning(name: str) -> dict[str, str]:
+    """Return unit and meaning of a quantity, or of a parameter of a named material."""
+    if name in QUANTITIES:
+        unit, meaning = QUANTITIES[name]
+        return {"units": unit, "long_name": meaning}
+    if "." in name:
+        parameter = parameter_named(name)
+        return {"units": parameter.unit, "long_name": parameter.meaning}
+    return {}
 
 
 def csv_text(data: xr.Dataset, columns: Sequence[str]) -> str:

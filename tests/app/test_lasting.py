@@ -17,7 +17,7 @@ from nicegui.testing.user_interaction import UserInteraction
 from test_rooms import drop, shown, until, visit
 from test_rooms_at_work import done
 
-from hotlever.app import showing
+from hotlever.app import live, showing
 from hotlever.app.choices import CHOICES, SCHEMA, read_choices
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.rooms.room import MEDIA
@@ -286,13 +286,16 @@ def test_what_was_chosen_is_there_after_a_restart(tmp_path: Path) -> None:
     assert (again.chosen, again.remark) == (CHOSEN, "")
 
 
-def test_pages_after_a_restart_show_what_was_chosen(tmp_path: Path) -> None:
+def test_pages_after_a_restart_show_what_was_chosen(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # a reduced lever is not what is tested, and takes long
+    monkeypatch.setattr(live, "_can_be_reduced", lambda probe: False)
     (tmp_path / "mine.csv").write_text("a,b\n" + "".join(f"{n / 2},{n / 9}\n" for n in range(20)))
 
     words = "hotlever fit mine.csv --probe own.toml --column 'V_b (V)=a' --column 'I_h (mA)=b'"
 
     async def first(user: User, session: Session) -> None:
-        session.reduced[None, ()] = False  # it is not what is tested, and takes long
         session.project.write("own.toml", Probe.reference().to_toml(), "saved")
         await user.open("/simulate")
         of(user, ui.select, "Probe").set_value("own.toml")
@@ -339,19 +342,29 @@ def test_a_damaged_or_foreign_file_of_choices_is_a_line(
     hidden = tmp_path / ".hotlever"
     hidden.mkdir()
     (hidden / CHOICES).write_text(text)
+    session = Session(Project(tmp_path))
+    assert session.chosen == {}
+    assert session.remark.startswith(f"{hidden / CHOICES}: ")
+    assert said in session.remark
+    assert "\n" not in session.remark
+    assert (hidden / "choices.unread.json").read_text() == text
+
+
+def test_the_line_on_an_unread_file_of_choices_is_shown_once(tmp_path: Path) -> None:
+    hidden = tmp_path / ".hotlever"
+    hidden.mkdir()
+    (hidden / CHOICES).write_text("{")
 
     async def story(user: User, session: Session) -> None:
-        assert session.chosen == {}
         await user.open("/fit")
         line = shown(user, "role=status")
         assert line.startswith(f".hotlever/{CHOICES}: ")
-        assert said in line
+        assert "not valid JSON" in line
         assert "\n" not in line
         await user.open("/raman")
         assert shown(user, "role=status") == ""
 
     visit(tmp_path, story)
-    assert (hidden / "choices.unread.json").read_text() == text
 
 
 def test_what_is_unknown_in_a_file_of_choices_is_left_out(tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hotlever.air.covering import divided
 from hotlever.air.panels import Panels
 from hotlever.errors import InputError
 from hotlever.probe.layout import Layout
@@ -112,6 +111,8 @@ def chip_panels(layout: Layout, refinement: float = 1.0) -> Panels:
     InputError
         If leg ends are not on one line, or the lever is on both sides of it.
     """
+    from hotlever.air.covering import divided  # loads Shapely; see `PanelledAir`
+
     line = BaseLine.of(layout, "the chip")
     seen = line.seen(layout.corners)
     low, high = float(seen[:, 1].min()), float(seen[:, 1].max())

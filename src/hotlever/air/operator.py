@@ -17,10 +17,9 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from hotlever.air.chip import BaseLine, chip_panels
-from hotlever.air.panels import Mirror, Panels, mirror_group
+from hotlever.air.panels import Mirror, PanelOptions, Panels, mirror_group
 from hotlever.air.screened_layer import Numbers, screened_layers
 from hotlever.air.single_layer import layer_potential, single_layer_matrix
-from hotlever.air.surface import PanelOptions, lever_surface
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout
@@ -147,6 +146,9 @@ class PanelledAir:
         options: PanelOptions,
         progress: Progress | None = None,
     ) -> None:
+        # only air that is not in the cache needs panels, and with them Shapely
+        from hotlever.air.surface import lever_surface
+
         self.surface = lever_surface(layout, options, mirrored=surroundings.symmetric)
         chip = [chip_panels(layout, options.refinement)] if surroundings.chip else []
         self.panels = Panels(np.concatenate([one.corners for one in (self.surface.panels, *chip)]))

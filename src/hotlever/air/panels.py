@@ -21,6 +21,25 @@ _RECTANGLE = 1e-6
 
 
 @dataclass(frozen=True)
+class PanelOptions:
+    """Sizes of the panels.
+
+    Attributes
+    ----------
+    refinement : float
+        Divides all sizes and their growth: 2 halves them.
+    edge : float
+        At an edge of the lever, as a share of its thickness.
+    heater : float
+        In the heater, as a share of its narrow side.
+    """
+
+    refinement: float = 1.0
+    edge: float = 0.15
+    heater: float = 0.3
+
+
+@dataclass(frozen=True)
 class Mirror:
     """Reflection of space in planes, with the sign that an image source takes.
 

@@ -14,7 +14,7 @@ import shapely
 from shapely import LineString, MultiLineString, Polygon
 
 from hotlever.air.covering import GRID, cover, divided, parts, rings, turns
-from hotlever.air.panels import Panels
+from hotlever.air.panels import PanelOptions, Panels
 from hotlever.probe.layout import Layout
 from hotlever.types import Array, Index
 
@@ -29,25 +29,6 @@ _SHARP = 0.4
 _ON_LINE = 1e-5
 #: Shorter edges (µm) beside a terminal are left out.
 _SHORTEST = 1e-3
-
-
-@dataclass(frozen=True)
-class PanelOptions:
-    """Sizes of the panels.
-
-    Attributes
-    ----------
-    refinement : float
-        Divides all sizes and their growth: 2 halves them.
-    edge : float
-        At an edge of the lever, as a share of its thickness.
-    heater : float
-        In the heater, as a share of its narrow side.
-    """
-
-    refinement: float = 1.0
-    edge: float = 0.15
-    heater: float = 0.3
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from scipy.sparse import diags
 from scipy.sparse.linalg import eigsh
 
 from hotlever.air.operator import PanelledAir
+from hotlever.air.panels import PanelOptions
 from hotlever.air.stores import AirStores, stores_of
-from hotlever.air.surface import PanelOptions
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.heat_in_air import HeatInAir

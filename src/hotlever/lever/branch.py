@@ -18,19 +18,23 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PPoly
 
 from hotlever.errors import BranchEndError
 from hotlever.lever.by_power import ByPower
+from hotlever.lever.curve import piecewise
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.ramp import Reading, crossing
 from hotlever.lever.sections import UNIT_K, UNIT_V, Across, ByTip, Sections
 from hotlever.lever.solved_states import SolvedStates
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 #: A bias (V) that is none.
 _NO_BIAS = 1e-9
@@ -146,7 +150,7 @@ class Branch:
     def path(self) -> PPoly:
         """Tip and lever voltage by u, in the units of `hotlever.lever.sections.in_plane`."""
         own = self.curve.c[..., [TIP_RISE, 0]] / np.array([UNIT_K, UNIT_V])
-        return PPoly(own, self.curve.x)
+        return piecewise(own, self.curve.x)
 
     @property
     def solved(self) -> slice:
@@ -248,7 +252,7 @@ class Branch:
     @cached_property
     def knee_u(self) -> float | None:
         """Where the knee is."""
-        lever_V = PPoly(self.curve.c[..., 0], self.curve.x)
+        lever_V = piecewise(self.curve.c[..., 0], self.curve.x)
         falling = [u for u in self.states.turns(lever_V).tolist() if lever_V(u, 2) < 0]
         return falling[0] if falling else None
 
@@ -286,7 +290,7 @@ class Branch:
 
     def _ramp(self, circuit: Circuit, bias: Array) -> Reading:
         """Find the states that a slow ramp takes from zero upwards."""
-        curve = PPoly(circuit.bias(self.curve.c[..., 0], self.curve.c[..., 1]), self.curve.x)
+        curve = piecewise(circuit.bias(self.curve.c[..., 0], self.curve.c[..., 1]), self.curve.x)
         u, start = np.full(bias.shape, np.nan), self._without_bias(curve)
         # what is at no bias is found to rounding errors
         reading = Reading(u, [], min(0.0, float(curve(start))), start, float(self.tip_K(start)))

@@ -8,14 +8,17 @@ power belongs to several temperatures.
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PPoly
 
-from hotlever.lever.curve import smooth_curve
+from hotlever.lever.curve import piecewise, smooth_curve
 from hotlever.lever.ramp import crossing
 from hotlever.lever.solved_states import SolvedStates
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 
 class ByPower:
@@ -40,7 +43,7 @@ class ByPower:
         product = np.zeros((len(lever) + len(current) - 1, lever.shape[1]))
         for place, row in enumerate(lever):
             product[place : place + len(current)] += row * current
-        return PPoly(product, self._curve.x)
+        return piecewise(product, self._curve.x)
 
     @cached_property
     def turn_u(self) -> float | None:

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import BSpline, PPoly, make_interp_spline
 
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline, PPoly
+
+
+def piecewise(coefficients: Array, u: Array) -> PPoly:
+    """Return the polynomials between nodes, (degree + 1, k - 1, ...), the highest power first."""
+    # takes as long to import as all of the lever, and is first needed once something is solved
+    from scipy.interpolate import PPoly
+
+    return PPoly(coefficients, u)
 
 
 def smooth_curve(u: Array, values: Array, slopes: Array, steps: Array | tuple = ()) -> PPoly:
@@ -35,7 +46,7 @@ def smooth_curve(u: Array, values: Array, slopes: Array, steps: Array | tuple = 
     pieces = [
         _coefficients(u[a : b + 1], values[a : b + 1], slopes[a : b + 1]) for a, b in pairwise(ends)
     ]
-    return PPoly(np.concatenate(pieces, axis=1), u)
+    return piecewise(np.concatenate(pieces, axis=1), u)
 
 
 def _coefficients(u: Array, values: Array, slopes: Array) -> Array:
@@ -67,6 +78,8 @@ def spline_through(u: Array, values: Array, most: int = 3) -> BSpline:
 
     What is NaN, as the reader voltage of a lever without a reader, stays so.
     """
+    from scipy.interpolate import make_interp_spline  # see `piecewise`
+
     missing = np.isnan(values).any(axis=0)
     spline: BSpline = make_interp_spline(u, np.where(missing, 0.0, values), min(most, u.size - 1))
     spline.c[:, missing] = np.nan

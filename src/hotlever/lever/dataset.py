@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import QUANTITIES, csv_text, labelled, write_dataset
+from hotlever.datasets import QUANTITIES, csv_text, labelled, quantity, write_dataset
 from hotlever.errors import InputError
 from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES, balance_names
@@ -23,6 +22,8 @@ from hotlever.probe.probe import SECTIONS
 from hotlever.types import Array
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from hotlever.lever.lever import Lever
 
 #: Columns of a sweep file.
@@ -94,8 +95,8 @@ def at_bias(data: xr.Dataset, bias: Array) -> xr.Dataset:
     Rounded sums would be other labels: ``sel`` would miss them, and sweeps of two levers
     would have no bias in common.
     """
-    exact = data.assign(bias_V=data.bias_V.copy(data=bias))
-    return exact.assign_coords(bias=data.bias.copy(data=bias))
+    exact = data.assign(bias_V=quantity("bias_V", "bias", bias))
+    return exact.assign_coords(bias=quantity("bias", "bias", bias))
 
 
 def _resistance(heat_mW: Array, current_mA: Array) -> Array:
@@ -163,6 +164,8 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
     InputError
         If the file is not a sweep, or is damaged.
     """
+    import xarray as xr  # see `hotlever.datasets.labelled`
+
     if not Path(path).is_file():
         read_text(path)  # says why
     try:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from skfem import CellBasis, Mesh
-from skfem.element import Element, ElementTriP3
 
 from hotlever.errors import InputError
 from hotlever.types import Array, Index
+
+if TYPE_CHECKING:
+    from skfem import Mesh
+    from skfem.element import Element
 
 
 def sums_by_index(index: Index, values: Array, size: int) -> Array:
@@ -68,6 +70,8 @@ class FiniteElements:
         element: Element | None = None,
         quadrature: int | tuple[Array, Array] = 5,
     ) -> None:
+        from skfem import CellBasis, ElementTriP3  # see `hotlever.probe.mesh`
+
         rule = {"intorder" if isinstance(quadrature, int) else "quadrature": quadrature}
         self.basis = CellBasis(mesh, element or ElementTriP3(), **rule)
         self.size = int(self.basis.N)

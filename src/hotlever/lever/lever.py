@@ -9,11 +9,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from hotlever.air.operator import air_operator, change_with_gap
-from hotlever.air.surface import PanelOptions
+from hotlever.air.panels import PanelOptions
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.around import AroundLever
 from hotlever.lever.balances import balance_columns, balance_slopes
@@ -35,6 +34,8 @@ from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from hotlever.lever.transient.waveform import Waveform
 
 #: Tip temperature (K) up to which branches are followed: where the material laws end.
@@ -71,6 +72,7 @@ class Lever:
 
     space: FullSpace
 
+    @one_blas_thread
     def __init__(
         self,
         probe: Probe | str | os.PathLike[str],
@@ -185,6 +187,7 @@ class Lever:
             raise
         return self._branch
 
+    @one_blas_thread
     def branch_to(
         self, bias: float, progress: Progress | None = None, lowest: float | None = None
     ) -> Branch:

@@ -14,7 +14,6 @@ from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
-from skfem.element import ElementTriP2
 
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
@@ -91,6 +90,8 @@ def energy_between_degrees(space: FullSpace, kinds: Mapping[str, Kind], circuit:
     -------
     ndarray, shape (elements,)
     """
+    from skfem import ElementTriP2  # see `hotlever.probe.mesh`
+
     quadratic = FullSpace(
         space.mesh, FiniteElements(space.mesh.elements, ElementTriP2()), space.wiring
     )

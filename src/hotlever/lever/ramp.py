@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PPoly
 
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 #: Points between two states at which a bias is first looked for, and steps of Newton's method
 #: from there.

@@ -8,13 +8,15 @@ across a curve, which is that of a lever like it.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from scipy.interpolate import PPoly
 
 from hotlever.lever.space import TIP, Pin, Space
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 #: Units in which changes of the tip (K) and of the lever voltage (V) compare.
 UNIT_K, UNIT_V = 60.0, 1.0

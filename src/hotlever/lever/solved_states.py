@@ -10,13 +10,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PPoly
 
 from hotlever.lever.curve import smooth_curve
 from hotlever.lever.equations import LeverEquations, steps_of
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 #: Places along a branch that are looked at together.
 _AT_ONCE = 64

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import erfc
 
 from hotlever.errors import InputError
 from hotlever.materials.laws import Evaluated, law
@@ -47,6 +46,9 @@ def tapered_doping(distances: ArrayLike, n_d: float, delta: float, *, n_hd: floa
     >>> [f"{value:.3g}" for value in n]
     ['5.03e+17', '1.1e+20']
     """
+    # takes longer to import than all laws, which are looked up without being used
+    from scipy.special import erfc
+
     ratio = np.asarray(distances, dtype=float) / delta
     share = 0.5 * erfc(ratio).sum(axis=0)
     full = share >= 1.0

@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from skfem import MeshTet, MeshTri
 
 from hotlever.errors import ComputationError
 from hotlever.probe.circuit import Wiring
 from hotlever.probe.layout import Layout, Point, Region, Terminal
 from hotlever.types import Array, Index
+
+if TYPE_CHECKING:
+    from skfem import MeshTet, MeshTri
 
 #: How far off (µm) a point is still on a line.
 ON_LINE = 1e-6
@@ -89,6 +91,8 @@ class ProbeMesh:
 
         Of their neighbours, some are split too, so that the mesh stays conforming.
         """
+        from skfem import MeshTri  # see `_netgen`
+
         parts = {str(place): self.region == place for place in range(len(self.layout.regions))}
         named = self.elements.with_subdomains(
             {name: np.flatnonzero(inside) for name, inside in parts.items()}
@@ -135,9 +139,10 @@ def _area(corners: Array) -> float:
 def _netgen(
     layout: Layout, heaters: tuple[Region, ...], options: MeshOptions
 ) -> tuple[MeshTri, Index]:
-    # imported here: OpenCASCADE takes a quarter of a second to load, and a saved sweep can be
-    # read and drawn without it
+    # imported here: OpenCASCADE takes a quarter of a second to load, scikit-fem a tenth, and a
+    # probe is written and a saved sweep read and drawn without a mesh
     from netgen.occ import Glue, OCCGeometry, WorkPlane
+    from skfem import MeshTri
 
     narrow = layout.heater.narrow_um / options.refinement
     whole = max(region.sides.max() for region in layout.regions) / options.refinement

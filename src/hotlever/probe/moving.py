@@ -12,8 +12,6 @@ from itertools import chain
 
 import numpy as np
 from scipy.sparse.linalg import splu
-from skfem import CellBasis, ElementTriP1, MeshTri
-from skfem.models.poisson import laplace
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout, Point
@@ -105,6 +103,10 @@ class Movement:
 
 def vertex_velocity(mesh: ProbeMesh, rate: LayoutRate) -> Array:
     """Return the velocity (2, vertices) of a flat mesh's vertices, per unit of a dimension."""
+    # see `hotlever.probe.mesh`
+    from skfem import CellBasis, ElementTriP1
+    from skfem.models.poisson import laplace
+
     points, corners = mesh.elements.p, rate.corners()
     places = np.array(list(corners))
     velocities = np.array(list(corners.values()))
@@ -160,6 +162,8 @@ class MovingMesh:
         ComputationError
             If a triangle would turn over.
         """
+        from skfem import MeshTri  # see `hotlever.probe.mesh`
+
         points = self._mesh.elements.p.copy()
         names = dimensions_of(probe)
         for name, change in zip(names, probe.at(names) - self._probe.at(names), strict=True):

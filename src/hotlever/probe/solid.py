@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from skfem import MeshTet
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.circuit import Wiring
@@ -214,6 +213,8 @@ def material_names(mesh: Any) -> NDArray[np.str_]:
 
 
 def _take_out_silicon(mesh: Any, layout: Layout, centre: tuple[float, float, float]) -> SolidMesh:
+    from skfem import MeshTet  # see `hotlever.probe.mesh`
+
     elements = mesh.Elements3D().NumPy()
     if not len(elements):
         raise ComputationError("Netgen made no tetrahedra for this lever")
