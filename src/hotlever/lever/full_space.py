@@ -341,18 +341,13 @@ class FullSpace(Space):
         return sums_by_index(self._slots, element, self._entries + 1)[: self._entries]
 
     def _lu(self, entries: Array, pin: Pin) -> SuperLU:
-        """Factorise; the unknowns are already ordered for little fill.
-
-        Supernodes are not relaxed: theirs are small here, and a quarter of the time would go into
-        zeros.
-        """
+        """Factorise; the unknowns are already ordered for little fill."""
         entries[self._pin_slots] = np.append(pin.tip * self.tip[1], pin.lever)
         count = self.size + 1
         return splu(
             csc_matrix((entries, self._rows, self._starts), shape=(count, count)),
             permc_spec="NATURAL",
             diag_pivot_thresh=0.01,
-            relax=1,
             options={"SymmetricMode": True},
         )
 

@@ -1,0 +1,71 @@
+"""Files that former versions wrote are read, and go on to be used."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hotlever.calibration import calibrate, read_calibration
+from hotlever.estimation import read_fit
+
+FOLDERS = sorted((Path(__file__).parents[1] / "stored").iterdir())
+
+each_version = pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+
+
+@each_version
+def test_a_fit_says_what_it_said(folder):
+    content = json.loads((folder / "fit.json").read_text(encoding="utf-8"))
+    fit = read_fit(folder / "fit.json")
+    assert fit.describes_data
+    assert set(fit.parameters) == set(content["parameters"])
+    for name, stated in content["parameters"].items():
+        parameter = fit.parameters[name]
+        assert (parameter.value, parameter.vary) == (stated["value"], stated["vary"])
+        assert parameter.stderr == pytest.approx(stated["stderr"], rel=1e-12)
+    assert fit.inversion_temperature_K == pytest.approx(content["inversion_temperature_K"])
+    assert fit.observables == tuple(content["observables"])
+    # it can be solved, and is as near to its data as it was
+    off = fit.model().current_mA.values - fit.measurement.current_mA
+    rms = float(np.sqrt(np.mean(off**2)))
+    assert rms == pytest.approx(content["residual_rms"]["current_mA"], rel=0.02)
+
+
+@each_version
+def test_a_calibration_says_what_it_said(folder):
+    content = json.loads((folder / "calibration.json").read_text(encoding="utf-8"))
+    calibration = read_calibration(folder / "calibration.json")
+    table = content["table"]
+    assert calibration.describes_data
+    for column in ("bias_V", "tip_K", "tip_stderr_K", "tip_low_K", "tip_high_K"):
+        np.testing.assert_array_equal(calibration.table[column], [row[column] for row in table])
+    hottest = table[-1]
+    assert calibration.bias_for(hottest["tip_K"]) == pytest.approx(hottest["bias_V"])
+    assert calibration.knee.power_mW == content["knee"]["power_mW"]
+    heights = content["pulse"]["table"]
+    peak = calibration.pulse.tip_temperature(heights[-1]["height_V"])
+    assert peak == pytest.approx(heights[-1]["peak_K"])
+
+
+@each_version
+def test_what_is_written_again_is_the_same(folder):
+    for name, read in (("fit", read_fit), ("calibration", read_calibration)):
+        before = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+        after = read(folder / f"{name}.json").content()
+        for key in before.keys() - {"software", "tip_temperature_uncertainty_K"}:
+            if key in ("correlation", "priors", "parameters"):
+                continue  # the same to rounding, with more said of each
+            assert after[key] == before[key], key
+
+
+@each_version
+def test_a_lever_that_was_fitted_is_calibrated(folder):
+    fit = read_fit(folder / "fit.json")
+    calibration = calibrate(fit.measurement, fit=fit)
+    assert calibration.describes_data
+    stored = read_calibration(folder / "calibration.json").table
+    away = np.interp(stored.bias_V, calibration.table.bias_V, calibration.table.tip_K)
+    assert np.all(np.abs(away - stored.tip_K) < 3.0 * stored.tip_stderr_K)
