@@ -17,12 +17,16 @@ from hotlever.calibration.calibration import (
 )
 from hotlever.calibration.inference import Estimated, estimated
 from hotlever.calibration.knee import IVCurve
+from hotlever.calibration.knee_scaling import (
+    KneeScaling,
+    curve_of_law,
+    curve_of_model,
+    scaled_by_knee,
+)
 from hotlever.calibration.plausibility import check_plausible, remarks
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.power_law_fit import fit_power_law
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
-from hotlever.calibration.rule import ByRule, by_rule
-from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
@@ -61,7 +65,7 @@ def calibrate(
 
     What is known of the lever beforehand is brought up to date by all that was measured
     (`hotlever.calibration.inference`); with a power law the paper's rule is used instead
-    (`hotlever.calibration.rule`).
+    (`hotlever.calibration.knee_scaling`).
 
     Parameters
     ----------
@@ -244,7 +248,7 @@ def _by_rule(
     of_model = curve_of_model(vacuum)
     curve = IVCurve.of(measured.bias_V, measured.current_mA, circuit)
     reference = of_model if law is None else curve_of_law(law, circuit.base_temperature_K)
-    found = by_rule(curve, vacuum, probe, reference, str(measured.path or "measurement"))
+    found = scaled_by_knee(curve, vacuum, probe, reference, str(measured.path or "measurement"))
     rows, at_knee = circuit.power(found.bias_V, found.current_mA), found.knee.power_mW
     parts = found.parts
     if law is not None:
@@ -275,7 +279,7 @@ def _by_rule(
 
 def _table(
     circuit: Circuit,
-    found: Estimated | ByRule,
+    found: Estimated | KneeScaling,
     parts: dict[str, Array],
     limits: tuple[Array, Array] | None = None,
 ) -> xr.Dataset:
