@@ -68,6 +68,8 @@ def test_a_knee_below_the_range_is_said_to_be_there(reference):
     curve = measured_curve(reference, np.random.default_rng(4), from_V=8.6, points=12)
     with pytest.raises(KneeOutsideError, match="below the measured range"):
         find_knee(curve)
+    with pytest.raises(InputError, match=r"highest at point [12]: .* measure from a lower bias"):
+        scale_to(curve, reference)
 
 
 def test_the_advised_bias_reaches_the_knee(reference, lever_3):

@@ -8,7 +8,7 @@ smoothed against the power, and the knee is where the smooth V_l(P_l) is highest
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +35,15 @@ _SEARCH, _GRID, _SAMPLES = 1.35, 151, 300
 _ROWS, _POWERS = 101, 2000
 #: The knee of another lever is looked for up to this factor of the highest measured power.
 _FARTHEST = 20.0
+
+
+class KneePoint(NamedTuple):
+    """Where an I-V curve has its highest lever voltage."""
+
+    lever_V: float
+    current_mA: float
+    power_mW: float
+    bias_V: float
 
 
 @dataclass(frozen=True)
@@ -94,15 +103,15 @@ class IVCurve:
         return int(np.argmax(lever_V[: fallen[0]] if fallen.size else lever_V))
 
     @property
-    def vertex(self) -> list[float]:
-        """V_l, I_h, P_l and V_b where V_l is highest, on the parabola through three points."""
+    def vertex(self) -> KneePoint:
+        """Where V_l is highest, on the parabola through the three highest points."""
         middle = int(np.clip(self.peak, 1, self.bias_V.size - 2))
         three = self.rows(np.arange(middle - 1, middle + 2))
         parabola = np.polynomial.Polynomial.fit(three.power_mW, three.lever_V, 2)
         power = float(np.clip(parabola.deriv().roots()[0], *three.power_mW[[0, -1]]))
         lever_V = float(parabola(power))
         current = power / lever_V
-        return [lever_V, current, power, self.circuit.bias(lever_V, current)]
+        return KneePoint(lever_V, current, power, self.circuit.bias(lever_V, current))
 
 
 @dataclass(frozen=True)
@@ -186,13 +195,14 @@ def find_knee(curve: IVCurve, like: Branch | None = None) -> Knee:
             "measure more finely there"
         )
     low, high = max(peak_mW / _SEARCH, measured[0]), min(peak_mW * _SEARCH, measured[-1])
-    likeliest, *others = smooth.curves(np.linspace(low, high, _GRID), _SAMPLES)
+    power = np.linspace(low, high, _GRID)
+    likeliest = smooth.likeliest(power)
     if likeliest.peak in (0, _GRID - 1):
         raise KneeOutsideError(
             "the lever voltage is highest at the end of the points near the knee "
-            f"({likeliest.power_mW[likeliest.peak]:.3f} mW): measure beyond it, and more finely"
+            f"({power[likeliest.peak]:.3f} mW): measure beyond it, and more finely"
         )
-    errors = np.std([other.vertex for other in others], axis=0)
+    errors = np.std([sample.vertex for sample in smooth.samples(power)], axis=0)
     values = [*likeliest.vertex, *errors.tolist(), smooth.current_noise, measured.size]
     return Knee(*values)
 
@@ -247,13 +257,18 @@ class _SmoothCurves:
         tip = self._like.tip_temperature(power / self._knee_mW * knee.power_mW)
         return (tip - base) / (knee.tip_K - base)
 
-    def curves(self, power: Array, samples: int = 0) -> list[IVCurve]:
-        """Return the likeliest curve at some powers (mW), and samples of the others."""
-        along = self._along(power)
-        ln_root_R = [self._smooth.value(along), *self._smooth.samples(along, samples)]
-        current = np.sqrt(power) * np.exp(-np.array(ln_root_R))
-        bias = self.points.circuit.bias(power / current, current)
-        return [IVCurve(*rows, self.points.circuit) for rows in zip(bias, current, strict=True)]
+    def likeliest(self, power: Array) -> IVCurve:
+        """Return the likeliest curve at some powers (mW), (n,)."""
+        return self._curve(power, self._smooth.value(self._along(power)))
+
+    def samples(self, power: Array) -> list[IVCurve]:
+        """Return curves that are as likely by the points, at some powers (mW), (n,)."""
+        ln_root_R = self._smooth.samples(self._along(power), _SAMPLES)
+        return [self._curve(power, sample) for sample in ln_root_R]
+
+    def _curve(self, power: Array, ln_root_R: Array) -> IVCurve:
+        circuit, current = self.points.circuit, np.sqrt(power) * np.exp(-ln_root_R)
+        return IVCurve(np.asarray(circuit.bias(power / current, current)), current, circuit)
 
 
 def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> IVCurve:
@@ -264,7 +279,7 @@ def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> I
     smooth = _SmoothCurves(curve, knee_mW, like)
     measured = smooth.points
     power = np.linspace(measured.power_mW[0], measured.power_mW[-1], _POWERS)
-    (fine,) = smooth.curves(power)
+    fine = smooth.likeliest(power)
     bias = np.maximum.accumulate(fine.bias_V)
     low, high = max(measured.bias_V[0], bias[0]), min(measured.bias_V.max(), bias[-1])
     even = np.linspace(low, high, _ROWS)
@@ -307,26 +322,22 @@ def scale_to(curve: IVCurve, like: Branch) -> Scale:
     below = curve.rows(np.arange(curve.peak + 1))
     if curve.peak < _FEWEST_BESIDE:
         raise InputError(
-            f"{curve.peak + 1} points up to the highest lever voltage, which are too few to tell "
-            "how much power the lever needs; measure from a lower bias"
+            f"the lever voltage is highest at point {curve.peak + 1}: too few are below "
+            "the knee to tell how much power the lever needs; measure from a lower bias"
         )
     top = like.knee.power_mW if like.knee is not None else like.highest_power_mW
 
-    def ln_resistance(power: Array, ln_power: float, ln_resistance: float) -> Array:
-        own = power * np.exp(-ln_power)
+    def ln_resistance(power: Array, ln_power_scale: float, ln_resistance_scale: float) -> Array:
+        own = power * np.exp(-ln_power_scale)
         lever_V = like.lever_voltage(like.tip_temperature(np.minimum(own, top)))
-        return np.log(lever_V**2 / own) + ln_resistance
+        return np.log(lever_V**2 / own) + ln_resistance_scale
 
     # from where the last point is at the other lever's knee
     lowest = float(np.log(below.power_mW[-1] / top))
     highest = lowest + np.log(_FARTHEST)
-    values, covariance = curve_fit(
-        ln_resistance,
-        below.power_mW,
-        np.log(below.lever_V / below.current_mA),
-        (lowest + 0.1, 0.0),
-        bounds=((lowest, -np.inf), (highest, np.inf)),
-    )
+    start, bounds = (lowest + 0.1, 0.0), ((lowest, -np.inf), (highest, np.inf))
+    measured = np.log(below.lever_V / below.current_mA)
+    values, covariance = curve_fit(ln_resistance, below.power_mW, measured, start, bounds=bounds)
     if values[0] > highest - 0.01:
         raise InputError(
             "the resistance hardly changes over the measured points: they are too cold to tell "

@@ -182,7 +182,6 @@ def _error_of_meters(reference: TemperatureCurve, knee_mW: float, rows: IVCurve)
 
     The knee moves as the highest lever voltage of the rows does.
     """
-    *_, highest_mW, _ = rows.vertex
     changes = []
     for series, voltage, current in 1.0 + np.diag([RESISTANCE, METERS, METERS]):
         ohm = float(series * rows.circuit.series_resistance_ohm)
@@ -191,8 +190,8 @@ def _error_of_meters(reference: TemperatureCurve, knee_mW: float, rows: IVCurve)
             current * rows.current_mA,
             rows.circuit.with_(series_resistance_ohm=ohm),
         )
-        *_, moved_mW, _ = misread.vertex
-        changes.append(reference.at(misread.power_mW, knee_mW * moved_mW / highest_mW))
+        moved_mW = knee_mW * misread.vertex.power_mW / rows.vertex.power_mW
+        changes.append(reference.at(misread.power_mW, moved_mW))
     return np.linalg.norm(np.array(changes) - reference.at(rows.power_mW, knee_mW), axis=0)
 
 

@@ -171,11 +171,11 @@ def _two_branches(data: _Data, threshold: float | None) -> tuple[PowerLaw, dict[
 
 def _exponent(data: _Data, split: int) -> tuple[float, float]:
     """Return the best exponent with so many rows on the cold branch, and the sum of squares."""
-    optimum = minimize_scalar(
-        lambda m: data.solve(_columns(data.power_mW, split, m))[1],
-        bounds=_EXPONENTS,
-        method="bounded",
-    )
+
+    def cost(m: float) -> float:
+        return data.solve(_columns(data.power_mW, split, m))[1]
+
+    optimum = minimize_scalar(cost, bounds=_EXPONENTS, method="bounded")
     return float(optimum.x), float(optimum.fun)
 
 

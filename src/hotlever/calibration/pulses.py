@@ -116,11 +116,12 @@ class PulseCalibration:
 
     def content(self) -> dict[str, Any]:
         """Return the section of the calibration file."""
-        budget = self.table.budget_K.to_series().groupby("source", sort=False).agg(list)
         return {
             **asdict(self.timing),
             "table": self.table[list(PULSE_COLUMNS)].to_dataframe().to_dict("records"),
-            "budget_K": budget.to_dict(),
+            "budget_K": {
+                error.source.item(): error.values.tolist() for error in self.table.budget_K
+            },
         }
 
     def table_csv(self) -> str:

@@ -35,10 +35,6 @@ class SmoothCurve:
         Standard errors of the values up to a common factor, `noise_factor`, which is found.
     """
 
-    length: float
-    amplitude: float
-    noise_factor: float
-
     @one_blas_thread
     def __init__(self, x: Array, y: Array, noise: Array) -> None:
         self._x, self._mean, self._noise = x, float(np.mean(y)), noise
@@ -56,19 +52,18 @@ class SmoothCurve:
             for start in np.log(_STARTS)
         ]
         best = min(optima, key=lambda optimum: optimum.fun)
-        self.length, self.amplitude, self.noise_factor = np.exp(best.x).tolist()
-        self._factor = self._factorised(self.length, self.amplitude, self.noise_factor)
+        self._length, self._amplitude, self.noise_factor = np.exp(best.x).tolist()
+        self._factor = self._factorised(*np.exp(best.x))
         self._weights = cho_solve(self._factor, values)
 
     def _factorised(self, length: float, amplitude: float, noise_factor: float) -> tuple:
         covariance = _covariance(self._x, self._x, length, amplitude)
-        covariance[np.diag_indices_from(covariance)] += (noise_factor * self._noise) ** 2
-        covariance[np.diag_indices_from(covariance)] += _ROUNDING
-        return cho_factor(covariance, lower=True)
+        variance = (noise_factor * self._noise) ** 2 + _ROUNDING
+        return cho_factor(covariance + np.diag(variance), lower=True)
 
     def value(self, x: Array) -> Array:
         """Return the curve at some places, (m,)."""
-        cross = _covariance(x, self._x, self.length, self.amplitude)
+        cross = _covariance(x, self._x, self._length, self._amplitude)
         return np.asarray(self._mean + cross @ self._weights)
 
     @one_blas_thread
@@ -77,8 +72,8 @@ class SmoothCurve:
 
         They scatter about it by its standard error.
         """
-        cross = _covariance(x, self._x, self.length, self.amplitude)
-        prior = _covariance(x, x, self.length, self.amplitude)
+        cross = _covariance(x, self._x, self._length, self._amplitude)
+        prior = _covariance(x, x, self._length, self._amplitude)
         covariance = prior - cross @ cho_solve(self._factor, cross.T)
         rng = np.random.default_rng(0)
         return rng.multivariate_normal(self.value(x), covariance, count, method="eigh")
