@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hotlever.calibration.knee import IVCurve, find_knee
+from hotlever.calibration.knee_scaling import curve_of_law, curve_of_model, knee_of
 from hotlever.calibration.power_law import EQ12
-from hotlever.calibration.transfer import curve_of_law, curve_of_model, knee_of
 from hotlever.errors import HotleverError
 from hotlever.estimation import Measurement, fit
 from hotlever.lever import Branch, Lever

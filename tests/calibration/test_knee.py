@@ -68,6 +68,8 @@ def test_a_knee_below_the_range_is_said_to_be_there(reference):
     curve = measured_curve(reference, np.random.default_rng(4), from_V=8.6, points=12)
     with pytest.raises(KneeOutsideError, match="below the measured range"):
         find_knee(curve)
+    with pytest.raises(InputError, match=r"highest at point [12]: .* measure from a lower bias"):
+        scale_to(curve, reference)
 
 
 def test_the_advised_bias_reaches_the_knee(reference, lever_3):
@@ -122,15 +124,18 @@ def test_curves_that_cannot_tell_are_refused(reference):
 
 
 def test_a_smooth_curve_covers_the_truth():
+    """Its value, and its slope, which decides where the knee is."""
     rng = np.random.default_rng(7)
-    x = np.linspace(0, 2, 50)
+    x, at, step = np.linspace(0, 2, 50), 1.1, 1e-3
     pulls = []
     for _ in range(25):
         noisy = np.sin(4 * x) + 0.02 * rng.standard_normal(x.size)
         curve = SmoothCurve(x, noisy, np.ones_like(x))
-        pulls += [
-            (float(curve.value(np.array(1.1))) - np.sin(4.4)) / curve.value_stderr(1.1),
-            (float(curve.slope(np.array(1.1))) - 4 * np.cos(4.4)) / curve.slope_stderr(1.1),
-        ]
+        around = np.array([at - step, at, at + step])
+        likeliest, *others = (
+            np.array([values[1], (values[2] - values[0]) / (2 * step)])
+            for values in (curve.value(around), *curve.samples(around, 1000))
+        )
+        pulls.append((likeliest - [np.sin(4.4), 4 * np.cos(4.4)]) / np.std(others, axis=0))
         assert curve.noise_factor == pytest.approx(0.02, rel=0.4)
     assert 0.5 < np.sqrt(np.mean(np.square(pulls))) < 1.4

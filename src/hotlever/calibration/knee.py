@@ -7,11 +7,12 @@ smoothed against the power, and the knee is where the smooth V_l(P_l) is highest
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import curve_fit
 
 from hotlever.calibration.smoothing import SmoothCurve
 from hotlever.errors import InputError
@@ -19,20 +20,30 @@ from hotlever.lever import Branch, OperatingPoint
 from hotlever.probe import Circuit
 from hotlever.types import Array
 
-Function = Callable[[Array], Array]
-
-#: Points whose power is within this factor of the knee's are used.
-_NEARBY = 2.0
+#: Points whose power is within this factor of the highest lever voltage's are used.
+_NEARBY = 1.8
 #: Fewest points near the knee, and fewest on either side of it.
 _FEWEST, _FEWEST_BESIDE = 6, 2
 #: Points below this share of the highest bias may be lost in noise.
 _LOST = 0.01
 #: The knee has been passed once V_l has fallen by this share.
 _FALLEN = 0.05
-#: The knee is sought within this factor of the highest measured lever voltage's power.
-_SEARCH = 1.35
-#: Rows of a smooth table.
-_ROWS = 101
+#: The knee is sought within this factor of the highest measured lever voltage's power, at so many
+#: powers, and as many smooth curves tell its error.
+_SEARCH, _GRID, _SAMPLES = 1.35, 151, 300
+#: Rows of a smooth table, and powers that they are read from.
+_ROWS, _POWERS = 101, 2000
+#: The knee of another lever is looked for up to this factor of the highest measured power.
+_FARTHEST = 20.0
+
+
+class KneePoint(NamedTuple):
+    """Where an I-V curve has its highest lever voltage."""
+
+    lever_V: float
+    current_mA: float
+    power_mW: float
+    bias_V: float
 
 
 @dataclass(frozen=True)
@@ -54,24 +65,21 @@ class IVCurve:
         """
         bias, current = np.asarray(bias_V, dtype=float), np.asarray(current_mA, dtype=float)
         present = np.isfinite(bias) & np.isfinite(current) & (bias > 0)
-        bias, current = bias[present], current[present]
-        lever = circuit.lever_voltage(bias, current)
-        wrong = (current <= 0) | (lever <= 0)
-        lost = wrong & (bias < _LOST * bias.max(initial=0.0))
-        bias, current, lever, wrong = (values[~lost] for values in (bias, current, lever, wrong))
-        if wrong.any():
-            place = int(np.argmax(wrong))
+        curve = cls(bias[present], current[present], circuit)
+        wrong = (curve.current_mA <= 0) | (curve.lever_V <= 0)
+        lost = wrong & (curve.bias_V < _LOST * curve.bias_V.max(initial=0.0))
+        for row in np.flatnonzero(wrong & ~lost):
             raise InputError(
-                f"at a bias of {bias[place]:g} V the current is {current[place]:g} mA and the "
-                f"lever voltage {lever[place]:.4g} V with a series resistance of "
+                f"at a bias of {curve.bias_V[row]:g} V the current is {curve.current_mA[row]:g} mA "
+                f"and the lever voltage {curve.lever_V[row]:.4g} V with a series resistance of "
                 f"{circuit.series_resistance_ohm:g} ohm, expected positive ones"
             )
-        if bias.size < _FEWEST:
+        curve = curve.rows(~lost)
+        if curve.bias_V.size < _FEWEST:
             raise InputError(
-                f"{bias.size} points with bias and current, expected at least {_FEWEST}"
+                f"{curve.bias_V.size} points with bias and current, expected at least {_FEWEST}"
             )
-        order = np.argsort(lever * current, kind="stable")
-        return cls(bias[order], current[order], circuit)
+        return curve.rows(np.argsort(curve.power_mW, kind="stable"))
 
     @property
     def lever_V(self) -> Array:
@@ -83,9 +91,27 @@ class IVCurve:
         """P_l = V_l I_h."""
         return self.lever_V * self.current_mA
 
-    def only(self, here: NDArray[np.bool_]) -> IVCurve:
-        """Return some of the points."""
-        return IVCurve(self.bias_V[here], self.current_mA[here], self.circuit)
+    def rows(self, chosen: NDArray[Any]) -> IVCurve:
+        """Return some of the points, by a mask or their numbers."""
+        return IVCurve(self.bias_V[chosen], self.current_mA[chosen], self.circuit)
+
+    @property
+    def peak(self) -> int:
+        """Row of the first maximum of V_l: hot legs can make it rise again."""
+        lever_V = self.lever_V
+        fallen = np.flatnonzero(lever_V < (1.0 - _FALLEN) * np.maximum.accumulate(lever_V))
+        return int(np.argmax(lever_V[: fallen[0]] if fallen.size else lever_V))
+
+    @property
+    def vertex(self) -> KneePoint:
+        """Where V_l is highest, on the parabola through the three highest points."""
+        middle = int(np.clip(self.peak, 1, self.bias_V.size - 2))
+        three = self.rows(np.arange(middle - 1, middle + 2))
+        parabola = np.polynomial.Polynomial.fit(three.power_mW, three.lever_V, 2)
+        power = float(np.clip(parabola.deriv().roots()[0], *three.power_mW[[0, -1]]))
+        lever_V = float(parabola(power))
+        current = power / lever_V
+        return KneePoint(lever_V, current, power, self.circuit.bias(lever_V, current))
 
 
 @dataclass(frozen=True)
@@ -156,149 +182,108 @@ def find_knee(curve: IVCurve, like: Branch | None = None) -> Knee:
             "without a series resistance the lever jumps at its knee, so a measured curve ends "
             "there and does not show it; measure with one of some kΩ"
         )
-    peak = _highest(curve.lever_V)
-    centre = float(curve.power_mW[peak])
-    _check_sides(curve, peak, like)
-    for _ in range(4):
-        knee = _around(curve, centre, like)
-        if abs(knee.power_mW - centre) < 1e-4 * knee.power_mW:
-            break
-        centre = knee.power_mW
-    return knee
-
-
-def _highest(lever_V: Array) -> int:
-    """Place of the first maximum of V_l: hot legs can make it rise again."""
-    highest = np.maximum.accumulate(lever_V)
-    fallen = np.flatnonzero(lever_V < (1.0 - _FALLEN) * highest)
-    return int(np.argmax(lever_V[: fallen[0]] if fallen.size else lever_V))
-
-
-def _check_sides(curve: IVCurve, peak: int, like: Branch | None) -> None:
-    """Refuse a curve whose highest lever voltage is at one of its ends."""
-    if peak < _FEWEST_BESIDE:
-        raise KneeOutsideError(
-            f"the lever voltage falls from the first points on ({curve.lever_V[0]:.3f} V at a "
-            f"bias of {curve.bias_V[0]:.3f} V): the knee is below the measured range; measure "
-            "from a lower bias"
-        )
-    if peak >= curve.bias_V.size - _FEWEST_BESIDE:
-        raise KneeOutsideError(
-            f"the lever voltage still rises at the end of the measured range "
-            f"({curve.lever_V[-1]:.3f} V at a bias of {curve.bias_V[-1]:.3f} V): the knee is "
-            f"beyond it{_advice(curve, like)}"
-        )
-
-
-def _advice(curve: IVCurve, like: Branch | None) -> str:
-    """Say what bias to go to, by a lever that resembles the measured one."""
-    if like is None or like.knee is None:
-        return "; measure to a higher bias"
-    knee = scale_to(curve, like).applied(like.knee)
-    bias = curve.circuit.bias(knee.lever_V, knee.current_mA)
-    beyond = max(bias, float(curve.bias_V[-1])) * 1.1
-    return (
-        f", at about {bias:.1f} V by comparison with the model; measure to {beyond:.1f} V or more"
-    )
-
-
-def _around(curve: IVCurve, centre: float, like: Branch | None) -> Knee:
-    """Smooth the points whose power is near `centre`, and find the knee."""
-    warp, warp_slope = _warp(centre, like)
-    power = curve.power_mW
-    near = (np.abs(np.log(power / centre)) < np.log(_NEARBY)) & np.isfinite(warp(power))
-    used = curve.only(near)
-    power = used.power_mW
-    if power.size < _FEWEST or min((power < centre).sum(), (power > centre).sum()) < _FEWEST_BESIDE:
+    _check_sides(curve, like)
+    peak_mW = float(curve.power_mW[curve.peak])
+    near = curve.rows(np.abs(np.log(curve.power_mW / peak_mW)) < np.log(_NEARBY))
+    smooth = _SmoothCurves(near, peak_mW, like)
+    measured = smooth.points.power_mW
+    beside = min((measured < peak_mW).sum(), (measured > peak_mW).sum())
+    if measured.size < _FEWEST or beside < _FEWEST_BESIDE:
         raise InputError(
-            f"{power.size} points with {centre / _NEARBY:.2f} to {centre * _NEARBY:.2f} mW, near "
-            f"the knee, expected at least {_FEWEST} with {_FEWEST_BESIDE} on either side; measure "
-            "more finely there"
+            f"{measured.size} points with {peak_mW / _NEARBY:.2f} to {peak_mW * _NEARBY:.2f} mW, "
+            f"near the knee, expected at least {_FEWEST} with {_FEWEST_BESIDE} on either side; "
+            "measure more finely there"
         )
-    smooth = _smoothed(used, warp, warp_slope)
-    low, high = max(centre / _SEARCH, power[0]), min(centre * _SEARCH, power[-1])
-    grid = np.linspace(low, high, 3001)
-    ln_V = 0.5 * np.log(grid) + smooth.value(warp(grid))
-    place = int(np.argmax(ln_V))
-    margin = 30
-    if not margin <= place < grid.size - margin:
+    low, high = max(peak_mW / _SEARCH, measured[0]), min(peak_mW * _SEARCH, measured[-1])
+    power = np.linspace(low, high, _GRID)
+    likeliest = smooth.likeliest(power)
+    if likeliest.peak in (0, _GRID - 1):
         raise KneeOutsideError(
-            f"the lever voltage is highest at the end of the points near the knee "
-            f"({grid[place]:.3f} mW): measure beyond it, and more finely"
+            "the lever voltage is highest at the end of the points near the knee "
+            f"({power[likeliest.peak]:.3f} mW): measure beyond it, and more finely"
         )
-    around = slice(place - margin, place + margin + 1)
-    curvature, tilt, _ = np.polyfit(grid[around] - grid[place], ln_V[around], 2)
-    knee_power = float(grid[place] - tilt / (2.0 * curvature))
-    at = np.array(knee_power)
-    error_P = float(smooth.slope_stderr(float(warp(at))) * warp_slope(at) / (-2.0 * curvature))
-    lever_V = float(np.exp(0.5 * np.log(knee_power) + smooth.value(warp(at))))
-    error_V = lever_V * smooth.value_stderr(float(warp(at)))
-    current = knee_power / lever_V
-    error_I = current * np.hypot(error_P / knee_power, error_V / lever_V)
-    # V_b = V + R_s P / V
-    by_P = used.circuit.bias(0.0, 1.0 / lever_V)
-    by_V = used.circuit.bias(1.0, -current / lever_V)
-    error_b = np.hypot(by_P * error_P, by_V * error_V)
-    return Knee(
-        lever_V,
-        current,
-        knee_power,
-        used.circuit.bias(lever_V, current),
-        error_V,
-        float(error_I),
-        error_P,
-        float(error_b),
-        smooth.noise_factor,
-        power.size,
+    errors = np.std([sample.vertex for sample in smooth.samples(power)], axis=0)
+    values = [*likeliest.vertex, *errors.tolist(), smooth.current_noise, measured.size]
+    return Knee(*values)
+
+
+def _check_sides(curve: IVCurve, like: Branch | None) -> None:
+    """Refuse a curve whose highest lever voltage is at one of its ends."""
+    lever_V, bias_V = curve.lever_V, curve.bias_V
+    if curve.peak < _FEWEST_BESIDE:
+        raise KneeOutsideError(
+            f"the lever voltage falls from the first points on ({lever_V[0]:.3f} V at a bias of "
+            f"{bias_V[0]:.3f} V): the knee is below the measured range; measure from a lower bias"
+        )
+    if curve.peak < bias_V.size - _FEWEST_BESIDE:
+        return
+    advice = "; measure to a higher bias"
+    if like is not None and like.knee is not None:
+        knee = scale_to(curve, like).applied(like.knee)
+        bias = curve.circuit.bias(knee.lever_V, knee.current_mA)
+        beyond = max(bias, float(bias_V[-1])) * 1.1
+        advice = (
+            f", at about {bias:.1f} V by comparison with the model; measure to {beyond:.1f} V or "
+            "more"
+        )
+    raise KneeOutsideError(
+        f"the lever voltage still rises at the end of the measured range ({lever_V[-1]:.3f} V at "
+        f"a bias of {bias_V[-1]:.3f} V): the knee is beyond it{advice}"
     )
 
 
-def _smoothed(curve: IVCurve, warp: Function, warp_slope: Function) -> SmoothCurve:
-    """Smooth the logarithm of the root of the resistance, V_l = sqrt(P_l R_l), along `warp`."""
-    power, lever = curve.power_mW, curve.lever_V
-    along, ln_root_R = warp(power), np.log(lever) - 0.5 * np.log(power)
-    # an error in the current moves a point along power and voltage; what counts is how far it
-    # leaves the curve, whose slope is known better after each turn
-    by_current_V = curve.circuit.lever_voltage(0.0, 1.0)
-    by_current_P = lever + by_current_V * curve.current_mA
-    smooth = SmoothCurve(along, ln_root_R, curve.current_mA / lever)
-    for _ in range(2):
-        slope = 0.5 / power + smooth.slope(along) * warp_slope(power)
-        leaving = np.abs(by_current_V / lever - slope * by_current_P) * curve.current_mA
-        smooth = SmoothCurve(along, ln_root_R, leaving, smooth)
-    return smooth
+class _SmoothCurves:
+    """Smooth I-V curves through measured points.
+
+    The logarithm of the root of the resistance, V_l = sqrt(P_l R_l), is smoothed along the
+    temperature rise of a lever that resembles the measured one, scaled to a knee; without it, along
+    the power.
+    """
+
+    def __init__(self, curve: IVCurve, knee_mW: float, like: Branch | None) -> None:
+        self._knee_mW, self._like = knee_mW, like
+        self.points = curve.rows(np.isfinite(self._along(curve.power_mW)))
+        power, lever_V = self.points.power_mW, self.points.lever_V
+        # at the knee an error of the current changes the lever voltage, at a power, by R_s times it
+        noise = curve.circuit.series_kohm * self.points.current_mA / lever_V
+        self._smooth = SmoothCurve(self._along(power), np.log(lever_V / np.sqrt(power)), noise)
+        self.current_noise = self._smooth.noise_factor
+
+    def _along(self, power: Array) -> Array:
+        """Return the coordinate of some powers: zero without power, and one at the knee."""
+        if self._like is None or self._like.knee is None:
+            return power / self._knee_mW
+        base, knee = self._like.base_temperature_K, self._like.knee
+        tip = self._like.tip_temperature(power / self._knee_mW * knee.power_mW)
+        return (tip - base) / (knee.tip_K - base)
+
+    def likeliest(self, power: Array) -> IVCurve:
+        """Return the likeliest curve at some powers (mW), (n,)."""
+        return self._curve(power, self._smooth.value(self._along(power)))
+
+    def samples(self, power: Array) -> list[IVCurve]:
+        """Return curves that are as likely by the points, at some powers (mW), (n,)."""
+        ln_root_R = self._smooth.samples(self._along(power), _SAMPLES)
+        return [self._curve(power, sample) for sample in ln_root_R]
+
+    def _curve(self, power: Array, ln_root_R: Array) -> IVCurve:
+        circuit, current = self.points.circuit, np.sqrt(power) * np.exp(-ln_root_R)
+        return IVCurve(np.asarray(circuit.bias(power / current, current)), current, circuit)
 
 
-def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> tuple[Array, Array]:
-    """Return current (mA) at evenly spaced biases (V) over the measured range, smoothed.
+def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> IVCurve:
+    """Return points at evenly spaced biases over the measured range, smoothed.
 
     The power of the knee may be measured or estimated; for `like` see `find_knee`.
     """
-    warp, warp_slope = _warp(knee_mW, like)
-    used = curve.only(np.isfinite(warp(curve.power_mW)))
-    smooth = _smoothed(used, warp, warp_slope)
-    power = np.linspace(used.power_mW[0], used.power_mW[-1], 4000)
-    lever = np.sqrt(power) * np.exp(smooth.value(warp(power)))
-    current = power / lever
-    bias = np.maximum.accumulate(used.circuit.bias(lever, current))
-    asked = np.linspace(max(used.bias_V[0], bias[0]), min(used.bias_V.max(), bias[-1]), _ROWS)
-    return asked, np.interp(asked, bias, current)
-
-
-def _warp(centre: float, like: Branch | None) -> tuple[Function, Function]:
-    """Return the coordinate in which the resistance is smooth, and its derivative, by the power.
-
-    The temperature rise of a lever that resembles the measured one; without it, the power. It is
-    zero without power, and one at the knee.
-    """
-    if like is None or like.knee is None:
-        return lambda power: power / centre, lambda power: np.full_like(power, 1.0 / centre)
-    base, knee_mW = like.base_temperature_K, like.knee.power_mW
-    rise, scale = like.knee.tip_K - base, like.knee.power_mW / centre
-    return (
-        lambda power: (like.tip_temperature(power / centre * knee_mW) - base) / rise,
-        lambda power: like.tip_slope(power * scale) * scale / rise,
-    )
+    smooth = _SmoothCurves(curve, knee_mW, like)
+    measured = smooth.points
+    power = np.linspace(measured.power_mW[0], measured.power_mW[-1], _POWERS)
+    fine = smooth.likeliest(power)
+    bias = np.maximum.accumulate(fine.bias_V)
+    low, high = max(measured.bias_V[0], bias[0]), min(measured.bias_V.max(), bias[-1])
+    even = np.linspace(low, high, _ROWS)
+    return IVCurve(even, np.interp(even, bias, fine.current_mA), curve.circuit)
 
 
 # --- the scale between a measured curve and a lever that resembles it -----------------------------
@@ -332,32 +317,31 @@ def scale_to(curve: IVCurve, like: Branch) -> Scale:
     Raises
     ------
     InputError
-        If the points are so cold that the resistance does not tell.
+        If the points are so few, or so cold, that the resistance does not tell.
     """
-    power, resistance = curve.power_mW, curve.lever_V / curve.current_mA
-    below = np.arange(power.size) <= _highest(curve.lever_V)
-    power, resistance = power[below], resistance[below]
+    below = curve.rows(np.arange(curve.peak + 1))
+    if curve.peak < _FEWEST_BESIDE:
+        raise InputError(
+            f"the lever voltage is highest at point {curve.peak + 1}: too few are below "
+            "the knee to tell how much power the lever needs; measure from a lower bias"
+        )
     top = like.knee.power_mW if like.knee is not None else like.highest_power_mW
 
-    def misfit(ln_k: float) -> tuple[Array, float]:
-        tip = like.tip_temperature(np.minimum(power * np.exp(-ln_k), top))
-        expected = np.log(like.lever_voltage(tip) ** 2 / (power * np.exp(-ln_k)))
-        difference = np.log(resistance) - expected
-        return difference - difference.mean(), float(np.exp(difference.mean()))
+    def ln_resistance(power: Array, ln_power_scale: float, ln_resistance_scale: float) -> Array:
+        own = power * np.exp(-ln_power_scale)
+        lever_V = like.lever_voltage(like.tip_temperature(np.minimum(own, top)))
+        return np.log(lever_V**2 / own) + ln_resistance_scale
 
-    lowest = np.log(power[-1] / top)
-    grid = np.linspace(lowest, lowest + np.log(20.0), 400)
-    squares = [float(np.sum(misfit(value)[0] ** 2)) for value in grid]
-    place = int(np.argmin(squares))
-    if place == grid.size - 1:
+    # from where the last point is at the other lever's knee
+    lowest = float(np.log(below.power_mW[-1] / top))
+    highest = lowest + np.log(_FARTHEST)
+    start, bounds = (lowest + 0.1, 0.0), ((lowest, -np.inf), (highest, np.inf))
+    measured = np.log(below.lever_V / below.current_mA)
+    values, covariance = curve_fit(ln_resistance, below.power_mW, measured, start, bounds=bounds)
+    if values[0] > highest - 0.01:
         raise InputError(
             "the resistance hardly changes over the measured points: they are too cold to tell "
             "how much power the lever needs"
         )
-    fine = np.linspace(grid[max(place - 1, 0)], grid[place + 1], 201)
-    ln_k = float(fine[np.argmin([np.sum(misfit(value)[0] ** 2) for value in fine])])
-    left, factor = misfit(ln_k)
-    slope = (misfit(ln_k + 1e-4)[0] - left) / 1e-4
-    variance = np.sum(left**2) / max(power.size - 2, 1)
-    stderr = np.sqrt(variance / np.sum(slope**2))
-    return Scale(float(np.exp(ln_k)), factor, float(np.exp(ln_k) * stderr))
+    power, resistance = np.exp(values).tolist()
+    return Scale(power, resistance, power * float(np.sqrt(covariance[0, 0])))

@@ -90,7 +90,6 @@ class PowerLaw(Record):
             (np.zeros_like(rise), np.full_like(rise, self.threshold_mW)),
             args=(wanted,),
         ).x
-        cold = np.where(wanted == top, self.threshold_mW, cold)
         hot = np.maximum(rise / self.hot_K_per_mW, self.threshold_mW)
         return np.where(rise <= top, cold, hot)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -89,146 +89,132 @@ def fit_power_law(
     >>> round(fit.law.exponent, 3), round(fit.law.hot_K_per_mW, 3)
     (3.1, 213.0)
     """
-    power, rise, weight = _data(power_mW, tip_K, tip_error_K, base_temperature_K)
-    if continuous:
-        law, stderr = _continuous(power, rise, weight)
-    else:
-        law, stderr = _two_branches(power, rise, weight, threshold_mW)
-    return PowerLawFit(law, stderr, power, rise - law.tip_temperature(power, 0.0))
+    data = _Data.of(power_mW, tip_K, tip_error_K, base_temperature_K)
+    law, stderr = _continuous(data) if continuous else _two_branches(data, threshold_mW)
+    residual = data.rise_K - law.tip_temperature(data.power_mW, 0.0)
+    return PowerLawFit(law, stderr, data.power_mW, residual)
 
 
-def _data(
-    power_mW: ArrayLike, tip_K: ArrayLike, tip_error_K: ArrayLike | None, base: float
-) -> tuple[Array, Array, Array]:
-    """Return power, rise and weight, rising in power."""
-    given = power_mW, tip_K, 1.0 if tip_error_K is None else tip_error_K
-    data = np.stack(np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in given)))
-    data = data[:, np.isfinite(data).all(axis=0) & (data[0] > 0) & (data[2] > 0)]
-    power, tip, error = data[:, np.argsort(data[0], kind="stable")]
-    if power.size < _FEWEST_COLD + _FEWEST_HOT:
-        raise InputError(
-            f"{power.size} temperatures with a power above zero, expected at least "
-            f"{_FEWEST_COLD + _FEWEST_HOT} for a power law"
-        )
-    return power, tip - base, 1.0 / error
+@dataclass(frozen=True)
+class _Data:
+    """Rises of the tip by power, rising in power, and the inverse of their standard errors."""
 
+    power_mW: Array
+    rise_K: Array
+    weight: Array
 
-# --- two branches that need not meet --------------------------------------------------------------
-
-
-def _two_branches(
-    power: Array, rise: Array, weight: Array, threshold: float | None
-) -> tuple[PowerLaw, dict[str, float]]:
-    """Fit each branch by itself, for every place at which the data may be divided."""
-    last = power.size - _FEWEST_HOT
-    if threshold is None:
-        splits = list(range(_FEWEST_COLD, last + 1))
-    else:
-        splits = [int(np.searchsorted(power, threshold, side="right"))]
-        if not _FEWEST_COLD <= splits[0] <= last:
+    @classmethod
+    def of(
+        cls, power_mW: ArrayLike, tip_K: ArrayLike, tip_error_K: ArrayLike | None, base_K: float
+    ) -> _Data:
+        """Sort the rows, and leave out those without power or temperature."""
+        given = power_mW, tip_K, 1.0 if tip_error_K is None else tip_error_K
+        columns = [np.asarray(column, dtype=float) for column in given]
+        data = np.stack(np.broadcast_arrays(*columns))
+        data = data[:, np.isfinite(data).all(axis=0) & (data[0] > 0) & (data[2] > 0)]
+        power, tip, error = data[:, np.argsort(data[0], kind="stable")]
+        fewest = _FEWEST_COLD + _FEWEST_HOT
+        if power.size < fewest:
             raise InputError(
-                f"{splits[0]} points up to the threshold of {threshold:g} mW and "
-                f"{power.size - splits[0]} above it, expected at least {_FEWEST_COLD} and "
-                f"{_FEWEST_HOT}"
+                f"{power.size} temperatures with a power above zero, expected at least {fewest} "
+                "for a power law"
             )
-    found = [_divided(power, rise, weight, split) for split in splits]
-    squares = np.array([each for _, each in found])
-    best = int(np.argmin(squares))
-    split, (a, b, m, c) = splits[best], found[best][0]
-    law = PowerLaw(**_named(a, b, m, c, power[split - 1]))
-    variance = squares[best] / max(power.size - 5, 1)
-    spread = 0.0
-    if threshold is None:
-        threshold = _between(law, float(power[split - 1]), float(power[split]))
-        alike = [splits[place] for place in np.flatnonzero(squares <= squares[best] + variance)]
-        spread = (power[max(alike)] - power[min(alike) - 1]) / 2.0
-    cold, hot = power[:split], power[split:, None]
-    slopes = np.stack([cold, cold**m, b * np.log(cold) * cold**m], axis=1)
-    covariance = _covariance(slopes, weight[:split], variance)
-    (hot_variance,) = _covariance(hot, weight[split:], variance).ravel()
-    errors = np.sqrt([*np.diag(covariance), hot_variance])
-    return law.with_(threshold_mW=float(threshold)), _named(*errors, spread)
+        return cls(power, tip - base_K, 1.0 / error)
 
+    def solve(self, columns: Array) -> tuple[Array, float]:
+        """Solve weighted linear least squares; return coefficients and the sum of squares."""
+        weighted, rise = columns * self.weight[:, None], self.rise_K * self.weight
+        coefficients: Array = np.linalg.lstsq(weighted, rise, rcond=None)[0].astype(float)
+        return coefficients, float(np.sum((rise - weighted @ coefficients) ** 2))
 
-def _between(law: PowerLaw, low: float, high: float) -> float:
-    """Place the threshold between two data: where the branches meet, or in the middle."""
-    middle = 0.5 * (low + high)
-    if law.hot_K_per_mW <= law.linear_K_per_mW or law.nonlinear_K <= 0:
-        return middle
-    meeting = law.meeting().threshold_mW
-    return meeting if low <= meeting < high else middle
-
-
-def _divided(
-    power: Array, rise: Array, weight: Array, split: int
-) -> tuple[tuple[float, ...], float]:
-    """Fit each branch by itself; return a, b, m and c, and the sum of squares."""
-    cold, hot = slice(split), slice(split, None)
-
-    def at(exponent: float) -> tuple[Array, float]:
-        columns = np.stack([power[cold], power[cold] ** exponent], axis=1)
-        return _linear(columns, rise[cold], weight[cold])
-
-    m = float(minimize_scalar(lambda m: at(m)[1], bounds=_EXPONENTS, method="bounded").x)
-    (a, b), squares = at(m)
-    (c,), more = _linear(power[hot, None], rise[hot], weight[hot])
-    return (a, b, m, c), squares + more
-
-
-def _linear(columns: Array, rise: Array, weight: Array) -> tuple[Array, float]:
-    """Solve weighted linear least squares; return the coefficients and the sum of squares."""
-    coefficients: Any = np.linalg.lstsq(columns * weight[:, None], rise * weight, rcond=None)[0]
-    return coefficients, float(np.sum((weight * (rise - columns @ coefficients)) ** 2))
-
-
-def _covariance(columns: Array, weight: Array, variance: float) -> Array:
-    """Return the covariance of the coefficients of weighted columns."""
-    weighted = columns * weight[:, None]
-    return np.asarray(np.linalg.pinv(weighted.T @ weighted) * variance)
-
-
-# --- branches that meet -----------------------------------------------------------------------
-
-
-def _continuous(power: Array, rise: Array, weight: Array) -> tuple[PowerLaw, dict[str, float]]:
-    """Fit T = P (a + b min(P, P_th)^(m-1)), which is linear in a and b."""
-
-    def at(shape: Array) -> tuple[Array, float]:
-        return _linear(_meeting_columns(power, *shape), rise, weight)
-
-    low, high = power[_FEWEST_COLD - 1], power[-_FEWEST_HOT]
-    starts = [(m, p) for m in (2.0, 3.0, 5.0) for p in np.linspace(low, high, 8)]
-    start = min(starts, key=lambda shape: at(np.array(shape))[1])
-    found = minimize(
-        lambda shape: at(shape)[1],
-        np.array(start),
-        method="Nelder-Mead",
-        bounds=[_EXPONENTS, (low, high)],
-        options={"xatol": 1e-8, "fatol": 1e-12, "maxiter": 2000, "maxfev": 4000},
-    )
-    m, threshold = map(float, found.x)
-    (a, b), squares = at(found.x)
-    reached = np.minimum(power, threshold)
-    slopes = np.column_stack(
-        [
-            _meeting_columns(power, m, threshold),
-            b * power * np.log(reached) * reached ** (m - 1),
-            np.where(power > threshold, b * (m - 1) * power * threshold ** (m - 2), 0.0),
-        ]
-    )
-    covariance = _covariance(slopes, weight, squares / max(power.size - 4, 1))
-    by_all = threshold ** (m - 1) * np.array(
-        [threshold ** (1 - m), 1.0, b * np.log(threshold), b * (m - 1) / threshold]
-    )
-    errors = np.sqrt(np.diag(covariance))
-    hot_error = np.sqrt(by_all @ covariance @ by_all)
-    law = PowerLaw(**_named(a, b, m, a + b * threshold ** (m - 1), threshold))
-    return law, _named(*errors[:3], hot_error, errors[3])
-
-
-def _meeting_columns(power: Array, m: float, threshold: float) -> Array:
-    return np.stack([power, power * np.minimum(power, threshold) ** (m - 1)], axis=1)
+    def covariance(self, slopes: Array, variance: float) -> Array:
+        """Return the covariance of parameters by the derivatives of the rises."""
+        weighted = slopes * self.weight[:, None]
+        return np.asarray(np.linalg.pinv(weighted.T @ weighted) * variance)
 
 
 def _named(*values: float) -> dict[str, float]:
     return dict(zip(PowerLaw.model_fields, map(float, values), strict=True))
+
+
+def _two_branches(data: _Data, threshold: float | None) -> tuple[PowerLaw, dict[str, float]]:
+    """Fit branches that need not meet, for every row at which the data may be divided."""
+    power, last = data.power_mW, data.power_mW.size - _FEWEST_HOT
+    splits = list(range(_FEWEST_COLD, last + 1))
+    if threshold is not None:
+        split = int(np.searchsorted(power, threshold, side="right"))
+        if split not in splits:
+            raise InputError(
+                f"{split} points up to the threshold of {threshold:g} mW and {power.size - split} "
+                f"above it, expected at least {_FEWEST_COLD} and {_FEWEST_HOT}"
+            )
+        splits = [split]
+    exponents, squares = np.transpose([_exponent(data, split) for split in splits])
+    best = int(np.argmin(squares))
+    split, m = splits[best], float(exponents[best])
+    variance = squares[best] / max(power.size - 5, 1)
+    columns = _columns(power, split, m)
+    (a, b, c), _ = data.solve(columns)
+    slopes = np.column_stack([columns, b * np.log(power) * columns[:, 1]])
+    errors = np.sqrt(np.diag(data.covariance(slopes, variance)))[[0, 1, 3, 2]]
+    if threshold is not None:
+        return PowerLaw(**_named(a, b, m, c, threshold)), _named(*errors, 0.0)
+    alike = np.flatnonzero(squares <= squares[best] + variance)
+    spread = (power[splits[alike[-1]]] - power[splits[alike[0]] - 1]) / 2.0
+    # between two rows the threshold is where the branches meet, or in the middle
+    low, high = power[split - 1], power[split]
+    law = PowerLaw(**_named(a, b, m, c, 0.5 * (low + high)))
+    with suppress(InputError):
+        law = law.meeting() if low <= law.meeting().threshold_mW < high else law
+    return law, _named(*errors, spread)
+
+
+def _exponent(data: _Data, split: int) -> tuple[float, float]:
+    """Return the best exponent with so many rows on the cold branch, and the sum of squares."""
+
+    def cost(m: float) -> float:
+        return data.solve(_columns(data.power_mW, split, m))[1]
+
+    optimum = minimize_scalar(cost, bounds=_EXPONENTS, method="bounded")
+    return float(optimum.x), float(optimum.fun)
+
+
+def _columns(power: Array, split: int, m: float) -> Array:
+    """Return what the coefficients a, b and c of both branches multiply, (n, 3)."""
+    cold = np.arange(power.size) < split
+    return np.stack([cold * power, cold * power**m, ~cold * power], axis=1)
+
+
+def _continuous(data: _Data) -> tuple[PowerLaw, dict[str, float]]:
+    """Fit branches that meet, T = P (a + b min(P, P_th)^(m-1)), which is linear in a and b."""
+    power = data.power_mW
+
+    def columns(m: float, threshold: float) -> Array:
+        return np.stack([power, power * np.minimum(power, threshold) ** (m - 1)], axis=1)
+
+    def cost(shape: ArrayLike) -> float:
+        return data.solve(columns(*np.asarray(shape)))[1]
+
+    low, high = power[_FEWEST_COLD - 1], power[-_FEWEST_HOT]
+    starts = [(m, p) for m in (2.0, 3.0, 5.0) for p in np.linspace(low, high, 8)]
+    optimum = minimize(
+        cost,
+        np.array(min(starts, key=cost)),
+        method="Nelder-Mead",
+        bounds=[_EXPONENTS, (low, high)],
+        options={"xatol": 1e-8, "fatol": 1e-12, "maxiter": 2000, "maxfev": 4000},
+    )
+    m, threshold = optimum.x.tolist()
+    (a, b), squares = data.solve(columns(m, threshold))
+    by_b, hot = columns(m, threshold)[:, 1], power > threshold
+    by_m = b * np.log(np.minimum(power, threshold)) * by_b
+    by_threshold = hot * b * (m - 1) * by_b / threshold
+    slopes = np.stack([power, by_b, by_m, by_threshold], axis=1)
+    covariance = data.covariance(slopes, squares / max(power.size - 4, 1))
+    # the hot slope is the rise at the threshold over the power there
+    chord = threshold ** (m - 1)
+    by_all = np.array([1.0, chord, b * np.log(threshold) * chord, b * (m - 1) * chord / threshold])
+    *errors, threshold_error = np.sqrt(np.diag(covariance))
+    hot_error = np.sqrt(by_all @ covariance @ by_all)
+    law = PowerLaw(**_named(a, b, m, a + b * chord, threshold))
+    return law, _named(*errors, hot_error, threshold_error)

@@ -25,12 +25,16 @@ from hotlever.calibration.inference import (
 )
 from hotlever.calibration.jumps import not_of_a_ramp
 from hotlever.calibration.knee import IVCurve
+from hotlever.calibration.knee_scaling import (
+    KneeScaling,
+    curve_of_law,
+    curve_of_model,
+    scaled_by_knee,
+)
 from hotlever.calibration.plausibility import check_plausible, misfit, what_data_lack
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.power_law_fit import fit_power_law
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
-from hotlever.calibration.rule import ByRule, by_rule
-from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
@@ -74,7 +78,7 @@ def calibrate(
 
     What is known of the lever beforehand is brought up to date by all that was measured
     (`hotlever.calibration.inference`); with a power law the paper's rule is used instead
-    (`hotlever.calibration.rule`).
+    (`hotlever.calibration.knee_scaling`).
 
     Parameters
     ----------
@@ -299,7 +303,7 @@ def _by_rule(
     of_model = curve_of_model(vacuum)
     curve = IVCurve.of(measured.bias_V, measured.current_mA, circuit)
     reference = of_model if law is None else curve_of_law(law, circuit.base_temperature_K)
-    found = by_rule(curve, vacuum, probe, reference, str(measured.path or "measurement"))
+    found = scaled_by_knee(curve, vacuum, probe, reference, str(measured.path or "measurement"))
     rows, at_knee = circuit.power(found.bias_V, found.current_mA), found.knee.power_mW
     parts = found.parts
     if law is not None:
@@ -349,7 +353,7 @@ def _statements(k: float, tip: Array) -> list[str]:
 
 def _table(
     circuit: Circuit,
-    tip: TipByBias | ByRule,
+    tip: TipByBias | KneeScaling,
     parts: dict[str, Array],
     limits: tuple[Array, Array] | None = None,
     held_mW: Array | None = None,

@@ -9,7 +9,7 @@ is that of a shorter one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -74,11 +74,6 @@ class PulseTiming:
         each = "" if self.period_us is None else f" each {self.period_us:g} µs"
         return f"a pulse of {self.length_us:g} µs{each}"
 
-    def scaled(self, factor: float) -> PulseTiming:
-        """Return the timing stretched by a factor."""
-        period = None if self.period_us is None else factor * self.period_us
-        return PulseTiming(factor * self.length_us, period)
-
 
 @dataclass(frozen=True)
 class PulseCalibration:
@@ -122,14 +117,12 @@ class PulseCalibration:
 
     def content(self) -> dict[str, Any]:
         """Return the section of the calibration file."""
-        budget = self.table.budget_K
         return {
-            "length_us": self.timing.length_us,
-            "period_us": self.timing.period_us,
+            **asdict(self.timing),
             "table": self.table[list(PULSE_COLUMNS)].to_dataframe().to_dict("records"),
-            "budget_K": dict(
-                zip(budget.source.values.tolist(), budget.values.tolist(), strict=True)
-            ),
+            "budget_K": {
+                error.source.item(): error.values.tolist() for error in self.table.budget_K
+            },
         }
 
     def table_csv(self) -> str:
@@ -188,106 +181,98 @@ def pulse_calibration(
     ComputationError
         If the lever cannot be followed in time.
     """
-    levers = _Pulsed(estimate, timing, progress)
-    rise = [levers.rise(place) for place in range(_HEIGHTS)]
-    directions = estimate.posterior.principal_steps(_LEAST_VARIANCE)
-    corrections, changes = [], []
-    kept: Index = np.arange(len(directions))
-    for place in _SOME:
-        corrections.append(levers.corrected(place))
-        rows = np.zeros((len(directions) + 1, len(MOMENTS)))
-        rows[-1] = levers.slower(place)
-        for one in kept:
-            rows[one] = levers.along(place, directions[one])
-        changes.append(rows)
-        if place == _SOME[0]:
-            kept = _main(rows[:-1])
-    some = levers.heights[list(_SOME)]
     bias = measured_range(estimate)
-    tip = _interpolated(levers.heights, np.array(rise), bias)
-    tip *= 1.0 + _through(some, np.array(corrections), bias)
-    slopes = tip[:, None] * _through(some, np.array(changes), bias)
+    pulses = _Pulses(estimate, bias, timing, progress)
+    directions = estimate.posterior.principal_steps(_LEAST_VARIANCE)
+    kept: Index = np.arange(len(directions))
+    corrections, changes = [], []
+    for row in _SOME:
+        change = np.zeros((len(directions) + 1, len(MOMENTS)))
+        for axis in kept:
+            change[axis] = pulses.along(row, directions[axis])
+        change[-1] = pulses.change(row, pulses.coarse, slower=1.0 + HEAT_CAPACITY_SPREAD)
+        corrections.append(pulses.change(row, pulses.fine))
+        changes.append(change)
+        if row == _SOME[0]:
+            kept = _main(change[:-1])
+    heights = pulses.heights
+    # over V² they hardly change when cold
+    by_square = CubicSpline(heights, np.log(pulses.rises / heights[:, None] ** 2))
+    rise = bias[:, None] ** 2 * np.exp(by_square(bias))
+    rise *= 1.0 + _through(heights[list(_SOME)], corrections, bias)
+    slopes = rise[:, None] * _through(heights[list(_SOME)], changes, bias)
     # with the base the whole lever gets warmer
-    slopes[:, :-1] += np.array([[one.get(BASE, 0.0)] for one in directions])
-    return _put_together(estimate, bias, timing, tip, slopes, directions)
+    slopes[:, :-1] += np.array([[direction.get(BASE, 0.0)] for direction in directions])
+    return _with_errors(estimate, bias, timing, rise, slopes, directions)
 
 
-class _Pulsed:
+class _Pulses:
     """Rises of the tip (K) in pulses of an estimated lever, and of others like it.
 
     Rises are those of `MOMENTS`, shape (3,); those of other levers are relative to it.
     """
 
-    def __init__(self, estimate: Estimate, timing: PulseTiming, progress: Progress | None) -> None:
+    def __init__(
+        self, estimate: Estimate, bias: Array, timing: PulseTiming, progress: Progress | None
+    ) -> None:
         self._probe, self._timing, self._progress = estimate.probe, timing, progress
-        lowest, *_, highest = measured_range(estimate).tolist()
-        self.heights = np.linspace(lowest, highest, _HEIGHTS)
-        self._coarse = Lever(estimate.probe, COARSE)
-        self._similar = SimilarLevers(self._coarse)
-        self._fine: Lever | None = None
-        self._known: dict[int, tuple[Array, State | None]] = {}
         self._done, self._all = 0, 2 * (_HEIGHTS + len(estimate.options.varied))
+        self.heights = np.linspace(float(bias[0]), float(bias[-1]), _HEIGHTS)
+        self.coarse, self.fine = Lever(estimate.probe, COARSE), Lever(estimate.probe)
+        self._similar = SimilarLevers(self.coarse)
+        # a train settles sooner from where one that is a little lower has
+        states: list[State | None] = [None]
+        rises = []
+        for height in self.heights:
+            rise, state = self._follow(self.coarse, height, states[-1])
+            rises.append(rise)
+            states.append(state)
+        self.rises, self._states = np.array(rises), states[1:]
 
-    def rise(self, place: int) -> Array:
-        """Return the rises of the coarse lever at one of the heights."""
-        if place not in self._known:
-            # a train settles sooner from where one that is a little lower has
-            near = self._known.get(place - 1, (None, None))[1]
-            self._known[place] = self._follow(self._coarse, self._timing, place, near)
-        return self._known[place][0]
+    def change(self, row: int, lever: Lever, slower: float = 1.0) -> Array:
+        """Return how the rises of a lever differ that holds `slower` times the heat."""
+        near = None if lever is self.fine else self._states[row]
+        return self._follow(lever, self.heights[row], near, slower)[0] / self.rises[row] - 1.0
 
-    def corrected(self, place: int) -> Array:
-        """Return how those of the fine lever differ."""
-        self._fine = self._fine or Lever(self._probe)
-        return self._follow(self._fine, self._timing, place, None)[0] / self.rise(place) - 1.0
+    def along(self, row: int, direction: dict[str, float]) -> Array:
+        """Return how those of a lever differ one standard error along a direction, linearised.
 
-    def slower(self, place: int) -> Array:
-        """Return how those of a lever differ whose heat capacity is larger by its error."""
-        faster = self._timing.scaled(1.0 / (1.0 + HEAT_CAPACITY_SPREAD))
-        return self._near(self._coarse, faster, place) / self.rise(place) - 1.0
+        The other way if it melts this way, or its mesh turns over.
+        """
+        try:
+            return self._aside(row, direction, -_ASIDE)
+        except ComputationError:
+            return self._aside(row, direction, _ASIDE)
 
-    def along(self, place: int, direction: dict[str, float]) -> Array:
-        """Return how those of a lever differ one standard error along a direction, linearised."""
-        names = list(direction)
-        step = np.array(list(direction.values()))
-        failure: ComputationError | None = None
-        for way in (-_ASIDE, _ASIDE):
-            values = self._probe.at(names) + way * step
-            try:
-                probe = self._probe.moved(dict(zip(names, values.tolist(), strict=True)))
-                rise = self._near(self._similar.lever(probe), self._timing, place)
-            except ComputationError as error:
-                failure = error  # it melts, or its mesh turns over
-                continue
-            return (rise / self.rise(place) - 1.0) / way
-        raise failure or ComputationError("no lever")
-
-    def _near(self, lever: Lever, timing: PulseTiming, place: int) -> Array:
-        """Return the rises of a lever that is nearly the coarse one."""
-        return self._follow(lever, timing, place, self._known[place][1])[0]
+    def _aside(self, row: int, direction: dict[str, float], way: float) -> Array:
+        values = self._probe.at(list(direction)) + way * np.array(list(direction.values()))
+        probe = self._probe.moved(dict(zip(direction, values.tolist(), strict=True)))
+        return self.change(row, self._similar.lever(probe)) / way
 
     def _follow(
-        self, lever: Lever, timing: PulseTiming, place: int, near: State | None
+        self, lever: Lever, height: float, near: State | None, slower: float = 1.0
     ) -> tuple[Array, State | None]:
-        """Return the rises, and the state in which a settled period begins."""
-        length, period = timing.length_us, timing.period_us
-        wave = pulse(float(self.heights[place]), length)
-        begin = None
+        """Return the rises, and the state in which a settled period begins.
+
+        A lever that holds more heat does the same more slowly: its pulse is that of a shorter one.
+        """
+        length, period = self._timing.length_us / slower, self._timing.period_us
+        wave, state = pulse(float(height), length), None
         if period is None:
             for longer in range(1, _LONGER + 1):
                 history = lever.pulse(wave, length * 2.0**longer, per_step=_PER_STEP)
                 if int(history.tip_K.values.argmax()) < history.sizes["time"] - 1:
                     break
         else:
-            history, begin = settled(lever, wave, period, start=near, per_step=_PER_STEP)
+            history, state = settled(lever, wave, period / slower, start=near, per_step=_PER_STEP)
         self._done += 1
         if self._progress is not None:
             self._progress(self._done, max(self._all, self._done + 1))
         time, tip = history.time.values, history.tip_K.values
         during = time <= length
         mean = simpson(tip[during], x=time[during]) / np.ptp(time[during])
-        found = np.array([tip.max(), tip[during][-1], mean])
-        return found - lever.circuit.base_temperature_K, begin
+        moments = np.array([tip.max(), tip[during][-1], mean])
+        return moments - lever.circuit.base_temperature_K, state
 
 
 def _main(changes: Array) -> Index:
@@ -297,19 +282,13 @@ def _main(changes: Array) -> Index:
     return np.sort(order[np.cumsum(shares[order]) > _LEFT_OUT])
 
 
-def _interpolated(heights: Array, rise: Array, at: Array) -> Array:
-    """Return rises (n, k) at some heights at others: over V² they hardly change when cold."""
-    curve = CubicSpline(heights, np.log(rise / heights[:, None] ** 2))
-    return np.asarray(at[:, None] ** 2 * np.exp(curve(at)))
-
-
-def _through(heights: Array, values: Array, at: Array) -> Array:
-    """Return values (n, ...) at falling heights at others; below the lowest they stay."""
+def _through(heights: Array, values: list[Array], at: Array) -> Array:
+    """Return values at falling heights at others; below the lowest they stay."""
     curve = PchipInterpolator(heights[::-1], values[::-1])
     return np.asarray(curve(np.maximum(at, heights.min())))
 
 
-def _put_together(
+def _with_errors(
     estimate: Estimate,
     bias: Array,
     timing: PulseTiming,
@@ -317,10 +296,10 @@ def _put_together(
     slopes: Array,
     directions: list[dict[str, float]],
 ) -> PulseCalibration:
-    """Make the table, of rises (n, moments) and their changes (n, directions + 1, moments)."""
+    """Return rises (n, moments) with errors, by their changes (n, directions + 1, moments)."""
     probe, varied = estimate.probe, estimate.options.varied
     # changes by directions to changes by parameters, of which units differ by many orders
-    steps = np.array([[one[name] for name in varied] for one in directions])
+    steps = np.array([[direction[name] for name in varied] for direction in directions])
     scale = np.abs(steps).max(axis=0)
     inverse = np.linalg.pinv(steps / scale) / scale[:, None]
     by_parameter = np.einsum("pd,ndm->nmp", inverse, slopes[:, :-1])
@@ -328,22 +307,20 @@ def _put_together(
         source: np.sqrt(np.einsum("nmp,pq,nmq->nm", by_parameter, share, by_parameter))
         for source, share in shares_by_source(estimate.posterior).items()
     }
-    slow = np.abs(slopes[:, -1])
-    parts["heat capacity"] = slow
-    around, base = probe.surroundings, probe.circuit.base_temperature_K
+    parts["heat capacity"] = np.abs(slopes[:, -1])
+    around = probe.surroundings
     if around.medium == "air":
-        share = _share_of_air(probe, timing.length_us)
-        parts["heat in air"] = slow * _HEAT_IN_AIR_SPREAD * share / HEAT_CAPACITY_SPREAD
+        share = _share_of_air(probe, timing.length_us) / HEAT_CAPACITY_SPREAD
+        parts["heat in air"] = parts["heat capacity"] * _HEAT_IN_AIR_SPREAD * share
     of_model = [error_of_model(around, varied, bias, column) for column in rise.T]
     parts["model"] = np.stack(of_model, axis=1)
-    total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
-    columns: dict[str, Array] = {"height_V": bias}
-    for place, moment in enumerate(MOMENTS):
-        tip, stderr = base + rise[:, place], total[:, place]
-        values = tip, stderr, tip - BAND * stderr, tip + BAND * stderr
-        columns |= {f"{moment}{kind}": one for kind, one in zip(_KINDS, values, strict=True)}
-    budget = {source: part[:, MOMENTS.index("peak")] for source, part in parts.items()}
-    return PulseCalibration(timing, _table(columns, budget))
+    tip = probe.circuit.base_temperature_K + rise
+    stderr = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
+    kinds = np.stack([tip, stderr, tip - BAND * stderr, tip + BAND * stderr], axis=2)
+    rows = np.column_stack([bias, kinds.reshape(len(kinds), -1)])
+    columns = dict(zip(PULSE_COLUMNS, rows.T, strict=True))
+    peak = MOMENTS.index("peak")
+    return PulseCalibration(timing, _table(columns, {name: parts[name][:, peak] for name in parts}))
 
 
 def _share_of_air(probe: Probe, time_us: float) -> float:
@@ -361,11 +338,8 @@ def _share_of_air(probe: Probe, time_us: float) -> float:
 
 def _table(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:
     errors = (("source", "height"), np.array(list(budget.values())))
-    return labelled(
-        {**columns, "budget_K": errors},
-        "height",
-        {"height": columns["height_V"], "source": list(budget)},
-    )
+    coordinates = {"height": columns["height_V"], "source": list(budget)}
+    return labelled({**columns, "budget_K": errors}, "height", coordinates)
 
 
 def _column(moment: str) -> str:

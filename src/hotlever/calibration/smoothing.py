@@ -7,8 +7,6 @@ round off a sharp bend as smoother covariances do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
@@ -22,6 +20,8 @@ _BOUNDS = ((0.03, 5.0), (1e-3, 20.0), (1e-6, 0.3))
 _STARTS = ((0.25, 0.5, 2e-3), (0.5, 0.5, 2e-2))
 #: Prior variance of the mean.
 _MEAN_VARIANCE = 1.0
+#: Added to the variances of the points, so that rounding leaves their covariance positive.
+_ROUNDING = 1e-11
 
 
 class SmoothCurve:
@@ -33,18 +33,12 @@ class SmoothCurve:
         Points and values, both of the order of one.
     noise : ndarray, shape (n,)
         Standard errors of the values up to a common factor, `noise_factor`, which is found.
-    start : SmoothCurve, optional
-        A curve through similar values, to begin the search at.
     """
 
-    length: float
-    amplitude: float
-    noise_factor: float
-
     @one_blas_thread
-    def __init__(self, x: Array, y: Array, noise: Array, start: SmoothCurve | None = None) -> None:
-        self._x, self._offset, self._noise = x, float(np.mean(y)), noise
-        values = y - self._offset
+    def __init__(self, x: Array, y: Array, noise: Array) -> None:
+        self._x, self._mean, self._noise = x, float(np.mean(y)), noise
+        values = y - self._mean
 
         def cost(logarithms: Array) -> float:
             """Minus the logarithm of the marginal likelihood, less a constant."""
@@ -53,49 +47,40 @@ class SmoothCurve:
                 0.5 * values @ cho_solve(factor, values) + np.log(np.diag(factor[0])).sum()
             )
 
-        starts: Sequence[tuple[float, float, float]] = _STARTS
-        if start is not None:
-            starts = [(start.length, start.amplitude, start.noise_factor)]
-        bounds = [tuple(np.log(ends)) for ends in _BOUNDS]
-        optima = [minimize(cost, np.log(one), method="L-BFGS-B", bounds=bounds) for one in starts]
+        optima = [
+            minimize(cost, start, method="L-BFGS-B", bounds=np.log(_BOUNDS))
+            for start in np.log(_STARTS)
+        ]
         best = min(optima, key=lambda optimum: optimum.fun)
-        self.length, self.amplitude, self.noise_factor = np.exp(best.x).tolist()
-        self._factor = self._factorised(self.length, self.amplitude, self.noise_factor)
+        self._length, self._amplitude, self.noise_factor = np.exp(best.x).tolist()
+        self._factor = self._factorised(*np.exp(best.x))
         self._weights = cho_solve(self._factor, values)
 
     def _factorised(self, length: float, amplitude: float, noise_factor: float) -> tuple:
-        scaled = np.abs(self._x[:, None] - self._x) * np.sqrt(5.0) / length
-        covariance = amplitude**2 * _matern(scaled) + _MEAN_VARIANCE
-        covariance[np.diag_indices_from(covariance)] += (noise_factor * self._noise) ** 2 + 1e-11
-        return cho_factor(covariance, lower=True)
-
-    def _covariances(self, x: Array) -> tuple[Array, Array]:
-        """Return the covariances of value and slope at some places with the values."""
-        scaled = (np.asarray(x)[..., None] - self._x) * np.sqrt(5.0) / self.length
-        bell = (1.0 + np.abs(scaled)) * np.exp(-np.abs(scaled))
-        tilt = -(self.amplitude**2) * np.sqrt(5.0) / (3.0 * self.length) * scaled * bell
-        return self.amplitude**2 * _matern(np.abs(scaled)) + _MEAN_VARIANCE, tilt
+        covariance = _covariance(self._x, self._x, length, amplitude)
+        variance = (noise_factor * self._noise) ** 2 + _ROUNDING
+        return cho_factor(covariance + np.diag(variance), lower=True)
 
     def value(self, x: Array) -> Array:
-        """Return the curve."""
-        return np.asarray(self._offset + self._covariances(x)[0] @ self._weights)
+        """Return the curve at some places, (m,)."""
+        cross = _covariance(x, self._x, self._length, self._amplitude)
+        return np.asarray(self._mean + cross @ self._weights)
 
-    def slope(self, x: Array) -> Array:
-        """Return the derivative of the curve."""
-        return np.asarray(self._covariances(x)[1] @ self._weights)
+    @one_blas_thread
+    def samples(self, x: Array, count: int) -> Array:
+        """Return curves that are as likely as this one by the points, (count, m); always the same.
 
-    def value_stderr(self, x: float) -> float:
-        """Return the standard error of the curve at a point."""
-        return self._stderr(self._covariances(np.array(x))[0], self.amplitude**2 + _MEAN_VARIANCE)
-
-    def slope_stderr(self, x: float) -> float:
-        """Return the standard error of the derivative at a point."""
-        prior = 5.0 / 3.0 * (self.amplitude / self.length) ** 2
-        return self._stderr(self._covariances(np.array(x))[1], prior)
-
-    def _stderr(self, k: Array, prior: float) -> float:
-        return float(np.sqrt(max(prior - k @ cho_solve(self._factor, k), 0.0)))
+        They scatter about it by its standard error.
+        """
+        cross = _covariance(x, self._x, self._length, self._amplitude)
+        prior = _covariance(x, x, self._length, self._amplitude)
+        covariance = prior - cross @ cho_solve(self._factor, cross.T)
+        rng = np.random.default_rng(0)
+        return rng.multivariate_normal(self.value(x), covariance, count, method="eigh")
 
 
-def _matern(scaled: Array) -> Array:
-    return (1.0 + scaled + scaled**2 / 3.0) * np.exp(-scaled)
+def _covariance(x: Array, y: Array, length: float, amplitude: float) -> Array:
+    """Return the covariance of the curve at some places, (n,), with that at others, (m,)."""
+    distance = np.abs(x[:, None] - y) * np.sqrt(5.0) / length
+    matern = (1.0 + distance + distance**2 / 3.0) * np.exp(-distance)
+    return np.asarray(amplitude**2 * matern + _MEAN_VARIANCE)

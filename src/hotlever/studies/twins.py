@@ -17,9 +17,9 @@ import numpy as np
 import xarray as xr
 
 from hotlever.calibration.knee import IVCurve, find_knee
+from hotlever.calibration.knee_scaling import curve_of_law, curve_of_model
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.procedure import calibrate
-from hotlever.calibration.transfer import curve_of_law, curve_of_model
 from hotlever.datasets import labelled
 from hotlever.errors import BranchEndError, HotleverError
 from hotlever.estimation import Measurement

@@ -1,0 +1,223 @@
+"""Knee scaling: one factor k from the knee of a measured I-V curve (the paper's Section V).
+
+In another medium, or on another lever of the same kind, the tip temperature is the same function
+of the power but for one factor, T(P) = T_ref(P / k), and the knee of the I-V curve tells the
+factor. What T_ref is decides how good that is: a power law, the model of a probe, or a model fitted
+to the lever itself. The error comes from the knee, from the meters, and from how much levers of
+other dimensions and materials differ from the one whose temperatures are taken over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hotlever.calibration.knee import (
+    IVCurve,
+    Knee,
+    KneeOutsideError,
+    find_knee,
+    scale_to,
+    smooth_rows,
+)
+from hotlever.calibration.power_law import PowerLaw
+from hotlever.errors import ComputationError, InputError
+from hotlever.estimation.scales import METERS
+from hotlever.lever import Branch, OperatingPoint
+from hotlever.lever.branch import Reach, shifted
+from hotlever.lever.curve import spline_through
+from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.similar import SimilarLevers
+from hotlever.probe import Probe
+from hotlever.probe.priors import RESISTANCE, default_priors
+from hotlever.text import value_with_error
+from hotlever.types import Array
+
+#: Largest relative error of a knee estimated from the points below it, to go on with.
+_WORST_ESTIMATE = 0.3
+#: How far (standard deviations) a parameter is moved for a derivative.
+_ASIDE = 0.1
+#: Highest bias (V) to which a lever is followed.
+_HIGHEST_V = 1e3
+
+
+@dataclass(frozen=True)
+class TemperatureCurve:
+    """Tip temperature against power of a reference, and the power of its knee.
+
+    Attributes
+    ----------
+    tip : callable
+        Temperature (K) of powers (mW); NaN where nothing is known.
+    knee_mW : float
+    """
+
+    tip: Callable[[Array], Array]
+    knee_mW: float
+
+    def at(self, power_mW: Array, knee_mW: float) -> Array:
+        """Return the temperature (K) of a lever whose knee is at `knee_mW`."""
+        return self.tip(np.asarray(power_mW, dtype=float) * (self.knee_mW / knee_mW))
+
+
+def curve_of_law(law: PowerLaw, base_temperature_K: float) -> TemperatureCurve:
+    """Return a power law as a reference; its threshold stands for the knee, as in the paper."""
+    return TemperatureCurve(
+        lambda power: law.tip_temperature(power, base_temperature_K), law.threshold_mW
+    )
+
+
+def curve_of_model(model: Branch, knee_mW: float | None = None) -> TemperatureCurve:
+    """Return the model of a lever, in the medium it is to be calibrated in, as reference.
+
+    A knee that was measured (its power) on the lever which the model was fitted to takes the place
+    of the model's, since models are less sure of the knee than of the temperature at a power.
+    """
+    return TemperatureCurve(model.tip_temperature, knee_mW or knee_of(model).power_mW)
+
+
+def knee_of(model: Branch) -> OperatingPoint:
+    """Return the knee of a model.
+
+    Raises
+    ------
+    ComputationError
+        If it has none.
+    """
+    if model.knee is None:
+        raise ComputationError(
+            f"the model has no knee below {model.hottest_K:.0f} K; calibrate a lever whose model "
+            "has one"
+        )
+    return model.knee
+
+
+@dataclass(frozen=True)
+class KneeScaling:
+    """A measured I-V curve with the temperatures of a reference at k times the power.
+
+    Attributes
+    ----------
+    knee : Knee
+        As measured, or with its power estimated.
+    bias_V, current_mA, tip_K : ndarray, shape (n,)
+        Even rows over the measured range.
+    parts : dict of str to ndarray
+        Standard error (K) at the rows, by source.
+    notes : list of str
+    """
+
+    knee: Knee
+    bias_V: Array
+    current_mA: Array
+    tip_K: Array
+    parts: dict[str, Array]
+    notes: list[str]
+
+
+def scaled_by_knee(
+    curve: IVCurve, like: Branch, probe: Probe, reference: TemperatureCurve, where: str
+) -> KneeScaling:
+    """Calibrate a measured curve by its knee.
+
+    Parameters
+    ----------
+    curve : IVCurve
+    like : Branch
+        Of `probe`, which resembles the lever, in the medium it is in.
+    reference : TemperatureCurve
+        Whose temperatures are taken over.
+    where : str
+        Names the measurement in errors.
+
+    Raises
+    ------
+    InputError
+        If the points neither show the knee nor tell its power to 30 %.
+    """
+    similar, notes = _similar_branches(probe, like), []
+    try:
+        knee = find_knee(curve, like)
+    except KneeOutsideError as outside:
+        knee = _estimated_knee(curve, like, reference, similar, f"{where}: {outside}")
+        notes.append(
+            f"{outside}; until then the power of the knee is estimated from the points below it, "
+            f"as {value_with_error(knee.power_mW, knee.power_mW_stderr)} mW"
+        )
+    rows, knee_mW = smooth_rows(curve, knee.power_mW, like), knee.power_mW
+    tip = reference.at(rows.power_mW, knee_mW)
+    parts = {
+        "k": np.abs(reference.at(rows.power_mW, knee_mW + knee.power_mW_stderr) - tip),
+        "electronics": _error_of_meters(reference, knee_mW, rows),
+        "other levers": _error_of_other_levers(similar, rows.power_mW / knee_mW),
+    }
+    return KneeScaling(knee, rows.bias_V, rows.current_mA, tip, parts, notes)
+
+
+def _estimated_knee(
+    curve: IVCurve, like: Branch, reference: TemperatureCurve, similar: list[Branch], text: str
+) -> Knee:
+    """Estimate the knee from how the resistance rises below it, with its error.
+
+    Levers of other materials have other knees for the same rise.
+    """
+    scale = scale_to(curve, like)
+    model, *others = (knee_of(branch).power_mW for branch in similar)
+    spread = np.linalg.norm(np.array(others) / model - 1.0) / _ASIDE
+    error = float(np.hypot(scale.power_stderr, spread))
+    if error > _WORST_ESTIMATE:
+        raise InputError(
+            f"{text}. The points below it give its power to ± {error:.0%} only, which is too "
+            "little to calibrate with"
+        )
+    # the knee of a fitted measurement stands above or below the model's
+    power = scale.power * reference.knee_mW
+    return Knee(power_mW=power, power_mW_stderr=error * power)
+
+
+def _error_of_meters(reference: TemperatureCurve, knee_mW: float, rows: IVCurve) -> Array:
+    """Return the standard error (K) at smooth rows by R_s and the scales of both meters.
+
+    The knee moves as the highest lever voltage of the rows does.
+    """
+    changes = []
+    for series, voltage, current in 1.0 + np.diag([RESISTANCE, METERS, METERS]):
+        ohm = float(series * rows.circuit.series_resistance_ohm)
+        misread = IVCurve(
+            voltage * rows.bias_V,
+            current * rows.current_mA,
+            rows.circuit.with_(series_resistance_ohm=ohm),
+        )
+        moved_mW = knee_mW * misread.vertex.power_mW / rows.vertex.power_mW
+        changes.append(reference.at(misread.power_mW, moved_mW))
+    return np.linalg.norm(np.array(changes) - reference.at(rows.power_mW, knee_mW), axis=0)
+
+
+# --- levers of other dimensions and materials ---------------------------------------------------
+
+
+def _similar_branches(probe: Probe, like: Branch) -> list[Branch]:
+    """Return a coarse model of a probe, and the same with each parameter moved within its prior."""
+    priors = default_priors(probe)
+    # the circuit is the measured one, whatever the lever
+    names = tuple(name for name in priors if name != "series_resistance_ohm")
+    past = float(like.bias(like.hottest_K, probe.circuit))
+    reach = Reach(probe.circuit, min(past, _HIGHEST_V))
+    solved = SimilarLevers(Lever(probe, COARSE)).linearised(probe, reach, None, names)
+    model = solved.branch
+    changes = solved.shown * np.array([_ASIDE * priors[name].absolute for name in names])
+    slopes = spline_through(model.u, changes)(model.u, 1)
+    moved = zip(np.moveaxis(changes, 2, 0), np.moveaxis(slopes, 2, 0), strict=True)
+    return [model, *(shifted(model, *change) for change in moved)]
+
+
+def _error_of_other_levers(similar: list[Branch], ratio: Array) -> Array:
+    """Return the standard deviation (K) of the tip at powers over that of the knee, (n,)."""
+    knees = [knee_of(branch).power_mW for branch in similar]
+    ends = [branch.highest_power_mW for branch in similar]
+    # where one of them has melted they differ as they do before
+    power = np.outer(knees, np.minimum(ratio, np.min(np.divide(ends, knees))))
+    tip, *moved = (branch.tip_temperature(row) for branch, row in zip(similar, power, strict=True))
+    return np.linalg.norm(np.array(moved) - tip, axis=0) / _ASIDE
