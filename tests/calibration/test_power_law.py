@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hotlever.calibration.power_law import EQ12, read_power_law
-from hotlever.calibration.power_law_fit import fit_power_law
-from hotlever.calibration.procedure import _law_of
+from hotlever.calibration.power_law_fit import fit_power_law, law_of_model
 from hotlever.errors import InputError
 
 POWER = np.linspace(0.1, 4.0, 80)
@@ -160,6 +159,6 @@ def test_a_lever_that_melts_right_above_its_knee_has_a_law(reference):
             power <= 1.006 * knee, reference.tip_temperature(power), np.nan
         ),
     )
-    law, residual = _law_of(melting, knee)
+    law, residual = law_of_model(melting, knee)
     assert law.threshold_mW == pytest.approx(knee)
     assert residual < 10.0

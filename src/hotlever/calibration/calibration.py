@@ -29,7 +29,7 @@ from hotlever.measurement import Measurement
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import PriorUse
 from hotlever.records import Number, stored_as
-from hotlever.text import value_with_error
+from hotlever.text import BAND, value_with_error
 from hotlever.types import Array
 
 #: Columns of a calibration's table; the last say how sure it is.
@@ -222,6 +222,29 @@ def table_of(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:
         {**columns, "budget_K": errors},
         coordinates={"bias": columns["bias_V"], "source": list(budget)},
     )
+
+
+def table_by_bias(
+    circuit: Circuit,
+    bias: Array,
+    current: Array,
+    tip: Array,
+    parts: dict[str, Array],
+    limits: tuple[Array, Array] | None = None,
+    held_mW: Array | None = None,
+) -> xr.Dataset:
+    """Return the table of bias (V), current (mA) and tip temperature (K), with its errors.
+
+    95 % lie between the limits, or as far away as the errors say. Held supplies have a power too.
+    """
+    stderr = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
+    low, high = limits or (tip - BAND * stderr, tip + BAND * stderr)
+    lever = circuit.lever_voltage(bias, current)
+    values = (bias, lever, current, lever * current, tip, stderr, low, high)
+    columns = dict(zip(TABLE_COLUMNS, values, strict=True))
+    if held_mW is not None:
+        columns[TOTAL_POWER] = lever * current + held_mW
+    return table_of(columns, parts)
 
 
 def _law(values: dict[str, float], info: ValidationInfo) -> PowerLaw:

@@ -11,6 +11,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.errors import InputError
+from hotlever.lever import Branch
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.types import Array
 
@@ -18,6 +19,9 @@ from hotlever.types import Array
 _EXPONENTS = (1.2, 12.0)
 #: Fewest points that determine a branch, one more than its coefficients.
 _FEWEST_COLD, _FEWEST_HOT = 4, 2
+#: Powers (over the knee's) at which the law is fitted to a model: even, up to here; at least so
+#: many of them above the knee.
+_TO, _POINTS, _LEAST_HOT = 1.4, 160, 8
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,36 @@ def fit_power_law(
     law, stderr = _continuous(data) if continuous else _two_branches(data, threshold_mW)
     residual = data.rise_K - law.tip_temperature(data.power_mW, 0.0)
     return PowerLawFit(law, stderr, data.power_mW, residual)
+
+
+def law_of_model(vacuum: Branch, threshold_mW: float | None) -> tuple[PowerLaw, float]:
+    """Fit Eq. 12 to the model in vacuum, with its threshold at the knee; return what it misses."""
+    highest = vacuum.highest_power_mW
+    if threshold_mW is not None:
+        highest = min(highest, _TO * threshold_mW)
+    power = np.linspace(0.0, highest, _POINTS + 1)[1:]
+    if threshold_mW is not None and np.sum(power > threshold_mW) < _LEAST_HOT:
+        # the lever melts right above its knee
+        power = np.append(power, np.linspace(threshold_mW, highest, _LEAST_HOT + 1)[1:])
+        power = np.unique(power)
+    law_fit = fit_power_law(
+        power,
+        vacuum.tip_temperature(power),
+        base_temperature_K=vacuum.base_temperature_K,
+        threshold_mW=threshold_mW,
+    )
+    return law_fit.law, law_fit.largest_residual_K()
+
+
+def power_turns(branch: Branch, medium: str) -> str:
+    """Say where the power of a lever turns in a medium; empty if it does not."""
+    turn = branch.power_turns_K
+    if turn is None:
+        return ""
+    return (
+        f"in {medium} the power of the lever falls from a tip of {turn:.0f} K on, so that the tip "
+        "temperature is no function of it"
+    )
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-import xarray as xr
 
-from hotlever.calibration.calibration import (
-    TABLE_COLUMNS,
-    TOTAL_POWER,
-    Calibration,
-    table_of,
-)
+from hotlever.calibration.calibration import Calibration, table_by_bias, table_of
 from hotlever.calibration.inference import (
-    TipByBias,
     estimate_lever,
     held_power,
     highest_bias,
@@ -26,14 +19,13 @@ from hotlever.calibration.inference import (
 from hotlever.calibration.jumps import not_of_a_ramp
 from hotlever.calibration.knee import IVCurve
 from hotlever.calibration.knee_scaling import (
-    KneeScaling,
     curve_of_law,
     curve_of_model,
     scaled_by_knee,
 )
 from hotlever.calibration.plausibility import check_plausible, misfit, what_data_lack
 from hotlever.calibration.power_law import PowerLaw
-from hotlever.calibration.power_law_fit import fit_power_law
+from hotlever.calibration.power_law_fit import law_of_model, power_turns
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
@@ -49,15 +41,10 @@ from hotlever.measurement import given_measurement, with_measured_circuit
 from hotlever.measurement.averages import averaged, note_on_averages
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import Prior, PriorUse, known_beforehand
-from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
 #: A vacuum model that needs this factor is told that its lever is probably in air.
 _LOOKS_LIKE_AIR = 1.08
-#: Powers (over the knee's) at which the power law is fitted to a model: even, up to here.
-_LAW_TO, _LAW_POINTS = 1.4, 160
-#: Of them at least so many above the knee.
-_LEAST_HOT = 8
 #: Share of the measured biases that a lever must reach to show the data.
 _REACHED = 0.98
 
@@ -209,7 +196,9 @@ def _by_estimate(
     k = k_stderr = residual = float("nan")
     law = None
     # with held supplies, or where the power turns, the tip does not follow from a power
-    turns = [] if not circuit.starts_cold else _turns(own, medium) or _turns(vacuum, "vacuum")
+    turns = ""
+    if circuit.starts_cold:
+        turns = power_turns(own, medium) or power_turns(vacuum, "vacuum")
     alone = circuit.starts_cold and not turns
     if own.knee is None or (alone and threshold is None):
         notes.append(f"the model has no knee below {vacuum.hottest_K:.0f} K; none is needed")
@@ -220,14 +209,20 @@ def _by_estimate(
         k = own.knee.power_mW / threshold.power_mW
         k_stderr = k * knee.power_mW_stderr / knee.power_mW
     if turns:
-        notes.append(f"{turns[0]}; there is no power law, and the table is read by bias")
+        notes.append(f"{turns}; there is no power law, and the table is read by bias")
     if not probe.shape.outline_moves:
         notes.append("the outline is taken to be as drawn: no error of it is in the result")
     if alone:
-        law, residual = _law_of(vacuum, None if threshold is None else threshold.power_mW)
+        law, residual = law_of_model(vacuum, None if threshold is None else threshold.power_mW)
     held = None if circuit.starts_cold else held_power(estimate, tip.bias_V)
     return Calibration(
-        table=_table(circuit, tip, tip.parts, (tip.low_K, tip.high_K), held),
+        table=table_by_bias(
+            circuit,
+            *(tip.bias_V, tip.current_mA, tip.tip_K),
+            tip.parts,
+            (tip.low_K, tip.high_K),
+            held,
+        ),
         route=route,
         medium=medium,
         power_law=law,
@@ -279,17 +274,6 @@ def _in_either(result: Calibration, other: Calibration) -> Calibration:
     return replace(result, table=table_of(columns, parts))
 
 
-def _turns(branch: Branch, medium: str) -> list[str]:
-    """Say where the power of a lever turns in a medium, if it does."""
-    turn = branch.power_turns_K
-    if turn is None:
-        return []
-    return [
-        f"in {medium} the power of the lever falls from a tip of {turn:.0f} K on, so that the tip "
-        "temperature is no function of it"
-    ]
-
-
 # --- by the paper's rule ------------------------------------------------------------------------
 
 
@@ -298,37 +282,37 @@ def _by_rule(
 ) -> Calibration:
     lever = Lever(probe)
     vacuum, circuit = lever.branch(), probe.circuit
-    if turns := _turns(vacuum, "vacuum"):
-        raise InputError(f"the paper's rule: {turns[0]}; expected a lever of which it is")
+    if turns := power_turns(vacuum, "vacuum"):
+        raise InputError(f"the paper's rule: {turns}; expected a lever of which it is")
     of_model = curve_of_model(vacuum)
     curve = IVCurve.of(measured.bias_V, measured.current_mA, circuit)
     reference = of_model if law is None else curve_of_law(law, circuit.base_temperature_K)
-    found = scaled_by_knee(curve, vacuum, probe, reference, str(measured.path or "measurement"))
-    rows, at_knee = circuit.power(found.bias_V, found.current_mA), found.knee.power_mW
-    parts = found.parts
+    scaled = scaled_by_knee(curve, vacuum, probe, reference, str(measured.path or "measurement"))
+    rows, at_knee = circuit.power(scaled.bias_V, scaled.current_mA), scaled.knee.power_mW
+    parts = scaled.parts
     if law is not None:
-        parts = {**parts, "power law": np.abs(of_model.at(rows, at_knee) - found.tip_K)}
+        parts = {**parts, "power law": np.abs(of_model.at(rows, at_knee) - scaled.tip_K)}
     if law is None or at_knee > _LOOKS_LIKE_AIR * reference.knee_mW:
         in_air = curve_of_model(lever.in_medium("air").branch())
         away = in_air.at(rows, at_knee) - of_model.at(rows, at_knee)
         parts = {**parts, "constant k": np.abs(away)}
-    used, residual = (law, 0.0) if law is not None else _law_of(vacuum, of_model.knee_mW)
+    used, residual = (law, 0.0) if law is not None else law_of_model(vacuum, of_model.knee_mW)
     k = at_knee / used.threshold_mW
     own = reference.at(circuit.power(measured.bias_V, measured.current_mA), at_knee)
     return Calibration(
-        table=_table(circuit, found, parts),
+        table=table_by_bias(circuit, scaled.bias_V, scaled.current_mA, scaled.tip_K, parts),
         route=route,
         medium="vacuum",
         power_law=used,
         law_residual_K=residual,
         k=k,
-        k_stderr=found.knee.power_mW_stderr / used.threshold_mW,
-        knee=found.knee,
+        k_stderr=scaled.knee.power_mW_stderr / used.threshold_mW,
+        knee=scaled.knee,
         knee_tip_K=float(reference.at(np.array(at_knee), at_knee)),
         measured_rms_K=_rms(measured.tip_K - own),
         probe=probe,
         measurement=measured,
-        notes=[*notes, *found.notes, *_statements(k, found.tip_K)],
+        notes=[*notes, *scaled.notes, *_statements(k, scaled.tip_K)],
     )
 
 
@@ -351,49 +335,11 @@ def _statements(k: float, tip: Array) -> list[str]:
 # --- both ---------------------------------------------------------------------------------------
 
 
-def _table(
-    circuit: Circuit,
-    tip: TipByBias | KneeScaling,
-    parts: dict[str, Array],
-    limits: tuple[Array, Array] | None = None,
-    held_mW: Array | None = None,
-) -> xr.Dataset:
-    """Return the table of a calibration; 95 % lie as far away as its errors say without limits."""
-    bias, current, tip_K = tip.bias_V, tip.current_mA, tip.tip_K
-    total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
-    low, high = limits or (tip_K - BAND * total, tip_K + BAND * total)
-    lever = circuit.lever_voltage(bias, current)
-    values = (bias, lever, current, lever * current, tip_K, total, low, high)
-    columns = dict(zip(TABLE_COLUMNS, values, strict=True))
-    if held_mW is not None:
-        columns[TOTAL_POWER] = lever * current + held_mW
-    return table_of(columns, parts)
-
-
 def _tips(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
     """Return the tip temperatures of a branch at the measured power; or bias, if not that tells."""
     if circuit.starts_cold and branch.power_turns_K is None:
         return branch.tip_temperature(circuit.power(measured.bias_V, measured.current_mA))
     return branch.tip_K(branch.read(circuit, measured.bias_V).u)
-
-
-def _law_of(vacuum: Branch, threshold: float | None) -> tuple[PowerLaw, float]:
-    """Fit Eq. 12 to the model in vacuum, with its threshold at the knee; return what it misses."""
-    highest = vacuum.highest_power_mW
-    if threshold is not None:
-        highest = min(highest, _LAW_TO * threshold)
-    power = np.linspace(0.0, highest, _LAW_POINTS + 1)[1:]
-    if threshold is not None and np.sum(power > threshold) < _LEAST_HOT:
-        # the lever melts right above its knee
-        power = np.append(power, np.linspace(threshold, highest, _LEAST_HOT + 1)[1:])
-        power = np.unique(power)
-    law_fit = fit_power_law(
-        power,
-        vacuum.tip_temperature(power),
-        base_temperature_K=vacuum.base_temperature_K,
-        threshold_mW=threshold,
-    )
-    return law_fit.law, law_fit.largest_residual_K()
 
 
 def _rms(difference: Array) -> float:
