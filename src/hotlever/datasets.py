@@ -188,9 +188,14 @@ def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> xr.Vari
 
     own, array, *stated = values if isinstance(values, tuple) else (dimensions, values)
     array, attributes = np.asarray(array), stated[0] if stated else _meaning(name)
-    if own == name and array.dtype.kind in "if":
+    if array.ndim == 0:
+        own = ()
+    elif own == name and array.dtype.kind in "if":
         return xr.Variable(own, pd.Index(array), attributes)
-    return xr.Variable(own, array, attributes, fastpath=True)
+    try:
+        return xr.Variable(own, array, attributes, fastpath=True)
+    except TypeError:  # a version of xarray that does not know it
+        return xr.Variable(own, array, attributes)
 
 
 def _meaning(name: str) -> dict[str, str]:

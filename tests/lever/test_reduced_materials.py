@@ -87,7 +87,7 @@ def test_a_batch_reduces_what_can_be_reduced(strip, monkeypatch):
     monkeypatch.setattr(batch, "cached_reduction", lambda _, progress, names: made.append(names))
     data, free = Measurement.of_sweep(strip.sweep(BIAS)), ("film.lorenz_ratio",)
     for options in (FitOptions(), FitOptions(free=free), FitOptions(free=("thickness_um",))):
-        assert not batch._reduced(strip.probe, options, {"one": data}, None)
+        assert not batch._not_reduced(strip.probe, options, {"one": data}, None)
     assert made == [set(Box.of(strip.probe).names), {*Box.of(strip.probe).names, *free}]
 
 
