@@ -58,8 +58,6 @@ _JUMP = 7e-3
 #: The same by the law of the mobility: how far two estimates of a lever are apart, with another law
 #: (MINIMOS) in place of Eq. 8 (rms of seven pairs of twins from number 1000 on).
 _MOBILITY = 4e-3
-#: How far (standard errors) along each axis of the estimate the knee is looked at.
-_ASIDE = 0.5
 
 
 def estimate_lever(
@@ -292,36 +290,26 @@ def error_of_model(around: Surroundings, varied: Sequence[str], bias: Array, ris
 
 
 def knee_of(estimate: Estimate, branch: Branch) -> Knee:
-    """Return the knee of a branch of the estimated lever, with standard errors; NaN without one."""
+    """Return the knee of a branch of the estimated lever, with standard errors; NaN without one.
+
+    There are no errors of a knee that the lever may have beyond the measured range.
+    """
     if branch.knee is None:
         return Knee()
-    values = _knee_values(branch, estimate)
-    return Knee(*values, *np.sqrt(np.sum(_knee_changes(estimate) ** 2, axis=0)).tolist())
-
-
-def _knee_values(branch: Branch, estimate: Estimate) -> list[float]:
-    """Return V_l, I_h, P_l and V_b of the knee of a branch; none beyond the measured range."""
-    point = branch.knee
-    if point is None:
-        return [np.nan] * 4
-    bias = float(estimate.probe.circuit.bias(point.lever_V, point.current_mA))
-    return [point.lever_V, point.current_mA, point.power_mW, bias]
-
-
-def _knee_changes(estimate: Estimate) -> Array:
-    """Return V_l, I_h, P_l and V_b of the knee one standard error away on each axis."""
     assert isinstance(estimate.prediction, PredictionAtRest)
-    surrogate = estimate.prediction.surrogate
-    origin = estimate.probe.at(surrogate.names)
-    changes = []
-    for step in estimate.posterior.principal_steps():
-        axis = _ASIDE * np.array([step.get(name, 0.0) for name in surrogate.names])
-        after, before = (
-            np.array(_knee_values(surrogate.branch_at(origin + way * axis), estimate))
-            for way in (1.0, -1.0)
-        )
-        changes.append((after - before) / (2.0 * _ASIDE))
-    return np.array(changes)
+    surrogate, circuit = estimate.prediction.surrogate, estimate.probe.circuit
+
+    def values(branch: Branch) -> Array:
+        """Return V_l, I_h, P_l and V_b of a knee; NaN without one."""
+        point = branch.knee
+        if point is None:
+            return np.full(4, np.nan)
+        bias = circuit.bias(point.lever_V, point.current_mA)
+        return np.array([point.lever_V, point.current_mA, point.power_mW, bias])
+
+    changes = estimate.posterior.changes(lambda at: values(surrogate.branch_at(at)))
+    errors = np.sqrt(np.sum(changes**2, axis=0))
+    return Knee(*values(branch).tolist(), *errors.tolist())
 
 
 def held_power(estimate: Estimate, bias: Array) -> Array:

@@ -116,6 +116,19 @@ class Posterior:
         names = self.objective.varied
         return [dict(zip(names, step.tolist(), strict=True)) for step in steps[variances >= least]]
 
+    def changes(self, function: Callable[[Array], Array]) -> Array:
+        """Return how values (m,) change by one standard error along each axis, (p, m).
+
+        Their squares add up to the variances. The function is of the parameters `names` of the
+        objective, (k,); differences are central, half a standard error either way.
+        """
+        names = self.objective.names
+        origin, rows = self.at.probe.at(names), []
+        for step in self.principal_steps():
+            half = 0.5 * np.array([step.get(name, 0.0) for name in names])
+            rows.append(function(origin + half) - function(origin - half))
+        return np.array(rows)
+
     def of(self, quantity: Quantity) -> tuple[float, float]:
         """Return a quantity and its standard error, linearised."""
         gradient = quantity.gradient(self.slopes)
