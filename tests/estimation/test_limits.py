@@ -12,8 +12,9 @@ from hotlever.estimation.coordinates import Coordinates
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.profile import profile_of_tip
-from hotlever.estimation.quantity import TipTemperature
+from hotlever.estimation.quantity import Pull, TipTemperature
 from hotlever.estimation.sampling import sample_tip
+from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe.priors import Prior, PriorDensity
 from hotlever.probe.surroundings import Surroundings
 from hotlever.text import BAND
@@ -88,6 +89,22 @@ def test_a_quantity_is_known_as_well_as_what_it_follows_from():
         value, stderr = posterior(0.1).of(TipTemperature(row))
         assert value == pytest.approx(TIPS[row])
         assert stderr == pytest.approx(slope)
+
+
+def test_changes_along_the_axes_add_up_to_the_variance():
+    changes = posterior(0.0).changes(lambda x: np.array([3.0 * x[0], -x[0]]))
+    np.testing.assert_allclose(np.sum(changes**2, axis=0), [9.0, 1.0])
+
+
+def test_a_pulled_quantity_is_on_its_profile():
+    """Of all levers with this tip the pulled one is nearest to what was known: x² tells how far."""
+    known = posterior(0.0)
+    tip = TipTemperature(2)
+    for target in (TIPS[2] + 30.0, TIPS[2] - 50.0):
+        pulled = known.objective.pulled(Pull(tip, target, 1e-3))
+        there, squares = Subproblem(pulled, known.at).minimum()
+        assert there[0] == pytest.approx((target - TIPS[2]) / SLOPES[2], rel=1e-4)
+        assert squares == pytest.approx(there[0] ** 2, rel=1e-3)
 
 
 def test_what_is_linear_has_the_linearised_error():
