@@ -88,13 +88,21 @@ class Posterior:
 
     @cached_property
     def moved(self) -> dict[str, Moved]:
-        """How far the data moved parameters and scales from their own priors, by name."""
+        """How far the data moved parameters and scales from their own priors, by name.
+
+        They are those of the optimum of the linearised problem. What data hardly tell is moved by
+        little, and a search may end further from the optimum than that.
+        """
         objective, prior = self.objective, self.objective.prior
-        scales = objective.residuals.in_common(self.at.values, self.slopes, self.covariance)
+        point, residual, jacobian = objective.linearised(self.at)
+        laplace = objective.laplace(self.at.slopes, point)
+        step = -laplace @ (jacobian.T @ residual) if objective.informed else np.zeros(point.size)
+        values = self.at.values + self.slopes @ (self._rates * step)
+        scales = objective.residuals.in_common(values, self.slopes, self.covariance)
         if prior is None:
             return scales
-        away, by = objective.from_priors(self._point), objective.of_priors(self._point)
-        laplace = objective.laplace(self.at.slopes, self._point)
+        by = objective.of_priors(point)
+        away = objective.from_priors(point) + by @ step
         left = np.sqrt(np.einsum("ij,jk,ik->i", by, laplace, by))
         rows = zip(prior.sources, away.tolist(), left.tolist(), strict=True)
         return {name: Moved(size, rest) for name, size, rest in rows if name != "fit"} | scales
