@@ -65,7 +65,7 @@ class Calibration(Outcome):
     knee_tip_K : float
         Tip temperature there.
     table : xarray.Dataset
-        `TABLE_COLUMNS` on the dimension ``bias``, evenly spaced over the measured range, and
+        ``TABLE_COLUMNS`` on the dimension ``bias``, evenly spaced over the measured range, and
         ``budget_K``, the standard error by ``source``. With held supplies, what is shown is of
         the swept one, and `TOTAL_POWER` that of all.
     priors : dict of str to PriorUse

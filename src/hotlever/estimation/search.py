@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,8 +28,25 @@ from hotlever.probe.parameters import dimensions_of, parameters_of
 from hotlever.probe.priors import Prior, PriorDensity, default_priors
 from hotlever.types import Progress
 
-#: The optimiser, as it was left, and where it ended.
-End = tuple[Optimiser, Optimum]
+
+class End(NamedTuple):
+    """Where a search ended, and the optimiser as it was left."""
+
+    optimiser: Optimiser
+    optimum: Optimum
+
+    @property
+    def describes(self) -> bool:
+        """Whether that is at a lever that describes the data."""
+        values = self.optimum.prediction.values
+        return self.optimum.converged and not undescribed(self.optimiser.residuals, values)
+
+    @property
+    def share(self) -> float:
+        """The mean square of differences, as shares of the largest of each observable."""
+        residuals = self.optimiser.residuals
+        share = residuals.difference(self.optimum.prediction.values) / residuals.largest
+        return float(np.nanmean((residuals.down * share) ** 2))
 
 
 @dataclass(frozen=True)
@@ -59,7 +77,7 @@ class Search:
     def near(self, experiment: Experiment, start: Probe) -> End:
         """Search from a lever that is not far from the one that was measured."""
         optimiser = self._optimiser(experiment, self.residuals.afresh(), start)
-        return optimiser, optimiser.solve_and_confirm(start, self.robust)
+        return End(optimiser, optimiser.solve_and_confirm(start, self.robust))
 
     def from_anywhere(self, experiment: ExperimentAtRest, measurement: Measurement) -> End:
         """Search from a lever of which little may be known.
@@ -76,8 +94,8 @@ class Search:
         optimiser = self._optimiser(experiment, self.residuals.afresh(), self.start)
         with suppress(ComputationError):
             if not _is_far(self.residuals, optimiser.predict(self.start)):
-                ends.append((optimiser, optimiser.solve_and_confirm(self.start, self.robust)))
-                if _describes(*ends[0]):
+                ends.append(End(optimiser, optimiser.solve_and_confirm(self.start, self.robust)))
+                if ends[0].describes:
                     return ends[0]
         grown, nearer = self._grown(experiment, measurement)
         if ends and nearer == self.start:
@@ -88,7 +106,7 @@ class Search:
         except ComputationError:
             if not ends:
                 raise
-        return min(ends, key=lambda end: (not _describes(*end), _share(*end)))
+        return min(ends, key=lambda end: (not end.describes, end.share))
 
     def _optimiser(
         self,
@@ -170,16 +188,3 @@ def _closing(probe: Probe, varied: Sequence[str]) -> dict[str, Prior]:
         else:
             closing[name] = Prior(value, GROWTH.open * every[name].scale, relative=False)
     return closing
-
-
-def _describes(optimiser: Optimiser, optimum: Optimum) -> bool:
-    """Whether a search has ended at a lever that describes the data."""
-    values = optimum.prediction.values
-    return optimum.converged and not undescribed(optimiser.residuals, values)
-
-
-def _share(optimiser: Optimiser, optimum: Optimum) -> float:
-    """Return the mean square of differences, as shares of the largest of each observable."""
-    residuals = optimiser.residuals
-    share = residuals.difference(optimum.prediction.values) / residuals.largest
-    return float(np.nanmean((residuals.down * share) ** 2))
