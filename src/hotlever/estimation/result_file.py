@@ -1,7 +1,7 @@
 """What fit and calibration files have in common: their schema states what is written and read.
 
 A file is a pydantic model. What stands in it as it is taken from a result by name, what stands in
-another form has a type that says how (``stored_as`` of ``hotlever.records``).
+another form has a type that says how.
 """
 
 from __future__ import annotations
