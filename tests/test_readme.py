@@ -27,27 +27,12 @@ def test_python_example(folder, monkeypatch, capsys):
     assert len(re.findall(r"^\w+ +\d[\d.]*\([\d.]+\)", printed, re.MULTILINE)) == 6
 
 
-def command_lines() -> tuple[list[str], list[str]]:
-    """Return the lines of the example, and of them the fits of several levers."""
-    (example,) = blocks(README, "sh")
-    lines = example.content.splitlines()
-    fits = [line for line in lines if line.startswith("hotlever fit")]
-    return lines, [line for line in fits if line.count(".csv") > 1]
-
-
 def test_command_line_example(run, folder):
-    lines, several = command_lines()
-    assert 0 < len(commands("\n".join(lines))) == len(lines) <= 10
-    # tests/estimation/test_batch.py has many levers fitted, and with less to find
-    assert len(several) == 1
-    run_commands("\n".join(line for line in lines if line not in several), run)
+    (example,) = blocks(README, "sh")
+    assert 0 < len(commands(example.content)) == len(example.content.splitlines()) <= 10
+    run_commands(example.content, run)
     made = {path.name for path in folder.iterdir()}
     assert {"probe.toml", "probe.png", "sweep.csv", "one.nc", "fields", "fit.json"} <= made
-
-
-@pytest.mark.slow
-def test_command_line_example_of_several_levers(run, folder):
-    run_commands("\n".join(command_lines()[1]), run)
 
 
 def test_make_targets_and_links_exist():
