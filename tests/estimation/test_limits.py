@@ -11,11 +11,12 @@ from hotlever.calibration.inference import error_of_model
 from hotlever.estimation.coordinates import Coordinates
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.posterior import Posterior
+from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.profile import profile_of_tip
 from hotlever.estimation.quantity import Pull, TipTemperature
 from hotlever.estimation.sampling import sample_tip
 from hotlever.estimation.subproblem import Subproblem
-from hotlever.probe.priors import Prior, PriorDensity
+from hotlever.probe.priors import Prior
 from hotlever.probe.surroundings import Surroundings
 from hotlever.text import BAND
 

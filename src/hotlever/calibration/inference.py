@@ -19,6 +19,7 @@ from hotlever.estimation import Fit, FitOptions, Measurement
 from hotlever.estimation.experiment_at_rest import PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate, estimate
 from hotlever.estimation.posterior import Posterior
+from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.profile import profile_of_tip
 from hotlever.estimation.quantity import TIP
 from hotlever.lever import Branch
@@ -29,7 +30,6 @@ from hotlever.probe.parameters import own_name, usual_parameters
 from hotlever.probe.priors import (
     SCALES,
     Prior,
-    PriorDensity,
     default_priors,
     known_beforehand,
     priors_of,

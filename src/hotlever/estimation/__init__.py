@@ -3,7 +3,7 @@
 ==============  ====================================================================================
 forward map     `experiment`: at rest, in time; `load_lines`, and the `surrogate` of a solved lever
 noise model     `residuals`: `noise`, `drift`, and the `scales` that data have in common
-prior           `hotlever.probe.priors`
+prior           `hotlever.probe.priors`, together a `prior_density`
 optimiser       of an `objective`: `optimiser`, its `subproblem`, `convergence`; where a `search`
                 begins; what steers it, `search_options`
 posterior       `posterior`: of any `quantity`, linearised; its `profile`; `sampling`

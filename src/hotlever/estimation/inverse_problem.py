@@ -22,6 +22,7 @@ from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser, Optimum
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.posterior import Posterior
+from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.scales import errors_of_scales
 from hotlever.estimation.search import Search
@@ -36,7 +37,6 @@ from hotlever.probe import Probe
 from hotlever.probe.priors import (
     SCALES,
     Prior,
-    PriorDensity,
     PriorUse,
     default_priors,
     priors_of,

@@ -9,10 +9,10 @@ import numpy as np
 
 from hotlever.estimation.coordinates import Coordinates
 from hotlever.estimation.experiment import Prediction
+from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.quantity import Pull
 from hotlever.estimation.residuals import Residuals
 from hotlever.probe import Probe
-from hotlever.probe.priors import PriorDensity
 from hotlever.types import Array
 
 #: Scaled residual given to trial parameters for which the lever has no state, so that a search

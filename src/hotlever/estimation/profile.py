@@ -21,11 +21,11 @@ from hotlever.estimation.experiment_at_rest import experiment_of
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.posterior import Posterior
+from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.quantity import ParameterValue, Pull, TipTemperature
 from hotlever.estimation.result import Fit
 from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe.parameters import parameter_of, usual_parameters
-from hotlever.probe.priors import PriorDensity
 from hotlever.text import BAND
 from hotlever.types import Array, Index
 

@@ -30,6 +30,7 @@ from hotlever.estimation.experiment_at_rest import (
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.posterior import Noise, Posterior, PosteriorDensity
+from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.profile import ErrorProfile, hotter_rows
 from hotlever.estimation.quantity import TIP, TipTemperature
 from hotlever.estimation.result import Fit
@@ -41,7 +42,6 @@ from hotlever.lever.reduced import ReducedLever
 from hotlever.materials import full_name
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameters_of, usual_parameters
-from hotlever.probe.priors import PriorDensity
 from hotlever.text import BAND, INVERSION
 from hotlever.types import Array, Progress
 

@@ -20,12 +20,13 @@ from hotlever.estimation.experiment_at_rest import ExperimentAtRest
 from hotlever.estimation.lack_of_fit import undescribed
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser, Optimum
+from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.search_options import GROWTH, SearchOptions
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, parameters_of
-from hotlever.probe.priors import Prior, PriorDensity, default_priors
+from hotlever.probe.priors import Prior, default_priors
 from hotlever.types import Progress
 
 
