@@ -162,3 +162,12 @@ def test_a_lever_that_melts_right_above_its_knee_has_a_law(reference):
     law, residual = law_of_model(melting, knee)
     assert law.threshold_mW == pytest.approx(knee)
     assert residual < 10.0
+
+
+@pytest.mark.parametrize("described", [False, None])
+def test_a_calibration_that_does_not_describe_its_data_is_no_power_law(tmp_path, described):
+    path = tmp_path / "refused.json"
+    content = {"power_law": EQ12.values(), "describes_data": described, "reason": "it is cold"}
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=r"refused.json: expected .* this one does not: it is"):
+        read_power_law(path)

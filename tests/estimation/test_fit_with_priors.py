@@ -211,3 +211,9 @@ def test_priors_of_files_that_say_no_distribution_are_read(found, tmp_path):
         del use["distribution"]
     (tmp_path / "old.json").write_text(json.dumps(content))
     assert read_fit(tmp_path / "old.json").priors["n_d"].distribution == "normal"
+
+
+def test_a_prior_that_does_not_count_is_said_to_have_no_effect(data):
+    priors = {**default_priors(NOMINAL), "gas_conductivity": Prior(1.0, 0.1)}
+    said = "priors that do not count in vacuum, and have no effect: gas_conductivity"
+    assert said in estimate(data[0], NOMINAL, FitOptions(priors=priors)).notes

@@ -330,3 +330,17 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(tmp_path_factory, part, p
     for name in data.observables:
         assert not np.isinf(data.observable(name)).any()
         assert not np.any(data.error(name) <= 0)
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ({"V_b (V)": "V_b", "I_h (mA)": "V_r"}, "its unit is mV, expected mA as --column says"),
+        ({"V_b (V)": "V_b", "I_h (mA)": "V_b"}, "is V_b and I_h, expected one of them"),
+    ],
+)
+def test_a_column_is_not_told_to_be_what_it_is_not(tmp_path, columns, said):
+    path = tmp_path / "data.csv"
+    path.write_text("V_b (V),I_h (mA),V_r (mV)\n1,0.1,60\n2,0.2,120\n")
+    with pytest.raises(InputError, match=said):
+        read_measurement(path, columns)

@@ -34,6 +34,19 @@ def test_noise_is_described():
     assert off_together(residuals, MODEL) == ""
 
 
+@pytest.mark.parametrize("seed", range(1, 9))
+@pytest.mark.parametrize("size", [0.02, 0.05])
+def test_much_noise_is_described_too(seed, size):
+    """Once runs of four rows were compared with 1.2 %, whatever the noise."""
+    noise = size * 1.1 * np.random.default_rng(seed).standard_normal(COUNT)
+    assert undescribed(compared(noise), MODEL) == ""
+
+
+def test_a_smooth_misfit_is_none_of_little_noise():
+    noise = 0.003 * np.random.default_rng(1).standard_normal(COUNT)
+    assert undescribed(compared(noise + 0.05 * ALONG**3), MODEL) != ""
+
+
 @pytest.mark.parametrize("row", [0, 20, -1])
 def test_an_outlier_is_at_random_wherever_it_is(row):
     off = np.zeros(COUNT)

@@ -14,6 +14,9 @@ from hotlever.files import read_json
 from hotlever.records import Record
 from hotlever.spieser2017 import BASE_TEMPERATURE_K, POWER_LAW
 
+#: Largest coefficient of a law that is read: K/mW, K, an exponent or mW.
+_LARGEST = 1e5
+
 
 class PowerLaw(Record):
     """Tip temperature against the power dissipated in the lever (Eq. 12).
@@ -147,13 +150,19 @@ def read_power_law(path: str | os.PathLike[str]) -> PowerLaw:
     """
     content = read_json(path)
     section = content.get("power_law", content)
+    if not content.get("describes_data", True):
+        raise InputError(
+            f"{path}: expected the calibration of a lever that shows its data; this one does not: "
+            f"{content.get('reason') or 'its file does not say why'}"
+        )
     if not isinstance(section, dict):
         raise InputError(f"{path}: found no power law, expected an object with its coefficients")
     known = {name: value for name, value in section.items() if name != "threshold_K"}
     law = PowerLaw.of(known, str(path))
     for name, value in law:
-        if not value > 0:
-            raise InputError(f"{path}: {name} = {value:g}, expected a positive number")
+        if not 0 < value <= _LARGEST:
+            expected = "a positive number" if not value > 0 else f"at most {_LARGEST:g}"
+            raise InputError(f"{path}: {name} = {value:g}, expected {expected}")
     return law
 
 

@@ -312,17 +312,18 @@ def _by_rule(
         measured_rms_K=_rms(measured.tip_K - own),
         probe=probe,
         measurement=measured,
-        notes=[*notes, *scaled.notes, *_statements(k, scaled.tip_K)],
+        notes=[*notes, *scaled.notes, *_statements(k, scaled.tip_K, measured.medium, law)],
     )
 
 
-def _statements(k: float, tip: Array) -> list[str]:
+def _statements(k: float, tip: Array, medium: str | None, law: PowerLaw | None) -> list[str]:
     """Say what the user should know."""
     statements = []
-    if k > _LOOKS_LIKE_AIR:
+    if k > _LOOKS_LIKE_AIR and medium != "vacuum":
+        better = "--medium air is" if law is None else "a probe with --medium air would be"
         statements.append(
             f"the lever needs {k:.2f} times the power of the model in vacuum: it seems to be "
-            "in air, where --medium air is more accurate"
+            f"in air, where {better} more accurate"
         )
     beyond = int(np.isnan(tip).sum())
     if beyond:

@@ -147,8 +147,9 @@ def _verdict(calibration: Calibration) -> str:
     word = "good" if stated <= _GOOD else "fair" if stated <= _FAIR else "rough"
     largest = calibration.table.budget_K.max("bias").idxmax("source").item()
     text = f"{word}; mostly from {largest}"
-    if largest in _ADVICE:
+    by_law = calibration.route == "power law"
+    if largest in _ADVICE and not (by_law and largest == "constant k"):
         return f"{text}: {_ADVICE[largest]}"
-    if calibration.route == "power law":
+    if by_law:
         return f"{text}; a probe (--probe) or a fit (--fit) would know more than a power law"
     return text

@@ -87,7 +87,12 @@ def fit(
     # a search that has not come to its end contradicts nothing
     if result.describes_data is not False or result.in_time or "current" not in result.observables:
         return result
-    cause = Diagnosis(solution.measurement, solution.stated, options.priors or None).named()
+    if solution.options.robust or not suspicious_points(
+        solution.residuals, solution.prediction.values, robust=False
+    ):
+        cause = Diagnosis(solution.measurement, solution.stated, options.priors or None).named()
+    else:
+        cause = "are the points far from the fit wrong ones? a robust fit (--robust) forgets them"
     return replace(result, reason=f"{result.reason}; {cause}")
 
 

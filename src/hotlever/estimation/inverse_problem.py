@@ -35,6 +35,7 @@ from hotlever.measurement import (
 from hotlever.measurement.averages import averaged, note_on_averages
 from hotlever.probe import Probe
 from hotlever.probe.priors import (
+    ALL_DIMENSIONS,
     SCALES,
     Prior,
     PriorUse,
@@ -167,6 +168,12 @@ def estimate(
     notes += note_on_averages(whole, measurement)
     options = options.of(probe, in_time=in_time)
     priors = priors_of(options.priors, probe, "priors", in_time=in_time)
+    without_effect = [name for name in options.priors if name not in (*priors, ALL_DIMENSIONS)]
+    if without_effect:
+        notes.append(
+            f"priors that do not count in {probe.surroundings.medium}, and have no effect: "
+            f"{', '.join(without_effect)}"
+        )
     if options.usual_priors:
         usual = default_priors(probe)
         priors = {name: usual[name] for name in usual if name not in options.fixed} | priors

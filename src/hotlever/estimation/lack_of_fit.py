@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from hotlever.estimation.residuals import Residuals
+from hotlever.measurement.scatter import noise_about_neighbours
 from hotlever.types import Array
 
 #: Data are not described where they differ from the model by more than this share of the largest
 #: (rms), and neighbours together: the product of two is this share of the square, of white noise 0.
 #: Neither are they where so many neighbours differ by three times as much in their median.
 _SCATTER, _TOGETHER, _RUN = 0.004, 0.4, 4
+#: Of noisier data so many neighbours differ by chance by up to so many times their scatter.
+_NOISY_RUN = 2.5
 #: The share for fits whose weights are no errors, which hold dimensions and whatever else is fixed.
 _HELD_SCATTER = 0.01
 #: Outliers stand alone: so many neighbours that are off by more than so many standard deviations
@@ -55,7 +58,9 @@ def undescribed(residuals: Residuals, values: Array) -> str:
                 f"{name} differs by {rms:.1%} of its largest value (rms), and not at "
                 f"random; most at {residuals.along[worst]:.3g} {residuals.unit}"
             )
-        if runs.max() > 3.0 * _SCATTER:
+        # noise alone has runs too
+        noise = noise_about_neighbours(whole[ordered])
+        if runs.max() > max(3.0 * _SCATTER, _NOISY_RUN * noise):
             run = residuals.along[ordered[np.argmax(runs) + np.arange(_RUN)]]
             return (
                 f"{name} differs by {runs.max():.1%} of its largest value in neighbouring rows, "

@@ -27,6 +27,8 @@ from hotlever.types import Array
 
 #: Columns of a measurement that are NaN where a file has none; the other errors are None then.
 _NEEDED = ("current_mA", "reader_V", "tip_K", "tip_error_K")
+#: No column of a measurement has larger values, in the units inside.
+_LARGEST = 1e9
 
 
 def array(values: Sequence[Any] | Array, shape: tuple[int, ...], where: str) -> Array:
@@ -138,8 +140,16 @@ class MeasurementSection(Section):
             raise InputError(f"{where}: columns: V_b is missing")
         count, waveform = self.columns["V_b"].size, self.waveform
         for name, values in {**self.columns, "rows": self.rows, "time_us": self.time_us}.items():
-            if values is not None:
-                array(values, (count,), f"{where}: {name}")
+            if values is None:
+                continue
+            array(values, (count,), f"{where}: {name}")
+            least = 0.0 if name.startswith("d") else -_LARGEST
+            wrong = values[(values <= least) | (values > _LARGEST)]
+            if wrong.size:
+                raise InputError(
+                    f"{where}: {name}: found {wrong[0]:g}, expected more than {least:g} and at "
+                    f"most {_LARGEST:g}"
+                )
         if (waveform is None) != (self.time_us is None) or (
             isinstance(waveform, Polyline) and len(waveform.times) != len(waveform.volts)
         ):

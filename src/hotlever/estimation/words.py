@@ -61,8 +61,11 @@ def conclusions(fit: Fit) -> list[str]:
     """Say what follows from the parameters of a fit, and how well it describes the data."""
     lines = [_tip_in_time(fit.band)] if fit.in_time else []
     if np.isfinite(fit.inversion_temperature_K):
-        inversion = fit.inversion_temperature_K, fit.inversion_temperature_stderr_K
-        lines.append(f"inversion temperature: {value_with_error(*inversion)} K")
+        inversion = value_with_error(
+            fit.inversion_temperature_K, fit.inversion_temperature_stderr_K
+        )
+        unit = "" if inversion == NOT_DETERMINED else " K"
+        lines.append(f"inversion temperature: {inversion}{unit}")
     rms = []
     for column, value in fit.residual_rms.items():
         name, _, unit = column.rpartition("_")

@@ -161,7 +161,14 @@ def find_columns(
     for quantity, heading in told.items():
         symbol, unit = _quantity(quantity, told=True)
         assert symbol is not None
-        columns[symbol] = _column(table, symbol, table.place(heading), unit)
+        place = table.place(heading)
+        for other, column in columns.items():
+            if column.place == place:
+                raise InputError(
+                    f"{where}: --column says that {shown(heading)} is {other} and {symbol}, "
+                    "expected one of them"
+                )
+        columns[symbol] = _column(table, symbol, place, unit)
     in_time = driven or TIME in columns
     taken = {column.place for column in columns.values()}
     places = defaultdict[str, list[int]](list)
@@ -201,9 +208,16 @@ def _column(table: Table, symbol: str, place: int, told: str | None) -> Column:
     scale = conversion(unit, inside, difference)
     if scale is None:
         raise unknown_unit(unit, inside, f"{table.where(-1)}: {shown(heading)}")
-    if told and written and conversion(written, inside, difference) not in (None, scale):
+    if told and written and _contradicts(written, inside, difference, scale):
         raise InputError(f"{where}: its unit is {written}, expected {told} as --column says")
     return Column(symbol, place, heading, unit, *scale)
+
+
+def _contradicts(written: str, inside: str, difference: bool, scale: tuple[float, float]) -> bool:
+    """Whether the unit of a heading, of any quantity, is not the one that is told."""
+    if (own := conversion(written, inside, difference)) is not None:
+        return own != scale
+    return any(conversion(written, unit) for unit in set(UNITS.values()))
 
 
 def _told(symbol: str, heading: str = "HEADING") -> str:

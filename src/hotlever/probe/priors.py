@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
@@ -137,7 +138,7 @@ class PriorUse:
     """
 
     value: float
-    spread: float
+    spread: Annotated[float, Field(gt=0)]
     posterior_value: float
     posterior_spread: Number
     distribution: Distribution = "normal"
