@@ -214,13 +214,14 @@ def test_routes_exclude_each_other(reference):
 
 
 @pytest.mark.slow
-def test_the_posterior_of_a_usual_lever_is_that_of_its_linearised_error(calibrated):
+def test_too_few_posterior_samples_of_a_usual_lever_leave_its_limits(calibrated):
+    """Of 2000 some 150 are worth anything, and these span little more than half of the limits."""
     sampled = calibrate(calibrated.measurement, samples=2000)
-    assert any("posterior samples" in note for note in sampled.notes)
+    assert any("too few posterior samples" in note for note in sampled.notes)
     np.testing.assert_allclose(sampled.table.tip_K, calibrated.table.tip_K, atol=0.01)
     for name in ("tip_low_K", "tip_high_K"):
         found, usual = (one.table[name] - one.table.tip_K for one in (sampled, calibrated))
-        np.testing.assert_allclose(found, usual, rtol=0.3)
+        np.testing.assert_allclose(found, usual)
 
 
 def test_a_scaled_model_is_the_paper_s_rule(reference):

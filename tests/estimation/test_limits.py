@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,9 +13,9 @@ from hotlever.estimation.coordinates import Coordinates
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.prior_density import PriorDensity
-from hotlever.estimation.profile import profile_of_tip
+from hotlever.estimation.profile import ErrorProfile, profile_of_tip
 from hotlever.estimation.quantity import Pull, TipTemperature
-from hotlever.estimation.sampling import sample_tip
+from hotlever.estimation.sampling import SampledTip, sample_tip
 from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe.priors import Prior
 from hotlever.probe.surroundings import Surroundings
@@ -139,12 +140,21 @@ def test_other_errors_are_the_same_either_way():
 def test_quantiles_of_the_posterior_are_those_of_what_is_unknown(bend):
     """x is normal, so that the quantiles of the tip are the tips at 1.96 standard errors."""
     found = sample_tip(posterior(bend), SimpleNamespace(others=lambda at: []), samples=4000)
-    assert found.rhat < 1.05
+    assert found.enough
     assert found.effective_samples > 500
     low, high = found.profile.credible_interval(TIPS[1:], SLOPES[1:], np.zeros(2))
     x = BAND * np.array([[-1.0], [1.0]])
     expected = TIPS[1:] + SLOPES[1:] * (x + bend * x**2)
     np.testing.assert_allclose([low, high], expected, atol=0.12 * BAND * SLOPES[-1])
+
+
+def test_few_posterior_samples_are_not_enough_though_their_ensembles_agree():
+    enough = SampledTip(ErrorProfile(TIPS, TIPS, TIPS), effective_samples=450.0, rhat=1.01)
+    assert enough.enough
+    assert "between quantiles" in enough.note
+    for few in (replace(enough, effective_samples=139.0), replace(enough, rhat=1.2)):
+        assert not few.enough
+        assert few.note.startswith("too few posterior samples")
 
 
 def test_what_the_model_leaves_open_is_an_error_of_it():

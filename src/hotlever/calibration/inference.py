@@ -235,6 +235,7 @@ def _credible_interval(
 ) -> tuple[tuple[Array, Array], str]:
     """Return what 95 % of the tip temperatures lie between (K), and words on where that is from."""
     posterior, away = estimate.posterior, BAND * np.hypot(stderr, of_model)
+    too_few = ""
     if not estimate.objective.informed:
         if samples:
             raise InputError("posterior: expected priors, without which it is not that of a fit")
@@ -244,17 +245,19 @@ def _credible_interval(
         from hotlever.estimation.sampling import sample_tip
 
         sampled = sample_tip(posterior, estimate.optimiser, samples=samples, progress=progress)
-        return sampled.profile.credible_interval(tip, stderr, of_model), sampled.note
+        if sampled.enough:
+            return sampled.profile.credible_interval(tip, stderr, of_model), sampled.note
+        too_few = sampled.note
     profile = profile_of_tip(posterior, estimate.optimiser.model)
     if profile.linear:
-        return (tip - away, tip + away), ""
+        return (tip - away, tip + away), too_few
     low, high = profile.credible_interval(tip, stderr, of_model)
     note = (
         "the tip temperature is not a linear function of what is unknown, so that its limits come "
         f"from estimates of hotter and colder levers: at {tip[-1]:.0f} K 95 % lie from "
         f"{low[-1]:.0f} to {high[-1]:.0f} K"
     )
-    return (low, high), note
+    return (low, high), "; ".join(filter(None, (too_few, note)))
 
 
 def shares_by_source(posterior: Posterior) -> dict[str, Array]:

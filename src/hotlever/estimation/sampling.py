@@ -49,8 +49,9 @@ from hotlever.types import Array, Progress
 BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)
 #: Standard deviations from which on a solved lever tells of those that samples reach.
 _TELLING = 1.0
-#: R̂ from which on samples are too few.
-_SETTLED = 1.05
+#: R̂ from which on samples are too few, and how many independent ones quantiles need (Vehtari et
+#: al., Bayesian Anal. 16, 667 (2021)). Ensembles that start alike drift alike, which R̂ cannot see.
+_SETTLED, _ENOUGH = 1.05, 400.0
 
 
 class SampledLever:
@@ -122,13 +123,22 @@ class SampledTip:
     rhat: float
 
     @property
+    def enough(self) -> bool:
+        """Whether the quantiles can be trusted."""
+        return self.rhat < _SETTLED and self.effective_samples >= _ENOUGH
+
+    @property
     def note(self) -> str:
-        """What the limits are from, and whether there are enough samples."""
-        text = (
-            "95 % of the tip temperatures lie between quantiles of posterior samples "
-            f"({self.effective_samples:.0f} effective ones, R̂ {self.rhat:.3f})"
+        """What the limits are from, or why not from these samples."""
+        worth = f"{self.effective_samples:.0f} effective ones, R̂ {self.rhat:.3f}"
+        if self.enough:
+            return (
+                f"95 % of the tip temperatures lie between quantiles of posterior samples ({worth})"
+            )
+        return (
+            f"too few posterior samples: {worth}, where {_ENOUGH:.0f} and less than "
+            f"{_SETTLED:g} are expected; the limits are those without samples, take more"
         )
-        return text + ("" if self.rhat < _SETTLED else "; these are too few, take more samples")
 
 
 def sample_tip(
