@@ -67,7 +67,7 @@ class Bent:
 
     def predict(self, probe, near=None):
         values, slopes = self._shown(np.array([float(probe)]))
-        surrogate = SimpleNamespace(predict=self._shown)
+        surrogate = SimpleNamespace(predict=self._shown, shown=lambda x: self._shown(x)[0])
         return SimpleNamespace(values=values, slopes=slopes, probe=probe, surrogate=surrogate)
 
     def _shown(self, x):

@@ -13,6 +13,9 @@ from scipy.stats import rankdata
 
 from hotlever.types import Array
 
+#: Effective samples that quantiles take at least.
+FEWEST_EFFECTIVE = 400
+
 
 def split_rhat(chains: Array) -> float:
     """Return the rank-normalised split R̂ of one quantity; one if the chains agree.

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import PPoly
 
 from hotlever.lever.branch import Branch
-from hotlever.lever.curve import spline_through
+from hotlever.lever.curve import piecewise, spline_through
 from hotlever.lever.ramp import crossing
 from hotlever.lever.sensitivities import at_fixed_bias
 from hotlever.probe.circuit import Circuit
@@ -103,7 +102,7 @@ class Rows:
 
     def _nearest(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
         """Return the states nearest to what was measured; see `states`."""
-        curve = PPoly(circuit.bias(branch.curve.c[..., 0], branch.curve.c[..., 1]), branch.curve.x)
+        curve = branch.bias_by_u(circuit)
         cold = branch.equations.circuit.starts_cold
         start = 0.0 if cold else float(branch.u[0])
         level = np.sort(curve.derivative().roots(extrapolate=False))
@@ -120,7 +119,7 @@ class Rows:
             if not here.size:
                 continue
             sign = 1.0 if last >= first else -1.0
-            at = crossing(PPoly(sign * curve.c, curve.x), low, high, sign * bias[here])
+            at = crossing(piecewise(sign * curve.c, curve.x), low, high, sign * bias[here])
             away = self._distance(shown_at(branch, branch.equations.circuit, at), here)
             nearer = away < distance[here]
             u[here[nearer]], distance[here[nearer]] = at[nearer], away[nearer]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from hotlever.estimation.quantity import Pull
 from hotlever.estimation.residuals import Residuals
 from hotlever.probe import Probe
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from hotlever.estimation.result import Fit
 
 #: Scaled residual given to trial parameters for which the lever has no state, so that a search
 #: turns back.
@@ -63,6 +67,12 @@ class Objective:
         self.coordinates = Coordinates.of(probe, varied, logarithms)
         self.bounds = self.coordinates.bounds
         self._pull: Pull | None = None
+
+    @classmethod
+    def of_fit(cls, fit: Fit, names: Sequence[str]) -> Objective:
+        """Return what a fit has made small, by derivatives by some parameters."""
+        prior = PriorDensity.independent(fit.known_before) if fit.known_before else None
+        return cls(fit.residuals(), fit.probe, names, fit.names, prior)
 
     @property
     def informed(self) -> bool:

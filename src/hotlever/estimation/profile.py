@@ -21,8 +21,7 @@ from hotlever.estimation.experiment_at_rest import experiment_of
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.posterior import Posterior
-from hotlever.estimation.prior_density import PriorDensity
-from hotlever.estimation.quantity import ParameterValue, Pull, TipTemperature
+from hotlever.estimation.quantity import TIP, ParameterValue, Pull, TipTemperature
 from hotlever.estimation.result import Fit
 from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe.parameters import parameter_of, usual_parameters
@@ -103,14 +102,15 @@ def profile_of_tip(posterior: Posterior, experiment: Experiment) -> ErrorProfile
     for side, way in enumerate((-1.0, 1.0)):
         pulled = [objective.pulled(_pull(posterior, tip, way)) for tip in tips]
         near = _solved_near(pulled[-1], posterior, experiment)
-        for number, tip in enumerate(tips if near is not None else []):
-            assert near is not None
+        if near is None:
+            continue
+        for number, tip in enumerate(tips):
             there, _ = near.of(pulled[number]).minimum()
             value, stderr = posterior.of(tip)
             away = abs(tip.value(near.shown(there), there) - value)
             rise = max(near.squares(there) - least, _LEAST_RISE)
             sides[side, number] = max(away / (stderr * np.sqrt(rise)), _NARROWEST)
-    return ErrorProfile(at.values[2, rows], *sides)
+    return ErrorProfile(at.values[TIP, rows], *sides)
 
 
 def _solved_near(
@@ -151,7 +151,7 @@ def _pull(posterior: Posterior, tip: TipTemperature, way: float) -> Pull:
 
 def hotter_rows(at: Prediction) -> Index:
     """Return the rows of the data at which limits are looked for, the hottest last."""
-    order = np.argsort(at.values[2])
+    order = np.argsort(at.values[TIP])
     return order[np.linspace(order.size / 2, order.size - 1, _ROWS).astype(int)]
 
 
@@ -203,14 +203,14 @@ def profile_likelihood(
         raise InputError(f"found points = {points}, expected an odd number of 5 or more")
     if not result.sum_of_squares > 0:
         raise InputError("the fit meets its data exactly: without scatter nothing tells how sure")
-    residuals, quantity = result.residuals(), ParameterValue(result.names.index(name))
+    quantity = ParameterValue(result.names.index(name))
     names = tuple(dict.fromkeys([*usual_parameters(result.probe), *result.names]))
+    objective = Objective.of_fit(result, names)
+    residuals = objective.residuals
     model = experiment_of(result.probe, residuals.bias, names=names, reduce=True)
     # exact to first order at the optimum, and used as it is from there
     model = model.confirmed(model.predict(result.probe))
     at_optimum = model.predict(result.probe)
-    prior = PriorDensity.independent(result.known_before) if result.known_before else None
-    objective = Objective(residuals, result.probe, model.names, result.names, prior)
     # with priors, residuals are in standard deviations
     variance = 1.0 if objective.informed else _noise_variance(result, name, residuals.size)
     least = objective.squares(at_optimum) if objective.informed else result.sum_of_squares

@@ -16,6 +16,7 @@ import xarray as xr
 
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
+from hotlever.estimation.chains import FEWEST_EFFECTIVE
 from hotlever.estimation.ensembles import (
     Chains,
     independent_samples,
@@ -30,7 +31,6 @@ from hotlever.estimation.experiment_at_rest import (
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.posterior import Noise, Posterior, PosteriorDensity
-from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.profile import ErrorProfile, hotter_rows
 from hotlever.estimation.quantity import TIP, TipTemperature
 from hotlever.estimation.result import Fit
@@ -49,9 +49,8 @@ from hotlever.types import Array, Progress
 BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)
 #: Standard deviations from which on a solved lever tells of those that samples reach.
 _TELLING = 1.0
-#: R̂ from which on samples are too few, and how many independent ones quantiles need (Vehtari et
-#: al., Bayesian Anal. 16, 667 (2021)). Ensembles that start alike drift alike, which R̂ cannot see.
-_SETTLED, _ENOUGH = 1.05, 400.0
+#: R̂ from which on samples are too few. Ensembles that start alike drift alike, which it cannot see.
+_SETTLED = 1.05
 
 
 class SampledLever:
@@ -125,7 +124,7 @@ class SampledTip:
     @property
     def enough(self) -> bool:
         """Whether the quantiles can be trusted."""
-        return self.rhat < _SETTLED and self.effective_samples >= _ENOUGH
+        return self.rhat < _SETTLED and self.effective_samples >= FEWEST_EFFECTIVE
 
     @property
     def note(self) -> str:
@@ -136,7 +135,7 @@ class SampledTip:
                 f"95 % of the tip temperatures lie between quantiles of posterior samples ({worth})"
             )
         return (
-            f"too few posterior samples: {worth}, where {_ENOUGH:.0f} and less than "
+            f"too few posterior samples: {worth}, where {FEWEST_EFFECTIVE} and less than "
             f"{_SETTLED:g} are expected; the limits are those without samples, take more"
         )
 
@@ -160,7 +159,9 @@ def sample_tip(
         density.log_probability, density.approximation, samples=samples, progress=progress
     )
     points, rows = chains.points.reshape(-1, near.origin.size), hotter_rows(at)
-    tips = np.array([near.shown(point)[TIP] for point in points])[:, rows]
+    # a walker stands still where a proposal is refused
+    different, place = np.unique(points, axis=0, return_inverse=True)
+    tips = np.array([near.shown(point)[TIP, rows] for point in different])[place]
     middle, stderr = np.transpose([posterior.of(TipTemperature(int(row))) for row in rows])
     low, high = np.percentile(tips, (2.5, 97.5), axis=0)
     hottest = tips[:, -1].reshape(chains.points.shape[:3])
@@ -182,10 +183,8 @@ def _lever_like(fit: Fit, probe: Probe, bias: Array) -> SampledLever:
 
 def _density_at(fit: Fit, probe: Probe, noise: Noise) -> tuple[PosteriorDensity, SampledLever]:
     """Return the density of a fit's parameters, approximated about a probe, and levers near it."""
-    residuals = fit.residuals()
-    lever = _lever_like(fit, probe, residuals.bias)
-    prior = PriorDensity.independent(fit.known_before) if fit.known_before else None
-    objective = Objective(residuals, probe, lever.names, fit.names, prior)
+    objective = Objective.of_fit(fit, fit.names)
+    lever = _lever_like(fit, probe, objective.residuals.bias)
     shown = partial(_shown_at, lever.shown, objective, probe.at(lever.names))
     return PosteriorDensity(objective, lever.at, shown, noise), lever
 

@@ -34,6 +34,10 @@ class Surrogate(Protocol):
         """
         ...
 
+    def shown(self, parameters: Array) -> Array:
+        """Return the values of `predict` alone."""
+        ...
+
 
 @dataclass(frozen=True)
 class LinearSurrogate:
@@ -52,7 +56,11 @@ class LinearSurrogate:
 
     def predict(self, parameters: Array) -> tuple[Array, Array]:
         """See `Surrogate`."""
-        return self.values + self.slopes @ (parameters - self.parameters), self.slopes.copy()
+        return self.shown(parameters), self.slopes.copy()
+
+    def shown(self, parameters: Array) -> Array:
+        """See `Surrogate`."""
+        return self.values + self.slopes @ (parameters - self.parameters)
 
 
 class CurveSurrogate:
@@ -113,7 +121,7 @@ class CurveSurrogate:
         return self.rows.differentiated(branch, by_parameter / self._unit, circuit, self.names)
 
     def shown(self, parameters: Array) -> Array:
-        """Return the values of `predict` alone."""
+        """See `Surrogate`."""
         return self.rows.values(self.branch_at(parameters), self.circuit(parameters))
 
     def circuit(self, parameters: Array) -> Circuit:

@@ -12,6 +12,7 @@ import xarray as xr
 from dask.system import CPU_COUNT
 
 from hotlever.cluster import local_processes
+from hotlever.estimation.chains import FEWEST_EFFECTIVE
 from hotlever.estimation.profile import profile_likelihood
 from hotlever.estimation.result import Fit
 from hotlever.estimation.sampling import BAND_QUANTILES, predictive_band, sample_posterior
@@ -20,9 +21,8 @@ from hotlever.probe.parameters import parameters_of
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
-#: Chains are called unsettled above this R̂ or below this effective sample size (Vehtari et al.,
-#: doi:10.1214/20-BA1221).
-_RHAT, _EFFECTIVE = 1.01, 400
+#: Chains are called unsettled above this R̂ (Vehtari et al., doi:10.1214/20-BA1221).
+_RHAT = 1.01
 #: A parameter is called undetermined if this share of the samples lies within the second share
 #: of its range from a bound, or if its spread is more than the third share of the prior's.
 _AT_BOUND, _NEAR, _AS_WIDE = 0.025, 0.02, 0.7
@@ -191,14 +191,14 @@ def examine(
 def _unsettled(posterior: xr.Dataset) -> list[str]:
     """Name the quantities whose chains do not agree, or say too little."""
     rhat, effective = posterior.rhat.values, posterior.effective_sample_size.values
-    names = posterior.quantity.values[(rhat > _RHAT) | (effective < _EFFECTIVE)].tolist()
+    names = posterior.quantity.values[(rhat > _RHAT) | (effective < FEWEST_EFFECTIVE)].tolist()
     if not names:
         return []
     return [
         f"the posterior of {', '.join(names).replace('_temperature', ' temperature')} is not "
         f"settled: R̂ up to {rhat.max():.3f} (expected at most {_RHAT:g}), as few as "
-        f"{effective.min():.0f} effective samples (expected at least {_EFFECTIVE}); take more "
-        "samples"
+        f"{effective.min():.0f} effective samples (expected at least {FEWEST_EFFECTIVE}); take "
+        "more samples"
     ]
 
 

@@ -288,9 +288,13 @@ class Branch:
         reading = self.read(circuit, np.array([bias_V]))
         return bias_V if np.isfinite(reading.u[0]) else reading.last_V
 
+    def bias_by_u(self, circuit: Circuit) -> PPoly:
+        """Return the bias (V) along the branch in a circuit."""
+        return piecewise(circuit.bias(self.curve.c[..., 0], self.curve.c[..., 1]), self.curve.x)
+
     def _ramp(self, circuit: Circuit, bias: Array) -> Reading:
         """Find the states that a slow ramp takes from zero upwards."""
-        curve = piecewise(circuit.bias(self.curve.c[..., 0], self.curve.c[..., 1]), self.curve.x)
+        curve = self.bias_by_u(circuit)
         u, start = np.full(bias.shape, np.nan), self._without_bias(curve)
         # what is at no bias is found to rounding errors
         reading = Reading(u, [], min(0.0, float(curve(start))), start, float(self.tip_K(start)))
