@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from hotlever.lever import Lever
-from hotlever.lever.transient import step
+from hotlever.lever.transient import simulate, step
 from hotlever.probe import MeshOptions, Probe, mesh_layout
 from problems import peer_problem, solve_with_peer, table
 
@@ -29,7 +29,7 @@ def compare(bias: float) -> tuple[object, ...]:
         for growth in (GROWTH, np.sqrt(GROWTH))
     ]
     rough, fine = (np.array([one["tip_K"], one["current_mA"]]) for one in found)
-    ours = Lever(probe).pulse(step(bias), at=TIMES, tolerance_K=0.003)
+    ours = simulate(Lever(probe), step(bias), at=TIMES, tolerance_K=0.003)
     away = np.abs(fine - np.array([ours.tip_K.values, ours.current_mA.values])).max(axis=1)
     own = np.abs(fine - rough).max(axis=1) / 3.0
     return (

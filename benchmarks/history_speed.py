@@ -19,7 +19,7 @@ import xarray as xr
 
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
-from hotlever.lever.transient import followed, pulse
+from hotlever.lever.transient import followed, pulse, simulate
 from hotlever.lever.transient.reduced import reduced_in_time
 from hotlever.lever.transient.sensitivities import with_sensitivities
 from hotlever.materials import PARAMETERS
@@ -57,7 +57,7 @@ def main() -> None:
     reduced, made_s = timed(lambda: reduced_in_time(lever, np.hstack(snapshots)), 1)
     other, reduced_s = timed(lambda: followed(reduced, ONE, UNTIL, full.time.values), 21)
     off = float(np.abs(other.tip_K - full.tip_K).max())
-    train, train_s = timed(lambda: lever.pulse(TRAIN), 1)
+    train, train_s = timed(lambda: simulate(lever, TRAIN), 1)
     _, derived_s = timed(lambda: with_sensitivities(coarse, FITTED, TIMES, NAMES), 3)
     rows = [
         ("full lever, pulse of 5 µs until 100 µs", f"{full_s:.2f}", "", f"{imbalance(full):.0e}"),

@@ -21,7 +21,7 @@ from hotlever.errors import HotleverError
 from hotlever.estimation import Measurement, fit
 from hotlever.estimation.experiment_in_time import ExperimentInTime
 from hotlever.lever.lever import COARSE, Lever
-from hotlever.lever.transient import pulse
+from hotlever.lever.transient import pulse, simulate
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, default_priors
@@ -44,12 +44,12 @@ def main() -> None:
     model = partial(ExperimentInTime.of, waveform=wave, names=list(priors), lever=lever)
     rng = np.random.default_rng(SEED)
     rows, off, sure = [], {}, {}
-    guess = lever.pulse(wave, at=TIMES).tip_K.values[-1]
+    guess = simulate(lever, wave, at=TIMES).tip_K.values[-1]
     number = 0
     while number < COUNT:
         moved = {name: prior.at(rng.normal()) for name, prior in priors.items()}
         try:
-            truth = lever.with_probe(probe.moved(moved)).pulse(wave, at=TIMES)
+            truth = simulate(lever.with_probe(probe.moved(moved)), wave, at=TIMES)
         except HotleverError:
             continue  # it melts
         number += 1

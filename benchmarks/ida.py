@@ -17,7 +17,7 @@ from sksundae import ida
 
 from hotlever import Lever, Probe
 from hotlever.lever.space import Fluxes
-from hotlever.lever.transient import Waveform, pulse, sine, step
+from hotlever.lever.transient import Waveform, pulse, simulate, sine, step
 from hotlever.lever.transient.driven import DrivenLever
 from hotlever.threads import one_blas_thread
 
@@ -97,7 +97,7 @@ def main() -> None:
         start = time.process_time()
         tip, current = by_ida(lever, waveform, times)
         middle = time.process_time()
-        ours = lever.pulse(waveform, at=times, tolerance_K=0.003)
+        ours = simulate(lever, waveform, at=times, tolerance_K=0.003)
         end = time.process_time()
         off = np.abs(ours.tip_K.values - tip).max()
         largest = np.abs(current).max()

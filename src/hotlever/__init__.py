@@ -21,6 +21,7 @@ _MODULES = {
     "hotlever.materials": ("Material",),
     "hotlever.spieser2017": ("published",),
     "hotlever.lever": ("Lever", "Branch", "sweep", "read_sweep", "write_sweep"),
+    "hotlever.lever.transient": ("simulate",),
     "hotlever.estimation": ("Measurement", "read_measurement", "FitOptions", "fit", "read_fit"),
     "hotlever.calibration": ("calibrate", "read_calibration", "PowerLaw", "read_power_law"),
     "hotlever.raman": (

@@ -108,7 +108,7 @@ def test_pulses_in_the_room_are_those_of_the_command_and_of_python(tmp_path: Pat
         job = session.jobs.by_room["pulse"] = done(words.split(), tmp_path)[0]
         await user.open("/simulate")
         labels = [one.text for one in user.client.elements.values() if isinstance(one, ui.label)]
-        lines = next(text for text in labels if "lever.pulse(" in text)
+        lines = next(text for text in labels if "simulate(lever, " in text)
         found: dict[str, Any] = {}
         exec(lines, found)
         history = found["history"]

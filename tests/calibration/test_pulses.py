@@ -15,7 +15,7 @@ from hotlever.calibration.words import calibration_text
 from hotlever.errors import InputError
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
-from hotlever.lever.transient import pulse
+from hotlever.lever.transient import pulse, simulate
 from synthetic_curves import measured_curve, measurement_of
 
 
@@ -36,7 +36,7 @@ def calibrated(measured):
 def test_the_true_lever_is_within_the_band(calibrated, lever):
     """At rest its errors are of the order of those stated; in a pulse too."""
     for height in (3.0, 6.0, 8.0):
-        true = lever.pulse(pulse(height, 5.0), 10.0, per_step=8)
+        true = simulate(lever, pulse(height, 5.0), 10.0, per_step=8)
         tip, during = true.tip_K.values, true.time.values <= 5.0
         mean = np.trapezoid(tip[during], true.time.values[during]) / 5.0
         row = calibrated.pulse.table.interp(height=height)
@@ -49,7 +49,9 @@ def test_the_true_lever_is_within_the_band(calibrated, lever):
 def test_its_own_lever_has_these_temperatures(calibrated):
     own = Lever(calibrated.probe)
     heights = calibrated.pulse.table.height_V.values[[40, 90]]
-    true = [own.pulse(pulse(h, 5.0), 10.0, per_step=8).tip_K.max().item() for h in heights.tolist()]
+    true = [
+        simulate(own, pulse(h, 5.0), 10.0, per_step=8).tip_K.max().item() for h in heights.tolist()
+    ]
     np.testing.assert_allclose(calibrated.pulse.tip_temperature(heights), true, atol=0.2)
     np.testing.assert_allclose(calibrated.pulse.height_for(true), heights, atol=0.02)
     assert np.isnan(calibrated.pulse.height_for([200.0, 2000.0])).all()
@@ -67,13 +69,13 @@ def test_sources_add_up_and_a_cold_tip_is_as_sure_as_the_base(calibrated):
 
 
 def test_more_heat_capacity_is_a_slower_lever(coarse, monkeypatch):
-    usual = coarse.pulse(pulse(8.0, 5.0 / 1.03), at=[5.0 / 1.03], tolerance_K=1e-3).tip_K.item()
+    usual = simulate(coarse, pulse(8.0, 5.0 / 1.03), at=[5.0 / 1.03], tolerance_K=1e-3).tip_K.item()
     other = Lever(coarse.probe, COARSE)
     held = other.equations.heat_density
     monkeypatch.setattr(
         other.equations, "heat_density", lambda T: tuple(1.03 * one for one in held(T))
     )
-    slower = other.pulse(pulse(8.0, 5.0), at=[5.0], tolerance_K=1e-3).tip_K.item()
+    slower = simulate(other, pulse(8.0, 5.0), at=[5.0], tolerance_K=1e-3).tip_K.item()
     assert slower == pytest.approx(usual, abs=2e-3)
 
 

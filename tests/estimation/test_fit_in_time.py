@@ -13,7 +13,7 @@ from hotlever import read_measurement
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit, read_fit
 from hotlever.estimation.experiment_in_time import ExperimentInTime
-from hotlever.lever.transient import pulse, sine, step
+from hotlever.lever.transient import pulse, simulate, sine, step
 
 TIMES = np.array([0.2, 1.0, 3.0, 6.0, 10.0, 15.0, 20.0])
 WAVE = pulse(9.0, 30.0)
@@ -32,7 +32,7 @@ def folder(tmp_path, monkeypatch):
 def test_a_scale_of_the_heat_capacity_is_found(coarse):
     names = ["heat_capacity_scale", "n_d"]
     twin = coarse.with_probe(coarse.probe.moved({"heat_capacity_scale": 1.08, "n_d": 5.9e17}))
-    shown = twin.pulse(WAVE, at=TIMES, tolerance_K=0.02)
+    shown = simulate(twin, WAVE, at=TIMES, tolerance_K=0.02)
     noise = np.random.default_rng(0).normal(1.0, 1e-5, (2, TIMES.size))
     measured = Measurement.in_time(
         TIMES, WAVE, shown.current_mA.values * noise[0], shown.reader_V.values * noise[1]
@@ -56,7 +56,7 @@ def test_the_command_fits_a_file_in_time(coarse, run):
     """Few rows: a pulse is followed by both levers for each of some parameters."""
     times = np.array([0.5, 1.0, 2.0, 3.0])
     twin = coarse.with_probe(coarse.probe.moved({"heat_capacity_scale": 1.1}))
-    current = twin.pulse(step(9.0), at=times).current_mA.values
+    current = simulate(twin, step(9.0), at=times).current_mA.values
     rows = [f"{t / 1e3:g},{i:.6f}\n" for t, i in zip(times, current, strict=True)]
     Path("data.csv").write_text(f"Time/ms,I_h (mA)\n{''.join(rows)}")
     status, out, err = run("fit", "data.csv", "--step", "9V", "-o", "fit.json", "--report", "page")

@@ -9,7 +9,7 @@ from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit, read_fit
 from hotlever.lever import Lever, probe_of, read_sweep, sweep_csv, write_sweep
 from hotlever.lever.lever import COARSE
-from hotlever.lever.transient import pulse
+from hotlever.lever.transient import pulse, simulate
 from hotlever.materials.kinds import HighDopedSilicon
 from hotlever.probe import Probe
 from hotlever.probe.parameters import usual_parameters
@@ -51,7 +51,7 @@ def test_a_sweep_says_that_its_laws_are_in_no_file(made, probe, tmp_path):
 
 
 def test_a_history_says_so_too():
-    history = MinimosLever(Probe.reference(), COARSE).pulse(pulse(2.0, 1.0), at=[1.0])
+    history = simulate(MinimosLever(Probe.reference(), COARSE), pulse(2.0, 1.0), at=[1.0])
     with pytest.raises(InputError, match=REFUSED):
         probe_of(history)
 

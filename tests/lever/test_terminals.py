@@ -9,7 +9,7 @@ from hotlever import Lever, Probe
 from hotlever.errors import InputError
 from hotlever.lever.dataset import probe_of, read_sweep, sweep_csv, write_sweep
 from hotlever.lever.lever import COARSE
-from hotlever.lever.transient import step
+from hotlever.lever.transient import simulate, step
 from hotlever.lever3d import SolidLever
 
 BIAS = [1.0, 4.0, 7.22, 8.268]
@@ -101,7 +101,7 @@ def test_a_current_supply_does_what_a_voltage_supply_of_that_current_does():
 
 def test_a_step_ends_where_the_lever_rests_and_its_heat_is_balanced():
     lever = Lever(wired(reader=HEATED), COARSE)
-    history = lever.pulse(step(5.0), at=[0.0, 10.0, 5000.0], tolerance_K=0.01)
+    history = simulate(lever, step(5.0), at=[0.0, 10.0, 5000.0], tolerance_K=0.01)
     (rest,) = lever.solve([5.0])
     assert history.tip_K.values[-1] == pytest.approx(rest.tip_K, abs=0.01)
     (start,) = lever.solve([0.0])

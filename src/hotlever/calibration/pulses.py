@@ -28,7 +28,7 @@ from hotlever.lever.equations import BASE
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.state import State
-from hotlever.lever.transient import pulse
+from hotlever.lever.transient import pulse, simulate
 from hotlever.lever.transient.periodic import settled
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
 from hotlever.materials.heat import heat_capacity
@@ -260,7 +260,7 @@ class _Pulses:
         wave, state = pulse(float(height), length), None
         if period is None:
             for longer in range(1, _LONGER + 1):
-                history = lever.pulse(wave, length * 2.0**longer, per_step=_PER_STEP)
+                history = simulate(lever, wave, length * 2.0**longer, per_step=_PER_STEP)
                 if int(history.tip_K.values.argmax()) < history.sizes["time"] - 1:
                     break
         else:

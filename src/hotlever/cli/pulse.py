@@ -59,7 +59,7 @@ def pulse_command(
     ),
 ) -> None:
     """Follow a lever in time: steps, pulses, ramps, sines, or what a file says."""
-    from hotlever.lever.transient import history_csv, with_times, write_history
+    from hotlever.lever.transient import history_csv, simulate, with_times, write_history
 
     if report is not None:
         others = {**options_given(driven), "--until": until, "--at": at}
@@ -94,7 +94,7 @@ def pulse_command(
                 states.append((t, state))
 
         try:
-            curve = lever.pulse(wave, end, times, per_step=per_step, progress=update, seen=seen)
+            curve = simulate(lever, wave, end, times, per_step=per_step, progress=update, seen=seen)
         except HistoryEndError as error:
             curve, failure = error.partial, error
     if ends:

@@ -28,6 +28,7 @@ from hotlever.estimation.result_file import (
 )
 from hotlever.estimation.scales import errors_of_scales
 from hotlever.lever.lever import Lever
+from hotlever.lever.transient import simulate
 from hotlever.materials import full_name
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
@@ -209,11 +210,11 @@ class Fit(Outcome):
     def model(self, bias: ArrayLike | None = None) -> xr.Dataset:
         """Solve the fitted lever, at the measured biases by default; see `Lever.sweep`.
 
-        Of what was measured in time: follow it at the measured times (`Lever.pulse`).
+        Of what was measured in time: follow it at the measured times (`hotlever.simulate`).
         """
         lever, measured = Lever(self.probe), self.measurement
         if bias is None and measured.waveform is not None:
-            return lever.pulse(measured.waveform, at=measured.time_us)
+            return simulate(lever, measured.waveform, at=measured.time_us)
         return lever.sweep(measured.bias_V if bias is None else bias)
 
     def residuals(self) -> Residuals:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,7 +36,6 @@ from hotlever.types import Array, Progress
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hotlever.lever.transient.waveform import Waveform
 
 #: Tip temperature (K) up to which branches are followed: where the material laws end.
 HOTTEST = 1300.0
@@ -345,27 +344,6 @@ class Lever:
         return sweep_dataset(
             self, shown, branch.states.through(balances, slopes)(u), notes, sensitivities
         )
-
-    @one_blas_thread
-    def pulse(
-        self,
-        waveform: Waveform,
-        until: float | None = None,
-        at: ArrayLike | None = None,
-        **options: Any,
-    ) -> xr.Dataset:
-        """Follow the lever in time (µs); see `hotlever.lever.transient.history.followed`.
-
-        Examples
-        --------
-        >>> from hotlever.lever.transient import pulse
-        >>> history = Lever(Probe.reference()).pulse(pulse(10.0, 5.0), at=[5.0, 100.0])
-        >>> history.tip_K.values.round().tolist()
-        [410.0, 293.0]
-        """
-        from hotlever.lever.transient.trains import followed_on_modes
-
-        return followed_on_modes(self, waveform, until, at, **options)
 
     def knee(self) -> xr.Dataset:
         """Return the knee of the I-V curve, dV_l/dI_h = 0, as a sweep of one state.

@@ -9,7 +9,7 @@ import numpy as np
 
 from hotlever import figures
 from hotlever.lever import Lever
-from hotlever.lever.transient import pulse, rise_times, spectrum, step, time_constants
+from hotlever.lever.transient import pulse, rise_times, simulate, spectrum, step, time_constants
 from hotlever.lever.transient.modes import Source
 from hotlever.lever.transient.sinusoidal import harmonics
 from hotlever.report.page import Page
@@ -72,12 +72,12 @@ def transient_page(lever: Lever, progress: Progress | None = None) -> Page:
 
 def _step(page: Page, lever: Lever, biases: list[float]) -> None:
     bias = biases[-1]
-    history = lever.pulse(step(bias), per_step=_PER_STEP)
+    history = simulate(lever, step(bias), per_step=_PER_STEP)
     page.figure("step", figures.history_overview(history), f"The bias is switched to {bias:g} V.")
     times = [1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0]
     rows = []
     for one in biases:
-        tip = lever.pulse(step(one), at=times).tip_K.values
+        tip = simulate(lever, step(one), at=times).tip_K.values
         rows.append([f"{one:g}", *(f"{value:.0f}" for value in tip)])
     heads = ["bias (V)", *(f"{time:g} µs" for time in times)]
     page.table(heads, rows, "Tip temperature (K) so long after the bias was switched on.")
@@ -87,7 +87,7 @@ def _step(page: Page, lever: Lever, biases: list[float]) -> None:
 
 def _train(page: Page, lever: Lever, biases: list[float]) -> None:
     wave = pulse(biases[-1], _LENGTH, _PERIOD, _COUNT)
-    history = lever.pulse(wave, per_step=_PER_STEP)
+    history = simulate(lever, wave, per_step=_PER_STEP)
     page.figure("train", figures.history_overview(history), f"{sentence(wave.text)}")
     kept = history.stored_nJ + history.air_stored_nJ + history.lost_nJ
     off = float(np.abs(history.supplied_nJ - kept).max() / history.supplied_nJ.max())

@@ -8,7 +8,7 @@ import pytest
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
-from hotlever.lever.transient import Waveform, pulse, ramp, sine, step, switched_off
+from hotlever.lever.transient import Waveform, pulse, ramp, simulate, sine, step, switched_off
 from hotlever.materials import PARAMETERS
 from hotlever.materials.silicon import MELTING_POINT
 from hotlever.probe import Probe
@@ -56,7 +56,7 @@ def test_a_history_ends_or_says_when_it_stopped(seed):
     probe, (waveform, until) = random_probe(rng), random_waveform(rng)
     said = ""
     try:
-        data = Lever(probe, COARSE).pulse(waveform, until)
+        data = simulate(Lever(probe, COARSE), waveform, until)
         reached = until
     except HistoryEndError as error:
         data, reached, said = error.partial, error.time_reached, str(error)

@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 from hotlever.air.operator import PanelledAir
 from hotlever.air.surface import PanelOptions
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.transient import pulse, sine, step
+from hotlever.lever.transient import pulse, simulate, sine, step
 from hotlever.lever.transient.history import followed
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.periodic import settled
@@ -110,7 +110,7 @@ def test_a_small_step_is_its_inverse_laplace_transform(state, all_panels, in_air
     answers = all_panels.tip_by_bias(contour, in_air.circuit) / contour
     exact = base / many * np.sum(np.real(np.exp(contour * time) * answers * weights))
     up, down = (
-        in_air.pulse(step(BIAS + way * by), at=[time], start=state, tolerance_K=1e-3)
+        simulate(in_air, step(BIAS + way * by), at=[time], start=state, tolerance_K=1e-3)
         for way in (1.0, -1.0)
     )
     assert (up.tip_K - down.tip_K).item() / (2.0 * by) == pytest.approx(exact, rel=5e-4)
@@ -119,7 +119,7 @@ def test_a_small_step_is_its_inverse_laplace_transform(state, all_panels, in_air
 def test_at_rest_the_air_takes_up_nothing(state, in_air):
     air = in_air.equations.heat_in_air
     assert np.abs(air.taken_up(0.0)).max() == 0.0
-    data = in_air.pulse(sine(BIAS, 0.0, 1e4), 50.0, tolerance_K=1e-4)
+    data = simulate(in_air, sine(BIAS, 0.0, 1e4), 50.0, tolerance_K=1e-4)
     assert np.abs(data.tip_K - state.tip_K).max() < 1e-8
     np.testing.assert_allclose(data.air_stored_nJ, data.air_stored_nJ[0], rtol=1e-9)
 
@@ -127,7 +127,7 @@ def test_at_rest_the_air_takes_up_nothing(state, in_air):
 def test_a_pulse_in_air_has_to_heat_the_air_too(in_air, answering_at_once):
     """By the half space of a plate, 2e √(4t/π) a kelvin and area; more, by its edges."""
     wave = pulse(8.0, 10.0)
-    data, at_once = (one.pulse(wave, at=[10.0, 150.0]) for one in (in_air, answering_at_once))
+    data, at_once = (simulate(one, wave, at=[10.0, 150.0]) for one in (in_air, answering_at_once))
     less = 1.0 - (data.tip_K - 293.0) / (at_once.tip_K - 293.0)
     assert less.values[0] == pytest.approx(0.022, abs=0.004)
     # what was taken up comes back
@@ -143,7 +143,7 @@ def test_a_pulse_in_air_has_to_heat_the_air_too(in_air, answering_at_once):
 def test_a_gas_that_conducts_better_takes_up_more(in_air):
     thin = in_air.with_probe(in_air.probe.with_(gas_conductivity=4.0))
     stored = [
-        float(one.pulse(pulse(6.0, 5.0), at=[5.0]).air_stored_nJ[0]) for one in (in_air, thin)
+        float(simulate(one, pulse(6.0, 5.0), at=[5.0]).air_stored_nJ[0]) for one in (in_air, thin)
     ]
     assert 1.5 < stored[1] / stored[0] < 3.0
 
@@ -152,13 +152,13 @@ def test_a_gas_that_conducts_better_takes_up_more(in_air):
 def test_trains_on_modes_and_settled_periods_know_the_air(in_air):
     wave = pulse(6.0, 2.0, 5.0, 20)
     at = [2.0, 5.0, 10.0]
-    modes, full = in_air.pulse(wave, at=[*at, 97.0, 100.0]), followed(in_air, wave, at=at)
+    modes, full = simulate(in_air, wave, at=[*at, 97.0, 100.0]), followed(in_air, wave, at=at)
     assert "modes" in modes.notes
     np.testing.assert_allclose(modes.tip_K[:3], full.tip_K, atol=0.05)
     np.testing.assert_allclose(modes.air_stored_nJ[:3], full.air_stored_nJ, rtol=1e-2)
     period, begin = settled(in_air, pulse(6.0, 2.0), 5.0)
     # another settled period follows; the air takes milliseconds to get as warm as that
-    again = in_air.pulse(pulse(6.0, 2.0), 5.0, start=begin)
+    again = simulate(in_air, pulse(6.0, 2.0), 5.0, start=begin)
     assert float(again.air_stored_nJ[-1]) == pytest.approx(float(again.air_stored_nJ[0]), rel=1e-2)
     assert float(period.tip_K.max()) > float(modes.tip_K[3]) + 0.5
 

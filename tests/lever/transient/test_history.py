@@ -10,7 +10,7 @@ from hotlever import Lever, Probe
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.lever import probe_of
 from hotlever.lever.lever import COARSE
-from hotlever.lever.transient import history_csv, pulse, ramp, sine, step, write_history
+from hotlever.lever.transient import history_csv, pulse, ramp, simulate, sine, step, write_history
 from hotlever.lever.transient.history import TIME_COLUMNS
 from of_materials import metal_film_probe, metal_film_sections
 
@@ -24,7 +24,7 @@ def imbalance(data: xr.Dataset) -> float:
 
 @pytest.fixture(scope="module")
 def golden(lever):
-    return lever.pulse(step(4.0), at=[0.1, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0])
+    return simulate(lever, step(4.0), at=[0.1, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0])
 
 
 def test_a_step_is_that_of_an_independent_trial(golden):
@@ -37,14 +37,14 @@ def test_a_step_is_that_of_an_independent_trial(golden):
 
 def test_a_step_to_the_knee_takes_long(lever):
     """The same trial, to three digits; and IDA on our mesh (benchmarks/ida.py), to five."""
-    found = lever.pulse(step(8.268), at=[5.0, 10.0, 100.0, 200.0], tolerance_K=0.01)
+    found = simulate(lever, step(8.268), at=[5.0, 10.0, 100.0, 200.0], tolerance_K=0.01)
     np.testing.assert_allclose(found.tip_K, [365.0, 397.0, 714.0, 864.0], rtol=4e-3)
     np.testing.assert_allclose(found.tip_K, [364.735, 397.552, 715.883, 865.889], atol=0.05)
 
 
 @pytest.mark.parametrize("bias", [4.0, 8.268])
 def test_a_step_ends_in_the_state_at_rest(coarse, bias):
-    found = coarse.pulse(step(bias), at=[20000.0], tolerance_K=1e-3)
+    found = simulate(coarse, step(bias), at=[20000.0], tolerance_K=1e-3)
     (rest,) = coarse.solve([bias])
     assert found.tip_K.item() - 293.0 == pytest.approx(rest.tip_K - 293.0, rel=1e-6)
     assert found.current_mA.item() == pytest.approx(rest.current_mA, rel=1e-6)
@@ -64,7 +64,7 @@ def test_a_step_ends_in_the_state_at_rest(coarse, bias):
     ids=lambda waveform: waveform.text,
 )
 def test_heat_that_is_supplied_is_stored_or_lost(coarse, waveform):
-    data = coarse.pulse(waveform, 100.0)
+    data = simulate(coarse, waveform, 100.0)
     assert imbalance(data) < 1e-6
     # what is stored is what the temperatures say, and no other time is reported twice
     assert float(data.stored_nJ.min()) > -1e-9
@@ -75,7 +75,7 @@ def test_heat_that_is_supplied_is_stored_or_lost(coarse, waveform):
 @pytest.mark.parametrize("resistance", [0.0, 100.0, 1e5])
 def test_the_bias_drives_the_current_through_any_resistor(coarse, resistance):
     lever = coarse.with_probe(coarse.probe.with_(series_resistance_ohm=resistance))
-    data = lever.pulse(pulse(1.5, 5.0), 20.0)
+    data = simulate(lever, pulse(1.5, 5.0), 20.0)
     bias = lever.circuit.bias(data.lever_V, data.current_mA)
     np.testing.assert_allclose(bias, data.bias_V, atol=1e-5)
     assert imbalance(data) < 1e-6
@@ -94,7 +94,7 @@ def other(request, in_air):
 
 def test_every_lever_can_be_followed(other):
     # the air far away takes a tenth of a second to get warm
-    data = other.pulse(step(3.0), 3000.0 if other.medium == "vacuum" else 3e5)
+    data = simulate(other, step(3.0), 3000.0 if other.medium == "vacuum" else 3e5)
     (rest,) = other.solve([3.0])
     assert data.tip_K.values[-1] == pytest.approx(rest.tip_K, abs=1e-3)
     assert imbalance(data) < 1e-6
@@ -105,33 +105,33 @@ def test_every_lever_can_be_followed(other):
 
 def test_air_slows_nothing_down_but_cools(coarse, in_air):
     times = [1.0, 100.0]
-    vacuum, air = (one.pulse(step(6.0), at=times).tip_K.values for one in (coarse, in_air))
+    vacuum, air = (simulate(one, step(6.0), at=times).tip_K.values for one in (coarse, in_air))
     assert air[0] < vacuum[0] < air[0] + 2.0
     assert vacuum[1] > air[1] + 5.0
 
 
 def test_between_the_steps_it_is_as_accurate(coarse):
     times = np.geomspace(0.01, 300.0, 40)
-    rough, fine = (coarse.pulse(step(6.0), at=times, tolerance_K=tol) for tol in (0.1, 1e-3))
+    rough, fine = (simulate(coarse, step(6.0), at=times, tolerance_K=tol) for tol in (0.1, 1e-3))
     np.testing.assert_allclose(rough.tip_K, fine.tip_K, atol=0.1)
     np.testing.assert_allclose(rough.current_mA, fine.current_mA, rtol=1e-4)
     np.testing.assert_allclose(rough.stored_nJ, fine.stored_nJ, rtol=1e-3, atol=1e-3)
 
 
 def test_without_power_it_stays_as_it_is(coarse):
-    data = coarse.pulse(step(0.0))
+    data = simulate(coarse, step(0.0))
     np.testing.assert_allclose(data.tip_K, 293.0, atol=1e-9)
 
 
 def test_the_other_polarity_heats_alike(coarse):
-    there, back = (coarse.pulse(step(bias), at=[10.0]) for bias in (5.0, -5.0))
+    there, back = (simulate(coarse, step(bias), at=[10.0]) for bias in (5.0, -5.0))
     assert back.tip_K.item() == pytest.approx(there.tip_K.item(), abs=1e-6)
     assert back.current_mA.item() == pytest.approx(-there.current_mA.item(), rel=1e-9)
 
 
 def test_a_slow_sine_is_a_row_of_states_at_rest(coarse):
     times = np.array([25.0, 50.0, 75.0]) * 1e3
-    data = coarse.pulse(sine(3.0, 1.0, 10.0), at=times)
+    data = simulate(coarse, sine(3.0, 1.0, 10.0), at=times)
     rest = coarse.sweep([4.0, 3.0, 2.0])
     np.testing.assert_allclose(data.tip_K, rest.tip_K, atol=0.05)
 
@@ -139,10 +139,10 @@ def test_a_slow_sine_is_a_row_of_states_at_rest(coarse):
 def test_a_lever_without_resistor_runs_away_beyond_its_fold(coarse):
     lever = coarse.with_probe(coarse.probe.with_(series_resistance_ohm=0.0))
     fold = lever.knee().lever_V.item()
-    below = lever.pulse(step(0.99 * fold), 3000.0)
+    below = simulate(lever, step(0.99 * fold), 3000.0)
     assert float(below.max_K.max()) < 950.0
     with pytest.raises(HistoryEndError, match="silicon melts after") as ended:
-        lever.pulse(step(1.03 * fold), 3000.0)
+        simulate(lever, step(1.03 * fold), 3000.0)
     data = ended.value.partial
     assert data.max_K.values[-1] == pytest.approx(1687.0, abs=0.1)
     assert data.time.values[-1] == ended.value.time_reached
@@ -151,12 +151,12 @@ def test_a_lever_without_resistor_runs_away_beyond_its_fold(coarse):
 
 
 def test_times_asked_for_are_those_returned(coarse):
-    data = coarse.pulse(pulse(8.0, 5.0), at=[7.0, 0.0, 5.0])
+    data = simulate(coarse, pulse(8.0, 5.0), at=[7.0, 0.0, 5.0])
     assert data.time.values.tolist() == [0.0, 5.0, 7.0]
     # at the end of the pulse it is still on
     assert data.bias_V.values.tolist() == [8.0, 8.0, 0.0]
     seen = []
-    coarse.pulse(pulse(8.0, 5.0), at=[5.0, 7.0], seen=lambda t, state: seen.append((t, state)))
+    simulate(coarse, pulse(8.0, 5.0), at=[5.0, 7.0], seen=lambda t, state: seen.append((t, state)))
     assert [t for t, _ in seen] == [5.0, 7.0]
     for row, (_, state) in enumerate(seen, start=1):
         assert state.tip_K == pytest.approx(float(data.tip_K[row]), abs=1e-9)
@@ -178,7 +178,7 @@ def test_times_asked_for_are_those_returned(coarse):
 )
 def test_times_that_make_no_sense_are_refused(coarse, wrong):
     with pytest.raises(InputError, match="found"):
-        coarse.pulse(step(1.0), **wrong)
+        simulate(coarse, step(1.0), **wrong)
 
 
 def test_a_history_is_written_and_read_again(golden, tmp_path):
@@ -197,7 +197,7 @@ def test_a_history_is_written_and_read_again(golden, tmp_path):
 
 def test_a_lever_of_a_metal_film_on_a_dielectric_has_the_heat_of_both():
     lever = Lever(metal_film_probe(), COARSE)
-    found = lever.pulse(step(0.5), at=[1.0, 1e5], tolerance_K=1e-3)
+    found = simulate(lever, step(0.5), at=[1.0, 1e5], tolerance_K=1e-3)
     # over some thousand time constants
     assert imbalance(found) < 1e-5
     (rest,) = lever.solve([0.5])
@@ -213,4 +213,4 @@ def test_a_material_without_a_heat_capacity_cannot_be_followed():
     materials = {**metal_film_sections()["materials"], "film": film}
     lever = Lever(metal_film_probe(materials=materials), COARSE)
     with pytest.raises(InputError, match="a metal-film without heat_capacity"):
-        lever.pulse(step(1.0), at=[1.0])
+        simulate(lever, step(1.0), at=[1.0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.lever.transient import pulse, rise_times, step, time_constants, with_times
+from hotlever.lever.transient import pulse, rise_times, simulate, step, time_constants, with_times
 from hotlever.lever.transient.driven import DrivenLever
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.runge_kutta import Stepper
@@ -71,8 +71,8 @@ def test_rise_times_are_read_off_histories(coarse, rises):
 
 def test_a_history_says_how_fast_it_is(coarse, rises):
     states = []
-    history = coarse.pulse(
-        pulse(4.0, 300.0), 600.0, per_step=8, seen=lambda t, state: states.append(state)
+    history = simulate(
+        coarse, pulse(4.0, 300.0), 600.0, per_step=8, seen=lambda t, state: states.append(state)
     )
     found = with_times(history, states[0], states[-1]).attrs
     alone = rises.sel(bias=4.0)
@@ -81,7 +81,7 @@ def test_a_history_says_how_fast_it_is(coarse, rises):
     # cold at both ends, but without a bias nothing feeds back
     constants = [found[f"time_constants_us_at_{end}"] for end in ("start", "end")]
     assert constants[0][0] > constants[1][0] == pytest.approx(slowest(coarse, 1e-3), rel=1e-3)
-    flat = with_times(coarse.pulse(step(0.0)), states[0], states[-1]).attrs
+    flat = with_times(simulate(coarse, step(0.0)), states[0], states[-1]).attrs
     assert np.isnan(flat["heating_us"])
     few = with_times(history, states[0], states[-1], resolved=False).attrs
     assert "heating_us" not in few

@@ -7,7 +7,7 @@ import pytest
 
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.lever.dataset import OBSERVABLES
-from hotlever.lever.transient import pulse, step, switched_off
+from hotlever.lever.transient import pulse, simulate, step, switched_off
 from hotlever.lever.transient.history import follow
 from hotlever.lever.transient.sensitivities import with_sensitivities
 from hotlever.materials import PARAMETERS
@@ -39,7 +39,7 @@ def test_they_have_taylor_order_two(coarse, in_air, medium, names):
     assert [step.end for _, step in follow(lever, wave, 2.0, 0.1, stops=stops)] == stops
     base = with_sensitivities(lever, wave, stops, names)
     assert set(base.bias_V.values.tolist()) == {10.0, 0.0}
-    plain = lever.pulse(wave, at=stops, tolerance_K=0.05)
+    plain = simulate(lever, wave, at=stops, tolerance_K=0.05)
     np.testing.assert_allclose(base.tip_K, plain.tip_K, atol=0.1)
     slopes, value = base.sensitivity.values, lever.probe.at(names)
     unit = np.where(value == 0.0, 1.0, value)

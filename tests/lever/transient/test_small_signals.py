@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.lever.transient import sine
+from hotlever.lever.transient import simulate, sine
 from hotlever.lever.transient.small_signals import SPECTRUM_COLUMNS, spectrum
 
 
@@ -58,7 +58,7 @@ def test_a_history_under_a_weak_sine_answers_alike(coarse):
     frequency, amplitude = 10e3, 0.02
     data = spectrum(state, [frequency])
     times = np.linspace(400.0, 500.0, 41)[1:]  # the fifth period
-    history = coarse.pulse(sine(4.0, amplitude, frequency), at=times, tolerance_K=1e-3)
+    history = simulate(coarse, sine(4.0, amplitude, frequency), at=times, tolerance_K=1e-3)
     turning = np.exp(-2e-6j * np.pi * frequency * times)
     found = 2j * np.mean((history.tip_K.values - state.tip_K) * turning) / amplitude
     assert abs(found) == pytest.approx(data.tip_per_bias_K_per_V.item(), rel=2e-3)

@@ -8,7 +8,7 @@ import pytest
 from hotlever.errors import HistoryEndError
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.transient import followed, pulse, step
+from hotlever.lever.transient import followed, pulse, simulate, step
 from hotlever.lever.transient.alike import Train
 from hotlever.lever.transient.reduced import reduced_in_time
 
@@ -23,7 +23,7 @@ def states():
 
 @pytest.fixture(scope="module")
 def train(coarse, states):
-    return coarse.pulse(TRAIN, at=TIMES, seen=lambda t, state: states.append((t, state)))
+    return simulate(coarse, TRAIN, at=TIMES, seen=lambda t, state: states.append((t, state)))
 
 
 @pytest.mark.slow
@@ -62,8 +62,8 @@ def test_periods_that_are_alike_are_copied(coarse):
 
 def test_what_melts_or_is_short_is_followed_in_full(coarse):
     with pytest.raises(HistoryEndError, match=r"melts after 1\.2"):
-        coarse.pulse(pulse(40.0, 4.0, 20.0, 30))
-    assert not coarse.pulse(pulse(9.0, 4.0, 20.0, 30), at=[4.0]).attrs["notes"]
+        simulate(coarse, pulse(40.0, 4.0, 20.0, 30))
+    assert not simulate(coarse, pulse(9.0, 4.0, 20.0, 30), at=[4.0]).attrs["notes"]
 
 
 def test_laws_that_are_looked_up_are_the_laws(coarse):

@@ -114,11 +114,11 @@ class Pulses(WritingRoom):
         until = f", until={values['until']:.12g}" if "until" in values else ""
         return "\n".join(
             [
-                "from hotlever import Lever, Probe",
+                "from hotlever import Lever, Probe, simulate",
                 f"from hotlever.lever.transient import {form}",
                 "",
                 f"lever = Lever({in_python(self._lever)})",
-                f"history = lever.pulse({form}({', '.join(wave)}){until})",
+                f"history = simulate(lever, {form}({', '.join(wave)}){until})",
             ]
         )
 

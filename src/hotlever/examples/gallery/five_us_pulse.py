@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from hotlever import Lever, Probe, save_figure
+from hotlever import Lever, Probe, save_figure, simulate
 from hotlever.figures.style import figure
 from hotlever.lever.transient import pulse
 
 lever = Lever(Probe.reference())
 heights = np.array([3.0, 6.0, 9.0, 12.0])
-peak = [lever.pulse(pulse(V, 5.0), at=[5.0]).tip_K.item() for V in heights]
+peak = [simulate(lever, pulse(V, 5.0), at=[5.0]).tip_K.item() for V in heights]
 rest = lever.sweep(np.linspace(0.5, 10.0, 100))
 print(f"{heights[-1]:g} V for 5 µs heat the tip to {peak[-1]:.0f} K.")
 

@@ -3,6 +3,7 @@
 from hotlever.lever.transient.history import followed, history_csv, write_history
 from hotlever.lever.transient.modes import rise_times, time_constants, with_times
 from hotlever.lever.transient.small_signals import spectrum
+from hotlever.lever.transient.trains import simulate
 from hotlever.lever.transient.waveform import (
     Waveform,
     pulse,
@@ -21,6 +22,7 @@ __all__ = [
     "ramp",
     "read_waveform",
     "rise_times",
+    "simulate",
     "sine",
     "spectrum",
     "step",

@@ -27,6 +27,7 @@ from hotlever.lever.equations import LeverEquations
 from hotlever.lever.space import LEVER
 from hotlever.lever.state import State
 from hotlever.lever.transient.driven import InCircuit
+from hotlever.lever.transient.history import followed
 from hotlever.lever.transient.waveform import Waveform, step, switched_off
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
@@ -239,7 +240,7 @@ def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
         rise = state.tip_K - base
 
         def shares(waveform: Waveform, until: float = until, rise: float = rise) -> Any:
-            history = lever.pulse(waveform, until, per_step=_PER_STEP)
+            history = followed(lever, waveform, until, per_step=_PER_STEP)
             return history.time.values, (history.tip_K.values - base) / rise
 
         heating, _ = _swing(*shares(step(state.bias_V)))

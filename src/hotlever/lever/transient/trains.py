@@ -20,6 +20,7 @@ from hotlever.lever.transient.alike import Train
 from hotlever.lever.transient.history import Seen, checked_times, followed
 from hotlever.lever.transient.reduced import on_all_nodes, reduced_in_time
 from hotlever.lever.transient.waveform import Waveform
+from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
 if TYPE_CHECKING:
@@ -34,7 +35,8 @@ _PER_STEP = 2
 _LARGEST_RATIO = 0.97
 
 
-def followed_on_modes(
+@one_blas_thread
+def simulate(
     lever: Lever,
     waveform: Waveform,
     until: float | None = None,
@@ -44,10 +46,18 @@ def followed_on_modes(
     seen: Seen | None = None,
     **options: Any,
 ) -> xr.Dataset:
-    """Follow a lever in time, on modes if the wave form is repeated often and they suffice.
+    """Simulate a lever in time, on modes if the wave form is repeated often and they suffice.
 
     Parameters and errors are those of `hotlever.lever.transient.history.followed`; ``notes`` of the
     dataset say whether modes were used, and how far from the full lever they are.
+
+    Examples
+    --------
+    >>> from hotlever import Lever, Probe
+    >>> from hotlever.lever.transient import pulse
+    >>> history = simulate(Lever(Probe.reference()), pulse(10.0, 5.0), at=[5.0, 100.0])
+    >>> history.tip_K.values.round().tolist()
+    [410.0, 293.0]
     """
     given = {"tolerance_K": tolerance_K, **options}
     end, period = waveform.usual_end if until is None else until, waveform.period
