@@ -17,7 +17,7 @@ from hotlever.calibration.inference import _before
 from hotlever.calibration.knee_scaling import curve_of_law, curve_of_model
 from hotlever.calibration.power_law import EQ12, read_power_law
 from hotlever.calibration.procedure import calibrate
-from hotlever.calibration.words import calibration_text
+from hotlever.calibration.summary import calibration_text
 from hotlever.errors import InputError
 from hotlever.estimation import fit, read_fit
 from hotlever.lever import Lever

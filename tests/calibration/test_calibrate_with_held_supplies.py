@@ -11,7 +11,7 @@ from hotlever import Lever, Probe
 from hotlever.calibration import Calibration, calibrate, read_calibration, read_power_law
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.pulses import PulseTiming
-from hotlever.calibration.words import calibration_text
+from hotlever.calibration.summary import calibration_text
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement
 from hotlever.lever.lever import COARSE

@@ -15,7 +15,7 @@ import pytest
 from hotlever import figures
 from hotlever.app import showing
 from hotlever.calibration.calibration import Calibration, read_calibration
-from hotlever.calibration.words import calibration_text
+from hotlever.calibration.summary import calibration_text
 from hotlever.cli import main
 from hotlever.errors import InputError
 from hotlever.files import json_text

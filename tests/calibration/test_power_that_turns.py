@@ -13,7 +13,7 @@ from hotlever.app import showing
 from hotlever.calibration.calibration import Calibration, read_calibration
 from hotlever.calibration.knee import IVCurve
 from hotlever.calibration.procedure import calibrate
-from hotlever.calibration.words import calibration_text
+from hotlever.calibration.summary import calibration_text
 from hotlever.errors import InputError
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE

@@ -11,7 +11,7 @@ from hotlever.calibration import calibrate, read_calibration
 from hotlever.calibration import pulses as module
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.pulses import PULSE_COLUMNS, PulseTiming
-from hotlever.calibration.words import calibration_text
+from hotlever.calibration.summary import calibration_text
 from hotlever.errors import InputError
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE

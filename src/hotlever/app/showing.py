@@ -21,7 +21,7 @@ from hotlever import figures
 from hotlever.app.child import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.calibration import STATED, TABLE_COLUMNS
-from hotlever.calibration.words import calibration_text
+from hotlever.calibration.summary import calibration_text
 from hotlever.cli.options import load_probe
 from hotlever.cli.waveforms import pulses
 from hotlever.datasets import QUANTITIES

@@ -24,8 +24,7 @@ from hotlever.calibration.knee_scaling import (
     scaled_by_knee,
 )
 from hotlever.calibration.plausibility import check_plausible, misfit, what_data_lack
-from hotlever.calibration.power_law import PowerLaw
-from hotlever.calibration.power_law_fit import law_of_model, power_turns
+from hotlever.calibration.power_law import PowerLaw, law_of_model, power_turns
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit

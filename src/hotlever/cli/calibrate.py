@@ -56,7 +56,7 @@ def calibrate_command(
     """Find the tip temperature of a lever from its I-V curve, with its error."""
     from hotlever.calibration.power_law import read_power_law
     from hotlever.calibration.procedure import calibrate
-    from hotlever.calibration.words import calibration_text
+    from hotlever.calibration.summary import calibration_text
     from hotlever.estimation import read_fit, read_measurement
     from hotlever.estimation.options import UNKNOWN_MEDIUM
     from hotlever.measurement import parse_columns

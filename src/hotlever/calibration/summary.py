@@ -1,4 +1,4 @@
-"""A calibration in words."""
+"""The summary of a calibration, as lines of text."""
 
 from __future__ import annotations
 
