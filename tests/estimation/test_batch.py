@@ -166,8 +166,8 @@ time.sleep(600)
 def test_a_lost_cluster_is_said_and_what_was_done_is_written(
     levers, tmp_path, capfd, monkeypatch, lost, message
 ):
-    monkeypatch.setattr("hotlever.cluster._WITHOUT_WORKERS_S", 0.5)
-    monkeypatch.setattr("hotlever.cluster._LOOK_S", 0.5)
+    monkeypatch.setattr("hotlever.processes._WITHOUT_WORKERS_S", 0.5)
+    monkeypatch.setattr("hotlever.processes._LOOK_S", 0.5)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen([sys.executable, "-c", SCHEDULER], **pipes) as process:
         try:

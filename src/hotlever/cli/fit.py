@@ -206,14 +206,13 @@ def _show_curve(prediction: Prediction) -> None:
 def _fit_several(
     data: list[Path], probe: Probe, options: FitOptions, where: dict[str, Any], to: Destination
 ) -> None:
-    from hotlever.cluster import is_open
     from hotlever.estimation.batch import fit_many
     from hotlever.estimation.levers import compare_levers, levers_csv
     from hotlever.estimation.words import levers_text
 
     outputs, output, report = to
     scheduler = where["scheduler"]
-    if scheduler is not None and is_open(scheduler):
+    if scheduler is not None and _is_open(scheduler):
         note(
             f"--scheduler {scheduler}: without TLS whoever reaches this address can have its "
             "workers run any code"
@@ -264,3 +263,16 @@ def _fit_several(
     for said in (*map(str, batch.failures.values()), *batch.undescribed.values()):
         fail(said)
     raise typer.Exit(batch.exit_status)
+
+
+def _is_open(address: str) -> bool:
+    """Whether anybody on the network who finds a scheduler may use it, and its workers.
+
+    Examples
+    --------
+    >>> [_is_open(one) for one in ("tcp://node7:8786", "tls://node7:8786", "tcp://127.0.0.1:8786")]
+    [True, False, False]
+    """
+    scheme, _, rest = address.rpartition("://")
+    host = rest.rpartition(":")[0].strip("[]")
+    return scheme != "tls" and not (host in ("localhost", "::1") or host.startswith("127."))

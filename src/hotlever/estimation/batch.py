@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dask.system import CPU_COUNT
-
 from hotlever import __version__
-from hotlever.cluster import guarded, local_client, remote_client, run_all
 from hotlever.errors import HotleverError, InputError
 from hotlever.estimation.estimator import fit
 from hotlever.estimation.options import FitOptions
@@ -22,6 +20,7 @@ from hotlever.lever.lever import Lever
 from hotlever.lever.reduction import cached_reduction, can_be_reduced
 from hotlever.measurement import Measurement, read_measurement, with_measured_circuit
 from hotlever.probe import Probe
+from hotlever.processes import PROCESSORS, Workers, guarded, local_workers, run_all
 from hotlever.types import Progress
 
 
@@ -145,13 +144,12 @@ def fit_many(
             batch.reused += 1
     tell()
     if waiting:
-        local = min(processes or CPU_COUNT, len(waiting))
-        with local_client(local) if scheduler is None else remote_client(scheduler) as client:
+        with _workers(scheduler, min(processes or PROCESSORS, len(waiting))) as workers:
             for name, reason in _not_reduced(probe, options, waiting, reducing).items():
                 batch.fail(waiting.pop(name).path, reason)
             names = list(waiting)
             tasks = ((measurement, probe, options) for measurement in waiting.values())
-            for number, result in run_all(client, fit, tasks):
+            for number, result in run_all(workers, fit, tasks):
                 name, measurement = names[number], waiting[names[number]]
                 try:
                     if isinstance(result, HotleverError):
@@ -164,6 +162,19 @@ def fit_many(
                 tell()
     batch.fits = {name: batch.fits[name] for name in files if name in batch.fits}
     return batch
+
+
+def _workers(scheduler: str | None, processes: int) -> AbstractContextManager[Workers]:
+    if scheduler is None:
+        return local_workers(processes)
+    try:
+        from hotlever.cluster import cluster_workers
+    except ImportError:
+        raise InputError(
+            f"--scheduler {scheduler}: Dask is not installed, expected pip install "
+            "'hotlever[cluster]'"
+        ) from None
+    return cluster_workers(scheduler)
 
 
 def lever_names(paths: Sequence[str | os.PathLike[str]]) -> dict[str, Path]:

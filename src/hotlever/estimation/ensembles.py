@@ -10,9 +10,9 @@ from typing import Any
 import emcee
 import numpy as np
 
-from hotlever.cluster import local_processes
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.chains import effective_sample_size, split_rhat
+from hotlever.processes import local_processes
 from hotlever.types import Array, Progress
 
 # The logarithm of a density, up to a constant; −∞ where it vanishes.

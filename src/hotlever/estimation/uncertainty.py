@@ -9,15 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from dask.system import CPU_COUNT
 
-from hotlever.cluster import local_processes
 from hotlever.estimation.chains import FEWEST_EFFECTIVE
 from hotlever.estimation.profile import profile_likelihood
 from hotlever.estimation.result import Fit
 from hotlever.estimation.sampling import BAND_QUANTILES, predictive_band, sample_posterior
 from hotlever.files import json_text
 from hotlever.probe.parameters import parameters_of
+from hotlever.processes import PROCESSORS, local_processes
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
@@ -174,7 +173,7 @@ def examine(
     ComputationError
         If no start for sampling is found, a worker process dies, or the lever cannot be solved.
     """
-    processes = processes or CPU_COUNT
+    processes = processes or PROCESSORS
     curves, posterior, band = {}, None, None
     if profiles:
         tasks = [(fit, name) for name in fit.names]

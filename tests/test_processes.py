@@ -1,0 +1,200 @@
+"""Local workers: nobody else can connect, nothing is lost, nothing left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+
+from hotlever.errors import ComputationError, InputError
+from hotlever.processes import local_processes, local_workers, run_all
+
+# --- tasks --------------------------------------------------------------------------------------
+
+
+def square(number: int) -> int:
+    return number**2
+
+
+def slow(seconds: float) -> float:
+    time.sleep(seconds)
+    return seconds
+
+
+def die_once(mark: str) -> str:
+    if not Path(mark).exists():
+        Path(mark).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "done"
+
+
+def die(number: int) -> int:
+    if number == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def stop_once(mark: str) -> str:
+    if not Path(mark).exists():
+        Path(mark).touch()
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return "done"
+
+
+def makes_what_cannot_be_sent() -> object:
+    return lambda: 1
+
+
+class CountedArray:
+    """An array that counts how often it is sent."""
+
+    def __init__(self, values: np.ndarray) -> None:
+        self.values, self.sent = values, 0
+
+    def sum(self) -> float:
+        return self.values.sum()
+
+    def __reduce__(self):
+        self.sent += 1
+        return CountedArray, (self.values,)
+
+
+def fail(kind: str) -> None:
+    raise {"input": InputError, "other": ZeroDivisionError}[kind]("the reason")
+
+
+@pytest.fixture(scope="module")
+def workers():
+    with local_workers(2) as made:
+        yield made
+
+
+def children() -> list[psutil.Process]:
+    processes = psutil.Process().children(recursive=True)
+    return [process for process in processes if "spawn_main" in " ".join(process.cmdline())]
+
+
+# --- tests --------------------------------------------------------------------------------------
+
+
+def test_every_task_is_done_once_and_known_by_its_number(workers):
+    results = dict(run_all(workers, square, ((number,) for number in range(20))))
+    assert results == {number: number**2 for number in range(20)}
+    assert list(run_all(workers, square, [])) == []
+
+
+def test_errors_come_back_as_errors(workers):
+    results = dict(run_all(workers, fail, [("input",), ("other",)]))
+    assert isinstance(results[0], InputError)
+    assert str(results[0]) == "the reason"
+    assert isinstance(results[1], ComputationError)
+    assert str(results[1]) == "ZeroDivisionError: the reason"
+
+
+def test_a_dead_worker_s_task_is_done_again(workers, tmp_path):
+    tasks = [(str(tmp_path / name),) for name in "abc"]
+    assert dict(run_all(workers, die_once, tasks)) == dict.fromkeys(range(3), "done")
+
+
+def test_a_task_that_kills_its_workers_is_given_up_and_the_others_go_on(workers):
+    results = dict(run_all(workers, die, [(number,) for number in range(4)]))
+    assert str(results.pop(1)) == "every process that tried it died; too little memory?"
+    assert results == {0: 0, 2: 2, 3: 3}
+
+
+def test_a_stopped_worker_is_replaced(tmp_path, monkeypatch):
+    monkeypatch.setattr("hotlever.processes._SILENT_S", 2)
+    with local_workers(2) as workers:
+        tasks = [(str(tmp_path / name),) for name in "ab"]
+        assert dict(run_all(workers, stop_once, tasks)) == dict.fromkeys(range(2), "done")
+
+
+def test_nobody_can_connect_to_them():
+    """Another user of the machine finds no port: they listen to their pipes."""
+    before = psutil.Process().net_connections("inet")
+    with local_workers(2):
+        assert psutil.Process().net_connections("inet") == before
+        assert len(children()) >= 2
+        assert not any(process.net_connections("inet") for process in children())
+
+
+def total(large: CountedArray, number: int) -> float:
+    return float(large.sum()) + number
+
+
+def test_what_tasks_share_is_sent_once():
+    large = CountedArray(np.ones(1_000_000))
+    with local_processes(2) as (run, share):
+        shared = share(large)
+        assert run(total, [(shared, number) for number in range(8)]) == [
+            1e6 + number for number in range(8)
+        ]
+    assert 1 <= large.sent <= 2
+
+
+def test_a_task_that_cannot_be_sent_is_an_error(workers):
+    results = dict(run_all(workers, square, [(lambda: 1,), (2,)]))
+    assert "pickle" in str(results[0])
+    assert results[1] == 4
+    assert "pickle" in str(dict(run_all(workers, makes_what_cannot_be_sent, [()]))[0])
+
+
+SCRIPT = """
+import os, sys
+from hotlever.processes import local_workers, run_all
+sys.path.insert(0, {folder!r})
+from test_processes import children, slow
+if __name__ == "__main__":
+    with local_workers(2) as workers:
+        for _ in run_all(workers, slow, [(0.01,), (0.01,), (60.0,), (60.0,)]):
+            print(*(process.pid for process in children()), flush=True)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_workers_and_their_folder_end_with_their_parent(tmp_path, number):
+    """However it ends; without a cache the workers share a temporary folder."""
+    (tmp_path / "script.py").write_text(SCRIPT.format(folder=str(Path(__file__).parent)))
+    (tmp_path / "tmp").mkdir()
+    environment = {**os.environ, "HOTLEVER_CACHE": "", "TMPDIR": str(tmp_path / "tmp")}
+    command = [sys.executable, str(tmp_path / "script.py")]
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as process:
+        pids = [int(pid) for pid in process.stdout.readline().split()]
+        process.send_signal(number)
+    assert len(pids) == 2
+    deadline = time.monotonic() + 10
+    while any(map(psutil.pid_exists, pids)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(map(psutil.pid_exists, pids))
+    while list((tmp_path / "tmp").iterdir()) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert list((tmp_path / "tmp").iterdir()) == []
+
+
+def test_without_a_cache_workers_share_a_folder_that_goes(monkeypatch):
+    monkeypatch.setenv("HOTLEVER_CACHE", "")
+    with local_workers(1) as workers:
+        [(_, folder)] = run_all(workers, os.getenv, [("HOTLEVER_CACHE",)])
+        assert Path(folder).parent == Path(tempfile.gettempdir())
+    assert not Path(folder).exists()
+    assert os.environ["HOTLEVER_CACHE"] == ""
+
+
+def test_workers_that_do_not_start_are_said(tmp_path):
+    """A script without the guard that spawn needs."""
+    script = "from hotlever.processes import local_workers\nwith local_workers(1):\n    pass\n"
+    (tmp_path / "script.py").write_text(script)
+    ended = subprocess.run(
+        [sys.executable, str(tmp_path / "script.py")], capture_output=True, text=True, check=False
+    )
+    assert "ComputationError: the worker processes could not be started" in ended.stderr
