@@ -13,8 +13,6 @@ import numpy as np
 from hotlever import __version__
 from hotlever.errors import InputError
 from hotlever.files import whole_file, write_text
-from hotlever.materials import PARAMETERS
-from hotlever.text import parameter_named
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -144,7 +142,6 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "temperature_error_K": ("K", "standard error of the tip temperature"),
     "error": ("K", "line reads less true temperature"),
     "paper_error": ("K", "error stated in the paper"),
-    **{name: (known.unit, known.meaning) for name, known in PARAMETERS.items()},
 }
 
 
@@ -187,7 +184,8 @@ def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> xr.Vari
     import xarray as xr
 
     own, array, *stated = values if isinstance(values, tuple) else (dimensions, values)
-    array, attributes = np.asarray(array), stated[0] if stated else _meaning(name)
+    unit_and_meaning = zip(("units", "long_name"), QUANTITIES.get(name, ()), strict=False)
+    array, attributes = np.asarray(array), stated[0] if stated else dict(unit_and_meaning)
     if array.ndim == 0:
         own = ()
     elif own == name and array.dtype.kind in "if":
@@ -196,17 +194,6 @@ def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> xr.Vari
         return xr.Variable(own, array, attributes, fastpath=True)
     except TypeError:  # a version of xarray that does not know it
         return xr.Variable(own, array, attributes)
-
-
-def _meaning(name: str) -> dict[str, str]:
-    """Return unit and meaning of a quantity, or of a parameter of a named material."""
-    if name in QUANTITIES:
-        unit, meaning = QUANTITIES[name]
-        return {"units": unit, "long_name": meaning}
-    if "." in name:
-        parameter = parameter_named(name)
-        return {"units": parameter.unit, "long_name": parameter.meaning}
-    return {}
 
 
 def csv_text(data: xr.Dataset, columns: Sequence[str]) -> str:

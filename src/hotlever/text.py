@@ -4,13 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Sequence
 
-from hotlever.materials import KINDS, PARAMETERS
-from hotlever.materials.parameters import Parameter
-
-INVERSION = "inversion_temperature"
 #: What is written of a quantity whose error says that it may be anything.
 NOT_DETERMINED = "not determined"
 #: Numbers between these are written without a power of ten.
@@ -21,8 +16,6 @@ BAND = 1.96
 _FAR = 10.0
 #: Characters beyond which a list takes several lines.
 _LONG = 100
-#: Units by the endings of names in probe files.
-_UNITS = {"um": "µm", "ohm": "Ω", "K": "K", "deg": "°"}
 
 
 def value_with_error(
@@ -105,77 +98,6 @@ def significant(value: float) -> str:
     if value and not _PLAIN[0] <= abs(float(rounded)) < _PLAIN[1]:
         return f"{mantissa}e{int(power)}"
     return f"{value:.{max(0, 1 - int(power))}f}"
-
-
-def parameter_named(name: str) -> Parameter:
-    """Return how a parameter of a material, or any other value of a probe file, is printed.
-
-    Examples
-    --------
-    >>> parameter_named("heater_width_um").symbol, parameter_named("heater_width_um").unit
-    ('heater width', 'µm')
-    >>> parameter_named("film.tcr").symbol, parameter_named("film.tcr").unit
-    ('α (film)', 'K⁻¹')
-    """
-    if name in PARAMETERS:
-        return PARAMETERS[name]
-    material, dot, own = name.partition(".")
-    declared = [kind.declared[own] for kind in KINDS.values() if own in kind.declared]
-    if dot and declared:
-        known = declared[0]
-        return known._replace(
-            name=name, symbol=f"{known.symbol} ({material})", meaning=f"{known.meaning}, {material}"
-        )
-    stem, _, ending = name.rpartition("_")
-    if ending not in _UNITS:
-        return Parameter(name, name.replace("_", " "), "1", 1.0, -math.inf, math.inf, name)
-    symbol = stem.replace("_", " ")
-    return Parameter(name, symbol, _UNITS[ending], 1.0, -math.inf, math.inf, name)
-
-
-def scaled_unit(name: str) -> str:
-    """Return the unit a parameter is printed in.
-
-    Examples
-    --------
-    >>> scaled_unit("n_d")
-    '1e17 cm⁻³'
-    """
-    known = parameter_named(name)
-    power = "" if known.scale == 1 else f"{known.scale:.0e}".replace("e+", "e") + " "
-    return (power + ("" if known.unit == "1" else known.unit)).strip()
-
-
-def heading(name: str) -> str:
-    """Return the heading of a column with a parameter or the inversion temperature.
-
-    Examples
-    --------
-    >>> heading("n_d"), heading("p"), heading("inversion_temperature")
-    ('n_d (1e17 cm⁻³)', 'p', 'T_i (K)')
-    """
-    if name == INVERSION:
-        return "T_i (K)"
-    unit = scaled_unit(name)
-    return f"{name} ({unit})" if unit else name
-
-
-def scale_of(name: str) -> float:
-    """Return the unit, of its own, that a parameter or the inversion temperature is printed in."""
-    return parameter_named(name).scale
-
-
-def sentence(text: str) -> str:
-    """Make a note a sentence; names of parameters keep their small letters.
-
-    Examples
-    --------
-    >>> sentence("the levers differ"), sentence("n_d is not determined")
-    ('The levers differ.', 'n_d is not determined.')
-    """
-    first = re.split(r"[^\w.]", text, maxsplit=1)[0]
-    is_name = first in PARAMETERS or "." in first
-    return f"{text if is_name else text[0].upper() + text[1:]}."
 
 
 def aligned(rows: Sequence[Sequence[str]], right: bool = False) -> list[str]:

@@ -30,6 +30,7 @@ from hotlever.estimation import Fit, read_fit, read_measurement
 from hotlever.estimation.words import parameter_rows
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.meshing import chosen_space
+from hotlever.materials.naming import sentence
 from hotlever.measurement import parse_columns
 from hotlever.probe import Layout, Probe
 from hotlever.probe.sections import read_sections
@@ -37,7 +38,6 @@ from hotlever.probe.shapes import PARAMETRIC
 from hotlever.raman import read_spectra
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.page import Block, Page
-from hotlever.text import sentence
 
 #: Results kept, whose figures may be asked for as files.
 _KEPT = 4

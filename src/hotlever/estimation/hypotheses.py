@@ -11,8 +11,8 @@ from functools import partial
 
 import numpy as np
 
+from hotlever.materials.naming import parameter_named
 from hotlever.probe import Probe
-from hotlever.text import parameter_named
 from hotlever.types import Array
 
 #: A current that stands at its highest value in so many rows, within this share, is clipped, if it

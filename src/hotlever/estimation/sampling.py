@@ -40,9 +40,10 @@ from hotlever.lever.certificate import estimated_error
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduced import ReducedLever
 from hotlever.materials import full_name
+from hotlever.materials.naming import INVERSION
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameters_of, usual_parameters
-from hotlever.text import BAND, INVERSION
+from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
 #: Quantiles (%) of a predictive band: median, 68 % and 95 %.

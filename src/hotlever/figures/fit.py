@@ -28,7 +28,8 @@ from hotlever.figures.style import (
     from_zero,
     panel_letters,
 )
-from hotlever.text import BAND, parameter_named, value_with_error
+from hotlever.materials.naming import parameter_named
+from hotlever.text import BAND, value_with_error
 from hotlever.types import Array
 
 if TYPE_CHECKING:

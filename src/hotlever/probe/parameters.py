@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from hotlever.errors import unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, full_name
+from hotlever.materials.naming import parameter_named
 from hotlever.materials.parameters import IN_TIME, Parameter
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
-from hotlever.text import parameter_named
 
 if TYPE_CHECKING:
     from hotlever.probe.probe import Probe

@@ -19,8 +19,8 @@ from hotlever.estimation.words import (
     uncertainty_tables,
 )
 from hotlever.lever import Lever
+from hotlever.materials.naming import INVERSION, sentence
 from hotlever.report.page import Block, Page
-from hotlever.text import INVERSION, sentence
 
 #: Points of a curve without visible corners.
 _POINTS = 110

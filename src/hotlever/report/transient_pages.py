@@ -12,9 +12,9 @@ from hotlever.lever import Lever
 from hotlever.lever.transient import pulse, rise_times, simulate, spectrum, step, time_constants
 from hotlever.lever.transient.modes import Source
 from hotlever.lever.transient.sinusoidal import harmonics
+from hotlever.materials.naming import sentence
 from hotlever.report.page import Page
 from hotlever.steps import each
-from hotlever.text import sentence
 from hotlever.types import Progress
 
 #: Operating points, as shares of the bias of the knee: beyond it a lever may run away.

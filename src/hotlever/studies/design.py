@@ -15,10 +15,10 @@ from hotlever.errors import unknown_name
 from hotlever.lever import Lever
 from hotlever.materials import LOW_DOPED, full_name
 from hotlever.materials.doping import diffusion_length
+from hotlever.materials.naming import parameter_named
 from hotlever.probe import MeshOptions, Probe
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.steps import each
-from hotlever.text import parameter_named
 from hotlever.types import Array, Progress
 
 #: What follows from a design; k is the power of the knee in air over that in vacuum.
@@ -181,10 +181,12 @@ def vary(
     design.probe.circuit.need_cold_start("a study of a design")
     probes = [design.changed(name, float(value)) for value in values]
     rows = [quantities(probe, power_mW, air) for probe in each(probes, progress)]
+    varied = parameter_named(name)
+    meaning = {"units": varied.unit, "long_name": varied.meaning}
     return labelled(
         {key: [row[key] for row in rows] for key in QUANTITIES},
         name,
-        {name: np.asarray(values, dtype=float)},
+        {name: (name, np.asarray(values, dtype=float), meaning)},
         **{key: json.dumps(section) for key, section in design.probe.values().items()},
         power_mW=power_mW,
         base_value=design.value(name),
