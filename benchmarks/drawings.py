@@ -53,7 +53,7 @@ def drawn(silicon: Any, heater: Any, tip: Any, supply: Any, ground: Any) -> Prob
         "layers": {"silicon": silicon, "heater": heater},
         "terminals": {"supply": supply, "ground": ground},
     }
-    return Probe.from_values(sections, "benchmark")
+    return Probe.from_sections(sections, "benchmark")
 
 
 def levers() -> dict[str, Probe]:
@@ -78,7 +78,7 @@ def same() -> None:
     """Print the reference probe, drawn, against itself."""
     reference = Probe.reference()
     layout = reference.layout()
-    probe = Probe.from_values(
+    probe = Probe.from_sections(
         {
             "probe": {"shape": "drawing", "thickness_um": 0.4, "tip_um": list(layout.tip)},
             "layers": {

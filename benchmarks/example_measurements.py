@@ -110,7 +110,7 @@ def nominal(name: str) -> Probe:
         return Probe.from_file(path)
     # what `hotlever probe import` proposes
     proposal = import_drawing(path.with_suffix(".gds"), None, FOLDER).text
-    return Probe.from_values(tomllib.loads(proposal), name, FOLDER)
+    return Probe.from_sections(tomllib.loads(proposal), name, FOLDER)
 
 
 def true_lever(name: str) -> Lever:
@@ -181,7 +181,7 @@ def compare(name: str) -> None:
     for key, true in EXAMPLES[name].values.items():
         known = calibration.priors.get(key)
         found = _with_error(known) if known else "not looked for"
-        rows.append((key, f"{nominal(name).at([key])[0]:.4g}", f"{true:.4g}", found))
+        rows.append((key, f"{nominal(name).values([key])[0]:.4g}", f"{true:.4g}", found))
     table(("parameter", "probe file", "true", "calibrated"), rows)
 
 

@@ -62,7 +62,7 @@ def main() -> None:
     priors = default_priors(probe)
     spread = np.array([priors[name].absolute for name in NAMES[:-1]] + [HEAT_CAPACITY])
     beforehand = np.diag(spread**-2.0)
-    tip, scale = slopes[2, -1], probe.at(NAMES)
+    tip, scale = slopes[2, -1], probe.values(NAMES)
     rows = []
     for what, places in (("current", [0]), ("current and reader", [0, 1])):
         moving = information(values, slopes, places)

@@ -49,7 +49,7 @@ def main() -> None:
     while number < COUNT:
         moved = {name: prior.at(rng.normal()) for name, prior in priors.items()}
         try:
-            truth = simulate(lever.with_probe(probe.moved(moved)), wave, at=TIMES)
+            truth = simulate(lever.with_probe(probe.replace(moved)), wave, at=TIMES)
         except HotleverError:
             continue  # it melts
         number += 1

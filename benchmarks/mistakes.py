@@ -126,7 +126,7 @@ def drawing(**factors: float) -> Callable[[Bench], None]:
     """Return what puts wrong values into the probe file."""
 
     def make(bench: Bench) -> None:
-        values = bench.probe.at(list(factors)) * list(factors.values())
+        values = bench.probe.values(list(factors)) * list(factors.values())
         bench.probe = bench.probe.with_(**dict(zip(factors, values.tolist(), strict=True)))
 
     return make

@@ -49,7 +49,7 @@ def drawn(file: Path | str, tip: Any = TIP, **values: Any) -> Probe:
     shape = {"shape": "drawing", "file": str(file), "thickness_um": 0.4, **values}
     shape["tip_um"] = [float(one) for one in tip]
     sections = {"probe": shape, "layers": LAYERS, "terminals": TERMINALS}
-    return Probe.from_values(sections, "test")
+    return Probe.from_sections(sections, "test")
 
 
 def box(x0: float, y0: float, x1: float, y1: float) -> list[list[float]]:

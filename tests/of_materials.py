@@ -38,7 +38,7 @@ def metal_film_sections() -> dict[str, dict[str, Any]]:
 
 
 def metal_film_probe(**changes: Any) -> Probe:
-    return Probe.from_values(metal_film_sections() | changes, "test")
+    return Probe.from_sections(metal_film_sections() | changes, "test")
 
 
 def strip_probe(**changes: Any) -> Probe:
@@ -52,7 +52,7 @@ def strip_probe(**changes: Any) -> Probe:
         "supply": [[20.0, 0.0], [20.0, 2.0]],
         "ground": [[0.0, 0.0], [0.0, 2.0]],
     }
-    return Probe.from_values(sections | changes, "test")
+    return Probe.from_sections(sections | changes, "test")
 
 
 def of_named_silicon(kind: str, legs: dict[str, Any], heater: dict[str, Any]) -> Probe:
@@ -68,7 +68,7 @@ def of_named_silicon(kind: str, legs: dict[str, Any], heater: dict[str, Any]) ->
         "legs": {"kind": "high-doped-silicon", **legs},
         "hot": {"kind": kind, **heater},
     }
-    return Probe.from_values(sections, "test")
+    return Probe.from_sections(sections, "test")
 
 
 def p_type_probe() -> Probe:
@@ -86,4 +86,4 @@ def silicon_with_a_film(**film: Any) -> Probe:
         **film,
     }
     sections["materials"] = {"gold": {"kind": "metal-film", "preset": "Au"}}
-    return Probe.from_values(sections, "test")
+    return Probe.from_sections(sections, "test")

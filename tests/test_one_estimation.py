@@ -31,7 +31,9 @@ def test_fit_and_calibrate_give_the_same_parameters(data, probe):
     assert fitted.describes_data == calibration.describes_data
     names = fitted.names
     assert set(calibration.priors) >= set(names)
-    assert np.allclose(fitted.probe.at(names), calibration.probe.at(names), rtol=1e-9, atol=0)
+    assert np.allclose(
+        fitted.probe.values(names), calibration.probe.values(names), rtol=1e-9, atol=0
+    )
     for name in names:
         # one posterior, of which both give what they are asked for
         assert fitted.parameters[name].stderr == pytest.approx(

@@ -55,8 +55,8 @@ def test_a_wrong_name_is_answered_with_the_nearest():
 def test_material_refuses_what_cannot_be():
     good = published("option III").material.model_dump()
     with pytest.raises(InputError, match=r"c_kappa = -1: input should be greater than or equal to"):
-        Material.of({**good, "c_kappa": -1}, "here")
+        Material.from_values({**good, "c_kappa": -1}, "here")
     with pytest.raises(InputError, match=r"n_d = 1.5e\+19 must be below n_hd"):
-        Material.of({**good, "n_d": 1.5e19, "n_hd": 1e19}, "here")
+        Material.from_values({**good, "n_d": 1.5e19, "n_hd": 1e19}, "here")
     with pytest.raises(InputError, match=r"did you mean 'delta'"):
-        Material.of({**good, "dleta": 1}, "here")
+        Material.from_values({**good, "dleta": 1}, "here")

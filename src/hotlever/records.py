@@ -56,7 +56,7 @@ class Record(BaseModel):
     Raises
     ------
     InputError
-        From `of` and `with_`, on a missing, misspelt or impossible value.
+        From `from_values` and `with_`, on a missing, misspelt or impossible value.
     """
 
     # strict: a number in quotes, or true, is no number
@@ -72,7 +72,7 @@ class Record(BaseModel):
             )
 
     @classmethod
-    def of(cls, values: dict[str, Any], where: str) -> Self:
+    def from_values(cls, values: dict[str, Any], where: str) -> Self:
         """Check `values` and make a record; `where` names their origin in an error."""
         try:
             return cls.model_validate(values)
@@ -87,7 +87,7 @@ class Record(BaseModel):
 
     def with_(self, **changes: Any) -> Self:
         """Return a copy with some values changed, checked again."""
-        return type(self).of({**self.model_dump(), **changes}, type(self).__name__.lower())
+        return type(self).from_values({**self.model_dump(), **changes}, type(self).__name__.lower())
 
 
 def explained(error: ValidationError, record: type[BaseModel], where: str) -> InputError:

@@ -373,7 +373,7 @@ def test_what_was_known_before_a_fit_is_not_what_it_found(shared_fit):
     usual = _before(one, None)
     assert usual["n_d"] == published_material()["n_d"]
     stated = {"n_d": "3e17 ± 10%", "p": "2.7 ± 1%"}
-    probe = one.probe.model_copy(update={"prior": PriorTexts.of(stated, "here")})
+    probe = one.probe.model_copy(update={"prior": PriorTexts.from_values(stated, "here")})
     of_file = _before(replace(one, probe=probe), None)
     assert (of_file["n_d"], of_file["p"]) == (Prior(3e17, 0.1), Prior(2.7, 0.01))
     assert _before(replace(one, probe=probe), {"p": "2.8 ± 1%"})["p"] == Prior(2.8, 0.01)

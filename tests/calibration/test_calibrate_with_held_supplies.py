@@ -18,7 +18,7 @@ from hotlever.lever.lever import COARSE
 
 HELD = {"kind": "supply", "bias_V": 2.0, "series_resistance_ohm": 500.0}
 PROBE = Probe.reference().with_(**{f"circuit.reader.{key}": HELD[key] for key in HELD})
-TRUE = PROBE.moved({"c_kappa": 0.66, "n_d": 5.3e17, "p": 2.6})
+TRUE = PROBE.replace({"c_kappa": 0.66, "n_d": 5.3e17, "p": 2.6})
 
 
 @pytest.fixture(scope="module")

@@ -32,13 +32,13 @@ def shorter(reach: float) -> Probe:
         silicon[leg] = [[max(x, reach), y] for x, y in silicon[leg]]
     for name, (low, high) in ENDS.items():
         values["terminals"][name] = [[reach, low], [reach, high]]
-    return Probe.from_values(values, "shorter")
+    return Probe.from_sections(values, "shorter")
 
 
 @pytest.mark.parametrize("start", [-1.0, 2.0])
 def test_a_terminal_by_area_is_a_lever_with_shorter_legs(start):
     """Also where a stub of the leg is left behind the contact."""
-    probe, expected = Probe.from_values(lever(12.0, start), "by area"), shorter(12.0)
+    probe, expected = Probe.from_sections(lever(12.0, start), "by area"), shorter(12.0)
     own, other = probe.layout().terminals, expected.layout().terminals
     assert [one.name for one in own] == [one.name for one in other]
     corners = [[(one.start, one.end) for one in ends] for ends in (own, other)]
@@ -47,28 +47,28 @@ def test_a_terminal_by_area_is_a_lever_with_shorter_legs(start):
     for name in ("current_mA", "reader_V", "lever_V"):
         np.testing.assert_allclose(found[name], other[name], rtol=2e-5)
     np.testing.assert_allclose(found.tip_K, other.tip_K, atol=0.02)
-    edge = Lever(Probe.from_values(lever(12.0, by_area=False), "edge")).sweep(BIAS)
+    edge = Lever(Probe.from_sections(lever(12.0, by_area=False), "edge")).sweep(BIAS)
     assert abs(edge.tip_K - found.tip_K).max() > 10
 
 
 def test_a_contact_in_a_leg_is_a_hole_with_the_terminal_round_it():
     values = reference_points()
     values["terminals"]["reader"] = {"area": box(1, -9, 3, -7)}
-    layout = Probe.from_values(values, "p").layout()
+    layout = Probe.from_sections(values, "p").layout()
     assert sum(one.name == "reader" for one in layout.terminals) == 4
     assert sum(len(region.holes) for region in layout.regions) == 1
 
 
 def test_a_probe_with_a_terminal_by_area_is_written_and_read(tmp_path):
-    probe = Probe.from_values(lever(12.0), "by area")
+    probe = Probe.from_sections(lever(12.0), "by area")
     probe.to_file(tmp_path / "copy.toml")
     assert Probe.from_file(tmp_path / "copy.toml") == probe
-    assert Probe.from_values(probe.values(), "copy") == probe
-    assert hash(Probe.from_values(lever(12.0, by_area=False), "edge")) != hash(probe)
+    assert Probe.from_sections(probe.sections(), "copy") == probe
+    assert hash(Probe.from_sections(lever(12.0, by_area=False), "edge")) != hash(probe)
 
 
 def test_a_contact_over_more_than_a_tenth_of_a_leg_is_noted(run, tmp_path):
-    Probe.from_values(lever(6.0, by_area=False), "p").to_file(tmp_path / "own.toml")
+    Probe.from_sections(lever(6.0, by_area=False), "p").to_file(tmp_path / "own.toml")
     for command in (["sweep", "own.toml", "--bias", "4:4:1"], ["probe", "show", "own.toml"]):
         status, _, err = run(*command)
         assert status == 0
@@ -83,7 +83,7 @@ def test_a_contact_over_more_than_a_tenth_of_a_leg_is_noted(run, tmp_path):
     "values", [lever(4.0, by_area=False), lever(30.0), reference_points()], ids=str
 )
 def test_a_contact_that_just_overlaps_is_not_noted(values):
-    assert Probe.from_values(values, "p").shape.notes() == []
+    assert Probe.from_sections(values, "p").shape.notes() == []
 
 
 def test_a_contact_that_is_a_film_too_is_not_noted():
@@ -91,9 +91,9 @@ def test_a_contact_that_is_a_film_too_is_not_noted():
     metal = [values["terminals"][name] for name in ENDS]
     values["layers"]["metal"] = {"drawn": metal, "material": "film", "thickness_um": 0.1}
     values["materials"] = {"film": {"kind": "metal-film", "preset": "Pd"}}
-    assert Probe.from_values(values, "p").shape.notes() == []
+    assert Probe.from_sections(values, "p").shape.notes() == []
     del values["layers"]["metal"], values["materials"]
-    assert len(Probe.from_values(values, "p").shape.notes()) == 3
+    assert len(Probe.from_sections(values, "p").shape.notes()) == 3
 
 
 @pytest.mark.parametrize(
@@ -111,5 +111,5 @@ def test_terminals_by_area_that_are_wrong(terminal, given, message):
     values = reference_points()
     values["terminals"][terminal] = given
     with pytest.raises((InputError, DrawingError), match=message) as caught:
-        Probe.from_values(values, "probe.toml")
+        Probe.from_sections(values, "probe.toml")
     assert "\n" not in str(caught.value)

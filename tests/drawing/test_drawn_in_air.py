@@ -34,7 +34,7 @@ def pointed(folder) -> Probe:
         "layers": {"silicon": "SI", "heater": "HEATER"},
         "terminals": {"supply": "V+", "ground": "GND"},
     }
-    return Probe.from_values(sections, "test")
+    return Probe.from_sections(sections, "test")
 
 
 @pytest.mark.parametrize("turn", [False, True])

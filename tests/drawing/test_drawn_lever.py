@@ -96,7 +96,7 @@ def test_a_drawing_on_a_coarser_grid_is_healed(tmp_path):
 
 def test_a_drawn_probe_keeps_its_outline_without_the_file(file, tmp_path):
     probe = drawn(file)
-    copy = Probe.from_values(probe.values(), "copy")
+    copy = Probe.from_sections(probe.sections(), "copy")
     assert copy == probe
     assert hash(copy.shape) == hash(probe.shape)
     probe.to_file(tmp_path / "copy.toml")
@@ -157,7 +157,7 @@ def test_dxf_with_arcs_blocks_and_outlines_of_lines(tmp_path):
     found = {}
     for unit in (1.0, 1000.0):
         file = pointed_lever(tmp_path / f"lever{unit:g}.dxf", unit)
-        probe = Probe.from_values({"probe": {**shape, "file": str(file)}, **sections}, "test")
+        probe = Probe.from_sections({"probe": {**shape, "file": str(file)}, **sections}, "test")
         found[unit] = probe.layout()
     layout = found[1.0]
     assert [len(region.holes) for region in layout.regions] == [0, 0, 1]
@@ -182,7 +182,7 @@ def polygon_area(outline):
 def test_a_heater_round_a_corner_takes_the_distance_to_its_borders():
     values = points()
     values["layers"]["heater"] = [box(40, -4, 50.58, 4)]
-    layout = Probe.from_values(values, "test").layout()
+    layout = Probe.from_sections(values, "test").layout()
     taper = layout.heater.taper
     assert isinstance(taper, BorderTaper)
     back, front = sorted(taper.borders, key=lambda border: border[0][0])
@@ -210,7 +210,7 @@ def test_several_heaters_and_further_terminals():
     heaters = [box(46.58, -2, 50.58, 2), box(10, 6, 14, 11)]
     values["layers"]["heater"] = heaters
     values["terminals"]["cold end"] = values["terminals"].pop("reader")
-    probe = Probe.from_values(values, "test")
+    probe = Probe.from_sections(values, "test")
     layout = probe.layout()
     assert [region.name for region in layout.regions if region.part == "heater"] == [
         "heater",
@@ -218,7 +218,7 @@ def test_several_heaters_and_further_terminals():
     ]
     sweep = Lever(probe, COARSE).sweep([4.0])
     assert np.isnan(sweep.reader_V).all()
-    one = Lever(Probe.from_values(points(), "test"), COARSE).sweep([4.0])
+    one = Lever(Probe.from_sections(points(), "test"), COARSE).sweep([4.0])
     assert sweep.heater_ohm.item() > 1.3 * one.heater_ohm.item()
 
 

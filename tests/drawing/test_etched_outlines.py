@@ -15,7 +15,7 @@ from hotlever.probe import Probe
 def changed(**given) -> Probe:
     values = reference_points()
     values["probe"] |= given
-    return Probe.from_values(values, "p")
+    return Probe.from_sections(values, "p")
 
 
 def outline(probe: Probe) -> Polygon:
@@ -31,7 +31,7 @@ def as_points(scale: float) -> Probe:
             many = isinstance(rings[0][0], list)
             larger = [(scale * np.array(one)).tolist() for one in (rings if many else [rings])]
             values[section][name] = larger
-    return Probe.from_values(values, "larger")
+    return Probe.from_sections(values, "larger")
 
 
 def test_a_scaled_drawing_is_one_that_is_drawn_larger():
@@ -50,7 +50,7 @@ def test_edges_are_where_those_of_the_same_lever_of_dimensions_are(bias):
     values = reference_points()
     values["probe"]["edge_bias_um"] = bias
     values["layers"]["heater"] = box(46.58 + bias, -2, 50.58 - bias, 2)
-    found = Probe.from_values(values, "p")
+    found = Probe.from_sections(values, "p")
     expected = Probe.reference().with_(edge_bias_um=bias, heater_length_um=4 - 2 * bias)
     reader = expected.shape.reader_centre_um or 2 / 3 * 54.4
     expected = expected.with_(reader_centre_um=reader)
@@ -72,7 +72,7 @@ def test_layers_that_end_at_the_outline_follow_it():
     values["layers"]["heater"] = box(46.58, -0.8225, 50.58, 0.8225)
     values["layers"]["reader"] = [[34, -9.88], [38, -9.88], [37, -6.42], [33, -6.42]]
     values["probe"]["edge_bias_um"] = 0.1
-    layout = Probe.from_values(values, "p").layout()
+    layout = Probe.from_sections(values, "p").layout()
     regions = {region.name: region for region in layout.regions}
     assert regions["heater"].area == pytest.approx(4 * 1.845, abs=1e-4)
     assert regions["reader"].area == pytest.approx(4 * 3.66, abs=1e-4)
@@ -94,9 +94,9 @@ def test_slanted_legs_arcs_and_holes(tmp_path, bias):
         "layers": {"silicon": "SI", "heater": "HEATER"},
         "terminals": {"supply": "V+", "ground": "GND"},
     }  # fmt: skip
-    plain = outline(Probe.from_values(values, "p"))
+    plain = outline(Probe.from_sections(values, "p"))
     values["probe"]["edge_bias_um"] = bias
-    probe = Probe.from_values(values, "p")
+    probe = Probe.from_sections(values, "p")
     etched = outline(probe)
     # the leg ends, 8 µm wide each, stay on their line
     assert etched.bounds[0] == pytest.approx(0.0, abs=1e-9)
@@ -121,7 +121,7 @@ def test_places_in_errors_are_those_of_the_drawing():
     values["probe"]["scale"] = 2.0
     values["layers"]["heater"] = [values["layers"]["heater"], box(100, 0, 104, 3)]
     with pytest.raises(InputError, match=r"polygon 2, at \(102.000, 1.500\) µm"):
-        Probe.from_values(values, "p")
+        Probe.from_sections(values, "p")
 
 
 def test_a_prior_of_a_drawing_s_edges_is_refused_in_one_line(run, tmp_path):

@@ -107,7 +107,7 @@ def test_what_is_drawn_wrongly_is_named_with_its_place(name):
     group[number : number + 1] = [outline]
     values[section][part] = group
     with pytest.raises(DrawingError, match=message) as caught:
-        Probe.from_values(values, "probe.toml")
+        Probe.from_sections(values, "probe.toml")
     assert "\n" not in str(caught.value)
     assert caught.value.place is not None
     assert part in "".join(caught.value.outlines)
@@ -142,14 +142,14 @@ def test_a_probe_file_of_a_drawing_that_is_wrong(change, message):
         else:
             values[section] = entries
     with pytest.raises(InputError, match=message) as caught:
-        Probe.from_values(values, "probe.toml")
+        Probe.from_sections(values, "probe.toml")
     assert "\n" not in str(caught.value)
 
 
 def test_layers_mean_nothing_with_a_parametric_shape():
-    values = Probe.reference().values() | {"layers": {}}
+    values = Probe.reference().sections() | {"layers": {}}
     with pytest.raises(InputError, match=r"section \[layers\] means nothing with shape"):
-        Probe.from_values(values, "probe.toml")
+        Probe.from_sections(values, "probe.toml")
 
 
 def test_in_a_file_an_error_names_the_layer_and_the_place_is_drawn(run, tmp_path):
@@ -182,10 +182,10 @@ def test_a_border_tangent_to_an_arc_names_the_layer_that_is_to_be_moved():
         "terminals": {"supply": [[0, -10], [0, -4]], "ground": [[0, 4], [0, 10]]},
     }
     with pytest.raises(DrawingError, match=r"^p: heater, polygon 1, at \(5.*move it$") as caught:
-        Probe.from_values(values, "p")
+        Probe.from_sections(values, "p")
     assert "its border leaves the silicon with a corner" in str(caught.value)
     values["layers"]["heater"] = box(53.5, -20, 70, 20)
-    assert Probe.from_values(values, "p").layout().regions
+    assert Probe.from_sections(values, "p").layout().regions
 
 
 def damaged() -> dict[str, bytes]:
@@ -250,14 +250,14 @@ def test_a_dxf_outline_that_is_open(tmp_path):
     with pytest.raises(
         InputError, match=r"silicon \(layer SI\), at \(.*: an outline .* not closed"
     ):
-        Probe.from_values(values, "probe.toml")
+        Probe.from_sections(values, "probe.toml")
     values["probe"]["cell"] = "LEVER"
     with pytest.raises(InputError, match="a DXF file has no cells"):
-        Probe.from_values(values, "probe.toml")
+        Probe.from_sections(values, "probe.toml")
 
 
 def test_what_a_drawing_cannot_do_yet_is_refused_where_it_is_met(run, tmp_path):
-    probe = Probe.from_values(reference_points(), "probe.toml")
+    probe = Probe.from_sections(reference_points(), "probe.toml")
     probe.to_file(tmp_path / "probe.toml")
     data = "V_b (V), I_h (mA)\n" + "".join(f"{v}, {0.1 * v}\n" for v in range(1, 9))
     (tmp_path / "iv.csv").write_text(data, encoding="utf-8")

@@ -37,7 +37,7 @@ BIAS = [2.0, 7.22, 9.0]
 
 
 def test_named_silicon_is_the_same_as_the_plain_form():
-    plain = Probe.from_values(reference_points(), "test")
+    plain = Probe.from_sections(reference_points(), "test")
     named = of_named_silicon("n-silicon", {}, {})
     assert not named.has_plain_silicon
     first, second = (Lever(one, COARSE).sweep(BIAS) for one in (plain, named))
@@ -47,7 +47,7 @@ def test_named_silicon_is_the_same_as_the_plain_form():
 
 def test_derivatives_of_named_silicon_add_up_to_those_of_the_plain_form():
     """c_κ is one number in the plain form, and two here."""
-    plain = Lever(Probe.from_values(reference_points(), "test"), COARSE)
+    plain = Lever(Probe.from_sections(reference_points(), "test"), COARSE)
     named = Lever(of_named_silicon("n-silicon", {}, {}), COARSE)
     x = plain.branch(700.0).x[:, 1:]
     pairs = {
@@ -68,7 +68,7 @@ def test_a_reader_may_have_doping_of_its_own():
     sections = reference_points()
     sections["layers"]["reader"] = {"drawn": [sections["layers"]["reader"]], "material": "light"}
     sections["materials"] = {"light": {"kind": "n-silicon", "n_d": 1e17}}
-    probe = Probe.from_values(sections, "test")
+    probe = Probe.from_sections(sections, "test")
     lever = Lever(probe, COARSE)
     films = {film.material: film for film in lever.space.films}
     assert films["light"].dopant_from == HIGH_DOPED
@@ -151,9 +151,11 @@ def test_derivatives_by_parameters_of_films_are_exact(film_lever, name):
     probe = film_lever.probe
     x = film_lever.branch(900.0).x[:, -2:]
     slope = SimilarLevers(film_lever).equations(probe, (name,)).by_parameter(x, [name])[..., 0]
-    value = float(probe.at([name])[0])
+    value = float(probe.values([name])[0])
     step = 1e-4 * value
-    away = [Lever(probe.moved({name: value + way * step})).equations.balance(x) for way in (1, -1)]
+    away = [
+        Lever(probe.replace({name: value + way * step})).equations.balance(x) for way in (1, -1)
+    ]
     change = (away[0] - away[1]) / (2 * step)
     np.testing.assert_allclose(slope, change, rtol=1e-6, atol=1e-7 * np.abs(change).max())
 
@@ -177,7 +179,7 @@ def test_a_heater_of_its_own_layer_has_legs():
         "material": "film",
         "thickness_um": 0.02,
     }
-    probe = Probe.from_values(sections, "test")
+    probe = Probe.from_sections(sections, "test")
     assert [region.part for region in probe.layout().regions].count("heater") >= 1
     data = Lever(probe, COARSE).sweep([0.3])
     assert data.legs_ohm.item() > 0
@@ -190,7 +192,7 @@ def test_a_heater_of_its_own_layer_has_legs():
 
 
 def test_a_film_on_a_leg_takes_its_resistance_away():
-    plain = Lever(Probe.from_values(reference_points(), "test"), COARSE).sweep([7.22])
+    plain = Lever(Probe.from_sections(reference_points(), "test"), COARSE).sweep([7.22])
     gilt = Lever(silicon_with_a_film(), COARSE).sweep([7.22])
     assert gilt.leg1_ohm.item() < 0.5 * plain.leg1_ohm.item()
     assert gilt.leg2_ohm.item() == pytest.approx(plain.leg2_ohm.item(), rel=0.1)
@@ -200,7 +202,7 @@ def test_a_heater_under_a_film_keeps_its_taper():
     """The film cuts the heater in two; both halves know both borders."""
     probe = silicon_with_a_film(drawn=[box(30, -5, 48.5, 5)])
     tapers = {r.taper for r in probe.layout().regions if r.name.startswith(("heater", "gold"))}
-    plain = Probe.from_values(reference_points(), "test").layout().heater.taper
+    plain = Probe.from_sections(reference_points(), "test").layout().heater.taper
     assert plain in tapers
     heaters = [r for r in probe.layout().regions if r.part == "heater"]
     assert [len(one.films) for one in heaters] == [0, 1] or [len(one.films) for one in heaters] == [
@@ -218,15 +220,19 @@ def test_a_heater_under_a_film_keeps_its_taper():
 )
 def test_a_probe_file_is_read_back(probe):
     text = probe.to_toml()
-    assert Probe.from_values(tomllib.loads(text), "again") == probe
+    assert Probe.from_sections(tomllib.loads(text), "again") == probe
     assert ("[material]" in text) == probe.has_plain_silicon
 
 
 def test_values_of_materials_are_changed_by_name():
     probe = metal_film_probe()
     changed = probe.with_(**{"film.tcr": 1e-3, "nitride.kappa": 0.02, "thickness_um": 0.3})
-    assert changed.at(["film.tcr", "nitride.kappa", "thickness_um"]).tolist() == [1e-3, 0.02, 0.3]
-    assert probe.moved({"film.tcr": 1e-3}).materials["film"] == changed.materials["film"]
+    assert changed.values(["film.tcr", "nitride.kappa", "thickness_um"]).tolist() == [
+        1e-3,
+        0.02,
+        0.3,
+    ]
+    assert probe.replace({"film.tcr": 1e-3}).materials["film"] == changed.materials["film"]
     with pytest.raises(InputError, match=r"did you mean 'tcr'"):
         probe.with_(**{"film.tcrr": 1e-3})
     with pytest.raises(InputError, match=r"did you mean 'film'"):
@@ -286,14 +292,14 @@ OTHER = {"kind": "metal-film", "preset": "Cr"}
         (metal_film_sections() | {"layers": 3}, r"\[layers\] must be a section"),
         (metal_film_sections() | {"material": {"p": 2.0}}, r"\[material\]: no layer is made of it"),
         (
-            {**Probe.reference().values(), "materials": {"film": FILM}},
+            {**Probe.reference().sections(), "materials": {"film": FILM}},
             r"\[materials.film\]: no layer is made of it",
         ),
     ],
 )
 def test_what_is_wrong_with_materials_is_said_in_one_line(sections, message):
     with pytest.raises(InputError, match=message) as caught:
-        Probe.from_values(sections, "probe.toml")
+        Probe.from_sections(sections, "probe.toml")
     text = str(caught.value)
     assert text.startswith("probe.toml")
     assert "\n" not in text

@@ -80,7 +80,7 @@ def broken(draw):
 def solved(values, **surroundings):
     """What the lever shows at a bias, None if the drawing is refused in one line."""
     try:
-        lever = Lever(Probe.from_values(values, "probe.toml").with_(**surroundings), COARSE)
+        lever = Lever(Probe.from_sections(values, "probe.toml").with_(**surroundings), COARSE)
         shown = lever.dataset(lever.solve([0.5]))
     except HotleverError as refused:
         return check_told(str(refused))

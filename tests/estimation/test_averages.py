@@ -106,7 +106,7 @@ def test_a_fit_of_very_many_rows_says_so_and_is_read_back(coarse, ramp, tmp_path
     found = fit(ramp, model=lambda probe, bias: full_experiment(coarse.with_probe(probe), bias))
     assert f"{ROWS} rows are averaged to {found.measurement.bias_V.size}" in found.notes[0]
     for name, parameter in found.parameters.items():
-        truth = float(coarse.probe.at([name])[0])
+        truth = float(coarse.probe.values([name])[0])
         assert abs(parameter.value - truth) < 5 * parameter.stderr
     found.write(tmp_path / "fit.json")
     assert (tmp_path / "fit.json").stat().st_size < 1e6

@@ -263,7 +263,7 @@ def test_fit_file_has_the_keys_of_the_contract(exact_fit, tmp_path):
         "probe",
     } <= set(content)
     assert {"path", "sha256"} <= set(content["data"])
-    assert Probe.from_values(content["probe"], "fit") == exact_fit.probe
+    assert Probe.from_sections(content["probe"], "fit") == exact_fit.probe
 
 
 def test_reduced_and_full_lever_give_the_same_fit(coarse, coarse_model, coarse_fast):

@@ -31,7 +31,7 @@ def folder(tmp_path, monkeypatch):
 
 def test_a_scale_of_the_heat_capacity_is_found(coarse):
     names = ["heat_capacity_scale", "n_d"]
-    twin = coarse.with_probe(coarse.probe.moved({"heat_capacity_scale": 1.08, "n_d": 5.9e17}))
+    twin = coarse.with_probe(coarse.probe.replace({"heat_capacity_scale": 1.08, "n_d": 5.9e17}))
     shown = simulate(twin, WAVE, at=TIMES, tolerance_K=0.02)
     noise = np.random.default_rng(0).normal(1.0, 1e-5, (2, TIMES.size))
     measured = Measurement.in_time(
@@ -55,7 +55,7 @@ def test_a_scale_of_the_heat_capacity_is_found(coarse):
 def test_the_command_fits_a_file_in_time(coarse, run):
     """Few rows: a pulse is followed by both levers for each of some parameters."""
     times = np.array([0.5, 1.0, 2.0, 3.0])
-    twin = coarse.with_probe(coarse.probe.moved({"heat_capacity_scale": 1.1}))
+    twin = coarse.with_probe(coarse.probe.replace({"heat_capacity_scale": 1.1}))
     current = simulate(twin, step(9.0), at=times).current_mA.values
     rows = [f"{t / 1e3:g},{i:.6f}\n" for t, i in zip(times, current, strict=True)]
     Path("data.csv").write_text(f"Time/ms,I_h (mA)\n{''.join(rows)}")

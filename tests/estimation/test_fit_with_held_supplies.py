@@ -58,8 +58,8 @@ def test_predictions_are_states_and_their_slopes_have_taylor_order_two(circuit):
     at = ExperimentAtRest(similar, None, bias, names).predict(probe, between)
     start = shown(similar.lever(probe), bias)
     for place, name in enumerate(names):
-        (value,) = probe.at([name])
-        levers = [similar.lever(probe.moved({name: value * (1 + step)})) for step in STEPS]
+        (value,) = probe.values([name])
+        levers = [similar.lever(probe.replace({name: value * (1 + step)})) for step in STEPS]
         rest = [
             np.abs(shown(one, bias) - start - step * value * at.slopes[:, :, place]).max(axis=1)
             for step, one in zip(STEPS, levers, strict=True)
@@ -85,7 +85,7 @@ def corrected(probe: Probe, bias: np.ndarray, full: Lever) -> ExperimentAtRest:
 
 def test_a_fit_finds_what_a_file_of_both_polarities_was_made_with(coarse, tmp_path):
     truth = {"c_kappa": 0.62, "n_d": 5.0e17, "p": 2.5}
-    true = coarse.probe.moved(truth)
+    true = coarse.probe.replace(truth)
     data = coarse.with_probe(true).sweep(np.linspace(-8.0, 9.0, 24))
     rows = zip(
         *(data[name].values for name in ("bias_V", "current_mA", "reader_V", "tip_K")), strict=True

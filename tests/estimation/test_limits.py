@@ -27,10 +27,10 @@ TIPS, SLOPES = np.array([300.0, 500.0, 800.0]), np.array([1.0, 10.0, 20.0])
 class Lever(float):
     """A lever of which all is said by one number, x."""
 
-    def at(self, names):
+    def values(self, names):
         return np.array([float(self)])
 
-    def moved(self, values):
+    def replace(self, values):
         return Lever(values["x"])
 
 
@@ -54,7 +54,7 @@ class OneUnknown(Objective):
         self._of_prior, self._pull = [0], None
 
     def values(self, probe):
-        return probe.at(["x"])
+        return probe.values(["x"])
 
 
 class Bent:

@@ -61,7 +61,7 @@ def test_derivatives_by_parameters_are_those_of_the_values(highest):
     shown = np.stack([current, np.full(5, np.nan), np.full(5, np.nan)])
     model = experiment_of(probe, bias, names=NAMES).measuring(bias, shown)
     at = model.predict(probe)
-    start, step = probe.at(NAMES), np.array([0.02, -0.01, 0.01])
+    start, step = probe.values(NAMES), np.array([0.02, -0.01, 0.01])
     misses = []
     for share in (1.0, 0.5):
         values = at.surrogate.predict(start * (1.0 + share * step))[0]

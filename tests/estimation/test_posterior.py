@@ -128,7 +128,7 @@ def test_effective_sample_size_of_an_autoregressive_chain():
 def sampled(coarse, reduced, bias=BIAS):
     """The reduced lever as samples see it, and what it shows of a material."""
     lever = SampledLever(reduced_experiment(coarse, reduced, bias), coarse.probe)
-    return lambda material: lever.shown(coarse.with_material(material).probe.at(lever.names))
+    return lambda material: lever.shown(coarse.with_material(material).probe.values(lever.names))
 
 
 def test_the_surrogate_shows_nearby_what_the_full_lever_does(coarse, reduced):
@@ -227,7 +227,7 @@ def test_other_probes_are_predicted_by_powers_nearly_as_they_are_solved(coarse):
     names = ("n_d", "heater_length_um", "base_temperature_K")
     lever = SampledLever(experiment_of(coarse.probe, BIAS, names=names), coarse.probe)
     there = coarse.probe.with_(n_d=5.5e17, heater_length_um=4.1, base_temperature_K=295.0)
-    exact, parameters = Lever(there).sweep(BIAS).tip_K.values, there.at(names)
+    exact, parameters = Lever(there).sweep(BIAS).tip_K.values, there.values(names)
     assert np.abs(lever.shown(parameters)[2] - exact).max() < 2.0
     assert lever.error_K(parameters) < 2.0
 

@@ -30,10 +30,10 @@ def orders(lever, name):
     probe, names, similar = lever.probe, (name,), SimilarLevers(lever)
     start = similar.linearised(probe, REACH, None, names)
     shown = slice(0, 3 if "reader" in lever.space.mesh.terminal_facets else 2)
-    (value,), rest = probe.at(names), []
+    (value,), rest = probe.values(names), []
     unit = value or 1.0
     for step in (0.02, 0.01):
-        moved = probe.moved({name: float(value + step * unit)})
+        moved = probe.replace({name: float(value + step * unit)})
         other = similar.linearised(moved, REACH, start, names).branch
         count = start.branch.u.size
         change = (other.values[:count] - start.branch.values)[1:, shown]
@@ -87,7 +87,7 @@ def test_a_moved_mesh_shows_what_a_new_one_does(coarse):
 
 
 def test_a_mesh_that_would_turn_over_is_refused(coarse):
-    probe = coarse.probe.moved({"heater_length_um": 60.0})
+    probe = coarse.probe.replace({"heater_length_um": 60.0})
     with pytest.raises(ComputationError, match="cannot follow so large a change"):
         SimilarLevers(coarse).linearised(probe, REACH)
 
@@ -104,8 +104,8 @@ def test_derivatives_at_a_fixed_bias(coarse, name):
     probe, rest = coarse.probe, []
     start = model.predict(probe)
     for step in (0.02, 0.01):
-        (value,) = probe.at(names)
-        moved = model.predict(probe.moved({name: float(value * (1 + step))}), start)
+        (value,) = probe.values(names)
+        moved = model.predict(probe.replace({name: float(value * (1 + step))}), start)
         change = moved.values - start.values
         rest.append(np.abs(change - step * value * start.slopes[..., 0]) / start.values)
     # between its states a branch's slopes are splines
@@ -119,9 +119,9 @@ def test_predictions_nearby_agree_with_a_new_branch(coarse):
     names = ("n_d", "heater_length_um", "series_resistance_ohm", "base_temperature_K")
     model = replace(full_experiment(coarse, bias), names=names)
     start = model.predict(coarse.probe)
-    values = coarse.probe.at(names) * np.array([1.04, 0.96, 1.01, 1.02])
+    values = coarse.probe.values(names) * np.array([1.04, 0.96, 1.01, 1.02])
     nearby, slopes = start.surrogate.predict(values)
-    moved = coarse.probe.moved(dict(zip(names, values.tolist(), strict=True)))
+    moved = coarse.probe.replace(dict(zip(names, values.tolist(), strict=True)))
     exact = model.predict(moved)
     np.testing.assert_allclose(nearby, exact.values, rtol=3e-3)
     assert slopes.shape == exact.slopes.shape == (3, 3, 4)

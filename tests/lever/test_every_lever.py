@@ -169,10 +169,10 @@ def test_derivatives_by_the_material_have_taylor_order_two(one, start, name):
         pytest.skip("one parameter is enough where every solve takes seconds")
     reach = Reach(NORMAL, 4.0)
     u = start.branch.u[1:]
-    value, rest = float(one.probe.at([name])[0]), []
+    value, rest = float(one.probe.values([name])[0]), []
     slope = by_parameter(start.branch.equations, hot(start.branch), [name])
     for step in (0.02, 0.01):
-        moved = one.probe.moved({name: value * (1 + step)})
+        moved = one.probe.replace({name: value * (1 + step)})
         other = one.solver.linearised(moved, reach, start).branch
         np.testing.assert_allclose(other.u[1 : u.size + 1], u)
         change = (other.values[: u.size + 1] - start.branch.values)[1:, :3].T

@@ -166,10 +166,10 @@ def test_the_plain_circuit_is_written_as_ever():
     ],
 )
 def test_a_circuit_at_fault_is_refused_in_a_line(section, message):
-    values = Probe.reference().values()
+    values = Probe.reference().sections()
     values["circuit"] = {**values["circuit"], **section}
     with pytest.raises(InputError, match=message):
-        Probe.from_values(values, "probe.toml")
+        Probe.from_sections(values, "probe.toml")
 
 
 def test_a_name_of_a_contact_is_found_by_its_typo():

@@ -60,7 +60,7 @@ def test_a_number_beyond_its_bounds_is_quoted_with_them(name, value, expected):
 @pytest.mark.parametrize("shape", [["three-leg"], {"a": 1}, 7, None])
 def test_a_shape_that_is_no_name_is_refused(shape):
     with pytest.raises(InputError, match=r"shape.*three-leg, u-shape"):
-        Probe.from_values({"probe": {"shape": shape}}, "probe")
+        Probe.from_sections({"probe": {"shape": shape}}, "probe")
 
 
 @pytest.mark.parametrize(

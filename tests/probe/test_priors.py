@@ -95,7 +95,7 @@ def test_a_probe_file_states_priors_which_win_over_the_usual_ones(tmp_path):
     section = '\n[prior]\nn_d = "3.3e17 ± 10%"\ndimensions = "± 2%"\n'
     path.write_text(PROBE.to_toml().split("\n# Without")[0] + section)
     probe = Probe.from_file(path)
-    assert Probe.from_values(probe.values(), "again") == probe
+    assert Probe.from_sections(probe.sections(), "again") == probe
     assert '"3.3e17 ± 10%"' in probe.to_toml()
     known = default_priors(probe)
     assert known["n_d"] == Prior(3.3e17, 0.10)
@@ -150,7 +150,7 @@ def test_everything_that_a_prior_may_have_is_a_parameter():
     for probe in (PROBE, Probe.u_shape(), PROBE.in_medium("air")):
         known = parameters_of(probe)
         assert set(default_priors(probe)) <= set(known)
-        for name, value in zip(known, probe.at(list(known)), strict=True):
+        for name, value in zip(known, probe.values(list(known)), strict=True):
             assert known[name].lower <= value <= known[name].upper
             assert known[name].meaning
     with pytest.raises(InputError, match="did you mean 'heater_width_um'"):
@@ -158,9 +158,9 @@ def test_everything_that_a_prior_may_have_is_a_parameter():
 
 
 def test_values_are_moved_in_whatever_section_they_are():
-    moved = PROBE.moved({"n_d": 4e17, "gap_um": 3.0, "series_resistance_ohm": 5.0})
+    moved = PROBE.replace({"n_d": 4e17, "gap_um": 3.0, "series_resistance_ohm": 5.0})
     assert moved == PROBE.with_(n_d=4e17, gap_um=3.0, series_resistance_ohm=5.0)
-    np.testing.assert_array_equal(moved.at(["gap_um", "n_d"]), [3.0, 4e17])
+    np.testing.assert_array_equal(moved.values(["gap_um", "n_d"]), [3.0, 4e17])
 
 
 def test_a_prior_of_the_gas_counts_in_air_only():

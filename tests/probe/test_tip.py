@@ -16,7 +16,7 @@ TIP = Tip(height_um=0.7, half_angle_deg=25, apex_radius_um=0.03)
 
 
 def tipped(tip=TIP):
-    return Probe.from_values({**Probe.reference().values(), "tip": tip.model_dump()}, "test")
+    return Probe.from_sections({**Probe.reference().sections(), "tip": tip.model_dump()}, "test")
 
 
 def test_a_probe_with_a_tip_is_written_and_read_with_comments(tmp_path):
@@ -55,7 +55,7 @@ def test_the_example_in_the_comments_is_a_valid_section(tmp_path):
 )
 def test_a_wrong_tip_is_one_clear_line(section, message):
     with pytest.raises(InputError, match=message) as caught:
-        Probe.from_values({**Probe.reference().values(), "tip": section}, "probe.toml")
+        Probe.from_sections({**Probe.reference().sections(), "tip": section}, "probe.toml")
     assert "\n" not in str(caught.value)
 
 

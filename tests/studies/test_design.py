@@ -60,7 +60,7 @@ def test_annealing_changes_the_diffusion_length_only(start):
 
 @pytest.fixture(scope="module")
 def drawn() -> Design:
-    return Design(Probe.from_values(reference_points(), "drawn"))
+    return Design(Probe.from_sections(reference_points(), "drawn"))
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_scale_and_edges_of_a_drawing_are_varied(drawn):
 
 
 def test_design_command_of_a_drawing(run, tmp_path):
-    Probe.from_values(reference_points(), "drawn").to_file(tmp_path / "own.toml")
+    Probe.from_sections(reference_points(), "drawn").to_file(tmp_path / "own.toml")
     status, out, err = run("design", "own.toml", "--no-air")
     assert status == 0, err
     rows = [line.split()[0] for line in out.splitlines()[4:]]

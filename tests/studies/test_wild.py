@@ -69,7 +69,7 @@ def test_levers_scatter_about_what_their_owners_know_as_the_priors_say():
         except wild.HotleverError:
             continue
         assert true.prior is None
-        values = true.at(list(known)).tolist()
+        values = true.values(list(known)).tolist()
         away.append([one.deviation(v) for one, v in zip(known.values(), values, strict=True)])
     # levers that cannot be drawn are left out, so that the scatter is somewhat smaller
     spread = np.std(away, axis=0)

@@ -58,7 +58,7 @@ def strip(**changes) -> Probe:
         "materials": {"film": METAL, "nitride": DIELECTRIC},
         "circuit": {"series_resistance_ohm": 0.0},
     }
-    return Probe.from_values(sections | changes, "test")
+    return Probe.from_sections(sections | changes, "test")
 
 
 def test_a_drawn_strip_is_within_1e_6_of_the_exact_solution():

@@ -23,7 +23,9 @@ def test_without_power_the_integral_of_kappa_is_linear_between_the_ends():
     taper = Taper((LENGTH / 2, 0.5), (1.0, 0.0), LENGTH)
     material = published("option III").material
     cold = bare_equations(mesh, supply, ground, (LENGTH / 2, 0.5), material, taper=taper)
-    circuit = Circuit.of({"ground": {"kind": "ground", "base_temperature_K": 593.0}}, "test")
+    circuit = Circuit.from_values(
+        {"ground": {"kind": "ground", "base_temperature_K": 593.0}}, "test"
+    )
     equations = LeverEquations(cold.space, cold.materials, circuit)
     rest = at_rest(equations)
     T, V = cold.space.nodal(rest[:, 0], 293.0, equations.end_rises)

@@ -237,7 +237,7 @@ def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
     probe = load_probe(None if name is None else folder / name)
     sliders = []
     known = of_materials(probe)
-    for one, value in zip(known, probe.at(list(known)).tolist(), strict=True):
+    for one, value in zip(known, probe.values(list(known)).tolist(), strict=True):
         parameter = known[one]
         low, high = max(parameter.lower, value / 2), min(parameter.upper, value * 2)
         if value == 0.0:

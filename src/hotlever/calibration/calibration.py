@@ -249,7 +249,7 @@ def table_by_bias(
 
 def _law(values: dict[str, float], info: ValidationInfo) -> PowerLaw:
     coefficients = {name: value for name, value in values.items() if name != "threshold_K"}
-    return PowerLaw.of(coefficients, f"{info.context}: power_law")
+    return PowerLaw.from_values(coefficients, f"{info.context}: power_law")
 
 
 def _pulse(section: PulseSection, info: ValidationInfo) -> PulseCalibration:

@@ -104,10 +104,10 @@ def estimate_lever(
     # those of each measurement
     own = [name for name in fitted.options.varied if name not in _CIRCUIT]
     numbers = [fitted.options.varied.index(name) for name in own]
-    values, covariance = fitted.probe.at(own), fitted.posterior.covariance
+    values, covariance = fitted.probe.values(own), fitted.posterior.covariance
     relative = np.array([name not in before_fit or before_fit[name].relative for name in own])
     left = PriorDensity.of_estimate(own, values, covariance[np.ix_(numbers, numbers)], relative)
-    probe = probe.moved(dict(zip(own, values.tolist(), strict=True)))
+    probe = probe.replace(dict(zip(own, values.tolist(), strict=True)))
     theirs = {name: prior for name, prior in known.items() if name in {*_CIRCUIT, *SCALES}}
     free = tuple(name for name in own if name not in usual_parameters(probe))
     again = FitOptions(fixed=fixed, priors=theirs, free=free, medium=medium)

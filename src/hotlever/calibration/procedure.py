@@ -114,7 +114,7 @@ def calibrate(
         route, origin = f"fit in {fit.medium}", fit.probe
     else:
         route = "probe" if law is None else "power law"
-        origin = Probe.reference() if probe is None else Probe.given(probe)
+        origin = Probe.reference() if probe is None else Probe.coerce(probe)
     whole = given_measurement(measurement, origin.circuit)
     measured = averaged(whole, robust=True)
     measured.need_rest("a calibration")

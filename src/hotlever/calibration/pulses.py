@@ -245,8 +245,8 @@ class _Pulses:
             return self._aside(row, direction, _ASIDE)
 
     def _aside(self, row: int, direction: dict[str, float], way: float) -> Array:
-        values = self._probe.at(list(direction)) + way * np.array(list(direction.values()))
-        probe = self._probe.moved(dict(zip(direction, values.tolist(), strict=True)))
+        values = self._probe.values(list(direction)) + way * np.array(list(direction.values()))
+        probe = self._probe.replace(dict(zip(direction, values.tolist(), strict=True)))
         return self.change(row, self._similar.lever(probe)) / way
 
     def _follow(

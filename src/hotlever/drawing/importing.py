@@ -92,7 +92,7 @@ def import_drawing(path: Path, cell: str | None, folder: Path, unit: str | None 
     fault: InputError | None = None
     notes: list[str] = []
     try:
-        notes = Probe.from_values(tomllib.loads(text), str(path), folder).shape.notes()
+        notes = Probe.from_sections(tomllib.loads(text), str(path), folder).shape.notes()
     except InputError as error:
         fault = error
     return Imported(sheet, proposal, listing, text, fault, notes)

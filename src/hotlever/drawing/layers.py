@@ -127,7 +127,7 @@ def made_of(
             raise InputError(f"{here}: material = {quoted(material)}: expected a name")
         else:
             values["kind"] = ""
-        made[name] = Made.of(values, here)
+        made[name] = Made.from_values(values, here)
     _check_roles(drawn, made, where)
     return drawn, made
 

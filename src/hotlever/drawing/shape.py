@@ -201,7 +201,7 @@ class Drawing(Shape):
             if sheet is not None:
                 _check_unit(sheet, outlines["layers"])
             parts = {**outlines, "made": made, "by_area": by_area}
-            return cls.of({**values, **parts}, f"{where}: [probe]")
+            return cls.from_values({**values, **parts}, f"{where}: [probe]")
         except DrawingError as error:
             file = where if sheet is None else sheet.file
             raise error.of_file(file, named, _by_part(outlines)) from None

@@ -116,7 +116,7 @@ def fit_many(
     outputs, target, data = Outputs(*paths), Path(folder), lever_names(paths)
     outputs.folder(target)
     files = {name: target / f"{name}.json" for name in data}
-    asked = {"probe": probe.values(), "options": options.values(), "version": __version__}
+    asked = {"probe": probe.sections(), "options": options.values(), "version": __version__}
     if columns:
         asked["columns"] = dict(columns)
     batch, waiting = Batch(), dict[str, Measurement]()

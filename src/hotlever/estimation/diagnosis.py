@@ -204,7 +204,7 @@ class Diagnosis:
     def _again(self, explained: _Explanation) -> _Explanation:
         """Solve the lever where a search has led, and go on from there."""
         curve = explained.curve
-        values = curve.probe.at(curve.names) * np.exp(explained.away)
+        values = curve.probe.values(curve.names) * np.exp(explained.away)
         try:
             moved = curve.probe.with_(**dict(zip(curve.names, values.tolist(), strict=True)))
             curve = replace(self._solved(moved), probe=curve.probe, at=explained.away)
@@ -239,7 +239,7 @@ class Diagnosis:
             value += float(end.x[-1])
         if hypothesis.parameter:
             place = curve.names.index(hypothesis.parameter)
-            value = float(curve.probe.at([hypothesis.parameter])[0] * np.exp(away[place]))
+            value = float(curve.probe.values([hypothesis.parameter])[0] * np.exp(away[place]))
         unknowns = hypothesis.free + bool(hypothesis.parameter)
         squares = 2.0 * float(end.cost) + _UNKNOWN * unknowns
         return _Explanation(hypothesis, curve, squares, value, away)

@@ -68,7 +68,7 @@ def fit(
         If the lever cannot be solved at the start, or the fit does not converge.
     """
     options = chosen_options(options, choices)
-    given = Probe.reference() if probe is None else Probe.given(probe)
+    given = Probe.reference() if probe is None else Probe.coerce(probe)
     whole = given_measurement(measurement, given.circuit)
 
     def fitted(options: FitOptions) -> tuple[Estimate, Fit]:

@@ -174,7 +174,7 @@ class ExperimentAtRest:
             linearised = self.fast.linearised(probe, self.reach(probe), linearised, self.names)
         branch, by_parameter = linearised.branch, linearised.shown
         if self.correction:
-            branch = self.correction.added(branch, probe.at(self.names))
+            branch = self.correction.added(branch, probe.values(self.names))
             by_parameter = by_parameter + self.correction.slopes(branch.u)
         rows = Rows(self.bias, self.shown)
         shown = rows.differentiated(branch, by_parameter, probe.circuit, self.names)
@@ -206,7 +206,7 @@ class ExperimentAtRest:
             # without power nothing is lacking
             u = np.append(0.0, u)
             values, slopes = (np.insert(lacking, 0, 0.0, axis=0) for lacking in (values, slopes))
-        correction = Correction.through(probe.at(self.names), u, values, slopes)
+        correction = Correction.through(probe.values(self.names), u, values, slopes)
         return replace(self, correction=correction)
 
     def _full_states(

@@ -128,7 +128,7 @@ class PredictionInTime:
     @property
     def surrogate(self) -> LinearSurrogate:
         """Predictions for similar probes."""
-        return LinearSurrogate(self.probe.at(self.names), self.values, self.slopes)
+        return LinearSurrogate(self.probe.values(self.names), self.values, self.slopes)
 
 
 @dataclass(frozen=True)

@@ -196,7 +196,7 @@ def _of_the_lever(probe: Probe) -> list[Hypothesis]:
 
 
 def _of_a_parameter(probe: Probe, name: str) -> Hypothesis:
-    (stated,) = probe.at([name]).tolist()
+    (stated,) = probe.values([name]).tolist()
     known, whose = parameter_named(name), "doping" if name == "n_d" else "drawing"
     return Hypothesis(
         lambda value: (

@@ -100,7 +100,7 @@ class Estimate:
     def priors(self, known: Mapping[str, Prior]) -> dict[str, PriorUse]:
         """Return what was known before, and what the data made of it."""
         names = self.options.varied
-        values = self.probe.at(names).tolist()
+        values = self.probe.values(names).tolist()
         spreads = np.sqrt(np.diag(self.posterior.covariance)).tolist()
         used = {
             name: known[name].used(value, spread)
@@ -200,7 +200,7 @@ def estimate(
     density = PriorDensity.independent(own) if own else None
     if before is not None:
         density = before if density is None else density.beside(before)
-    start = options.held(probe.moved({name: prior.value for name, prior in own.items()}))
+    start = options.held(probe.replace({name: prior.value for name, prior in own.items()}))
     search = Search(residuals, start, options.varied, options.robust, density, progress, seen)
     if measurement.waveform is not None:
         follow = partial(ExperimentInTime.of, waveform=measurement.waveform, names=options.varied)

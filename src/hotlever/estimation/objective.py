@@ -89,7 +89,7 @@ class Objective:
 
     def values(self, probe: Probe) -> Array:
         """Return the varied parameters of a probe in their own units."""
-        return probe.at(self.varied)
+        return probe.values(self.varied)
 
     def point(self, probe: Probe) -> Array:
         """Return the point of a probe."""
@@ -104,7 +104,7 @@ class Objective:
             If no such lever can be drawn.
         """
         values = self.coordinates.values(point).tolist()
-        return probe.moved(dict(zip(self.varied, values, strict=True)))
+        return probe.replace(dict(zip(self.varied, values, strict=True)))
 
     def among(self, parameters: Array, point: Array) -> Array:
         """Return the parameters `names` of a lever, (k,), with the values of a point."""

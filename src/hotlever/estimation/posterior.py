@@ -131,7 +131,7 @@ class Posterior:
         objective, (k,); differences are central, half a standard error either way.
         """
         names = self.objective.names
-        origin, rows = self.at.probe.at(names), []
+        origin, rows = self.at.probe.values(names), []
         for step in self.principal_steps():
             half = 0.5 * np.array([step.get(name, 0.0) for name in names])
             rows.append(function(origin + half) - function(origin - half))

@@ -217,7 +217,7 @@ def profile_likelihood(
     value, stderr = result.parameters[name].value, result.parameters[name].stderr
     # without a standard error, a tenth of the bounds' distance is a step as good as any
     step = (stderr or 0.1 * (parameter.upper - parameter.lower)) * _REACH / (points // 2)
-    rows = {value: (0.0, result.probe.at(result.names))}
+    rows = {value: (0.0, result.probe.values(result.names))}
     reasons: dict[str, str] = {}
     for side, sign, way, bound in (
         ("lower", -1.0, "down", parameter.lower),
@@ -233,13 +233,13 @@ def profile_likelihood(
                 break
             pulled = objective.pulled(Pull(quantity, target, _HELD * step))
             try:
-                start = near.probe.moved({name: target})
+                start = near.probe.replace({name: target})
                 near = Optimiser(model, pulled, near=near).solve(start).prediction
             except ComputationError:
                 reasons[side] = f"as far as the lever can be solved ({target:.4g} cannot)"
                 break
             delta = (objective.squares(near) - least) / variance
-            rows[target] = delta, near.probe.at(result.names)
+            rows[target] = delta, near.probe.values(result.names)
             if count >= points // 2 and delta > chdtri(1, 1.0 - LEVELS[-1]):
                 break
         else:

@@ -162,7 +162,7 @@ class Fit(Outcome):
         names = list(dict.fromkeys([*usual_parameters(self.probe), *self.names]))
         return {
             name: FittedParameter(value, stderr.get(name), units[name].unit, name in self.names)
-            for name, value in zip(names, self.probe.at(names).tolist(), strict=True)
+            for name, value in zip(names, self.probe.values(names).tolist(), strict=True)
         }
 
     @cached_property

@@ -55,7 +55,7 @@ def _matrix(values: list[list[float]]) -> Array:
 
 
 def _probe(sections: dict[str, dict[str, Any]], info: ValidationInfo) -> Probe:
-    return Probe.from_values(sections, f"{info.context}: probe")
+    return Probe.from_sections(sections, f"{info.context}: probe")
 
 
 def _columns(rows: list[dict[str, float]]) -> dict[str, Array]:
@@ -78,7 +78,7 @@ _Counts = Annotated[
     Array, stored_as(list[_Count], write=lambda counts: counts.astype(int).tolist())
 ]
 _Times = Annotated[Array, stored_as(list[float])]
-_Probe = Annotated[Probe, stored_as(dict[str, dict[str, Any]], _probe, Probe.values)]
+_Probe = Annotated[Probe, stored_as(dict[str, dict[str, Any]], _probe, Probe.sections)]
 # What is not written where there is none.
 IF_ANY: Any = Field(None, exclude_if=lambda value: value is None)
 

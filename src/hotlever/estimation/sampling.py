@@ -93,7 +93,7 @@ class SampledLever:
 
         By the lever that is solved there; of a reduced one by what the full one's residual says.
         """
-        probe = self.at.probe.moved(dict(zip(self.names, parameters.tolist(), strict=True)))
+        probe = self.at.probe.replace(dict(zip(self.names, parameters.tolist(), strict=True)))
         solved = self._experiment.predict(probe, self.at)
         error = float(np.abs(self.shown(parameters) - solved.values)[TIP].max())
         if isinstance(self._experiment.fast, ReducedLever):
@@ -186,7 +186,7 @@ def _density_at(fit: Fit, probe: Probe, noise: Noise) -> tuple[PosteriorDensity,
     """Return the density of a fit's parameters, approximated about a probe, and levers near it."""
     objective = Objective.of_fit(fit, fit.names)
     lever = _lever_like(fit, probe, objective.residuals.bias)
-    shown = partial(_shown_at, lever.shown, objective, probe.at(lever.names))
+    shown = partial(_shown_at, lever.shown, objective, probe.values(lever.names))
     return PosteriorDensity(objective, lever.at, shown, noise), lever
 
 
@@ -261,7 +261,7 @@ def sample_posterior(
     objective = density.objective
     data = _dataset(fit, chains, objective.coordinates.values)
     points = chains.points.reshape(-1, density.optimum.size)
-    at_middle = middle.at(lever.names)
+    at_middle = middle.values(lever.names)
     error = max(
         lever.error_K(objective.among(at_middle, points[row])) for row in _outermost(points)
     )
@@ -292,7 +292,7 @@ def _dataset(fit: Fit, chains: Chains, values_of: Callable[[Array], Array]) -> x
     }
     size = [independent_samples(column) for column in columns.values()]
     held = [name for name in usual_parameters(fit.probe) if name not in fit.names]
-    at_rest = zip(held, fit.probe.at(held).tolist(), strict=True)
+    at_rest = zip(held, fit.probe.values(held).tolist(), strict=True)
     data = labelled(
         {
             **chained,
@@ -366,7 +366,7 @@ def predictive_band(
         else np.unique(np.asarray(bias, float))
     )
     lever = _lever_like(fit, fit.probe, grid)
-    origin = fit.probe.at(lever.names)
+    origin = fit.probe.values(lever.names)
     varied = [lever.names.index(name) for name in fit.names]
     flat = np.stack([posterior[name].values.ravel() for name in fit.names], axis=1)
     chosen = flat[np.linspace(0, len(flat) - 1, min(samples, len(flat))).round().astype(int)]

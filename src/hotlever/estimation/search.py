@@ -172,7 +172,7 @@ def _is_far(residuals: Residuals, at: Prediction) -> bool:
 def _has_moved(drawn: Probe, probe: Probe) -> bool:
     """Whether a probe's dimensions are far from those that a mesh was drawn with."""
     names = dimensions_of(probe)
-    before, now = drawn.at(names), probe.at(names)
+    before, now = drawn.values(names), probe.values(names)
     return bool(np.any(np.abs(now - before) > GROWTH.mesh_follows * np.abs(before)))
 
 
@@ -180,7 +180,7 @@ def _closing(probe: Probe, varied: Sequence[str]) -> dict[str, Prior]:
     """Return wide priors about a probe for all that is varied."""
     usual, every = default_priors(probe), parameters_of(probe, anywhere=True)
     closing = {}
-    for name, value in zip(varied, probe.at(list(varied)).tolist(), strict=True):
+    for name, value in zip(varied, probe.values(list(varied)).tolist(), strict=True):
         if name in usual:
             prior = usual[name]
             closing[name] = Prior(value, GROWTH.widened * prior.spread, prior.relative)

@@ -48,7 +48,7 @@ class Subproblem:
     ) -> None:
         self.objective, self.at = objective, at
         self.origin = objective.point(at.probe)
-        self._surrogate, self._parameters = at.surrogate, at.probe.at(objective.names)
+        self._surrogate, self._parameters = at.surrogate, at.probe.values(objective.names)
         self._bends: list[tuple[Array, Array]] = []
         self._latest: tuple[Array, tuple[Array, Array]] | None = None
         jacobian = objective.jacobian(at.slopes, self.origin)

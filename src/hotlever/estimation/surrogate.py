@@ -86,7 +86,7 @@ class CurveSurrogate:
         self, probe: Probe, names: tuple[str, ...], branch: Branch, by_parameter: Array, rows: Rows
     ) -> None:
         self.probe, self.names, self.branch, self.rows = probe, names, branch, rows
-        self._origin = probe.at(names)
+        self._origin = probe.values(names)
         scale = Coordinates.of(probe, names).scale
         self._unit = np.maximum(np.abs(self._origin), 0.1 * scale)
         self._rates = by_parameter * self._unit
@@ -170,7 +170,7 @@ class ReducedSurrogate:
         """
         local = self._local
         named = zip(local.names, parameters.tolist(), strict=True)
-        ratio = self._on_few_points(local.probe.moved(dict(named))) / self._shown
+        ratio = self._on_few_points(local.probe.replace(dict(named))) / self._shown
         # without power the ratio is that of a barely warm lever
         ratio = np.concatenate([ratio[:1], ratio])
         growth = spline_through(local.branch.u, ratio)(local.branch.u, 1) / ratio

@@ -81,7 +81,7 @@ class Atlas:
 
 
 def _scale(box: Box, probe: Probe) -> float:
-    return float(probe.at([box.scale])[0]) if box.scale else 1.0
+    return float(probe.values([box.scale])[0]) if box.scale else 1.0
 
 
 def _terms(place: Array) -> tuple[Array, Array]:

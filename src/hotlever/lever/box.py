@@ -69,7 +69,7 @@ class Box:
         chosen = [one for one in known if one in {*usual_parameters(probe), *names}]
         ranges: list[tuple[float, float]] = []
         by_logarithm: list[bool] = []
-        for name, value in zip(chosen, probe.at(chosen).tolist(), strict=True):
+        for name, value in zip(chosen, probe.values(chosen).tolist(), strict=True):
             prior, one = priors.get(name), known[name]
             if prior is None:
                 away = _UNKNOWN * (abs(value) or one.scale)
@@ -99,7 +99,7 @@ class Box:
 
     def probe(self, probe: Probe, shares: Array) -> Probe:
         """Return the probe of the materials there."""
-        return probe.moved(self.values(shares))
+        return probe.replace(self.values(shares))
 
     def covers(self, probe: Probe) -> bool:
         """Whether a reduced lever of this box serves a probe: the paper's serves any."""
@@ -107,14 +107,14 @@ class Box:
 
     def place(self, probe: Probe) -> Array:
         """Invert `probe`, beyond the box too."""
-        value, low, high = probe.at(self.names), self.low.copy(), self.high.copy()
+        value, low, high = probe.values(self.names), self.low.copy(), self.high.copy()
         for one in (value, low, high):
             one[self.by_logarithm] = np.log(one[self.by_logarithm])
         return np.asarray((value - low) / (high - low))
 
     def slopes(self, probe: Probe) -> Array:
         """Return how far each parameter moves per unit of its share of the box, (p,)."""
-        by_logarithm = probe.at(self.names) * np.log(self._ratio)
+        by_logarithm = probe.values(self.names) * np.log(self._ratio)
         return np.where(self.by_logarithm, by_logarithm, self.high - self.low)
 
     @property

@@ -127,7 +127,7 @@ def probe_attributes(lever: Lever) -> dict[str, str]:
 
     The lever may follow other laws than its probe.
     """
-    values: dict[str, Any] = lever.probe.values()
+    values: dict[str, Any] = lever.probe.sections()
     if laws := own_laws(lever.equations.made_of):
         values[LAWS] = laws
     sections = {name: json.dumps(section) for name, section in values.items()}
@@ -189,12 +189,12 @@ def probe_of(data: xr.Dataset) -> Probe:
         If it has a material with laws of its own, which no file holds.
     """
     names = [name for name in (*SECTIONS, LAWS) if name in data.attrs]
-    return Probe.from_values({name: json.loads(data.attrs[name]) for name in names}, "sweep")
+    return Probe.from_sections({name: json.loads(data.attrs[name]) for name in names}, "sweep")
 
 
 def circuit_of(data: xr.Dataset) -> Circuit:
     """Return the circuit in which a sweep was made."""
-    return Circuit.of(json.loads(data.attrs["circuit"]), "sweep: [circuit]")
+    return Circuit.from_values(json.loads(data.attrs["circuit"]), "sweep: [circuit]")
 
 
 def checked_bias(bias: ArrayLike, circuit: Circuit) -> Array:

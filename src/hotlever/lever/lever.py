@@ -80,7 +80,7 @@ class Lever:
         space: FullSpace | None = None,
         progress: Progress | None = None,
     ) -> None:
-        self.probe, self._mesh = Probe.given(probe), mesh or MeshOptions()
+        self.probe, self._mesh = Probe.coerce(probe), mesh or MeshOptions()
         if space is None and mesh is None:
             space = chosen_space(self.probe)
         self.space = space or flat_space(self.probe.layout(), self._mesh, self.probe.wiring)

@@ -200,7 +200,7 @@ class Linearised:
         Roughly: with the same temperatures, and potentials in proportion to the lever voltage; the
         same states if there are other supplies.
         """
-        moved, x = probe.at(self.names) - self.probe.at(self.names), self.branch.x
+        moved, x = probe.values(self.names) - self.probe.values(self.names), self.branch.x
         if self.changes.size:
             return np.asarray(x + self.changes @ moved)
         if not self.branch.equations.circuit.starts_cold:

@@ -67,7 +67,7 @@ class SolidLever(Lever):
         air_order: int = 3,
     ) -> None:
         self._options, self._sphere_radius_um, self._air_order = mesh, sphere_radius_um, air_order
-        self.probe = Probe.given(probe)
+        self.probe = Probe.coerce(probe)
         self.space = self._meshed()
         self._prepare()
 
@@ -193,7 +193,7 @@ class SolidLever(Lever):
     def _file(self, bias: float) -> Path | None:
         air = None if self.space.air is None else self.space.air.operator
         facts = {
-            "probe": self.probe.values(),
+            "probe": self.probe.sections(),
             "nodes": self.space.elements.nodes,
             "air": None if air is None else [air.radius_um, air.order, air.size],
             "bias_V": bias,

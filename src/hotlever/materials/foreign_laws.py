@@ -49,6 +49,6 @@ def with_laws_of(before: Any, probe: Any) -> Any:
     for name, kind in materials.items():
         old = before.materials.get(name)
         if old is not None and old.kind == kind.kind:
-            materials[name] = type(old).of(kind.model_dump(), name)
-    material = type(before.material).of(probe.material.model_dump(), "material")
+            materials[name] = type(old).from_values(kind.model_dump(), name)
+    material = type(before.material).from_values(probe.material.model_dump(), "material")
     return probe.model_copy(update={"material": material, "materials": materials})

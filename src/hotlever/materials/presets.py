@@ -114,7 +114,7 @@ def material_of(values: Mapping[str, Any], where: str) -> Kind:
     if not isinstance(kind, str) or kind not in KINDS:
         raise unknown_name("kind", str(kind), KINDS, where)
     given = {**usual_values(kind), **_preset(values.get("preset"), kind, where), **values}
-    return KINDS[kind].of(given, where)
+    return KINDS[kind].from_values(given, where)
 
 
 def materials_of(

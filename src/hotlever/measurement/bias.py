@@ -92,7 +92,7 @@ def _series_kohm(contents: Contents, circuit: Circuit | None, needed: str) -> fl
 
 def _put_resistance(contents: Contents, ohm: float, what: str, origin: str) -> None:
     """Let a resistance that follows from the data count as R_s, if it may be one."""
-    Circuit.of({"series_resistance_ohm": ohm}, f"{contents.table.path}: {what}")
+    Circuit.from_values({"series_resistance_ohm": ohm}, f"{contents.table.path}: {what}")
     contents.settings.put("series_resistance_ohm", ohm, origin)
 
 

@@ -189,7 +189,7 @@ def _setting(text: str, where: str) -> dict[str, Any] | None:
         if converted is None:
             return None
         if attribute != "pressure_mbar":
-            Circuit.of({attribute: converted}, where)
+            Circuit.from_values({attribute: converted}, where)
         return {attribute: converted}
     # a resistance, temperature or pressure may be meant for one
     number, rest = quantity(value or key)

@@ -130,15 +130,17 @@ class Circuit(Record):
     contacts: dict[str, Contact] = Field(default_factory=dict)
 
     @classmethod
-    def of(cls, values: dict[str, Any], where: str) -> Self:
+    def from_values(cls, values: dict[str, Any], where: str) -> Self:
         """Check `values` and make a circuit; `where` names their origin in an error."""
         parts = contacts_apart(values)
         given = parts.get("contacts", {}).items()
         inside = {
-            name: one if isinstance(one, Contact) else Contact.of(one, f"{where[:-1]}.{name}]")
+            name: one
+            if isinstance(one, Contact)
+            else Contact.from_values(one, f"{where[:-1]}.{name}]")
             for name, one in given
         }
-        return super().of({**parts, "contacts": inside}, where)
+        return super().from_values({**parts, "contacts": inside}, where)
 
     @model_validator(mode="before")
     @classmethod

@@ -50,9 +50,9 @@ class LayoutRate:
         InputError
             If parts would come apart.
         """
-        value = float(probe.at([name])[0])
+        value = float(probe.values([name])[0])
         now, step = probe.layout(), _STEP * (value or 1.0)
-        later = probe.moved({name: value + step}).layout()
+        later = probe.replace({name: value + step}).layout()
         if len(later.regions) != len(now.regions):
             raise InputError(
                 f"{name} cannot change by itself here: parts of the lever would come apart; "
@@ -166,7 +166,9 @@ class MovingMesh:
 
         points = self._mesh.elements.p.copy()
         names = dimensions_of(probe)
-        for name, change in zip(names, probe.at(names) - self._probe.at(names), strict=True):
+        for name, change in zip(
+            names, probe.values(names) - self._probe.values(names), strict=True
+        ):
             if change:
                 points += change * self.movement(name).velocity
         before, triangles = self._mesh.elements.p, self._mesh.elements.t

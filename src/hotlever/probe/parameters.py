@@ -124,7 +124,9 @@ def parameters_of(
     parts = (probe.shape, probe.tip, probe.circuit, probe.surroundings)
     meaning = {name: text for part in parts if part for name, text in part.description().items()}
     found = of_materials(probe, in_time=anywhere or in_time)
-    for (name, (least, most)), value in zip(shares.items(), probe.at(list(shares)), strict=True):
+    for (name, (least, most)), value in zip(
+        shares.items(), probe.values(list(shares)), strict=True
+    ):
         found[name] = parameter_named(name)._replace(
             scale=float(value),
             lower=float(least * value),

@@ -237,7 +237,7 @@ def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) ->
         spreads["gas_conductivity"] = _GAS
         if probe.surroundings.surface_gap_um is not None:
             spreads["surface_gap_um"] = _GAP
-    values = probe.at(list(spreads)).tolist()
+    values = probe.values(list(spreads)).tolist()
     found = {
         name: Prior(value, float(spread))
         for (name, spread), value in zip(spreads.items(), values, strict=True)
@@ -248,7 +248,7 @@ def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) ->
         name: _IMPURITIES for name in of_materials(probe) if own_name(name) == "impurity_exponent"
     }
     for name, spread in absolute.items():
-        found[name] = Prior(float(probe.at([name])[0]), spread, relative=False)
+        found[name] = Prior(float(probe.values([name])[0]), spread, relative=False)
     own = {name: prior for name, prior in (material or {}).items() if name in found}
     return found | own | priors_of(probe.stated_priors, probe, "[prior]")
 
@@ -307,7 +307,7 @@ def priors_of(
             some = [one for one in nuisances(probe) if one not in stated]
         else:
             some = [name]
-        for one, own in zip(some, probe.at(some).tolist(), strict=True):
+        for one, own in zip(some, probe.values(some).tolist(), strict=True):
             found[one] = Prior(own if value is None else value, spread, written != "unit")
             _check(found[one], known[one], f"{where}: {one}", written)
     counting = parameters_of(probe, in_time=in_time)

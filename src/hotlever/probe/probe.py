@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -125,7 +125,7 @@ class Probe(Record):
         return cls(shape=UShape.reference())
 
     @classmethod
-    def given(cls, probe: Probe | str | os.PathLike[str]) -> Probe:
+    def coerce(cls, probe: Probe | str | os.PathLike[str]) -> Probe:
         """Return a probe as it is, or read one from a probe file.
 
         Raises
@@ -140,7 +140,7 @@ class Probe(Record):
         raise InputError(f"found {type(probe).__name__}, expected a Probe or a probe file")
 
     @classmethod
-    def from_values(cls, values: dict[str, Any], where: str, folder: Path | None = None) -> Probe:
+    def from_sections(cls, values: dict[str, Any], where: str, folder: Path | None = None) -> Probe:
         """Make a probe of the sections of a probe file.
 
         Parameters
@@ -179,8 +179,8 @@ class Probe(Record):
         for name, part in _PARTS.items():
             if name in values:
                 section = {**usual.get(name, {}), **values[name]}
-                parts[name] = part.of(section, f"{where}: [{name}]")
-        probe = cls.of(parts, where)
+                parts[name] = part.from_values(section, f"{where}: [{name}]")
+        probe = cls.from_values(parts, where)
         probe.circuit.check(probe.layout().terminal_names, probe.surroundings.medium, where)
         if "material" in values and not probe.has_plain_silicon:
             raise InputError(f"{where}: [material]: no layer is made of it, expected none")
@@ -199,7 +199,7 @@ class Probe(Record):
             If the file cannot be read or its content is at fault.
         """
         values = read_sections(path)
-        return cls.from_values(values, str(path), Path(path).parent)
+        return cls.from_sections(values, str(path), Path(path).parent)
 
     @property
     def _records(self) -> dict[str, Record]:
@@ -220,8 +220,8 @@ class Probe(Record):
         """Whether any of it is made of the silicon of ``[material]``."""
         return not {LOW_DOPED, HIGH_DOPED}.isdisjoint(self.layout().materials)
 
-    def values(self) -> dict[str, dict[str, Any]]:
-        """Return the sections as plain values: what `from_values` takes, or refuses."""
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """Return the sections as plain values: what `from_sections` takes, or refuses."""
         found: dict[str, dict[str, Any]] = self.shape.sections()
         if self.materials:
             found[_MATERIALS] = {name: kind.model_dump() for name, kind in self.materials.items()}
@@ -275,7 +275,7 @@ class Probe(Record):
         InputError
             If a name exists in no section (the nearest one is given) or a value is impossible.
         """
-        sections = self.values()
+        sections = self.sections()
         sections.pop(LAWS, None)
         for name, value in changes.items():
             section, key, _ = self.field(name)
@@ -292,10 +292,10 @@ class Probe(Record):
         if shape is not None and not isinstance(self.shape, shape):
             own = sections["probe"].items()
             sections["probe"] = {key: value for key, value in own if key in shape.model_fields}
-        changed: Probe = with_laws_of(self, Probe.from_values(sections, "probe"))
+        changed: Probe = with_laws_of(self, Probe.from_sections(sections, "probe"))
         return changed
 
-    def at(self, names: Sequence[str]) -> Array:
+    def values(self, names: Sequence[str]) -> Array:
         """Return some of its values by their names in a probe file, shape (len(names),)."""
         return np.array([self._value(name) for name in names], dtype=float)
 
@@ -308,7 +308,7 @@ class Probe(Record):
             getattr(part, name) for part in parts if part and name in type(part).model_fields
         )
 
-    def moved(self, values: Mapping[str, float]) -> Probe:
+    def replace(self, values: Mapping[str, float]) -> Probe:
         """Return a copy with some values changed, as `with_` does but unchecked and fast."""
         parts: dict[str, Any] = {}
         for field in ("shape", *_PARTS):
@@ -370,7 +370,7 @@ class Probe(Record):
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip."""
-        return replace(self.shape.layout(), cone=self.tip)
+        return dataclasses.replace(self.shape.layout(), cone=self.tip)
 
     def to_toml(self) -> str:
         """Return the probe as a commented probe file."""

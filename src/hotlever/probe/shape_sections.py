@@ -49,4 +49,4 @@ def shape_of(
     for section in SHAPE_SECTIONS[1:]:
         if section in sections:
             raise InputError(f'{where}: section [{section}] means nothing with shape = "{name}"')
-    return PARAMETRIC[name].of(values, here)
+    return PARAMETRIC[name].from_values(values, here)

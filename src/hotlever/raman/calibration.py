@@ -267,7 +267,7 @@ def calibrate_raman(
         "anharmonic": law,
         "points": list(points),
     }
-    return RamanCalibration.of(content, "calibration")
+    return RamanCalibration.from_values(content, "calibration")
 
 
 def _fit_anharmonic(

@@ -77,7 +77,7 @@ class Design:
     def numbers(self) -> dict[str, float]:
         """All that can be varied, by name: the numbers of the probe file, and the annealing."""
         fixed, found = (*self.probe.shape.read_with, "tolerance_um"), dict[str, float]()
-        for section, entries in self.probe.values().items():
+        for section, entries in self.probe.sections().items():
             for key, entry in entries.items():
                 if isinstance(entry, Mapping):
                     # a material's name is enough, a layer or a contact has its section before it
@@ -187,7 +187,7 @@ def vary(
         {key: [row[key] for row in rows] for key in QUANTITIES},
         name,
         {name: (name, np.asarray(values, dtype=float), meaning)},
-        **{key: json.dumps(section) for key, section in design.probe.values().items()},
+        **{key: json.dumps(section) for key, section in design.probe.sections().items()},
         power_mW=power_mW,
         base_value=design.value(name),
     )

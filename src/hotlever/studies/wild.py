@@ -163,7 +163,7 @@ def _nominal(rng: Generator, shape: str) -> Probe:
         delta=common * probe.material.delta,
         series_resistance_ohm=_between(rng, *_SERIES_OHM),
     )
-    return probe.model_copy(update={"prior": PriorTexts.of(priors, "priors")})
+    return probe.model_copy(update={"prior": PriorTexts.from_values(priors, "priors")})
 
 
 def _drawing(rng: Generator, common: float) -> Probe:
@@ -199,7 +199,7 @@ def _drawing(rng: Generator, common: float) -> Probe:
         },
         "terminals": {"supply": right[-2:], "ground": left[:2]},
     }
-    return Probe.from_values(sections, "drawn twin")
+    return Probe.from_sections(sections, "drawn twin")
 
 
 def _drawn(rng: Generator, nominal: Probe) -> Probe:

@@ -23,10 +23,10 @@ def random_probe(rng: np.random.Generator) -> Probe:
     while True:
         probe = Probe.reference() if rng.random() < 0.7 else Probe.u_shape()
         names = [*dimensions_of(probe), *(name for name in PARAMETERS if name != "delta")]
-        values = probe.at(names) * np.exp(rng.normal(0.0, 0.15, len(names)))
+        values = probe.values(names) * np.exp(rng.normal(0.0, 0.15, len(names)))
         circuit = {"series_resistance_ohm": float(rng.choice([0.0, 300.0, 5600.0, 2e4]))}
         try:
-            moved = probe.moved(dict(zip(names, values.tolist(), strict=True)))
+            moved = probe.replace(dict(zip(names, values.tolist(), strict=True)))
             return moved.with_(**circuit, base_temperature_K=float(rng.uniform(250.0, 400.0)))
         except InputError:
             continue  # its parts would overlap

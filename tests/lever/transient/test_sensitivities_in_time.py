@@ -41,7 +41,7 @@ def test_they_have_taylor_order_two(coarse, in_air, medium, names):
     assert set(base.bias_V.values.tolist()) == {10.0, 0.0}
     plain = simulate(lever, wave, at=stops, tolerance_K=0.05)
     np.testing.assert_allclose(base.tip_K, plain.tip_K, atol=0.1)
-    slopes, value = base.sensitivity.values, lever.probe.at(names)
+    slopes, value = base.sensitivity.values, lever.probe.values(names)
     unit = np.where(value == 0.0, 1.0, value)
     share = np.minimum(MOVED_K / np.abs(slopes[2] * unit).max(axis=0), MOST)
     moved = share * unit * np.random.default_rng(0).choice([-1.0, 1.0], len(names))
@@ -49,7 +49,7 @@ def test_they_have_taylor_order_two(coarse, in_air, medium, names):
     for h in (1.0, 0.5):
         changes = dict(zip(names, (value + h * moved).tolist(), strict=True))
         other = with_sensitivities(
-            lever.with_probe(lever.probe.moved(changes)), wave, stops, names[-1:]
+            lever.with_probe(lever.probe.replace(changes)), wave, stops, names[-1:]
         )
         missed = values_of(other) - values_of(base) - h * (slopes @ moved)
         rest.append(np.abs(missed).max(axis=1))

@@ -14,7 +14,7 @@ tip = np.array([120, -35]) + 48.58 * np.array([np.cos(np.pi / 6), np.sin(np.pi /
 drawn = {"shape": "drawing", "file": "turned.gds", "thickness_um": 0.4, "tip_um": tip.tolist()}
 layers = {"silicon": "1/0", "heater": "2/0", "reader": "3/0"}
 terminals = {"supply": "10/0", "ground": "11/0", "reader": "12/0"}
-turned = Probe.from_values({"probe": drawn, "layers": layers, "terminals": terminals}, "turned")
+turned = Probe.from_sections({"probe": drawn, "layers": layers, "terminals": terminals}, "turned")
 
 bias = np.linspace(1.0, 11.0, 11)
 as_drawn, as_turned = (Lever(probe).sweep(bias) for probe in (Probe.reference(), turned))
