@@ -12,6 +12,8 @@ from hotlever.errors import InputError, shown
 
 ZERO_CELSIUS_K = 273.15
 LARGEST_NUMBER = 1e30  #: no quantity is larger in any unit
+#: Between these (V) a lever has a current that can be told from none, and no spark.
+LEAST_BIAS, MOST_BIAS = 1e-6, 1e4
 
 NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 LONGEST_NUMBER = 60  #: characters
@@ -322,6 +324,27 @@ def setting(text: str, inside: str, where: str, *, bare: bool = False) -> float:
     # whole powers are exact: 250 ns are 0.25 µs to the last digit
     power = theirs - ours
     return value * 10.0**power if power >= 0 else value / 10.0**-power
+
+
+def bias_setting(text: str, where: str) -> float:
+    """Return a bias such as ``5``, ``5V`` or ``200 mV`` in volts, of either sign.
+
+    Raises
+    ------
+    InputError
+        If it is no voltage, or none between `LEAST_BIAS` and `MOST_BIAS` but 0.
+
+    Examples
+    --------
+    >>> bias_setting("200 mV", "--step"), bias_setting("5", "--step")
+    (0.2, 5.0)
+    """
+    volts = setting(text, "V", where, bare=True)
+    if volts and not LEAST_BIAS <= abs(volts) <= MOST_BIAS:
+        raise InputError(
+            f"{where}: found a bias of {volts:g} V, expected 0 or {LEAST_BIAS:g} to {MOST_BIAS:g} V"
+        )
+    return volts
 
 
 def plausible(where: str, unit: str, value: float, low: float, high: float) -> None:

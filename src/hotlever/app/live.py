@@ -22,7 +22,6 @@ from matplotlib.path import Path as Outline
 from PIL import Image
 
 from hotlever.app.child import Report
-from hotlever.cli.options import load_probe
 from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.lever import Branch, Lever
@@ -234,7 +233,7 @@ def prepare(report: Report, folder: Path, name: str | None, changes: dict[str, A
 
 def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
     """Return what sliders need of a probe: its values, their bounds, units and meanings."""
-    probe = load_probe(None if name is None else folder / name)
+    probe = Probe.reference() if name is None else Probe.from_file(folder / name)
     sliders = []
     known = of_materials(probe)
     for one, value in zip(known, probe.values(list(known)).tolist(), strict=True):
@@ -277,7 +276,7 @@ def _stamp(folder: Path, name: str | None) -> float:
 def _probe(
     folder: Path, name: str | None, stamp: float, changes: tuple[tuple[str, Any], ...]
 ) -> Probe:
-    probe = load_probe(None if name is None else folder / name)
+    probe = Probe.reference() if name is None else Probe.from_file(folder / name)
     return probe.with_(**dict(changes)) if changes else probe
 
 

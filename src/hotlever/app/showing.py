@@ -22,14 +22,13 @@ from hotlever.app.child import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.calibration import STATED, TABLE_COLUMNS
 from hotlever.calibration.summary import calibration_text
-from hotlever.cli.options import load_probe
-from hotlever.cli.waveforms import pulses
 from hotlever.datasets import QUANTITIES
 from hotlever.errors import InputError
 from hotlever.estimation import Fit, read_fit, read_measurement
 from hotlever.estimation.words import parameter_rows
 from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.meshing import chosen_space
+from hotlever.lever.transient.waveform_texts import waveform_from_text
 from hotlever.materials.naming import sentence
 from hotlever.measurement import parse_columns
 from hotlever.probe import Layout, Probe
@@ -57,7 +56,8 @@ def understood(
     told = told or {}
     circuit = _probe(folder, told.get("probe")).circuit
     columns = parse_columns(told.get("columns") or [])
-    waveform = pulses(told["waveform"]) if told.get("waveform") else None
+    pulse = told.get("waveform")
+    waveform = waveform_from_text("pulse", pulse) if pulse else None
     measurement = read_measurement(folder / name, columns, circuit, waveform)
     data = measurement.dataset(circuit)
     (along,) = data.sizes
@@ -275,7 +275,7 @@ def _impossible(values: Mapping[str, Any], said: str) -> Figure:
 
 
 def _probe(folder: Path, name: str | None) -> Probe:
-    return load_probe(None if name is None else folder / name)
+    return Probe.reference() if name is None else Probe.from_file(folder / name)
 
 
 def _stamp(path: Path) -> float:

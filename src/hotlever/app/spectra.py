@@ -10,33 +10,16 @@ from typing import Any
 import numpy as np
 
 from hotlever.app.child import Report
-from hotlever.cli.output import heard_by
-from hotlever.cli.thermometer import Setup, set_up
 from hotlever.errors import HotleverError, InputError
 from hotlever.raman import measure, read_lines
 from hotlever.raman.peak import WINDOW, in_window
 from hotlever.raman.series import Line
 from hotlever.raman.spectrum import Spectrum, read_file, spectrum_files
+from hotlever.raman.thermometry import Thermometry, set_up
 from hotlever.types import Array
 
 #: Points of the fitted curve.
 _POINTS = 800
-#: What the room does not ask for.
-_UNASKED: dict[str, Any] = {
-    **dict.fromkeys(("temperatures", "reference", "shape", "resolution")),
-    **dict.fromkeys(("laser_power", "thermal_resistance")),
-    "stress": 0.0,
-}
-
-
-class _Nobody:
-    """Hears what the command will say once more."""
-
-    def told(self, line: str) -> None: ...
-
-    def progressed(self, label: str, done: int, total: int) -> None: ...
-
-    def shown(self, what: str, content: Any) -> None: ...
 
 
 def names(report: Report, folder: Path, folders: Sequence[str]) -> list[str]:
@@ -114,17 +97,20 @@ def _words(line: Line, table: Any) -> str:
     return f"{said} ({flags})" if flags else said
 
 
-def _setup(folder: Path, asked: dict[str, Any]) -> tuple[Setup, str]:
+def _setup(folder: Path, asked: dict[str, Any]) -> tuple[Thermometry, str]:
     """Return the thermometer; one without temperatures, and why, if that cannot be made."""
-    paths = {key: asked[key] and folder / asked[key] for key in ("calibration", "corrections")}
-    plate = [folder / asked["calibrate_from"]] if asked["calibrate_from"] else None
-    given = {**_UNASKED, **paths, "calibrate_from": plate, "law": asked["law"]}
-    with heard_by(_Nobody()):
-        try:
-            return set_up(**given), ""
-        except HotleverError as error:
-            doubt = f"no temperature: {str(error).replace(f'{folder}/', '')}"
-        return set_up(**{**given, "calibration": None, "calibrate_from": None}), doubt
+    calibration, corrections, plate = (
+        asked[key] and folder / asked[key]
+        for key in ("calibration", "corrections", "calibrate_from")
+    )
+    law, paths = asked["law"], [plate] if plate else None
+    try:
+        return set_up(
+            calibration=calibration, calibrate_from=paths, corrections=corrections, law=law
+        ), ""
+    except HotleverError as error:
+        doubt = f"no temperature: {str(error).replace(f'{folder}/', '')}"
+    return set_up(corrections=corrections, law=law), doubt
 
 
 def _spectrum(folder: Path, name: str) -> Spectrum:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,12 +18,12 @@ from hotlever.cli.options import (
     check_number,
     column_files,
     load_probe,
-    options_of,
     parse_priors,
     parse_values,
+    with_groups,
 )
 from hotlever.cli.output import fail, give, note, progress, progress_bars, show, tell, tell_table
-from hotlever.cli.waveforms import drive, options_given, table_of
+from hotlever.cli.waveforms import Drive
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.files import Outputs, write_text
 
@@ -42,9 +41,9 @@ _TABLE = "levers.csv"
 
 
 @app.command("fit")
-@options_of(drive, "driven")
+@with_groups
 def fit_command(
-    driven: partial[Any],
+    drive: Drive,
     data: list[Path] = Argument(
         metavar="DATA.csv...", help="Measurement files, one for each lever."
     ),
@@ -104,9 +103,8 @@ def fit_command(
         raise InputError("--processes and --scheduler: expected one of them, not both")
     if len(data) > 1 and (posterior or profiles):
         raise InputError("--posterior and --profiles: expected a single data file")
-    waves = options_given(driven)
-    if len(data) > 1 and waves:
-        raise InputError(f"{next(iter(waves))}: expected a single data file")
+    if len(data) > 1 and drive.options:
+        raise InputError(f"{next(iter(drive.options))}: expected a single data file")
     if len(data) == 1 and scheduler is not None:
         raise InputError("--scheduler: expected several data files")
     chosen: Any = {"weights": weights, "medium": medium, "robust": robust, "drift": drift}
@@ -123,7 +121,7 @@ def fit_command(
         **chosen,
     )
     columns = parse_columns(column or [])
-    outputs = Outputs(*data, probe_file, *column_files(column), table_of(driven))
+    outputs = Outputs(*data, probe_file, *column_files(column), drive.waveform)
     to = Destination(outputs, output, report)
     where: Any = {"processes": processes}
     if len(data) > 1:
@@ -131,7 +129,7 @@ def fit_command(
         _fit_several(data, probe, options, where, to)
     else:
         asked = {"samples": samples if posterior else None, "profiles": profiles}
-        _fit_one(data[0], columns, driven(), probe, options, where | asked, to)
+        _fit_one(data[0], columns, drive.read(), probe, options, where | asked, to)
 
 
 class Destination(NamedTuple):

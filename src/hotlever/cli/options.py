@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
+from dataclasses import is_dataclass
 from inspect import Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
@@ -14,15 +14,13 @@ from typer import Argument, Option
 from hotlever.cli.output import note, progress
 from hotlever.errors import InputError, quoted, shown
 from hotlever.files import Outputs
-from hotlever.units import setting
+from hotlever.units import LEAST_BIAS, MOST_BIAS
 
 if TYPE_CHECKING:
     from hotlever.lever import Lever
     from hotlever.probe import Circuit, Probe
     from hotlever.types import Array
 
-#: Between these (V) a lever has a current that can be told from none, and no spark.
-LEAST_BIAS, MOST_BIAS = 1e-6, 1e4
 #: A sweep of so many biases takes minutes, as does a design varied so often.
 MOST_BIASES, MOST_DESIGNS = 10_000, 1000
 
@@ -68,24 +66,29 @@ MeasuredMediumOption = Annotated[
 ]
 
 
-def options_of(function: Callable[..., Any], name: str) -> Callable[[Callable[..., None]], Any]:
-    """Let a command have the options of a function, which it calls as its argument `name`."""
+def with_groups(command: Callable[..., None]) -> Callable[..., None]:
+    """Let a command take a dataclass as an argument, whose fields are options of the command."""
+    arguments = signature(command, eval_str=True).parameters
+    types = {name: argument.annotation for name, argument in arguments.items()}
+    groups: dict[str, type] = {
+        name: kind for name, kind in types.items() if isinstance(kind, type) and is_dataclass(kind)
+    }
+    fields = {name: signature(kind, eval_str=True).parameters for name, kind in groups.items()}
 
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        def run(**given: Any) -> None:
-            options = {key: given.pop(key) for key in added}
-            command(**given, **{name: partial(function, **options)})
+    def run(**values: Any) -> None:
+        for name, group in groups.items():
+            values[name] = group(**{field: values.pop(field) for field in fields[name]})
+        command(**values)
 
-        added = signature(function, eval_str=True).parameters
-        own = signature(command, eval_str=True).parameters
-        nested = [added.values() if key == name else [one] for key, one in own.items()]
-        taken = [one for group in nested for one in group]
-        run.__signature__ = Signature(taken)  # type: ignore[attr-defined]
-        run.__annotations__ = {one.name: one.annotation for one in taken}
-        run.__doc__ = command.__doc__
-        return run
-
-    return decorate
+    options = [
+        option
+        for name, argument in arguments.items()
+        for option in (fields[name].values() if name in groups else [argument])
+    ]
+    run.__signature__ = Signature(options)  # type: ignore[attr-defined]
+    run.__annotations__ = {option.name: option.annotation for option in options}
+    run.__doc__ = command.__doc__
+    return run
 
 
 def load_probe(
@@ -201,22 +204,6 @@ def parse_number(text: str, where: str) -> float:
     if not math.isfinite(value):
         raise InputError(f"{where}: found {quoted(text)}, expected a number")
     return value
-
-
-def parse_volts(text: str, where: str) -> float:
-    """Parse a voltage such as ``5V`` or ``200 mV``, of either sign.
-
-    Examples
-    --------
-    >>> parse_volts("200 mV", "--step"), parse_volts("5", "--step")
-    (0.2, 5.0)
-    """
-    volts = setting(text, "V", where, bare=True)
-    if volts and not LEAST_BIAS <= abs(volts) <= MOST_BIAS:
-        raise InputError(
-            f"{where}: found a bias of {volts:g} V, expected 0 or {LEAST_BIAS:g} to {MOST_BIAS:g} V"
-        )
-    return volts
 
 
 def parse_priors(texts: list[str] | None, probe: Probe) -> dict[str, str] | None:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import partial
 from itertools import count as count_up
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from typer import Option
 
@@ -23,10 +22,10 @@ from hotlever.cli.options import (
     check_plot,
     load_probe,
     make_lever,
-    options_of,
+    with_groups,
 )
 from hotlever.cli.output import give, note, progress, tell_table
-from hotlever.cli.waveforms import KINDS, drive, options_given, table_of
+from hotlever.cli.waveforms import Drive
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.files import Outputs, output_folder
 from hotlever.units import setting
@@ -41,9 +40,9 @@ MOST_TIMES, _CURVE = 10_000, 8
 
 
 @app.command("pulse")
-@options_of(drive, "driven")
+@with_groups
 def pulse_command(
-    driven: partial[Any],
+    drive: Drive,
     probe_file: ProbeFile = None,
     until: str | None = Option(None, metavar="TIME", help="When to stop."),
     at: str | None = Option(
@@ -62,19 +61,17 @@ def pulse_command(
     from hotlever.lever.transient import history_csv, simulate, with_times, write_history
 
     if report is not None:
-        others = {**options_given(driven), "--until": until, "--at": at}
+        others = {**drive.options, "--until": until, "--at": at}
         others |= {"--output": output, "--plot": plot, "--fields": fields}
         _report(report, others, probe_file, medium, settings)
         return
-    wave = driven()
-    if wave is None:
-        raise InputError(f"found none: expected one of {', '.join(KINDS)}")
+    wave = drive.need()
     end = None if until is None else setting(until, "us", "--until")
     times = None if at is None else [setting(one, "us", "--at") for one in at.split(",")]
     if times is not None and len(times) > MOST_TIMES:
         raise InputError(f"--at: found {len(times)} times, expected at most {MOST_TIMES}")
     check_medium(medium)
-    outputs = Outputs(probe_file, table_of(driven))
+    outputs = Outputs(probe_file, drive.waveform)
     outputs.file(output, ".csv", ".nc")
     check_plot(outputs, plot)
     outputs.folder(fields)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,9 +10,9 @@ import typer.core
 from typer import Argument, Option
 
 from hotlever.cli.application import app
-from hotlever.cli.options import File, check_plot, options_of
+from hotlever.cli.options import File, check_plot, with_groups
 from hotlever.cli.output import give, note, tell
-from hotlever.cli.thermometer import CalibrationOption, Setup, calibration_of, set_up
+from hotlever.cli.thermometer import CalibrationOption, ThermometerOptions
 from hotlever.errors import InputError
 from hotlever.files import Outputs, json_text, write_text
 
@@ -77,10 +76,10 @@ Spectra = Annotated[
 
 
 @app.command("raman", cls=SeveralFiles)
-@options_of(set_up, "thermometer")
+@with_groups
 def raman_command(
     spectra: Spectra,
-    thermometer: partial[Setup],
+    thermometer: ThermometerOptions,
     save_calibration: File = Option(
         None, metavar="CAL.json", help="Write the calibration to this file."
     ),
@@ -92,11 +91,11 @@ def raman_command(
     """Find the silicon line in Raman spectra and, calibrated, the temperature."""
     from hotlever.raman.series import to_csv
 
-    outputs = Outputs(*spectra, *_read_by(thermometer))
+    outputs = Outputs(*spectra, *thermometer.files)
     check_plot(outputs, plot)
     outputs.file(save_calibration)
     outputs.file(output)
-    setup = thermometer()
+    setup = thermometer.set_up()
     if save_calibration is not None and setup.calibration is None:
         raise InputError("--save-calibration: there is no calibration; give --calibrate-from")
     lines, table = setup.measure(spectra)
@@ -117,11 +116,11 @@ def raman_command(
 
 
 @app.command("join", cls=SeveralFiles)
-@options_of(set_up, "thermometer")
+@with_groups
 def join_command(
     bias_log: Annotated[Path, Argument(metavar="BIAS_LOG.csv", help="The bias sweep.")],
     spectra: Spectra,
-    thermometer: partial[Setup],
+    thermometer: ThermometerOptions,
     output: File = Option(None, "--output", "-o", metavar="DATA.csv", help="Left out: print."),
 ) -> None:
     """Join a bias log with tip spectra into the file that `hotlever fit` takes.
@@ -131,10 +130,10 @@ def join_command(
     """
     from hotlever.raman.bias_log import join, read_bias_log
 
-    outputs = Outputs(bias_log, *spectra, *_read_by(thermometer))
+    outputs = Outputs(bias_log, *spectra, *thermometer.files)
     outputs.file(output)
     log = read_bias_log(bias_log)
-    setup = thermometer()
+    setup = thermometer.set_up()
     if setup.thermometer is None:
         raise InputError("join needs temperatures: give --calibration or --calibrate-from")
     _, table = setup.measure(spectra)
@@ -155,12 +154,13 @@ def raman_check_command(
     output: File = Option(None, "--output", "-o", metavar="FILE.json", help="The numbers."),
 ) -> None:
     """How far the paper's linear law is off above 900 K, and what that does to the knee."""
+    from hotlever.raman.thermometry import calibration_named
     from hotlever.studies.raman_check import conclusion, paper_check
 
     outputs = Outputs(calibration)
     check_plot(outputs, plot)
     outputs.file(output)
-    check = paper_check(calibration_of(calibration))
+    check = paper_check(calibration_named(calibration))
     said = conclusion(check)
     with outputs.together():
         if plot is not None:
@@ -173,13 +173,6 @@ def raman_check_command(
             numbers |= {"lines": lines.reset_index().to_dict("records"), "conclusion": said}
             write_text(output, json_text(numbers))
     give(f"{said}\n")
-
-
-def _read_by(thermometer: partial[Setup]) -> list[Any]:
-    """Return the files that a thermometer is set up from."""
-    given = thermometer.keywords
-    several = (given["calibrate_from"] or []) + (given["reference"] or [])
-    return [*several, *(given[name] for name in ("temperatures", "calibration", "corrections"))]
 
 
 def _answer(text: str, output: Path | None) -> None:

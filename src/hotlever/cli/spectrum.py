@@ -17,12 +17,11 @@ from hotlever.cli.options import (
     check_plot,
     load_probe,
     make_lever,
-    parse_volts,
 )
 from hotlever.cli.output import give, progress
 from hotlever.errors import InputError, shown
 from hotlever.files import Outputs
-from hotlever.units import setting
+from hotlever.units import bias_setting, setting
 
 if TYPE_CHECKING:
     from hotlever.types import Array
@@ -51,8 +50,8 @@ def spectrum_command(
     from hotlever.lever.transient.sinusoidal import HARMONIC_COLUMNS, harmonics
     from hotlever.lever.transient.small_signals import SPECTRUM_COLUMNS, spectrum
 
-    swing = None if amplitude is None else parse_volts(amplitude, "--amplitude")
-    volts, frequencies = parse_volts(bias, "--bias"), _frequencies(frequency)
+    swing = None if amplitude is None else bias_setting(amplitude, "--amplitude")
+    volts, frequencies = bias_setting(bias, "--bias"), _frequencies(frequency)
     check_medium(medium)
     outputs = Outputs(probe_file)
     outputs.file(output, ".csv", ".nc")

@@ -1,0 +1,262 @@
+"""A Raman thermometer as a user sets it up, from files to the temperatures of spectra."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from hotlever.errors import InputError, unknown_name
+from hotlever.raman import series
+from hotlever.raman.calibration import (
+    RamanCalibration,
+    published_raman_calibration,
+    read_raman_calibration,
+)
+from hotlever.raman.correction import Correction, check_corrections, read_corrections
+from hotlever.raman.part import file_and_label
+from hotlever.raman.peak import LineShape, PeakOptions
+from hotlever.raman.series import Line, measure, read_lines
+from hotlever.raman.spectrum import Spectrum, read_spectra
+from hotlever.raman.thermometer import Law, Thermometer, laser_heating
+from hotlever.types import Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: What stands for the published laws in place of a calibration file.
+PUBLISHED = "published"
+_MOST_NOTES = 20
+
+
+@dataclass(frozen=True)
+class Listener:
+    """Who is told what was noticed, and how far the work is; by default nobody."""
+
+    note: Callable[[str], None] = lambda text: None
+    progress: Callable[[str], AbstractContextManager[Progress | None]] = lambda label: nullcontext()
+
+    def notes(self, texts: Sequence[str]) -> None:
+        """Tell the first of many notes, and how many more there are."""
+        for text in texts[:_MOST_NOTES]:
+            self.note(text)
+        if len(texts) > _MOST_NOTES:
+            self.note(f"{len(texts) - _MOST_NOTES} more such notes")
+
+    def read(self, paths: Sequence[Path]) -> list[Spectrum]:
+        """Read spectra; what a folder holds beside them is noted."""
+        skipped: list[str] = []
+        with self.progress("reading") as update:
+            spectra = read_spectra(paths, skipped, update)
+        self.notes([f"passed over {line}" for line in skipped])
+        names = {(spectrum.folder, spectrum.name) for spectrum in spectra}
+        files = Counter((folder, file_and_label(name)[0]) for folder, name in names)
+        several = {name: count for (_, name), count in sorted(files.items()) if count > 1}
+        self.notes([f"{name}: {count} spectra in one file" for name, count in several.items()])
+        return spectra
+
+    def measure(
+        self,
+        spectra: Sequence[Spectrum],
+        options: PeakOptions,
+        corrections: Mapping[str, Correction],
+        label: str,
+    ) -> list[Line]:
+        """Fit the lines of spectra; those of many that have none are noted."""
+        with self.progress(label) as update:
+            lines = measure(spectra, options, update, corrections)
+        if len(lines) > 1:
+            without = [line.spectrum.name for line in lines if line.used and line.peak is None]
+            self.notes([f"{name}: no silicon line" for name in without])
+        return lines
+
+
+@dataclass(frozen=True)
+class Thermometry:
+    """How spectra are measured: the line's shape, and a thermometer if there is a calibration.
+
+    `hot_plate` is what the calibration was made of, if it was made now; `spectra` are all that
+    the thermometer was set up from.
+    """
+
+    options: PeakOptions
+    calibration: RamanCalibration | None = None
+    thermometer: Thermometer | None = None
+    hot_plate: Sequence[Line] = ()
+    spectra: Sequence[Spectrum] = ()
+    corrections: Mapping[str, Correction] = field(default_factory=dict)
+    corrected_by: str = ""  #: name of the table
+    listener: Listener = Listener()
+
+    def measure(self, paths: Sequence[Path]) -> tuple[list[Line], xr.Dataset]:
+        """Read and fit spectra; return their lines and the table of `read_lines`.
+
+        Raises
+        ------
+        InputError
+            If one cannot be read, none is left to use, or none has a silicon line.
+        """
+        spectra = self.listener.read(paths)
+        table = self.corrected_by
+        elsewhere = check_corrections(self.corrections, [*self.spectra, *spectra], table)
+        self.listener.notes(
+            [f"{table}: passed over {name}, of no folder read here" for name in elsewhere]
+        )
+        lines = self.listener.measure(spectra, self.options, self.corrections, "spectra")
+        used = [line for line in lines if line.used]
+        if not used:
+            raise InputError(f"{table}: leaves out every spectrum, expected some to use")
+        if all(line.peak is None for line in used):
+            which = "this spectrum" if len(used) == 1 else f"any of {len(used)} spectra"
+            raise InputError(f"{paths[0]}: no silicon line in {which}, expected one near 520 cm⁻¹")
+        return lines, read_lines(lines, self.thermometer)
+
+
+def calibration_named(name: str | None) -> RamanCalibration | None:
+    """Return the published calibration, the one in a file, or none."""
+    if name is None:
+        return None
+    return published_raman_calibration() if name == PUBLISHED else read_raman_calibration(name)
+
+
+def set_up(
+    *,
+    calibration: str | None = None,
+    calibrate_from: Sequence[Path] | None = None,
+    temperatures: Path | None = None,
+    corrections: Path | None = None,
+    reference: Sequence[Path] | None = None,
+    law: str = "anharmonic",
+    shape: str | None = None,
+    resolution: float | None = None,
+    laser_power: float | None = None,
+    thermal_resistance: float | None = None,
+    stress: float = 0.0,
+    listener: Listener = Listener(),
+) -> Thermometry:
+    """Set up a thermometer, or only the fit of the line if no calibration is named.
+
+    Parameters
+    ----------
+    calibration : str, optional
+        A calibration file, or ``published``, which needs a `reference`.
+    calibrate_from, reference : sequence of path, optional
+        Spectra of a hot plate, and of the instrument as it is now at room temperature.
+    temperatures, corrections : path, optional
+        Tables: of the hot plate (see `series.read_temperatures`), and by hand
+        (`read_corrections`).
+    law : {'linear', 'anharmonic'}
+    shape : {'lorentzian', 'voigt', 'fano'}, optional
+        That of the calibration, else a Lorentzian, if left out.
+    resolution : float, optional
+        Full width of the spectrometer's response, cm⁻¹.
+    laser_power, thermal_resistance : float, optional
+        mW and K/mW.
+    stress : float
+        Not known, MPa.
+    listener : Listener
+
+    Raises
+    ------
+    InputError
+        If a file is at fault, or these do not go together.
+    """
+    if law not in get_args(Law):
+        raise unknown_name("law", law, get_args(Law))
+    if shape not in (None, *get_args(LineShape)):
+        raise unknown_name("line shape", str(shape), get_args(LineShape))
+    if calibration is not None and calibrate_from:
+        raise InputError("give --calibration or --calibrate-from, not both")
+    if temperatures is not None and not calibrate_from:
+        raise InputError("--temperatures belongs to --calibrate-from, which is missing")
+    if (laser_power is None) != (thermal_resistance is None):
+        raise InputError("--laser-power and --thermal-resistance belong together: give both")
+    heating = 0.0
+    if laser_power is not None and thermal_resistance is not None:
+        heating = laser_heating(laser_power, thermal_resistance)
+        listener.note(f"laser heating is estimated as {heating:.2g} K and enters the error")
+    chosen = calibration_named(calibration)
+    options = _options(chosen, shape, resolution, listener)
+    by_hand = read_corrections(corrections) if corrections else {}
+    hot_plate: list[Line] = []
+    spectra: list[Spectrum] = []
+    if calibrate_from:
+        table = series.read_temperatures(temperatures) if temperatures else None
+        spectra = listener.read(calibrate_from)
+        source = ", ".join(path.name or str(path) for path in calibrate_from)
+        with listener.progress("hot plate") as update:
+            chosen, hot_plate = series.calibrate_from(
+                spectra, options, table, update, source, by_hand
+            )
+        _describe(chosen, listener)
+    if chosen is None:
+        unused = {"--reference": reference, "--stress": stress, "--laser-power": laser_power}
+        for name, value in unused.items():
+            if value:
+                raise InputError(f"{name} needs --calibration or --calibrate-from")
+        return Thermometry(
+            options, corrections=by_hand, corrected_by=str(corrections), listener=listener
+        )
+    if chosen.reference_cm is None and not reference:
+        raise InputError(
+            "--calibration published: give --reference, a spectrum of your instrument at room "
+            "temperature, from which the shifts are taken"
+        )
+    # a calibration without reference gets one below; 0 stands in until then
+    start = 0.0 if chosen.reference_cm is None else None
+    chosen_law: Any = law
+    thermometer = Thermometer(chosen, chosen_law, start, 0.0, heating, stress)
+    if reference:
+        lines = listener.measure(listener.read(reference), options, by_hand, "reference")
+        peaks = [(line.peak, line.spectrum.temperature) for line in lines if line.peak]
+        thermometer = thermometer.with_reference(peaks)
+        spectra += [line.spectrum for line in lines]
+    return Thermometry(
+        options, chosen, thermometer, hot_plate, spectra, by_hand, str(corrections), listener
+    )
+
+
+def _options(
+    calibration: RamanCalibration | None,
+    shape: str | None,
+    resolution: float | None,
+    listener: Listener,
+) -> PeakOptions:
+    """The line shape asked for, else the calibration's: both sides must be fitted alike."""
+    if calibration is not None and calibration.points:
+        same = shape in (None, calibration.line_shape)
+        if not same or resolution not in (None, calibration.resolution_cm):
+            listener.note(
+                f"the calibration was made with the line shape {calibration.line_shape}; "
+                "fitting another one shifts the line"
+            )
+        if shape is None:
+            shape = calibration.line_shape
+            resolution = calibration.resolution_cm if resolution is None else resolution
+    asked: Any = shape or "lorentzian"
+    return PeakOptions(asked, resolution).validate()
+
+
+def _describe(calibration: RamanCalibration, listener: Listener) -> None:
+    """Tell what the series gave, and plainly where the line is not good enough."""
+    line, law = calibration.linear, calibration.anharmonic
+    residuals, (low, high) = calibration.residuals(), calibration.range_K
+    outside = abs(residuals["linear_K"]) > residuals["band_K"]
+    listener.note(
+        f"calibrated from {len(calibration.points)} spectra, {low:g} to {high:g} K: linear "
+        f"{line.slope_K_cm:.2f} K cm (rms {line.residual_rms_K:.1f} K), anharmonic rms "
+        f"{law.residual_rms_K:.1f} K"
+    )
+    if outside.any():
+        where = ", ".join(f"{t:g}" for t in residuals["temperature_K"][outside])
+        listener.note(
+            f"the line leaves the paper's error band at {where} K: the shift is not linear"
+        )
+    if law.ratio_fixed:
+        listener.note(
+            "too few temperatures to tell three- from four-phonon terms: their ratio is the "
+            "published one"
+        )
