@@ -22,8 +22,8 @@ from hotlever.air.surface import PanelOptions
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimation.experiment_at_rest import reduced_experiment
 from hotlever.lever import Lever
-from hotlever.lever.box import PAPER, Box
-from hotlever.lever.reduction import cached_reduction
+from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
+from hotlever.lever.reduced.training import cached_reduction
 from hotlever.probe import Probe
 from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K, K_IN_AIR
@@ -95,7 +95,7 @@ def accuracy(air, model, count=8):
     rng = np.random.default_rng(5)
     rows = []
     for _ in range(count):
-        material = Box.of(air.probe).probe(air.probe, rng.random(len(PAPER))).material
+        material = ParameterDomain.of(air.probe).probe(air.probe, rng.random(len(PAPER))).material
         material = material.with_(c_kappa=rng.uniform(0.6, 0.76))
         full = air.with_material(material).sweep(BIAS)
         current, reader, tip = model.predict(air.with_material(material).probe).values

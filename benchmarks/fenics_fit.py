@@ -32,7 +32,7 @@ from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimation import fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.lever.dataset import OBSERVABLES
-from hotlever.lever.reduction import cached_reduction
+from hotlever.lever.reduced.training import cached_reduction
 from hotlever.materials import PARAMETERS
 from hotlever.measurement import with_measured_circuit
 from hotlever.probe import Probe

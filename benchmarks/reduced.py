@@ -17,10 +17,10 @@ from hotlever.estimation import fit, read_measurement
 from hotlever.estimation.experiment_at_rest import full_experiment, reduced_experiment
 from hotlever.estimation.load_lines import Rows, shown_at
 from hotlever.lever import Lever
-from hotlever.lever.box import PAPER, Box
 from hotlever.lever.branch import Reach
-from hotlever.lever.certificate import estimated_error
-from hotlever.lever.reduction import cached_reduction
+from hotlever.lever.reduced.error_estimate import estimated_error
+from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
+from hotlever.lever.reduced.training import cached_reduction
 from hotlever.probe import Probe
 from problems import (
     BIAS,
@@ -38,7 +38,7 @@ BIASES = 5
 
 
 def random_material(lever, rng):
-    material = Box.of(lever.probe).probe(lever.probe, rng.random(len(PAPER))).material
+    material = ParameterDomain.of(lever.probe).probe(lever.probe, rng.random(len(PAPER))).material
     return material.with_(c_kappa=rng.uniform(0.6, 0.76))
 
 
@@ -53,7 +53,7 @@ def accuracy(lever, reduced, cases):
         branch = reduced.linearised(same.probe, Reach(circuit, bias[-1])).branch
         u, _ = Rows(bias).states(branch, circuit)
         shown = shown_at(branch, circuit, u)
-        guesses = reduced.all_points.expanded(branch.states(u))
+        guesses = reduced.space.expanded(branch.states(u))
         exact = same.dataset(
             [same.polished(x[:, None], v) for x, v in zip(guesses.T, bias, strict=True)]
         )
@@ -64,7 +64,7 @@ def accuracy(lever, reduced, cases):
         size[2] = 1.0
         errors.append((error / size).max(axis=1))
     print(
-        f"Reduced against full lever, {cases} random parameter sets of the box, "
+        f"Reduced against full lever, {cases} random parameter sets of the domain, "
         f"{BIASES} random biases each\n"
     )
     table(
@@ -114,7 +114,10 @@ def main():
     table(
         ("", "seconds"),
         [
-            ("25-point sweep with sensitivities, reduced, anywhere in the box", f"{anywhere:.3f}"),
+            (
+                "25-point sweep with sensitivities, reduced, anywhere",
+                f"{anywhere:.3f}",
+            ),
             ("the same next to a known one, as in a fit", f"{nearby:.3f}"),
             ("the same, full lever", f"{full:.2f}"),
             ("the same, plain FEniCS, seven sweeps for the derivatives", f"{7 * peer:.1f}"),

@@ -14,8 +14,8 @@ from hotlever.errors import ComputationError
 from hotlever.estimation import Measurement, fit, read_measurement
 from hotlever.estimation.experiment_at_rest import ExperimentAtRest, experiment_of
 from hotlever.lever import Lever
-from hotlever.lever.box import PAPER, Box
 from hotlever.lever.lever import COARSE
+from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from problems import BIAS, EXAMPLE, table
@@ -97,7 +97,7 @@ def starts(count, model, name):
     best = fit(data, probe, model=REDUCED)
     apart = []
     for _ in range(count):
-        material = Box.of(probe).probe(probe, rng.random(len(PAPER))).material
+        material = ParameterDomain.of(probe).probe(probe, rng.random(len(PAPER))).material
         material = material.with_(c_kappa=rng.uniform(0.4, 1.0))
         try:
             found = fit(data, probe.model_copy(update={"material": material}), model=model)

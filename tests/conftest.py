@@ -12,8 +12,8 @@ from hotlever.cache import CACHE_VARIABLE
 from hotlever.cli import main, output
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced import ReducedLever
-from hotlever.lever.reduction import cached_reduction
+from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.training import cached_reduction
 from hotlever.probe import Probe
 from hotlever.spieser2017 import published
 

@@ -43,7 +43,7 @@ LAWS = (
     "materials",
     "probe/tip.py",
     "calibration",
-    "lever/certificate.py",
+    "lever/reduced/error_estimate.py",
     "estimation/optimiser.py",
     "estimation/residuals.py",
 )

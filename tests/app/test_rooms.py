@@ -24,7 +24,7 @@ from hotlever.app.server import add_pages
 from hotlever.app.session import Session
 from hotlever.errors import BranchEndError, HotleverError
 from hotlever.lever import Lever
-from hotlever.lever.reduced import ReducedLever
+from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.probe import Probe
 
 Run = Callable[..., tuple[int, str, str]]

@@ -16,7 +16,7 @@ from hotlever.estimation.lack_of_fit import suspicious_points
 from hotlever.estimation.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced import ReducedLever
+from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.materials import PARAMETERS
 from hotlever.measurement import with_measured_circuit
 from hotlever.probe import Probe

@@ -19,8 +19,8 @@ from hotlever.lever import Branch, Lever
 from hotlever.lever.balances import BALANCES, balance_columns
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced import ReducedLever
-from hotlever.lever.reduction import cached_reduction
+from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.training import cached_reduction
 from hotlever.lever.sensitivities import Linearised, by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.space import LEVER, TIP

@@ -12,11 +12,11 @@ from hotlever.cache import CACHE_VARIABLE, store_arrays, stored
 from hotlever.estimation import Measurement, fit
 from hotlever.estimation.experiment_at_rest import reduced_experiment
 from hotlever.lever import Lever
-from hotlever.lever.box import Box
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced import ReducedLever
-from hotlever.lever.reduction import cached_reduction
+from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.response_surface import ParameterDomain
+from hotlever.lever.reduced.training import cached_reduction
 from hotlever.probe import Probe
 
 BIAS = np.linspace(0.0, 11.0, 12)
@@ -34,13 +34,13 @@ def as_array(sweep):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("medium", ["vacuum", "air"])
-def test_it_follows_the_full_lever_in_its_box(request, medium, seed):
-    """benchmarks/reduced.py states the accuracy over the whole box, on the default mesh."""
+def test_it_follows_the_full_lever_in_its_domain(request, medium, seed):
+    """benchmarks/reduced.py states the accuracy over the whole domain, on the default mesh."""
     names = ("coarse", "reduced") if medium == "vacuum" else ("in_air", "reduced_in_air")
     lever, reduced = map(request.getfixturevalue, names)
     rng = np.random.default_rng(seed)
-    box = Box.of(lever.probe)
-    material = box.probe(lever.probe, rng.random(len(box.names))).material
+    domain = ParameterDomain.of(lever.probe)
+    material = domain.probe(lever.probe, rng.random(len(domain.names))).material
     material = material.with_(c_kappa=rng.uniform(0.6, 0.76))
     full = lever.with_material(material).sweep(BIAS, sensitivities=seed == 0)
     found = predicted(reduced, lever, material)
@@ -54,9 +54,9 @@ def test_it_follows_the_full_lever_in_its_box(request, medium, seed):
 
 @pytest.mark.parametrize("seed", range(2))
 def test_at_the_few_points_alone_it_is_nearly_as_good(coarse, reduced, seed):
-    box = Box.of(coarse.probe)
-    shares = np.random.default_rng(seed).random(len(box.names))
-    full = coarse.with_probe(box.probe(coarse.probe, shares))
+    domain = ParameterDomain.of(coarse.probe)
+    shares = np.random.default_rng(seed).random(len(domain.names))
+    full = coarse.with_probe(domain.probe(coarse.probe, shares))
     branch = reduced.branch(full.probe, Reach(full.circuit, BIAS[-1]))
     u = branch.read(full.circuit, BIAS).u
     sweep = full.sweep(BIAS)
@@ -66,9 +66,9 @@ def test_at_the_few_points_alone_it_is_nearly_as_good(coarse, reduced, seed):
 
 
 def test_corrected_by_the_full_lever_it_is_exact_to_first_order(coarse, reduced):
-    """Beside the box, where it is wrong by more than it should be."""
+    """Beside the domain, where it is wrong by more than it should be."""
     shares = np.array([1.3, 0.5, -0.2, 1.2, 0.5])
-    material = Box.of(coarse.probe).probe(coarse.probe, shares).material
+    material = ParameterDomain.of(coarse.probe).probe(coarse.probe, shares).material
     model, probe = (
         reduced_experiment(coarse, reduced, BIAS),
         coarse.with_material(material).probe,
@@ -89,18 +89,18 @@ def test_corrected_by_the_full_lever_it_is_exact_to_first_order(coarse, reduced)
 
 def test_few_points_with_positive_weights_integrate_the_area(coarse, reduced):
     assert 100 < reduced.points.size < coarse.space.weights.size / 2
-    assert (reduced.few_points.weights > 0).all()
+    assert (reduced.hyper_reduced.weights > 0).all()
     assert len(set(reduced.points.tolist())) == reduced.points.size
 
 
 def test_full_states_are_expanded_and_found_again(coarse, reduced):
     states = coarse.branch(900.0).x[:, 4:8]
-    coordinates = reduced.all_points.coordinates(states)
-    back = reduced.all_points.expanded(coordinates)
+    coordinates = reduced.space.coordinates(states)
+    back = reduced.space.expanded(coordinates)
     hot = coarse.space.is_temperature
     assert np.abs(back - states)[hot].max() < 0.05
     assert np.abs(back - states)[~hot].max() < 1e-3
-    np.testing.assert_allclose(reduced.all_points.coordinates(back), coordinates, atol=1e-9)
+    np.testing.assert_allclose(reduced.space.coordinates(back), coordinates, atol=1e-9)
 
 
 def test_a_fit_of_data_taken_in_air_finds_the_material(in_air):
@@ -131,16 +131,16 @@ def test_a_geometry_is_reduced_once(coarse, reduced, cache, monkeypatch):
     def never(*_):
         raise AssertionError("reduced again")
 
-    monkeypatch.setattr("hotlever.lever.reduction.reduce", never)
+    monkeypatch.setattr("hotlever.lever.reduced.training.reduce", never)
     again = cached_reduction(coarse)
     np.testing.assert_array_equal(again.points, reduced.points)
-    np.testing.assert_array_equal(again.all_points.modes, reduced.all_points.modes)
+    np.testing.assert_array_equal(again.space.modes, reduced.space.modes)
 
 
 @pytest.mark.parametrize("damage", [b"", b"not a zip file", None], ids=["empty", "text", "cut"])
 def test_a_damaged_file_is_made_anew(coarse, reduced, tmp_path, monkeypatch, damage):
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
-    monkeypatch.setattr("hotlever.lever.reduction.reduce", lambda *_: reduced)
+    monkeypatch.setattr("hotlever.lever.reduced.training.reduce", lambda *_: reduced)
     cached_reduction(coarse)
     (file,) = (tmp_path / "reduced").iterdir()
     whole = file.read_bytes()
@@ -150,7 +150,7 @@ def test_a_damaged_file_is_made_anew(coarse, reduced, tmp_path, monkeypatch, dam
 
 
 def test_the_cache_can_be_switched_off_or_be_unwritable(coarse, reduced, tmp_path, monkeypatch):
-    monkeypatch.setattr("hotlever.lever.reduction.reduce", lambda *_: reduced)
+    monkeypatch.setattr("hotlever.lever.reduced.training.reduce", lambda *_: reduced)
     monkeypatch.setenv(CACHE_VARIABLE, "")
     assert cached_reduction(coarse) is reduced
     (tmp_path / "file").write_text("in the way")
@@ -160,7 +160,7 @@ def test_the_cache_can_be_switched_off_or_be_unwritable(coarse, reduced, tmp_pat
 
 def test_other_geometries_have_other_files(coarse, reduced, tmp_path, monkeypatch):
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
-    monkeypatch.setattr("hotlever.lever.reduction.reduce", lambda *_: reduced)
+    monkeypatch.setattr("hotlever.lever.reduced.training.reduce", lambda *_: reduced)
     cached_reduction(coarse)
     wider = Lever(coarse.probe.with_(gap_um=3.3), COARSE)
     cached_reduction(wider)
@@ -172,10 +172,10 @@ def test_other_geometries_have_other_files(coarse, reduced, tmp_path, monkeypatc
 def write_many_times(arguments):
     folder, count = arguments
     lever = Lever(Probe.reference(), COARSE)
-    path, box = folder / "one.npz", Box.of(lever.probe)
+    path, domain = folder / "one.npz", ParameterDomain.of(lever.probe)
     space = None
     for _ in range(count):
-        found = stored(path, lambda a: ReducedLever.from_arrays(lever.space, 293.0, box, a))
+        found = stored(path, lambda a: ReducedLever.from_arrays(lever.space, 293.0, domain, a))
         space = found or space
         if space is not None:
             store_arrays(path, space.arrays())
@@ -186,9 +186,9 @@ def test_two_processes_may_write_the_same_file(coarse, reduced, tmp_path):
     store_arrays(tmp_path / "one.npz", reduced.arrays())
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         assert all(pool.map(write_many_times, [(tmp_path, 20)] * 2))
-    box = Box.of(coarse.probe)
+    domain = ParameterDomain.of(coarse.probe)
     loaded = stored(
-        tmp_path / "one.npz", lambda a: ReducedLever.from_arrays(coarse.space, 293.0, box, a)
+        tmp_path / "one.npz", lambda a: ReducedLever.from_arrays(coarse.space, 293.0, domain, a)
     )
     assert loaded is not None
     assert [path.name for path in tmp_path.iterdir()] == ["one.npz"]

@@ -9,11 +9,11 @@ from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimation import FitOptions, Measurement, batch
 from hotlever.estimation.load_lines import Rows
 from hotlever.lever import Lever
-from hotlever.lever.box import PAPER, Box, is_papers
 from hotlever.lever.branch import Reach
-from hotlever.lever.certificate import certified_branch
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduction import cached_reduction, known_reduction
+from hotlever.lever.reduced.error_estimate import estimated_error
+from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain, is_papers
+from hotlever.lever.reduced.training import cached_reduction, known_reduction
 from hotlever.probe import Probe
 from of_materials import p_type_probe, strip_probe
 
@@ -31,17 +31,19 @@ def reduced(strip):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_it_follows_the_full_lever_and_is_certified(strip, reduced, seed):
-    box = Box.of(strip.probe)
-    shares = np.random.default_rng(seed).random(len(box.names))
-    lever = strip.with_probe(box.probe(strip.probe, shares))
-    branch = certified_branch(lever, reduced, BIAS[-1], within_K=0.02)
+def test_it_follows_the_full_lever_as_its_error_estimate_says(strip, reduced, seed):
+    domain = ParameterDomain.of(strip.probe)
+    shares = np.random.default_rng(seed).random(len(domain.names))
+    lever = strip.with_probe(domain.probe(strip.probe, shares))
+    found = reduced.linearised(lever.probe, Reach(lever.circuit, BIAS[-1]))
+    branch = found.branch
+    u = branch.read(lever.circuit, BIAS).u
+    assert estimated_error(lever, branch, u[u > 0])[2].max() < 0.02
     full = lever.sweep(BIAS)
     current, _, tip = Rows(BIAS).values(branch, lever.circuit)
     np.testing.assert_allclose(current, full.current_mA, rtol=1e-5)
     np.testing.assert_allclose(tip, full.tip_K, atol=0.02)
-    found = reduced.linearised(lever.probe, Reach(lever.circuit, BIAS[-1]))
-    assert found.names == reduced.names == box.names
+    assert found.names == reduced.names == domain.names
     with pytest.raises(ValueError, match=r"by nitride\.kappa, film\.resistivity, film\.tcr only"):
         reduced.linearised(lever.probe, Reach(lever.circuit, 0.1), names=("thickness_um",))
 
@@ -49,12 +51,13 @@ def test_it_follows_the_full_lever_and_is_certified(strip, reduced, seed):
 @pytest.mark.slow
 def test_boron_doped_silicon_is_as_good():
     lever = Lever(p_type_probe(), COARSE)
-    reduced, box = cached_reduction(lever), Box.of(lever.probe)
+    reduced, domain = cached_reduction(lever), ParameterDomain.of(lever.probe)
     for seed in range(3):
-        shares = np.random.default_rng(seed).random(len(box.names))
-        there = lever.with_probe(box.probe(lever.probe, shares))
+        shares = np.random.default_rng(seed).random(len(domain.names))
+        there = lever.with_probe(domain.probe(lever.probe, shares))
         bias = np.linspace(1.0, 5.0, 9)
-        branch = certified_branch(there, reduced, 5.0)
+        branch = reduced.linearised(there.probe, Reach(there.circuit, 5.0)).branch
+        assert estimated_error(there, branch, branch.read(there.circuit, bias).u)[2].max() < 0.1
         tip = Rows(bias).values(branch, there.circuit)[2]
         np.testing.assert_allclose(tip, there.sweep(bias).tip_K, atol=0.1)
 
@@ -71,15 +74,17 @@ def test_it_serves_where_it_was_made_for_and_a_little_beyond(strip, reduced):
 
 def test_the_paper_s_silicon_has_ranges_of_its_own():
     probe = Probe.reference()
-    assert Box.of(probe).names == tuple(PAPER)
-    np.testing.assert_array_equal(Box.of(probe).low, Box.of(probe.with_(n_d=1e18)).low)
+    assert ParameterDomain.of(probe).names == tuple(PAPER)
+    np.testing.assert_array_equal(
+        ParameterDomain.of(probe).low, ParameterDomain.of(probe.with_(n_d=1e18)).low
+    )
     assert is_papers(probe)
     assert not is_papers(probe, ["impurity_exponent"])
-    wider = Box.of(probe, ["impurity_exponent"])
+    wider = ParameterDomain.of(probe, ["impurity_exponent"])
     place = wider.names.index("impurity_exponent")
     assert wider.low[place] < 0 < wider.high[place]
     middle = np.full(len(wider.names), 0.3)
-    np.testing.assert_allclose(wider.place(wider.probe(probe, middle)), 0.3)
+    np.testing.assert_allclose(wider.shares(wider.probe(probe, middle)), 0.3)
 
 
 def test_a_batch_reduces_what_can_be_reduced(strip, monkeypatch):
@@ -88,7 +93,10 @@ def test_a_batch_reduces_what_can_be_reduced(strip, monkeypatch):
     data, free = Measurement.of_sweep(strip.sweep(BIAS)), ("film.lorenz_ratio",)
     for options in (FitOptions(), FitOptions(free=free), FitOptions(free=("thickness_um",))):
         assert not batch._not_reduced(strip.probe, options, {"one": data}, None)
-    assert made == [set(Box.of(strip.probe).names), {*Box.of(strip.probe).names, *free}]
+    assert made == [
+        set(ParameterDomain.of(strip.probe).names),
+        {*ParameterDomain.of(strip.probe).names, *free},
+    ]
 
 
 @pytest.mark.slow

@@ -25,12 +25,12 @@ from hotlever.app.child import Report
 from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.lever import Branch, Lever
-from hotlever.lever.box import is_papers
 from hotlever.lever.branch import Reach
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced import ReducedLever
-from hotlever.lever.reduction import cached_reduction, can_be_reduced, known_reduction
+from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.response_surface import is_papers
+from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
 from hotlever.probe import Circuit, Layout, Probe
 from hotlever.probe.parameters import of_materials
 from hotlever.probe.shapes import EDGE_BIAS
@@ -294,7 +294,7 @@ def _quick(probe: Probe, most: float, is_reduced: bool) -> LiveLever:
         full, small = reduced
         try:
             branch = small.branch(probe, Reach(probe.circuit, most))
-            expanded = small.all_points.expanded
+            expanded = small.space.expanded
             return LiveLever(REDUCED, full.space, probe.circuit, branch, expanded)
         except HotleverError:
             pass  # beyond what it is made for

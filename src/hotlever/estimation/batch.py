@@ -17,7 +17,7 @@ from hotlever.estimation.options import FitOptions
 from hotlever.estimation.result import Fit, FitFile
 from hotlever.files import Outputs, output_folder, without_nan, write_text
 from hotlever.lever.lever import Lever
-from hotlever.lever.reduction import cached_reduction, can_be_reduced
+from hotlever.lever.reduced.training import cached_reduction, can_be_reduced
 from hotlever.measurement import Measurement, read_measurement, with_measured_circuit
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, Workers, guarded, local_workers, run_all

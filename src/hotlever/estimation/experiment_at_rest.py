@@ -23,8 +23,9 @@ from hotlever.lever.held import at_places_of, followed
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.pinned import Pinned
-from hotlever.lever.reduced import ReducedLever, ReducedSpace
-from hotlever.lever.reduction import cached_reduction, can_be_reduced, known_reduction
+from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.space import ReducedSpace
+from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
 from hotlever.lever.sensitivities import Linearised, by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import PARAMETERS
@@ -250,7 +251,7 @@ def experiment_of(
     bias : ndarray, shape (n,)
     names : tuple of str
         Parameters of the derivatives; by default what a fit usually varies. A reduced lever does
-        not serve all, see `hotlever.lever.reduction.can_be_reduced`.
+        not serve all, see `hotlever.lever.reduced.training.can_be_reduced`.
     reduce : bool
         Make and keep a reduced lever (some seconds) if the geometry has none yet: it pays where
         more than one fit is to come.

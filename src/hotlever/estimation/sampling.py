@@ -36,9 +36,9 @@ from hotlever.estimation.quantity import TIP, TipTemperature
 from hotlever.estimation.result import Fit
 from hotlever.estimation.subproblem import Subproblem
 from hotlever.estimation.surrogate import ReducedSurrogate
-from hotlever.lever.certificate import estimated_error
 from hotlever.lever.lever import Lever
-from hotlever.lever.reduced import ReducedLever
+from hotlever.lever.reduced.error_estimate import estimated_error
+from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.materials import full_name
 from hotlever.materials.naming import INVERSION
 from hotlever.probe import Probe

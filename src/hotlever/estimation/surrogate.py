@@ -14,7 +14,7 @@ from hotlever.estimation.coordinates import Coordinates
 from hotlever.estimation.load_lines import Rows
 from hotlever.lever.branch import Branch, shifted
 from hotlever.lever.curve import spline_through
-from hotlever.lever.reduced import ReducedLever
+from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.sensitivities import Linearised
 from hotlever.probe import Circuit, Probe
 from hotlever.threads import one_blas_thread

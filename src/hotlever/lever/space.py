@@ -62,6 +62,14 @@ class LinearMap:
         rows = self.matrix.reshape(self.kinds, -1, self.matrix.shape[1])[:, points]
         return LinearMap(rows.reshape(-1, rows.shape[2]), self.kinds, self.columns)
 
+    def integrands(self, samples: Array) -> Array:
+        """Return what a dense map integrates to test samples (kinds, points), (columns, points).
+
+        Given may be the first of the kinds alone.
+        """
+        rows = self.matrix.reshape(self.kinds, samples.shape[1], -1)[: len(samples)]
+        return np.asarray(np.einsum("dqm,dq->mq", rows, samples))
+
     def at_points(self, x: Array) -> Array:
         """Return the samples (kinds, points, ...) of states (size + 1, ...)."""
         chosen = x[self.columns]

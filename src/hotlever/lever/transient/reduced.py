@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.reduced import ReducedSpace
-from hotlever.lever.reduction import ReductionOptions, empirical_rule
+from hotlever.lever.reduced.space import (
+    ReducedSpace,
+    empirical_cubature,
+    proper_orthogonal_modes,
+)
 from hotlever.lever.space import Space
 from hotlever.lever.stack import Conductivities
 from hotlever.lever.state import State
@@ -22,9 +25,9 @@ from hotlever.types import Array
 if TYPE_CHECKING:
     from hotlever.lever.lever import Lever
 
-#: Modes whose part of the snapshots is less, relative, are left out; and the accuracy of the rule.
-_LEAST_MODE = 1e-5
-_RULE = ReductionOptions(rule_tolerance=1e-5)
+#: Modes whose part of the snapshots is less, relative, are left out; and the accuracy of the
+#: cubature.
+_LEAST_MODE, _CUBATURE = 1e-5, 1e-5
 #: Places of each snapshot that are looked at for the highest temperature.
 _HOT = 20
 #: Laws are tabulated on pieces of so many kelvins between two temperatures (K).
@@ -45,11 +48,11 @@ def reduced_in_time(lever: Lever, snapshots: Array) -> Lever:
     Returns
     -------
     Lever
-        Its space is a `hotlever.lever.reduced.ReducedSpace` on few points.
+        Its space is a `hotlever.lever.reduced.space.ReducedSpace` on few points.
     """
     every = space_of_modes(lever, snapshots)
     weights = lever.space.weights[:, 0]
-    points, few = empirical_rule(_integrands(lever, every, snapshots), weights, _RULE)
+    points, few = empirical_cubature(_integrands(lever, every, snapshots), weights, _CUBATURE)
     other = copy(lever)
     space = every.at_points(points, few)
     other.space = cast("Any", space)
@@ -76,7 +79,7 @@ def space_of_modes(lever: Lever, snapshots: Array, origin: Array | None = None) 
             away = vectors - here
             size = np.linalg.norm(away, axis=1).max()
             vectors = np.vstack([away / size, here / max(float(np.linalg.norm(here)), 1e-300)])
-        modes.append(_modes(vectors))
+        modes.append(proper_orthogonal_modes(vectors, least=_LEAST_MODE))
     # a lever that cools is hottest elsewhere
     hottest = np.where(hot[:, None], x[:-1], 0.0)
     hottest = np.unique(np.argsort(-hottest, axis=0)[:_HOT])
@@ -146,15 +149,6 @@ class TabulatedEquations(LeverEquations):
         """See `hotlever.lever.points.LawsAtPoints.heat_density`."""
         values, slopes = self._look_up(T)
         return values[2], slopes[2]
-
-
-def _modes(vectors: Array) -> Array:
-    """Return the modes of vectors (n, size) that matter; their largest entry is one."""
-    values, combinations = np.linalg.eigh(vectors @ vectors.T)
-    kept = values > _LEAST_MODE**2 * values[-1]
-    modes = combinations[:, kept][:, ::-1].T @ vectors
-    modes = np.linalg.qr(modes.T)[0].T
-    return np.asarray(modes / np.abs(modes).max(axis=1, keepdims=True))
 
 
 def _integrands(lever: Lever, space: ReducedSpace, x: Array) -> Iterator[Array]:

@@ -1,49 +1,90 @@
-"""A reduced lever: the same equations on a few modes and a few quadrature points.
+"""The space of a reduced lever: modes of its states, and how they look at quadrature points.
 
-Temperature and potential are expanded in modes found from full solutions (proper orthogonal
-decomposition of states and of their parameter derivatives). The equations are projected on the
-modes (Galerkin), with every material law evaluated at the quadrature points. Two sets of points
-share the work: Newton's method runs on the few of an empirical rule with positive weights; then
-residuals at all points, with the same Jacobians, remove what the rule lacks. So the rule decides
-how fast a state is found, and the modes alone how accurate it is.
+Temperature and potential are expanded in modes of known states (proper orthogonal decomposition).
+The equations are projected on the modes (Galerkin), with every material law evaluated at the
+quadrature points, or at the few of an empirical cubature with positive weights (hyper-reduction).
+At rest and in time the spaces are the same, their states are not.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from copy import copy
-from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Self
 
 import numpy as np
+from scipy.optimize import nnls
 
 from hotlever.lever.air_loss import AirLoss
-from hotlever.lever.atlas import Atlas
-from hotlever.lever.box import Box
-from hotlever.lever.branch import Branch, Reach
-from hotlever.lever.equations import LeverEquations
-from hotlever.lever.following import branch_of
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.heat_in_air import HeatInAir
-from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
-from hotlever.lever.pinned import Pinned
-from hotlever.lever.sensitivities import Linearised
 from hotlever.lever.space import AirTangent, LinearMap, Pin, Space, Tangent, at_some
-from hotlever.probe import Circuit, Probe
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
-#: Error left (1 K or 10 mV) on the few points, and at the end; and the ratio of two steps with
-#: one Jacobian from which a new one is cheaper.
-_NEARLY = NewtonOptions(tolerance=1e-2, keep_while=0.2, max_iterations=12)
-_DONE = NewtonOptions(tolerance=1e-3, keep_while=0.5, max_iterations=12)
+#: Random combinations of the training integrals that a cubature is made to reproduce.
+_SKETCH = 420
 
 
-#: What is stored of an atlas.
-_OF_ATLAS = ("u", "surface", "grows", "scale")
-# Equations on the few points, and what Newton's method found.
-Solved = tuple[LeverEquations, NewtonResult]
+def proper_orthogonal_modes(snapshots: Array, most: int | None = None, least: float = 0.0) -> Array:
+    """Return the leading modes of snapshots (n, size), scaled so that their largest entry is one.
+
+    Parameters
+    ----------
+    snapshots : ndarray, shape (n, size)
+        Fewer of them than values, as a rule.
+    most : int, optional
+        How many modes there are at most.
+    least : float
+        Modes whose singular value is at most this share of the largest are left out.
+
+    Returns
+    -------
+    ndarray, shape (modes, size)
+        Orthogonal, the most important first.
+    """
+    # the eigenvectors of the Gram matrix: far fewer snapshots than values
+    values, combinations = np.linalg.eigh(snapshots @ snapshots.T)
+    kept = np.flatnonzero(values > least**2 * values[-1])[::-1][:most]
+    modes = np.linalg.qr((combinations[:, kept].T @ snapshots).T)[0].T
+    return np.asarray(modes / np.abs(modes).max(axis=1, keepdims=True))
+
+
+def empirical_cubature(
+    integrands: Iterable[Array], weights: Array, tolerance: float = 1e-6, seed: int = 0
+) -> tuple[Index, Array]:
+    """Choose points and positive weights that integrate given integrands as all points do.
+
+    A non-negative least-squares problem on random combinations of the integrands.
+
+    Parameters
+    ----------
+    integrands : iterable of ndarray, shape (k, points)
+        Of integrals that compare in size.
+    weights : ndarray, shape (points,)
+        Of all points.
+    tolerance : float
+        Relative accuracy on the integrals.
+    seed : int
+        Of the random combinations.
+
+    Returns
+    -------
+    points : ndarray of int, shape (m,)
+    weights : ndarray, shape (m,)
+    """
+    rng = np.random.default_rng(seed)
+    sketch = np.zeros((_SKETCH, weights.size))
+    for some in integrands:
+        rows = rng.integers(0, _SKETCH, len(some))
+        signs = rng.choice((-1.0, 1.0), len(some))
+        np.add.at(sketch, rows, signs[:, None] * some * weights)
+    values, vectors = np.linalg.eigh(sketch @ sketch.T)
+    kept = values > (tolerance**2) * values[-1]
+    directions = (vectors[:, kept] / np.sqrt(values[kept])).T @ sketch
+    shares, _ = nnls(directions, directions.sum(axis=1), maxiter=20 * len(directions))
+    points = np.flatnonzero(shares)
+    return points, shares[points] * weights[points]
 
 
 class ReducedSpace(Space):
@@ -97,6 +138,37 @@ class ReducedSpace(Space):
         self.elements = full.elements
         self._hot = modes_T if hot is None else modes_T[:, hot]
         self.air = None if full.air is None else ReducedAir(full.air, modes_T, self.size)
+
+    @classmethod
+    def of_snapshots(
+        cls,
+        full: FullSpace,
+        lift: Array,
+        snapshots: Array,
+        *,
+        most: tuple[int | None, int | None] = (None, None),
+        least: float = 0.0,
+        hot: Index | None = None,
+    ) -> Self:
+        """Return the space of the modes of states, temperatures and potentials by themselves.
+
+        Parameters
+        ----------
+        full : FullSpace
+        lift : ndarray, shape (full.size,)
+        snapshots : ndarray, shape (full.size + 1, n)
+            States, or changes of them.
+        most : tuple of int, optional
+            Modes of the temperature and of the potential.
+        least : float
+            See `proper_orthogonal_modes`.
+        hot : ndarray of int, optional
+        """
+        free = (snapshots[:-1] - np.outer(lift, snapshots[-1])).T
+        is_T = full.is_temperature[:-1]
+        modes_T = proper_orthogonal_modes(np.where(is_T, free, 0.0), most[0], least)
+        modes_V = proper_orthogonal_modes(np.where(is_T, 0.0, free), most[1], least)
+        return cls(full, modes_T, modes_V, lift, hot)
 
     def at_points(self, points: Index, weights: Array) -> ReducedSpace:
         """Return the same modes at some of the points, with other weights."""
@@ -233,129 +305,3 @@ class ReducedAir:
             own = self.stores.coordinates[:, : self._count]
             added = added + own.T @ taken_up @ own
         return np.asarray(added)
-
-
-@dataclass(frozen=True)
-class ReducedLever:
-    """The reduced lever of a geometry, medium and base temperature.
-
-    How wrong it is depends on the material: `hotlever.lever.certificate.certified_branch`.
-
-    Attributes
-    ----------
-    all_points, few_points : ReducedSpace
-    points : ndarray of int
-        Which of the full lever's quadrature points the few are.
-    atlas : Atlas
-        Known branches, to start from.
-    base_temperature_K : float
-    """
-
-    all_points: ReducedSpace
-    few_points: ReducedSpace
-    points: Index
-    atlas: Atlas
-    base_temperature_K: float
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The parameters that it is made for."""
-        return self.atlas.box.parameters
-
-    def equations(self, probe: Probe, *, few: bool = False) -> LeverEquations:
-        """Return the equations of a probe's materials at all points, or at the few."""
-        space = self.few_points if few else self.all_points
-        circuit = Circuit(base_temperature_K=self.base_temperature_K)
-        return LeverEquations(space, probe.kinds, circuit)
-
-    @one_blas_thread
-    def solved(self, probe: Probe, u: Array, guess: Array, factors: Any = None) -> Solved:
-        """Solve states of a probe's materials, (size + 1, k), on the few points.
-
-        They are given by u = √(T_tip − T_base) above zero; the factors may be of states nearby.
-
-        Raises
-        ------
-        NewtonError
-            If a state was not found.
-        """
-        few = self.equations(probe, few=True)
-        return few, find_roots(Pinned(few, u**2), guess, _NEARLY, factors)
-
-    @one_blas_thread
-    def branch(self, probe: Probe, reach: Reach) -> Branch:
-        """Return a probe's branch at the few points: within 0.1 K, in a third of the time.
-
-        Raises
-        ------
-        NewtonError
-            If a state was not found.
-        """
-        u, guess = self._start(probe, reach)
-        few, found = self.solved(probe, u, guess)
-        return branch_of(few, u, found)
-
-    def _start(self, probe: Probe, reach: Reach) -> tuple[Array, Array]:
-        """Return u of the states that suffice, and guesses of them."""
-        count = reach.count(self.atlas.shown(probe))
-        return self.atlas.u[1:count], self.atlas.states(probe)[:, 1:count]
-
-    @one_blas_thread
-    def linearised(
-        self,
-        probe: Probe,
-        reach: Reach,
-        near: Linearised | None = None,
-        names: tuple[str, ...] | None = None,
-    ) -> Linearised:
-        """Solve the branch of a probe of another material, with its derivatives by the material.
-
-        It starts from a branch of a similar material, or from the atlas; see `Lever.linearised`.
-        """
-        names = self.names if names is None else names
-        if not set(names) <= set(self.names):
-            raise ValueError(f"a reduced lever has derivatives by {', '.join(self.names)} only")
-        if near is None:
-            (u, guess), factors = self._start(probe, reach), None
-        else:
-            u, guess, factors = near.branch.u[1:], near.states(probe)[:, 1:], near.factors
-        few, found = self.solved(probe, u, guess, factors)
-        every = self.equations(probe)
-        found = find_roots(Pinned(every, u**2), found.x, _DONE, found.factors)
-        # derivatives by the material are taken at the few points: exact ones cost too much here
-        branch = branch_of(every, u, found)
-        return Linearised.of(probe, names, branch, reach, few, found.factors)
-
-    # --- on disk ----------------------------------------------------------------------------------
-
-    def arrays(self) -> dict[str, Array]:
-        """Return what `from_arrays` makes the reduced lever of again."""
-        every = self.all_points
-        return {
-            "modes_T": every.modes[: every.count],
-            "modes_V": every.modes[every.count :],
-            "lift": every.lift,
-            "points": self.points,
-            "weights": self.few_points.weights[:, 0],
-            "low": self.atlas.box.low,
-            "high": self.atlas.box.high,
-            **{f"atlas_{name}": np.asarray(getattr(self.atlas, name)) for name in _OF_ATLAS},
-        }
-
-    @classmethod
-    def from_arrays(
-        cls, full: FullSpace, base_temperature_K: float, box: Box, arrays: Mapping[str, Array]
-    ) -> ReducedLever:
-        """Make a reduced lever of stored arrays; of the box, they have the ranges themselves.
-
-        Raises
-        ------
-        KeyError, ValueError, IndexError
-            If they do not belong to the space.
-        """
-        every = ReducedSpace(full, arrays["modes_T"], arrays["modes_V"], arrays["lift"])
-        points = arrays["points"].astype(np.intp)
-        few = every.at_points(points, arrays["weights"])
-        known: dict[str, Any] = {name: arrays[f"atlas_{name}"] for name in _OF_ATLAS}
-        atlas = Atlas(replace(box, low=arrays["low"], high=arrays["high"]), **known)
-        return cls(every, few, points, atlas, base_temperature_K)

@@ -1,0 +1,168 @@
+"""A reduced lever: the same equations on a few modes, for a domain of parameters.
+
+Two sets of points share the work: Newton's method runs on the few of an empirical cubature; then
+residuals at all points, with the same Jacobians, remove what the cubature lacks. So the cubature
+decides how fast a state is found, and the modes alone how accurate it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hotlever.lever.branch import Branch, Reach
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.following import branch_of
+from hotlever.lever.full_space import FullSpace
+from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
+from hotlever.lever.pinned import Pinned
+from hotlever.lever.reduced.response_surface import ParameterDomain, ResponseSurface
+from hotlever.lever.reduced.space import ReducedSpace
+from hotlever.lever.sensitivities import Linearised
+from hotlever.probe import Circuit, Probe
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array, Index
+
+#: Error left (1 K or 10 mV) on the few points, and at the end; and the ratio of two steps with
+#: one Jacobian from which a new one is cheaper.
+_NEARLY = NewtonOptions(tolerance=1e-2, keep_while=0.2, max_iterations=12)
+_DONE = NewtonOptions(tolerance=1e-3, keep_while=0.5, max_iterations=12)
+
+
+#: What is stored of a response surface.
+_OF_SURFACE = ("u", "coefficients", "grows", "scale")
+# Equations on the few points, and what Newton's method found.
+Solved = tuple[LeverEquations, NewtonResult]
+
+
+@dataclass(frozen=True)
+class ReducedLever:
+    """The reduced lever of a geometry, medium and base temperature.
+
+    How wrong it is depends on the material: `hotlever.lever.reduced.error_estimate`.
+
+    Attributes
+    ----------
+    space, hyper_reduced : ReducedSpace
+        At all points, and at the few of the cubature.
+    points : ndarray of int
+        Which of the full lever's quadrature points the few are.
+    surface : ResponseSurface
+        To start from.
+    base_temperature_K : float
+    """
+
+    space: ReducedSpace
+    hyper_reduced: ReducedSpace
+    points: Index
+    surface: ResponseSurface
+    base_temperature_K: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters that it is made for."""
+        return self.surface.domain.parameters
+
+    def _equations(self, probe: Probe, space: ReducedSpace) -> LeverEquations:
+        circuit = Circuit(base_temperature_K=self.base_temperature_K)
+        return LeverEquations(space, probe.kinds, circuit)
+
+    @one_blas_thread
+    def solved(self, probe: Probe, u: Array, guess: Array, factors: Any = None) -> Solved:
+        """Solve states of a probe's materials, (size + 1, k), on the few points.
+
+        They are given by u = √(T_tip − T_base) above zero; the factors may be of states nearby.
+
+        Raises
+        ------
+        NewtonError
+            If a state was not found.
+        """
+        few = self._equations(probe, self.hyper_reduced)
+        return few, find_roots(Pinned(few, u**2), guess, _NEARLY, factors)
+
+    @one_blas_thread
+    def branch(self, probe: Probe, reach: Reach) -> Branch:
+        """Return a probe's branch at the few points: within 0.1 K, in a third of the time.
+
+        Raises
+        ------
+        NewtonError
+            If a state was not found.
+        """
+        u, guess = self._start(probe, reach)
+        few, roots = self.solved(probe, u, guess)
+        return branch_of(few, u, roots)
+
+    def _start(self, probe: Probe, reach: Reach) -> tuple[Array, Array]:
+        """Return u of the states that suffice, and guesses of them."""
+        count = reach.count(self.surface.shown(probe))
+        return self.surface.u[1:count], self.surface.states(probe)[:, 1:count]
+
+    @one_blas_thread
+    def linearised(
+        self,
+        probe: Probe,
+        reach: Reach,
+        near: Linearised | None = None,
+        names: tuple[str, ...] | None = None,
+    ) -> Linearised:
+        """Solve the branch of a probe of another material, with its derivatives by the material.
+
+        It starts from a branch of a similar material, or from the response surface; see
+        `hotlever.lever.similar.SimilarLevers.linearised`.
+        """
+        names = self.names if names is None else names
+        if not set(names) <= set(self.names):
+            raise ValueError(f"a reduced lever has derivatives by {', '.join(self.names)} only")
+        if near is None:
+            (u, guess), factors = self._start(probe, reach), None
+        else:
+            u, guess, factors = near.branch.u[1:], near.states(probe)[:, 1:], near.factors
+        few, roots = self.solved(probe, u, guess, factors)
+        every = self._equations(probe, self.space)
+        roots = find_roots(Pinned(every, u**2), roots.x, _DONE, roots.factors)
+        # derivatives by the material are taken at the few points: exact ones cost too much here
+        branch = branch_of(every, u, roots)
+        return Linearised.of(probe, names, branch, reach, few, roots.factors)
+
+    # --- on disk ----------------------------------------------------------------------------------
+
+    def arrays(self) -> dict[str, Array]:
+        """Return what `from_arrays` makes the reduced lever of again."""
+        space, domain = self.space, self.surface.domain
+        return {
+            "modes_T": space.modes[: space.count],
+            "modes_V": space.modes[space.count :],
+            "lift": space.lift,
+            "points": self.points,
+            "weights": self.hyper_reduced.weights[:, 0],
+            "low": domain.low,
+            "high": domain.high,
+            **{name: np.asarray(getattr(self.surface, name)) for name in _OF_SURFACE},
+        }
+
+    @classmethod
+    def from_arrays(
+        cls,
+        full: FullSpace,
+        base_temperature_K: float,
+        domain: ParameterDomain,
+        arrays: Mapping[str, Array],
+    ) -> ReducedLever:
+        """Make a reduced lever of stored arrays; of the domain, they have the ranges themselves.
+
+        Raises
+        ------
+        KeyError, ValueError, IndexError
+            If they do not belong to the space.
+        """
+        space = ReducedSpace(full, arrays["modes_T"], arrays["modes_V"], arrays["lift"])
+        points = arrays["points"].astype(np.intp)
+        few = space.at_points(points, arrays["weights"])
+        fitted: dict[str, Any] = {name: arrays[name] for name in _OF_SURFACE}
+        there = replace(domain, low=arrays["low"], high=arrays["high"])
+        return cls(space, few, points, ResponseSurface(there, **fitted), base_temperature_K)

@@ -1,0 +1,220 @@
+"""Training a reduced lever: known branches give its modes, its cubature, its response surface."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from hotlever.cache import cache_file, store_arrays, stored
+from hotlever.lever.equations import SHOWN
+from hotlever.lever.lever import Lever
+from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.response_surface import C_KAPPA, ParameterDomain, ResponseSurface
+from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
+from hotlever.lever.sensitivities import Linearised
+from hotlever.materials import full_name
+from hotlever.materials.foreign_laws import own_laws
+from hotlever.probe import Probe
+from hotlever.probe.parameters import of_materials
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array, Progress
+
+#: Range of c_κ, whose derivative joins the snapshots in air: silicon competes with air there.
+_C_KAPPA_IN_AIR = 0.25
+#: Tip temperature (K) up to which states are collected.
+HOTTEST = 1350.0
+#: Size of the changes of a state that join the snapshots: share of the domain, and K.
+_PARAMETER_STEP, _BRANCH_STEP = 0.25, 50.0
+
+
+@dataclass(frozen=True)
+class ReductionOptions:
+    """How a reduced lever is made.
+
+    Attributes
+    ----------
+    parameter_sets : int
+        Parameter sets whose whole branch is solved.
+    modes_T, modes_V : int
+        Modes of each field. The reader voltage, a small potential, asks for more of the latter.
+    """
+
+    parameter_sets: int = 8
+    modes_T: int = 36
+    modes_V: int = 48
+
+
+def can_be_reduced(probe: Probe, names: Collection[str]) -> bool:
+    """Return whether a reduced lever serves: of one geometry, for parameters of its materials.
+
+    With dimensions among the parameters it does not, since its modes are those of one geometry, nor
+    in another circuit than the paper's.
+    """
+    return set(names) <= set(of_materials(probe)) and probe.circuit.is_plain
+
+
+@one_blas_thread
+def reduce(
+    lever: Lever,
+    options: ReductionOptions | None = None,
+    progress: Progress | None = None,
+    names: Collection[str] = (),
+) -> ReducedLever:
+    """Make the reduced lever of a lever's geometry, medium and base temperature.
+
+    Parameters
+    ----------
+    lever : Lever
+        Its circuit does not matter, nor the values of the paper's silicon; others are where the
+        ranges of parameters are.
+    options : ReductionOptions, optional
+    progress : callable, optional
+        Called with the parameter sets done and their number.
+    names : collection of str
+        Parameters of the materials that vary beside those that a fit usually does.
+
+    Raises
+    ------
+    ValueError
+        If the lever cannot be reduced, see `can_be_reduced`.
+    """
+    if not can_be_reduced(lever.probe, names):
+        raise ValueError("a reduced lever is in the paper's circuit, for materials that vary")
+    from scipy.stats import qmc  # takes long, and most commands reduce nothing
+
+    options, domain = options or ReductionOptions(), ParameterDomain.of(lever.probe, names)
+    training = []
+    shares = qmc.Sobol(len(domain.names), seed=0).random(options.parameter_sets)
+    for done, row in enumerate(shares, start=1):
+        training.append(_trained(lever.with_probe(domain.probe(lever.probe, row)), domain))
+        if progress is not None:
+            progress(done, options.parameter_sets)
+    space = _space(lever, training, domain, options)
+    points, weights = empirical_cubature(_integrands(space, training), space.weights[:, 0])
+    few, surface = space.at_points(points, weights), _surface(space, training, domain)
+    return ReducedLever(space, few, points, surface, lever.circuit.base_temperature_K)
+
+
+def cached_reduction(
+    lever: Lever, progress: Progress | None = None, names: Collection[str] = ()
+) -> ReducedLever:
+    """Return the reduced lever of a lever's geometry and medium, from the cache or `reduce`."""
+    reduced = known_reduction(lever, names)
+    if reduced is None:
+        reduced = reduce(lever, None, progress, names)
+        store_arrays(_file(lever, ParameterDomain.of(lever.probe, names)), reduced.arrays())
+    return reduced
+
+
+def known_reduction(lever: Lever, names: Collection[str] = ()) -> ReducedLever | None:
+    """Return the reduced lever of a lever's geometry and medium, if it is in the cache."""
+    base, domain = lever.circuit.base_temperature_K, ParameterDomain.of(lever.probe, names)
+    reduced = stored(
+        _file(lever, domain),
+        lambda arrays: ReducedLever.from_arrays(lever.space, base, domain, arrays),
+    )
+    covers = reduced is not None and reduced.surface.domain.covers(lever.probe)
+    return reduced if covers else None
+
+
+def _file(lever: Lever, domain: ParameterDomain) -> Path | None:
+    """Return the file of a reduced lever, named by all that it depends on but the ranges."""
+    elements, air, probe = lever.space.elements, lever.space.air, lever.probe
+    held = {
+        full_name(material, name): value
+        for material, kind in probe.made_of.items()
+        for name, value in kind.model_dump().items()
+        if full_name(material, name) not in domain.parameters
+    }
+    facts = {
+        "shape": probe.shape.model_dump(),
+        "tip": probe.tip and probe.tip.model_dump(),
+        "base_temperature_K": lever.circuit.base_temperature_K,
+        "gas_conductivity": probe.surroundings.gas_conductivity,
+        "held": held,
+        "laws": own_laws(probe.made_of),
+        "parameters": list(domain.parameters),
+        "options": asdict(ReductionOptions()),
+        # a change of Netgen's mesh makes a new file instead of a wrong answer
+        "nodes": elements.nodes,
+        "elements": elements.dofs,
+        "points": elements.positions,
+        "air": np.empty(0) if air is None else air.operator.matrix,
+    }
+    return cache_file("reduced", facts)
+
+
+# --- training ---------------------------------------------------------------------------------
+
+
+def _trained(lever: Lever, domain: ParameterDomain) -> Linearised:
+    """Return a branch and its derivatives, without the factors: those of all branches are large."""
+    branch = lever.branch(HOTTEST)
+    linearised = Linearised.of(
+        lever.probe, domain.parameters, branch, lambda _: True, lever.equations
+    )
+    return replace(linearised, factors=None)
+
+
+def _space(
+    lever: Lever, training: list[Linearised], domain: ParameterDomain, options: ReductionOptions
+) -> ReducedSpace:
+    """Find the modes of states, and of their changes with parameters and along the branch."""
+    full = lever.space
+    cold = training[0].branch.states.slopes[:, 0]
+    lift = np.where(full.is_temperature[:-1], 0.0, cold[:-1] / cold[-1])
+    widths = domain.widths
+    if full.air is not None and domain.scale:
+        widths[C_KAPPA] = _C_KAPPA_IN_AIR
+    snapshots = []
+    for linearised in training:
+        branch = linearised.branch
+        snapshots.append(branch.x[:, 1:])
+        snapshots.append(branch.states.slopes[:, 1:] * (_BRANCH_STEP / (2.0 * branch.u[1:])))
+        for name, width in widths.items():
+            change = linearised.changes[:, 1:, domain.parameters.index(name)]
+            snapshots.append(change * (_PARAMETER_STEP * width))
+    together = np.concatenate(snapshots, axis=1)
+    return ReducedSpace.of_snapshots(full, lift, together, most=(options.modes_T, options.modes_V))
+
+
+def _surface(
+    space: ReducedSpace, training: list[Linearised], domain: ParameterDomain
+) -> ResponseSurface:
+    """Fit states and what they show at the nodes that all branches have."""
+    common = training[0].branch.u
+    for linearised in training[1:]:
+        common = common[np.isin(common.round(9), linearised.branch.u.round(9))]
+    columns = [domain.parameters.index(name) for name in domain.names]
+    values, slopes = [], []
+    for linearised in training:
+        branch = linearised.branch
+        here = np.flatnonzero(np.isin(branch.u.round(9), common.round(9)))
+        states, changes = space.coordinates(branch.x), space.coordinates(linearised.changes)
+        values.append(np.vstack([states, branch.values[:, :3].T])[:, here].T)
+        together = np.concatenate([changes, linearised.shown.swapaxes(0, 1)])
+        slopes.append(together[:, here][..., columns].swapaxes(0, 1))
+    return ResponseSurface.fitted(
+        domain,
+        common,
+        [linearised.probe for linearised in training],
+        np.nan_to_num(np.stack(values)),  # a lever without reader shows no V_r
+        np.nan_to_num(np.stack(slopes)),
+        np.append(~space.is_temperature, [True] * len(SHOWN)),
+    )
+
+
+def _integrands(space: ReducedSpace, training: list[Linearised]) -> Iterator[Array]:
+    """Give what the projected equations integrate at all training states, by their power."""
+    weights = space.weights[:, 0]
+    for branch in (linearised.branch for linearised in training):
+        for column in range(1, branch.u.size):
+            fluxes = branch.equations.fluxes(branch.x[:, [column]])
+            heat = np.concatenate([fluxes.heat_source[None], fluxes.heat])[..., 0]
+            power = -fluxes.heat_source[:, 0] @ weights
+            yield space.temperature.integrands(heat) / power
+            lever_V = branch.x[-1, column]
+            yield space.potential.integrands(fluxes.charge[..., 0]) * (lever_V / power)
