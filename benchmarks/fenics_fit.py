@@ -29,9 +29,9 @@ import lmfit
 import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
+from hotlever.datasets import OBSERVABLES
 from hotlever.estimation import fit, read_measurement
 from hotlever.lever import Lever
-from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.reduced.training import cached_reduction
 from hotlever.materials import PARAMETERS
 from hotlever.measurement import with_measured_circuit
@@ -76,7 +76,7 @@ def paper_fit(measurement, probe, plain):
             processor += found["processor_seconds"]
             if "error" in found:
                 return np.full(present.sum(), FAR)
-            model = np.stack([found[column] for column in OBSERVABLES.values()])
+            model = np.stack([found[column.name] for column in OBSERVABLES.values()])
             return ((model - data) / largest)[present]
 
         began = time.perf_counter()

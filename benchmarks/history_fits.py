@@ -16,7 +16,7 @@ import sys
 import numpy as np
 import xarray as xr
 
-from hotlever.lever.dataset import OBSERVABLES
+from hotlever.datasets import observables_of
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.transient import pulse
 from hotlever.lever.transient.sensitivities import with_sensitivities
@@ -35,7 +35,7 @@ HEAT_CAPACITY = 0.03
 
 def shown(data: xr.Dataset) -> np.ndarray:
     """Return the observables, (3, n)."""
-    return np.stack([data[name].values for name in OBSERVABLES.values()])
+    return observables_of(data)
 
 
 def information(values: np.ndarray, slopes: np.ndarray, places: list[int]) -> np.ndarray:

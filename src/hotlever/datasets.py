@@ -6,13 +6,14 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hotlever import __version__
 from hotlever.errors import InputError
 from hotlever.files import whole_file, write_text
+from hotlever.types import Array
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -143,6 +144,52 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "error": ("K", "line reads less true temperature"),
     "paper_error": ("K", "error stated in the paper"),
 }
+
+
+class Column(NamedTuple):
+    """A quantity that instruments measure."""
+
+    symbol: str  #: heads its column in measurement files
+    name: str  #: in datasets, and of the attribute of a `Measurement`
+    unit: str  #: in datasets
+
+    @property
+    def heading(self) -> str:
+        """Symbol and unit, as a header row has them."""
+        return f"{self.symbol} ({self.unit})"
+
+    @property
+    def meaning(self) -> str:
+        """What it is."""
+        return QUANTITIES[self.name][1]
+
+
+#: Everything that a measurement may hold, by symbol; ``d`` begins that of a standard error.
+COLUMNS = {
+    column.symbol: column
+    for column in (
+        Column("t", "time_us", "us"),
+        Column("V_l", "lever_V", "V"),
+        Column("V_b", "bias_V", "V"),
+        Column("I_h", "current_mA", "mA"),
+        Column("V_r", "reader_V", "V"),
+        Column("T_tip", "tip_K", "K"),
+        Column("dT_tip", "tip_error_K", "K"),
+        Column("dI_h", "current_error_mA", "mA"),
+        Column("dV_r", "reader_error_V", "V"),
+    )
+}
+#: What a fit compares, by the name that users give it.
+OBSERVABLES = {
+    "current": COLUMNS["I_h"],
+    "reader": COLUMNS["V_r"],
+    "tip": COLUMNS["T_tip"],
+}
+
+
+def observables_of(data: xr.Dataset) -> Array:
+    """Return current (mA), reader voltage (V) and tip temperature (K) of a dataset, (3, n)."""
+    return np.stack([data[column.name].values for column in OBSERVABLES.values()])
 
 
 def labelled(

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from hotlever import Lever, Probe, fit
+from hotlever.datasets import observables_of
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, read_fit, read_measurement
 from hotlever.estimation.experiment_at_rest import ExperimentAtRest
-from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import given_measurement
@@ -37,7 +37,7 @@ def wired(circuit: str) -> Probe:
 def shown(lever: Lever, bias: np.ndarray) -> np.ndarray:
     """I_h, V_r and T_tip of states that are solved one by one."""
     data = lever.dataset(lever.solve(bias))
-    return np.stack([data[column].values for column in OBSERVABLES.values()])
+    return observables_of(data)
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ import pytest
 
 from hotlever.air.operator import air_operator
 from hotlever.air.surface import PanelOptions
+from hotlever.datasets import OBSERVABLES
 from hotlever.lever import Lever, probe_of, read_sweep, write_sweep
-from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
 
@@ -44,11 +44,11 @@ def test_sensitivities_have_taylor_order_two(in_air, name):
     for observable, column in OBSERVABLES.items():
         slope = at.sensitivity.sel(observable=observable, parameter=name)
         rest = [
-            np.abs(one[column] - at[column] - step * value * slope).max().item()
+            np.abs(one[column.name] - at[column.name] - step * value * slope).max().item()
             for step, one in zip(steps, moved, strict=True)
         ]
         # a straight line leaves no remainder to measure an order of
-        linear = rest[0] < 1e-6 * np.abs(at[column]).max().item()
+        linear = rest[0] < 1e-6 * np.abs(at[column.name]).max().item()
         assert linear or np.log2(rest[0] / rest[1]) > 1.75
 
 

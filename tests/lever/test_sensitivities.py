@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hotlever.datasets import OBSERVABLES
 from hotlever.lever import Lever
-from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import PARAMETERS
 from hotlever.probe import MeshOptions, Probe
 
@@ -36,14 +36,14 @@ def test_sensitivities_have_taylor_order_two(coarse, name):
         slope = slopes.sel(observable=observable, parameter=name).values
         rest = np.array(
             [
-                np.abs(one[column].values - start[column].values - step * value * slope)
+                np.abs(one[column.name].values - start[column.name].values - step * value * slope)
                 for step, one in zip(STEPS, moved, strict=True)
             ]
         )
         orders = np.log2(rest[:-1] / rest[1:])
         # a straight line leaves no remainder to measure an order of; where the curvature happens
         # to vanish the order is higher, and a wrong slope would make it one
-        linear = rest[0] < 1e-7 * np.abs(start[column].values)
+        linear = rest[0] < 1e-7 * np.abs(start[column.name].values)
         assert orders[-1][~linear].min(initial=2.0) > 1.75, (observable, orders)
 
 

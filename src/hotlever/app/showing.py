@@ -22,11 +22,10 @@ from hotlever.app.child import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.calibration import STATED, TABLE_COLUMNS
 from hotlever.calibration.summary import calibration_text
-from hotlever.datasets import QUANTITIES
+from hotlever.datasets import OBSERVABLES, QUANTITIES
 from hotlever.errors import InputError
 from hotlever.estimation import Fit, read_fit, read_measurement
 from hotlever.estimation.words import parameter_rows
-from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.meshing import chosen_space
 from hotlever.lever.transient.waveform_texts import waveform_from_text
 from hotlever.materials.naming import sentence
@@ -63,7 +62,7 @@ def understood(
     (along,) = data.sizes
     data = data.isel({along: slice(None, None, data.sizes[along] // _POINTS + 1)})
     in_time = {"time_us": data.time.values.tolist()} if along == "time" else {}
-    columns_shown = ("bias_V", "lever_V", *OBSERVABLES.values())
+    columns_shown = ("bias_V", "lever_V", *(column.name for column in OBSERVABLES.values()))
     head, *rows = measurement.understood
     return {
         "rows": [(name, *head[1:]), *rows],

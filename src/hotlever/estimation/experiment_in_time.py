@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from hotlever.datasets import observables_of
 from hotlever.errors import InputError
 from hotlever.estimation.surrogate import LinearSurrogate
-from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.transient.history import followed
@@ -193,7 +193,7 @@ class ExperimentInTime:
                 self.names,
                 tolerance_K=_TOLERANCE_K,
             )
-            seen = np.stack([found[column].values for column in OBSERVABLES.values()])
+            seen = observables_of(found)
             seen_by = found.sensitivity.values
         right = seen + self.offset
         rows = self.times.at_rows(right), self.times.at_rows(seen_by)
@@ -212,7 +212,7 @@ class ExperimentInTime:
         found = followed(
             self.full.lever(at.probe), self.waveform, at=at.at, tolerance_K=_TOLERANCE_K
         )
-        right = np.stack([found[column].values for column in OBSERVABLES.values()])
+        right = observables_of(found)
         return replace(self, offset=right - at.uncorrected)
 
 

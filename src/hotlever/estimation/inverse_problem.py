@@ -10,6 +10,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from hotlever import memory
+from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.experiment_at_rest import (
@@ -28,7 +29,6 @@ from hotlever.estimation.scales import errors_of_scales
 from hotlever.estimation.search import Search
 from hotlever.lever.branch import Branch
 from hotlever.measurement import (
-    OBSERVABLE_SYMBOLS,
     Measurement,
     with_measured_circuit,
 )
@@ -234,7 +234,7 @@ def _observables(
     for name in options.observables:
         if not np.isfinite(measurement.observable(name)).any():
             raise InputError(
-                f"{where}: no values of {name} (column {OBSERVABLE_SYMBOLS[name]}); it has "
+                f"{where}: no values of {name} (column {OBSERVABLES[name].symbol}); it has "
                 f"{', '.join(measurement.observables)}"
             )
     return tuple(options.observables)

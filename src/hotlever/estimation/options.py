@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal, cast, get_args
 
+from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError, unknown_name
-from hotlever.lever.dataset import OBSERVABLES
 from hotlever.materials import PARAMETERS, parameter
 from hotlever.materials.parameters import OF_SILICON
 from hotlever.probe import Probe

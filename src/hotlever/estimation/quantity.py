@@ -9,7 +9,7 @@ import numpy as np
 
 from hotlever.types import Array
 
-#: Where predictions have the tip temperature; see `hotlever.lever.dataset.OBSERVABLES`.
+#: Where predictions have the tip temperature; see `hotlever.datasets.OBSERVABLES`.
 TIP = 2
 
 

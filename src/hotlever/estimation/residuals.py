@@ -7,12 +7,12 @@ from copy import copy
 
 import numpy as np
 
+from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError
 from hotlever.estimation.drift import Drift
 from hotlever.estimation.noise import relative_noise
 from hotlever.estimation.options import Weights
 from hotlever.estimation.scales import CommonCovariance, CommonError
-from hotlever.lever.dataset import OBSERVABLES
 from hotlever.measurement import Measurement
 from hotlever.measurement.scatter import noise_about_neighbours
 from hotlever.probe.priors import Moved
@@ -303,7 +303,7 @@ class Residuals:
         difference = self.shown - values
         difference[self.rows] = self.difference(values)
         return {
-            column: float(np.sqrt(np.nanmean(row**2)))
+            column.name: float(np.sqrt(np.nanmean(row**2)))
             for column, row in zip(OBSERVABLES.values(), difference, strict=True)
             if np.isfinite(row).any()
         }

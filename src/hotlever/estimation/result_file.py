@@ -18,7 +18,7 @@ from hotlever import __version__
 from hotlever.errors import InputError
 from hotlever.files import json_text, read_json, without_nan
 from hotlever.lever.transient.waveform import Polyline, Sine
-from hotlever.measurement import COLUMNS, Measurement
+from hotlever.measurement import MEASURED, Measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import PriorUse
 from hotlever.probe.surroundings import Medium
@@ -127,9 +127,9 @@ class MeasurementSection(Section):
     def of(cls, measurement: Measurement, **others: Any) -> Self:
         """Return the section of a measurement."""
         columns = {
-            name: values
-            for name, (attribute, _) in COLUMNS.items()
-            if (values := getattr(measurement, attribute)) is not None
+            column.symbol: values
+            for column in MEASURED
+            if (values := getattr(measurement, column.name)) is not None
         }
         return cls.holding(measurement, columns=columns, **others)
 
@@ -159,9 +159,9 @@ class MeasurementSection(Section):
     def measurement(self) -> Measurement:
         """Return the measurement."""
         columns: dict[str, Any] = dict.fromkeys(_NEEDED, np.full(self.columns["V_b"].size, np.nan))
-        for name, (attribute, _) in COLUMNS.items():
-            if name in self.columns:
-                columns[attribute] = self.columns[name]
+        for column in MEASURED:
+            if column.symbol in self.columns:
+                columns[column.name] = self.columns[column.symbol]
         return Measurement(**self.attributes_of(Measurement), **columns)
 
 

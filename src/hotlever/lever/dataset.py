@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import QUANTITIES, csv_text, labelled, quantity, write_dataset
+from hotlever.datasets import OBSERVABLES, QUANTITIES, csv_text, labelled, quantity, write_dataset
 from hotlever.errors import InputError
 from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES, balance_names
@@ -36,8 +36,6 @@ _MORE = (
     *("leg1_ohm", "leg2_ohm", "lever_ohm", "max_K"),
     *("ground_current_mA", "end_heat_mW", "air_heat_mW"),
 )
-#: What a fit compares, by the name users give it, and its column in a sweep.
-OBSERVABLES = {"current": "current_mA", "reader": "reader_V", "tip": "tip_K"}
 
 
 def sweep_dataset(

@@ -99,7 +99,7 @@ def at_fixed_bias(
     Returns
     -------
     ndarray, shape (3, n, p)
-        In the order of `hotlever.lever.dataset.OBSERVABLES`; mA, V and K per unit of the
+        In the order of `hotlever.datasets.OBSERVABLES`; mA, V and K per unit of the
         parameter.
     """
     lever_V, current_mA, reader_V, *tip = np.moveaxis(shown, 1, 0)

@@ -5,17 +5,11 @@ surroundings, `sweeps` polarities and the order of the rows, `checks` what no le
 """
 
 from hotlever.measurement.columns import parse_columns
-from hotlever.measurement.data import (
-    COLUMNS,
-    OBSERVABLE_SYMBOLS,
-    Measurement,
-    with_measured_circuit,
-)
+from hotlever.measurement.data import MEASURED, Measurement, with_measured_circuit
 from hotlever.measurement.reading import given_measurement, read_measurement
 
 __all__ = [
-    "COLUMNS",
-    "OBSERVABLE_SYMBOLS",
+    "MEASURED",
     "Measurement",
     "given_measurement",
     "parse_columns",

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median
 
-from hotlever.lever.dataset import OBSERVABLES
-from hotlever.measurement.data import COLUMNS, Measurement
+from hotlever.datasets import OBSERVABLES
+from hotlever.measurement.data import MEASURED, Measurement
 from hotlever.types import Array
 
 #: Rows up to which all are used as they are, and steps of the bias in which more are averaged.
@@ -44,13 +44,13 @@ def averaged(measurement: Measurement, robust: bool = False) -> Measurement:
     averaged_before = measurement.rows is not None
     if measurement.bias_V.size <= MANY or averaged_before or measurement.time_us is not None:
         return measurement
-    columns = {name: getattr(measurement, name) for name, _ in COLUMNS.values()}
+    columns = {column.name: getattr(measurement, column.name) for column in MEASURED}
     columns = {name: values for name, values in columns.items() if values is not None}
     step = _steps(measurement.bias_V)
     if robust:
-        for name in (OBSERVABLES[observable] for observable in measurement.observables):
+        for name in (OBSERVABLES[observable].name for observable in measurement.observables):
             columns[name] = np.where(_far_off(columns[name], step), np.nan, columns[name])
-    shown = np.isfinite([columns[name] for name in OBSERVABLES.values()]).any(axis=0)
+    shown = np.isfinite([columns[column.name] for column in OBSERVABLES.values()]).any(axis=0)
     used = {name: values[shown] for name, values in columns.items()}
     # rows with the same columns filled have the same mean bias for all of them
     filled = np.isfinite(list(used.values()))

@@ -7,9 +7,8 @@ import numpy as np
 from hotlever.errors import InputError
 from hotlever.lever.transient.waveform import MOST_BIAS, Waveform
 from hotlever.measurement.checks import NOISE
-from hotlever.measurement.columns import LEVER
 from hotlever.measurement.contents import Contents
-from hotlever.measurement.data import TIME
+from hotlever.measurement.data import LEVER, TIME
 from hotlever.probe import Circuit
 from hotlever.types import Array
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hotlever.datasets import COLUMNS
 from hotlever.errors import InputError
 from hotlever.measurement.contents import Contents
-from hotlever.measurement.data import COLUMNS
+from hotlever.measurement.data import MEASURED
 from hotlever.probe import Circuit
 from hotlever.types import Array
 from hotlever.units import plausible
@@ -44,9 +45,9 @@ def check(contents: Contents, *, signed: bool = False) -> None:
         If a value cannot be, or the largest of a quantity shows that its unit is wrong.
     """
     values, settings = contents.values, contents.settings.values
-    for symbol in (symbol for symbol in COLUMNS if symbol in contents.columns):
+    for symbol in (column.symbol for column in MEASURED if column.symbol in contents.columns):
         of, data = symbol.removeprefix("d"), values[symbol]
-        unit, (low, high) = COLUMNS[of][1], _PLAUSIBLE[of]
+        unit, (low, high) = COLUMNS[of].unit, _PLAUSIBLE[of]
         size = np.nanmax(np.abs(values[of]), initial=0.0)
         if symbol != of:
             expected = f"a standard error above 0 and up to {high:g} {unit}, or an empty cell"

@@ -11,19 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.cells import number, text_lines
+from hotlever.datasets import COLUMNS, OBSERVABLES
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_bytes
-from hotlever.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, TIME
+from hotlever.measurement.data import LEVER, MEASURED, TIME
 from hotlever.tables import Table
 from hotlever.types import Array
 from hotlever.units import TIMES, conversion, name_and_unit, unknown_unit
 
-#: The voltage over the lever, from which the bias follows.
-LEVER = "V_l"
-#: Quantities that a column can be: symbol, name in datasets, unit inside.
-QUANTITIES = {TIME: ("time_us", "us"), LEVER: ("lever_V", "V"), **COLUMNS}
-UNITS = {symbol: unit for symbol, (_, unit) in QUANTITIES.items()}
-#: Their other names, in small letters without blanks and marks.
+#: Other names of columns, in small letters without blanks and marks.
 _NAMES = {
     **dict.fromkeys(("vb", "ub", "vbias", "ubias", "bias", "biasvoltage"), "V_b"),
     **dict.fromkeys(("vl", "ul", "vlever", "ulever", "lever", "levervoltage"), LEVER),
@@ -101,9 +97,9 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
             )
         symbol, unit = _quantity(quantity, told=True)
         if symbol is None:
-            raise unknown_name("quantity", name_and_unit(quantity)[0], UNITS, where)
-        if unit is not None and conversion(unit, UNITS[symbol]) is None:
-            raise unknown_unit(unit, UNITS[symbol], f"{where}: {symbol}")
+            raise unknown_name("quantity", name_and_unit(quantity)[0], COLUMNS, where)
+        if unit is not None and conversion(unit, COLUMNS[symbol].unit) is None:
+            raise unknown_unit(unit, COLUMNS[symbol].unit, f"{where}: {symbol}")
         if symbol in headings:
             raise InputError(f"{where}: {symbol} is given twice, expected once")
         headings[symbol] = quantity, heading
@@ -126,7 +122,7 @@ def _quantity(heading: str, told: bool = False) -> tuple[str | None, str | None]
     The name alone is no time, unless it is told: settings of instruments are called so too.
     """
     name, unit = name_and_unit(heading)
-    is_time = name.casefold() in TIMES and (told or conversion(unit or "", UNITS[TIME]))
+    is_time = name.casefold() in TIMES and (told or conversion(unit or "", COLUMNS[TIME].unit))
     return TIME if is_time else symbol_of(name), unit
 
 
@@ -193,7 +189,7 @@ def find_columns(
 
 def _column(table: Table, symbol: str, place: int, told: str | None) -> Column:
     """Return a column with its unit, which the file or the user gives."""
-    heading, inside = table.names[place] if table.names else "", UNITS[symbol]
+    heading, inside = table.names[place] if table.names else "", COLUMNS[symbol].unit
     where = f"{table.where(-1)}: column '{shown(heading or str(place + 1))}'"
     written = name_and_unit(heading)[1]
     if table.names[:1] == [_IN_SI]:
@@ -217,11 +213,11 @@ def _contradicts(written: str, inside: str, difference: bool, scale: tuple[float
     """Whether the unit of a heading, of any quantity, is not the one that is told."""
     if (own := conversion(written, inside, difference)) is not None:
         return own != scale
-    return any(conversion(written, unit) for unit in set(UNITS.values()))
+    return any(conversion(written, unit) for unit in {column.unit for column in COLUMNS.values()})
 
 
 def _told(symbol: str, heading: str = "HEADING") -> str:
-    return f"--column '{symbol} ({UNITS[symbol]})={shown(heading)}'"
+    return f"--column '{symbol} ({COLUMNS[symbol].unit})={shown(heading)}'"
 
 
 def _are_brief(table: Table, column: Column) -> bool:
@@ -239,7 +235,10 @@ def _require(table: Table, columns: Mapping[str, Column], driven: bool) -> None:
             f"{table.where(-1)}: no column of the time, expected one like 'time (us)' beside a "
             "wave form"
         )
-    observed = {*OBSERVABLE_SYMBOLS.values(), *([LEVER] if TIME in columns else [])}
+    observed = {
+        *(column.symbol for column in OBSERVABLES.values()),
+        *([LEVER] if TIME in columns else []),
+    }
     has_bias = driven or "V_b" in columns or {LEVER, "I_h"} <= columns.keys()
     if has_bias and observed & columns.keys():
         return
@@ -258,11 +257,13 @@ def unused_columns(table: Table, columns: Mapping[str, Column]) -> list[str]:
     """Return a note on each column that is no quantity, with the one that it may be."""
     notes = []
     used = {column.place for column in columns.values()}
-    missing = [symbol for symbol in COLUMNS if symbol not in columns]
+    missing = [column for column in MEASURED if column.symbol not in columns]
     for place, heading in enumerate(table.names):
         if place not in used and heading != _IN_SI and heading.strip():
             unit = name_and_unit(heading)[1] or ""
-            likely = next((symbol for symbol in missing if conversion(unit, UNITS[symbol])), None)
+            likely = next(
+                (column.symbol for column in missing if conversion(unit, column.unit)), None
+            )
             hint = f"; if it is {likely}, name it '{likely} ({unit})'" if likely else ""
             notes.append(f"{table.path}: column '{shown(heading)}' is not used{hint}")
     return notes

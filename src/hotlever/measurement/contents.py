@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from hotlever.datasets import COLUMNS
 from hotlever.errors import InputError, shown
-from hotlever.measurement.columns import LEVER, UNITS, Column
-from hotlever.measurement.data import TIME
+from hotlever.measurement.columns import Column
+from hotlever.measurement.data import LEVER, TIME
 from hotlever.measurement.settings import Settings
 from hotlever.tables import Table
 from hotlever.types import Array
@@ -47,7 +48,7 @@ class Contents:
 
     def __post_init__(self) -> None:
         self.origin = {symbol: column.origin for symbol, column in self.columns.items()}
-        self.values = dict.fromkeys(UNITS, np.full(len(self.table.rows), np.nan))
+        self.values = dict.fromkeys(COLUMNS, np.full(len(self.table.rows), np.nan))
         for symbol, column in self.columns.items():
             self.values[symbol] = column.values(self.table)
             if symbol not in ("V_b", LEVER, TIME):

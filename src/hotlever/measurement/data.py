@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from hotlever.datasets import labelled
+from hotlever.datasets import COLUMNS, OBSERVABLES, labelled
 from hotlever.errors import InputError, unknown_name
-from hotlever.lever.dataset import OBSERVABLES, circuit_of
+from hotlever.lever.dataset import circuit_of
 from hotlever.lever.transient.history import checked_times
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.probe import Circuit, Probe
@@ -20,18 +20,10 @@ from hotlever.types import Array
 
 #: The time, in files of what was measured in time.
 TIME = "t"
-#: Quantities of a measurement file: symbol in the header, attribute, unit inside.
-COLUMNS = {
-    "V_b": ("bias_V", "V"),
-    "I_h": ("current_mA", "mA"),
-    "V_r": ("reader_V", "V"),
-    "T_tip": ("tip_K", "K"),
-    "dT_tip": ("tip_error_K", "K"),
-    "dI_h": ("current_error_mA", "mA"),
-    "dV_r": ("reader_error_V", "V"),
-}
-#: The columns a fit can compare, by the name users give it.
-OBSERVABLE_SYMBOLS = {"current": "I_h", "reader": "V_r", "tip": "T_tip"}
+#: The voltage over the lever, from which the bias follows.
+LEVER = "V_l"
+#: The columns that a measurement keeps: the bias, observables and standard errors.
+MEASURED = [column for symbol, column in COLUMNS.items() if symbol not in (TIME, LEVER)]
 #: mbar; between these the pressure is no matter to a lever without a temperature jump.
 _DENSE_MBAR = 700.0, 1200.0
 
@@ -160,8 +152,9 @@ class Measurement:
         >>> Measurement.of_sweep(sweep(Probe.reference(), [1.0, 2.0])).observables
         ('current', 'reader', 'tip')
         """
-        circuit, names = circuit_of(sweep), ("bias_V", *OBSERVABLES.values())
-        columns: dict[str, Any] = {name: sweep[name].values for name in names}
+        circuit, symbols = circuit_of(sweep), ("V_b", "I_h", "V_r", "T_tip")
+        shown = [COLUMNS[symbol].name for symbol in symbols]
+        columns: dict[str, Any] = {name: sweep[name].values for name in shown}
         return cls(
             **columns,
             tip_error_K=np.full(sweep.bias_V.size, np.nan),
@@ -175,7 +168,7 @@ class Measurement:
 
         Rising in bias, or in time.
         """
-        named = ((name, getattr(self, name)) for name, _ in COLUMNS.values())
+        named = ((column.name, getattr(self, column.name)) for column in MEASURED)
         columns = {name: values for name, values in named if values is not None}
         columns["lever_V"] = circuit.lever_voltage(self.bias_V, self.current_mA)
         columns["power_mW"] = circuit.power(self.bias_V, self.current_mA)
@@ -193,13 +186,13 @@ class Measurement:
         """
         if name not in OBSERVABLES:
             raise unknown_name("observable", name, OBSERVABLES)
-        values: Array = getattr(self, OBSERVABLES[name])
+        values: Array = getattr(self, OBSERVABLES[name].name)
         return values
 
     def error(self, name: str) -> Array:
         """Return the standard errors of an observable's data, NaN where there are none."""
         self.observable(name)
-        values = getattr(self, COLUMNS["d" + OBSERVABLE_SYMBOLS[name]][0])
+        values = getattr(self, COLUMNS["d" + OBSERVABLES[name].symbol].name)
         return np.full(self.bias_V.shape, np.nan) if values is None else values
 
     def part(self, rows: NDArray[np.bool_]) -> Measurement:

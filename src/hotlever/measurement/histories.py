@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 
+from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError
 from hotlever.lever.transient.waveform import Polyline, Waveform
 from hotlever.measurement.contents import Contents
-from hotlever.measurement.data import OBSERVABLE_SYMBOLS, TIME
+from hotlever.measurement.data import TIME
 from hotlever.measurement.scatter import noise_about_neighbours
 from hotlever.types import Array
 
@@ -46,8 +47,8 @@ def leave_out_jumps(contents: Contents, waveform: Waveform) -> None:
     pieces = waveform.pieces(float(times[-1]) * (1.0 + _SAME) + _SAME)
     jumps = np.array([piece.start for piece in pieces if piece.jumps])
     at_jump = np.isclose(times[:, None], jumps, rtol=_SAME, atol=0.0).any(axis=1)
-    for symbol in OBSERVABLE_SYMBOLS.values():
-        values[symbol] = np.where(at_jump, np.nan, values[symbol])
+    for column in OBSERVABLES.values():
+        values[column.symbol] = np.where(at_jump, np.nan, values[column.symbol])
     contents.note_rows(at_jump, "the bias jumps at this time, so that the row is not used")
 
 

@@ -9,20 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.datasets import QUANTITIES as MEANINGS
+from hotlever.datasets import COLUMNS, OBSERVABLES
 from hotlever.errors import InputError, shown
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.measurement.bias import find_bias, mirror
 from hotlever.measurement.checks import check
 from hotlever.measurement.columns import (
-    QUANTITIES,
     find_columns,
     is_heading,
     parse_columns,
     unused_columns,
 )
 from hotlever.measurement.contents import Contents
-from hotlever.measurement.data import COLUMNS, OBSERVABLE_SYMBOLS, TIME, Measurement
+from hotlever.measurement.data import MEASURED, TIME, Measurement
 from hotlever.measurement.histories import check_times, find_waveform, leave_out_jumps
 from hotlever.measurement.settings import Settings
 from hotlever.measurement.sweeps import described, disagreements, sweeps_of
@@ -89,7 +88,7 @@ def read_measurement(
     more = len(notes) - _MOST_NOTES
     if more > 0:
         notes[_MOST_NOTES:] = [f"{path}: {more} more such notes"]
-    rows: dict[str, Any] = {name: contents.values[symbol] for symbol, (name, _) in COLUMNS.items()}
+    rows: dict[str, Any] = {column.name: contents.values[column.symbol] for column in MEASURED}
     measurement = Measurement(
         **rows,
         **settings.values,
@@ -131,7 +130,7 @@ def _complete_at_rest(contents: Contents, circuit: Circuit | None) -> str:
     order = described(bias, sweeps)
     if len(sweeps) > 1:
         contents.note(f"{len(sweeps)} sweeps, all of them used: {order}")
-        data = {symbol: contents.values[symbol] for symbol in OBSERVABLE_SYMBOLS.values()}
+        data = {column.symbol: contents.values[column.symbol] for column in OBSERVABLES.values()}
         for text in disagreements(bias, sweeps, data, symmetric):
             contents.note(text)
     return order
@@ -142,13 +141,13 @@ def _understood(contents: Contents, order: str) -> tuple[tuple[str, ...], ...]:
     table = contents.table
     separator = {"\t": "tabs", ";": "semicolons", ",": "commas", None: "blanks"}[table.separator]
     rows = [(table.path, separator + ", decimal comma" * table.decimal_comma, order)]
-    for symbol, (name, unit) in QUANTITIES.items():
+    for symbol, column in COLUMNS.items():
         values = contents.values[symbol]
         count = int(np.isfinite(values).sum())
         if count > 0:
-            limits = f"{np.nanmin(values):.5g} to {np.nanmax(values):.5g} {unit}"
+            limits = f"{np.nanmin(values):.5g} to {np.nanmax(values):.5g} {column.unit}"
             some = f", {count} values" if count < values.size else ""
-            rows.append((symbol, limits + some, f"{MEANINGS[name][1]}, {contents.origin[symbol]}"))
+            rows.append((symbol, limits + some, f"{column.meaning}, {contents.origin[symbol]}"))
     return (*rows, *contents.settings.understood())
 
 

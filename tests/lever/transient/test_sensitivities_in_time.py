@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hotlever.datasets import observables_of
 from hotlever.errors import HistoryEndError, InputError
-from hotlever.lever.dataset import OBSERVABLES
 from hotlever.lever.transient import pulse, simulate, step, switched_off
 from hotlever.lever.transient.history import follow
 from hotlever.lever.transient.sensitivities import with_sensitivities
@@ -19,7 +19,7 @@ MOVED_K, MOST = 1.0, 0.2
 
 
 def values_of(data):
-    return np.stack([data[column].values for column in OBSERVABLES.values()])
+    return observables_of(data)
 
 
 @pytest.mark.parametrize(

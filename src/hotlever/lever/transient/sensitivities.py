@@ -14,9 +14,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import labelled
+from hotlever.datasets import OBSERVABLES, labelled
 from hotlever.errors import HistoryEndError, InputError, unknown_name
-from hotlever.lever.dataset import OBSERVABLES, probe_attributes
+from hotlever.lever.dataset import probe_attributes
 from hotlever.lever.space import Factors
 from hotlever.lever.transient.driven import DrivenLever
 from hotlever.lever.transient.history import checked_times, follow
@@ -124,7 +124,8 @@ def with_sensitivities(
             bias.append(piece.bias(step.end))
             shown.append(along.shown(step.x[:, 1:]))
             slopes.append(along.slopes(step.x[:, 1:]))
-    values = dict(zip(OBSERVABLES.values(), np.array(shown).T, strict=True))
+    names_shown = [column.name for column in OBSERVABLES.values()]
+    values = dict(zip(names_shown, np.array(shown).T, strict=True))
     table = np.array(slopes).transpose(1, 0, 2)
     return labelled(
         {
