@@ -1,5 +1,6 @@
 # make test       all tests: ruff, mypy, pytest (with the README's examples)
 # make test-app   the app in a real browser; screenshots in tests/app/screenshots
+# make test-pythons  sdist, wheel and some tests on every Python from 3.11 on that is there
 # make test-hostile  12 000 hostile files and arguments, full disks, kills: half an hour
 # make reproduce  the main job: the paper's results as one page in reproduce/
 # make docs       the documentation as a site in docs/_build/
@@ -7,7 +8,7 @@
 FORM ?= full
 BIN := .venv/bin
 
-.PHONY: test test-slow test-app test-hostile reproduce docs lock env clean
+.PHONY: test test-slow test-app test-hostile test-pythons reproduce docs lock env clean
 
 env: .venv/.ready
 
@@ -31,6 +32,9 @@ test-app: env
 test-hostile: env
 	HOTLEVER_HOSTILE=1 $(BIN)/python -m pytest tests/hostile -rP
 
+test-pythons: env
+	sh tools/test_pythons.sh
+
 reproduce: env
 	$(BIN)/hotlever reproduce -o reproduce $(if $(filter quick,$(FORM)),--quick)
 
@@ -43,4 +47,4 @@ lock: env
 	    --no-header --all-extras --output-file requirements.lock pyproject.toml
 
 clean:
-	rm -rf .venv reproduce docs/_build benchmarks/results tests/app/screenshots
+	rm -rf .venv build reproduce docs/_build benchmarks/results tests/app/screenshots

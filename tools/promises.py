@@ -2,35 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "hostile")]
-
-
-def lines(folder: str) -> int:
-    """Return how many lines of code, comments included, a folder has."""
-    files = (ROOT / folder).rglob("*.py")
-    return sum(len(file.read_text(encoding="utf-8").splitlines()) for file in files)
-
-
-def tests(*options: str) -> int:
-    """Return how many tests there are, each with each of its parameters."""
-    command = [sys.executable, "-m", "pytest", "--collect-only", "-q", *options]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    return sum("::" in line for line in done.stdout.splitlines())
-
-
-def counts() -> dict[str, int]:
-    """Return how large the code and its tests are."""
-    return {
-        "lines of the package": lines("src"),
-        "lines of its tests": lines("tests"),
-        "tests of `make test`": tests(),
-        "tests of `make test-slow`": tests("-m", "slow"),
-    }
 
 
 def hostile_counts() -> dict[str, int]:
@@ -59,12 +35,12 @@ def hostile_counts() -> dict[str, int]:
 
 def main() -> None:
     """Print them as a table."""
-    print(*rows(counts() | hostile_counts()), sep="\n")
+    print(*rows(hostile_counts()), sep="\n")
 
 
-def rows(found: dict[str, int]) -> list[str]:
+def rows(counts: dict[str, int]) -> list[str]:
     """Return counts as rows of a table."""
-    return [f"| {what} | {count:,} |".replace(",", " ") for what, count in found.items()]
+    return [f"| {what} | {count:,} |".replace(",", " ") for what, count in counts.items()]
 
 
 if __name__ == "__main__":

@@ -122,7 +122,7 @@ def store_arrays(path: Path | None, arrays: Mapping[str, NDArray[Any]]) -> None:
         with whole_file(path) as temporary:
             np.savez(temporary, **dict[str, Any](arrays))
     size = 0
-    for status, file in sorted(kept_files(path.parents[1]), key=lambda one: -one[0].st_mtime):
+    for status, file in sorted(kept_files(path.parents[1]), key=lambda file: -file[0].st_mtime):
         size += status.st_size
         if size > most:
             with suppress(OSError):
@@ -146,11 +146,11 @@ def largest_size() -> float:
 
 def kept_files(top: Path) -> list[tuple[os.stat_result, Path]]:
     """Return the files of a cache folder, and their sizes and times."""
-    found = []
+    files = []
     with suppress(OSError):
         for path in top.glob("*/*.npz"):
             # a folder that the user chose may hold other files too
             if re.fullmatch(r"[0-9a-f]{32}|\.hotlever-\w+", path.stem):
                 with suppress(OSError):
-                    found.append((path.stat(), path))
-    return found
+                    files.append((path.stat(), path))
+    return files

@@ -1,0 +1,27 @@
+#!/bin/sh
+# Builds sdist and wheel, installs the wheel for every Python from 3.11 on that this machine has, and runs tests there.
+set -eu
+cd "$(dirname "$0")/.."
+
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+# the wheel is made from the sdist, so that what the sdist lacks is noticed
+.venv/bin/python -m build --outdir "$folder" . >/dev/null
+wheel=$(ls "$folder"/*.whl)
+
+tested=
+for python in $(
+    { which -a python3.11 python3.12 python3.13 python3.14 || true
+      ls "${PYENV_ROOT:-$HOME/.pyenv}"/versions/*/bin/python3.1[1-9] 2>/dev/null || true; }
+); do
+    version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null) || continue
+    case " $tested " in *" $version "*) continue ;; esac
+    "$python" -m venv "$folder/$version" >/dev/null 2>&1 || { echo "Python $version makes no venv"; continue; }
+    "$folder/$version/bin/pip" install --quiet --disable-pip-version-check "$wheel[app,raman,cluster,test]"
+    echo "Python $version"
+    "$folder/$version/bin/python" -m pytest -q -p no:cacheprovider -n 2 --dist loadfile \
+        tests/materials tests/probe tests/measurement tests/test_cli.py tests/test_package.py tests/test_processes.py
+    tested="$tested $version"
+done
+[ -n "$tested" ] || { echo "no Python from 3.11 on was found" >&2; exit 1; }
+echo "tested:$tested"
