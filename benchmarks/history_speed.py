@@ -19,7 +19,7 @@ import xarray as xr
 
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
-from hotlever.lever.transient import followed, pulse, simulate
+from hotlever.lever.transient import integrate, pulse, simulate
 from hotlever.lever.transient.reduced import reduced_in_time
 from hotlever.lever.transient.sensitivities import with_sensitivities
 from hotlever.materials import PARAMETERS
@@ -51,11 +51,11 @@ def imbalance(data: xr.Dataset) -> float:
 
 def main() -> None:
     lever, coarse = Lever(Probe.reference()), Lever(Probe.reference(), COARSE)
-    full, full_s = timed(lambda: followed(lever, ONE, UNTIL), 3)
+    full, full_s = timed(lambda: integrate(lever, ONE, UNTIL), 3)
     snapshots: list[np.ndarray] = []
-    followed(lever, ONE, UNTIL, seen=lambda t, state: snapshots.append(state.x))
+    integrate(lever, ONE, UNTIL, callback=lambda t, state: snapshots.append(state.x))
     reduced, made_s = timed(lambda: reduced_in_time(lever, np.hstack(snapshots)), 1)
-    other, reduced_s = timed(lambda: followed(reduced, ONE, UNTIL, full.time.values), 21)
+    other, reduced_s = timed(lambda: integrate(reduced, ONE, UNTIL, full.time.values), 21)
     off = float(np.abs(other.tip_K - full.tip_K).max())
     train, train_s = timed(lambda: simulate(lever, TRAIN), 1)
     _, derived_s = timed(lambda: with_sensitivities(coarse, FITTED, TIMES, NAMES), 3)

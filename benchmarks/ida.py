@@ -18,7 +18,7 @@ from sksundae import ida
 from hotlever import Lever, Probe
 from hotlever.lever.space import Fluxes
 from hotlever.lever.transient import Waveform, pulse, simulate, sine, step
-from hotlever.lever.transient.driven import DrivenLever
+from hotlever.lever.transient.problem import TransientProblem
 from hotlever.threads import one_blas_thread
 
 CASES = (
@@ -29,7 +29,7 @@ CASES = (
 )
 
 
-def solved(problem: DrivenLever, x: np.ndarray, stops: np.ndarray) -> np.ndarray:
+def solved(problem: TransientProblem, x: np.ndarray, stops: np.ndarray) -> np.ndarray:
     """Return the unknowns at some times, the first where they are `x`, (times, size + 1)."""
     equations, space = problem.equations, problem.equations.space
     stored, one, rate, begins = space.is_temperature, np.arange(1), 1e9, float(stops[0])
@@ -40,7 +40,9 @@ def solved(problem: DrivenLever, x: np.ndarray, stops: np.ndarray) -> np.ndarray
         T = equations.at(state)[0].T
         rise = space.temperature.at_points(np.array(moving)[:, None])[0]
         heat, nothing = equations.heat_density(T)[1] * rise, np.zeros((2, *T.shape))
-        out[:] = (space.weak_form(Fluxes(heat, nothing, nothing)) + problem.rest(t, state))[:, 0]
+        out[:] = (space.weak_form(Fluxes(heat, nothing, nothing)) + problem.residual(t, state))[
+            :, 0
+        ]
 
     def prepare(t, y, moving, rest, rate):
         known["factors"] = problem.factorised(np.array(y)[:, None], rate)
@@ -50,10 +52,10 @@ def solved(problem: DrivenLever, x: np.ndarray, stops: np.ndarray) -> np.ndarray
 
     # the potentials that belong to the temperatures, and slopes, as if within an instant
     for _ in range(4):
-        rest = problem.rest(begins, x)
+        rest = problem.residual(begins, x)
         rest[stored] = 0.0
         x = x - problem.factorised(x, rate).solve(rest, one)
-    slope = -rate * problem.factorised(x, rate).solve(problem.rest(begins + 1.0 / rate, x), one)
+    slope = -rate * problem.factorised(x, rate).solve(problem.residual(begins + 1.0 / rate, x), one)
     solver = ida.IDA(
         residual,
         algebraic_idx=np.flatnonzero(~stored),
@@ -81,7 +83,7 @@ def by_ida(lever: Lever, waveform: Waveform, times: np.ndarray) -> np.ndarray:
     for piece in waveform.pieces(float(times[-1])):
         inside = times[(times > piece.start) & (times <= piece.end)]
         stops = np.unique(np.concatenate([[piece.start], inside, [piece.end]]))
-        states = solved(DrivenLever(equations, lever.circuit, piece.bias), x, stops)
+        states = solved(TransientProblem(equations, lever.circuit, piece.bias), x, stops)
         for y in states[np.isin(stops, inside)]:
             tip = equations.base_temperature_K + float(space.tip_rise(y))
             found.append([tip, float(equations.observed(y[:, None])[1, 0])])

@@ -6,7 +6,7 @@ import numpy as np
 from made_up_fields import BASE, BIAS, LENGTH, WIDTH, Exact, nodal_state, silicon_strip, source
 from skfem.element import ElementTriP3
 
-from hotlever.lever.transient.driven import DrivenLever
+from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import Stepper
 from hotlever.materials.heat import heat_capacity
 from hotlever.probe import Circuit
@@ -20,10 +20,10 @@ def exact_at(t: float) -> Exact:
     return Exact(AMPLITUDE * (1 - 0.8 * np.cos(phase)) / 1.8, BIAS + 0.4 * np.sin(phase))
 
 
-class Loaded(DrivenLever):
+class Loaded(TransientProblem):
     """The lever with the sources that the made-up fields need."""
 
-    def rest(self, t: float, x: np.ndarray) -> np.ndarray:
+    def residual(self, t: float, x: np.ndarray) -> np.ndarray:
         exact, space = exact_at(t), self.equations.space
         places = space.elements.positions
         heat, charge = exact.loads(*places)
@@ -34,9 +34,9 @@ class Loaded(DrivenLever):
         # J/(cm³ µs) is 10⁶ W/cm³, and 10⁸ W/cm³ are one W/(cm µm²)
         heat = heat + 1e-2 * heat_capacity(T)[0] * rise
         loads = space.from_nodal(source(space, heat), source(space, charge), 0.0)
-        return super().rest(t, x) - loads[:, None]
+        return super().residual(t, x) - loads[:, None]
 
-    def watched(self, x: np.ndarray) -> np.ndarray:
+    def monitored(self, x: np.ndarray) -> np.ndarray:
         return np.zeros((0, x.shape[1]))
 
 

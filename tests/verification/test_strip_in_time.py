@@ -10,8 +10,8 @@ from bare import bare_equations
 from skfem import MeshTri
 
 from hotlever.lever.state import State
-from hotlever.lever.transient.driven import DrivenLever
 from hotlever.lever.transient.modes import slowest_modes
+from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import Stepper
 from hotlever.materials.kinds import MetalFilm
 from hotlever.probe import Circuit, Terminal
@@ -39,10 +39,10 @@ def strip():
     )
 
 
-class Alone(DrivenLever):
+class Alone(TransientProblem):
     """A lever whose parts are not told apart."""
 
-    def watched(self, x):
+    def monitored(self, x):
         return np.zeros((1, x.shape[1]))
 
 

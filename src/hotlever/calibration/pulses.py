@@ -29,7 +29,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.state import State
 from hotlever.lever.transient import pulse, simulate
-from hotlever.lever.transient.periodic import settled
+from hotlever.lever.transient.cyclic import cyclic_steady_state
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
 from hotlever.materials.heat import heat_capacity
 from hotlever.probe import Probe
@@ -82,7 +82,7 @@ class PulseCalibration:
     Attributes
     ----------
     timing : PulseTiming
-        A repeated pulse is one of a train that has settled.
+        A repeated pulse is one in the cyclic steady state of its train.
     table : xarray.Dataset
         `PULSE_COLUMNS` on the dimension ``height``, over the heights of the calibrated range; and
         ``budget_K``, the standard error of the peak by ``source``.
@@ -252,7 +252,7 @@ class _Pulses:
     def _follow(
         self, lever: Lever, height: float, near: State | None, slower: float = 1.0
     ) -> tuple[Array, State | None]:
-        """Return the rises, and the state in which a settled period begins.
+        """Return the rises, and the state in which a period of the cyclic steady state begins.
 
         A lever that holds more heat does the same more slowly: its pulse is that of a shorter one.
         """
@@ -264,7 +264,9 @@ class _Pulses:
                 if int(history.tip_K.values.argmax()) < history.sizes["time"] - 1:
                     break
         else:
-            history, state = settled(lever, wave, period / slower, start=near, per_step=_PER_STEP)
+            history, state = cyclic_steady_state(
+                lever, wave, period / slower, start=near, per_step=_PER_STEP
+            )
         self._done += 1
         if self._progress is not None:
             self._progress(self._done, max(self._all, self._done + 1))

@@ -85,13 +85,15 @@ def pulse_command(
     lever = make_lever(probe)
     with progress("pulse") as update:
 
-        def seen(t: float, state: State) -> None:
+        def keep(t: float, state: State) -> None:
             ends[1:] = [state]
             if next(told) % per_step == 0 and fields is not None:
                 states.append((t, state))
 
         try:
-            curve = simulate(lever, wave, end, times, per_step=per_step, progress=update, seen=seen)
+            curve = simulate(
+                lever, wave, end, times, per_step=per_step, progress=update, callback=keep
+            )
         except HistoryEndError as error:
             curve, failure = error.partial, error
     if ends:

@@ -18,7 +18,7 @@ from hotlever.errors import InputError
 from hotlever.estimation.surrogate import LinearSurrogate
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
-from hotlever.lever.transient.history import followed
+from hotlever.lever.transient.history import integrate
 from hotlever.lever.transient.sensitivities import derivable, with_sensitivities
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.measurement import Measurement
@@ -209,7 +209,7 @@ class ExperimentInTime:
         """
         if self.full is None:
             return self
-        found = followed(
+        found = integrate(
             self.full.lever(at.probe), self.waveform, at=at.at, tolerance_K=_TOLERANCE_K
         )
         right = observables_of(found)

@@ -148,22 +148,22 @@ class LawsAtPoints:
         """The enthalpy at the base temperature (nJ/µm²), (points, 1)."""
         return self._stacks.heat(np.full_like(self.space.weights, self.base_temperature_K))[0]
 
-    def stored(self, x: Array) -> Array:
+    def storage(self, x: Array) -> Array:
         """Return the heat stored in states (nJ), tested as the balance is, (size + 1, n).
 
         In time the balance is what it loses per µs.
         """
         return self._only_heat(self.heat_density(self.at(x)[0].T)[0])
 
-    def stored_change(self, x: Array, change: Array) -> Array:
-        """Return how `stored` changes with the unknowns, by one change of each state or several."""
+    def storage_change(self, x: Array, change: Array) -> Array:
+        """Return how `storage` changes by one change of each state, or by several."""
         by_T = self.heat_density(self.at(x)[0].T)[1]
         rise = self.space.temperature.at_points(change)[0]
         heat = (by_T if change.ndim == 2 else by_T[..., None]) * rise
         return self._only_heat(heat)
 
-    def stored_by_parameter(self, x: Array, names: Sequence[str]) -> Array:
-        """Return how `stored` changes with parameters of materials, (size + 1, n, k)."""
+    def storage_by_parameter(self, x: Array, names: Sequence[str]) -> Array:
+        """Return how `storage` changes with parameters of materials, (size + 1, n, k)."""
         cold = np.full_like(self.space.weights, self.base_temperature_K)
         by = self._stacks.heat_by(self.at(x)[0].T, names) - self._stacks.heat_by(cold, names)
         return self._only_heat(by)

@@ -12,9 +12,9 @@ from hotlever.air.operator import PanelledAir
 from hotlever.air.surface import PanelOptions
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.transient import pulse, simulate, sine, step
-from hotlever.lever.transient.history import followed
+from hotlever.lever.transient.cyclic import cyclic_steady_state
+from hotlever.lever.transient.history import integrate
 from hotlever.lever.transient.modes import slowest_modes
-from hotlever.lever.transient.periodic import settled
 from hotlever.lever.transient.sinusoidal import harmonics
 from hotlever.lever.transient.small_signals import spectrum
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
@@ -48,7 +48,7 @@ class AllPanels:
         many = np.repeat(x, len(x), axis=1)
         self.rest, self.moving = (
             equations.balance_change(many, unit),
-            equations.stored_change(many, unit),
+            equations.storage_change(many, unit),
         )
         gradient = equations.observed_gradient(x)[:, 0]
         self.tip, self.shown = space.tip_rise(unit), gradient[:, :2]
@@ -152,11 +152,11 @@ def test_a_gas_that_conducts_better_takes_up_more(in_air):
 def test_trains_on_modes_and_settled_periods_know_the_air(in_air):
     wave = pulse(6.0, 2.0, 5.0, 20)
     at = [2.0, 5.0, 10.0]
-    modes, full = simulate(in_air, wave, at=[*at, 97.0, 100.0]), followed(in_air, wave, at=at)
+    modes, full = simulate(in_air, wave, at=[*at, 97.0, 100.0]), integrate(in_air, wave, at=at)
     assert "modes" in modes.notes
     np.testing.assert_allclose(modes.tip_K[:3], full.tip_K, atol=0.05)
     np.testing.assert_allclose(modes.air_stored_nJ[:3], full.air_stored_nJ, rtol=1e-2)
-    period, begin = settled(in_air, pulse(6.0, 2.0), 5.0)
+    period, begin = cyclic_steady_state(in_air, pulse(6.0, 2.0), 5.0)
     # another settled period follows; the air takes milliseconds to get as warm as that
     again = simulate(in_air, pulse(6.0, 2.0), 5.0, start=begin)
     assert float(again.air_stored_nJ[-1]) == pytest.approx(float(again.air_stored_nJ[0]), rel=1e-2)

@@ -156,7 +156,9 @@ def test_times_asked_for_are_those_returned(coarse):
     # at the end of the pulse it is still on
     assert data.bias_V.values.tolist() == [8.0, 8.0, 0.0]
     seen = []
-    simulate(coarse, pulse(8.0, 5.0), at=[5.0, 7.0], seen=lambda t, state: seen.append((t, state)))
+    simulate(
+        coarse, pulse(8.0, 5.0), at=[5.0, 7.0], callback=lambda t, state: seen.append((t, state))
+    )
     assert [t for t, _ in seen] == [5.0, 7.0]
     for row, (_, state) in enumerate(seen, start=1):
         assert state.tip_K == pytest.approx(float(data.tip_K[row]), abs=1e-9)

@@ -7,8 +7,8 @@ import pytest
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.transient import pulse, rise_times, simulate, step, time_constants, with_times
-from hotlever.lever.transient.driven import DrivenLever
 from hotlever.lever.transient.modes import slowest_modes
+from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import Stepper
 from hotlever.probe import Circuit
 
@@ -36,7 +36,7 @@ def test_a_small_change_decays_or_grows_as_its_mode_says(coarse, bias, source, r
     start = state.x + 1e-3 * moved
     circuit = coarse.circuit if source == "bias" else Circuit(series_resistance_ohm=0.0)
     held = bias if source == "bias" else state.lever_V
-    problem = DrivenLever(coarse.equations, circuit, lambda t: held)
+    problem = TransientProblem(coarse.equations, circuit, lambda t: held)
     until = 2.0 * abs(constants[0])
     *_, last = Stepper(problem, 1e-6).steps(0.0, until, start, np.inf)
     left = float(coarse.space.tip_rise(last.x[:, 1] - state.x[:, 0]))
@@ -72,7 +72,7 @@ def test_rise_times_are_read_off_histories(coarse, rises):
 def test_a_history_says_how_fast_it_is(coarse, rises):
     states = []
     history = simulate(
-        coarse, pulse(4.0, 300.0), 600.0, per_step=8, seen=lambda t, state: states.append(state)
+        coarse, pulse(4.0, 300.0), 600.0, per_step=8, callback=lambda t, state: states.append(state)
     )
     found = with_times(history, states[0], states[-1]).attrs
     alone = rises.sel(bias=4.0)

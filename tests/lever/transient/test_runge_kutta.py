@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError
-from hotlever.lever.transient.runge_kutta import EMBEDDED, STAGES, TIMES, WEIGHTS, Stepper
+from hotlever.lever.transient.runge_kutta import ARK436L2SA, StepController, Stepper
+
+TIMES, STAGES, EMBEDDED = ARK436L2SA.times, ARK436L2SA.stages, ARK436L2SA.embedded
+WEIGHTS = ARK436L2SA.weights
 
 
 def test_the_coefficients_fulfil_the_conditions_of_their_orders():
@@ -60,13 +63,13 @@ class Pendulum:
 
     scale = np.ones((2, 1))
 
-    def stored(self, x):
+    def storage(self, x):
         return np.array([x[0] + x[0] ** 3, 0.0 * x[1]])
 
-    def stored_change(self, x, changes):
+    def storage_change(self, x, changes):
         return np.array([1.0 + 3.0 * x[0] ** 2, 0.0 * x[1]])[..., None] * changes
 
-    def rest(self, t, x):
+    def residual(self, t, x):
         y, z = x
         flow = (1.0 + 3.0 * y**2) * (z - y**2) - 50.0 * (y - np.sin(t))
         return np.array([-flow, z - y**2 - np.cos(t)])
@@ -79,24 +82,33 @@ class Pendulum:
             np.array([[rate * (1.0 + 3.0 * y**2) - flow_by_y, -flow_by_z], [-2.0 * y, 1.0]])
         )
 
-    def size_of(self, change):
+    def norm(self, change):
         return float(abs(change[0, 0]))
 
-    def watched(self, x):
+    def monitored(self, x):
         return x[1:]
+
+
+def test_the_controller_keeps_changes_of_the_step_in_bounds():
+    control = StepController()
+    assert control.change(0.0) == control.most
+    assert control.change(1.0) == control.safety
+    assert control.change(1.001) < control.safety
+    assert control.change(1e9) == control.least
+    assert control.change(np.inf) == control.failed
 
 
 START = np.array([[0.0], [1.0]])
 
 
-def followed(tolerance, longest=np.inf):
+def integrate(tolerance, longest=np.inf):
     stepper = Stepper(Pendulum(), tolerance)
     return list(stepper.steps(0.0, 6.0, START, longest))
 
 
 def test_the_tolerance_controls_the_error():
     for tolerance in (1e-3, 1e-5, 1e-7):
-        steps = followed(tolerance)
+        steps = integrate(tolerance)
         y, z = np.array([step.x[:, 1] for step in steps]).T
         end = np.array([step.end for step in steps])
         assert np.abs(y - np.sin(end)).max() < 5.0 * tolerance
@@ -109,13 +121,13 @@ def test_the_error_falls_with_the_fourth_power_of_the_step():
     errors = []
     for count in (60, 120):
         # the last step is any length, and the error passes zero here and there
-        late = [step for step in followed(1e-5, 6.0 / count) if step.end > 3.0]
+        late = [step for step in integrate(1e-5, 6.0 / count) if step.end > 3.0]
         errors.append(max(abs(step.x[0, 1] - np.sin(step.end)) for step in late))
     assert np.log2(errors[0] / errors[1]) > 3.5
 
 
 def test_slopes_and_integrals_are_those_of_the_solution():
-    steps = followed(1e-6)
+    steps = integrate(1e-6)
     for step in steps:
         slopes = np.array([np.cos(step.end), np.sin(2 * step.end) - np.sin(step.end)])
         np.testing.assert_allclose(step.slopes[:, 1], slopes, atol=2e-2)
@@ -136,8 +148,8 @@ def test_algebraic_rows_that_are_not_fulfilled_are_so_first():
 
 def test_what_cannot_be_followed_ends_with_the_time():
     class Blowing(Pendulum):
-        def rest(self, t, x):
-            return super().rest(t, x) + (np.nan if t > 2.0 else 0.0)
+        def residual(self, t, x):
+            return super().residual(t, x) + (np.nan if t > 2.0 else 0.0)
 
     with pytest.raises(ComputationError, match="no step in time is short enough at 2"):
         list(Stepper(Blowing(), 1e-4).steps(0.0, 6.0, START, np.inf))

@@ -7,7 +7,7 @@ import pytest
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.transient import sine, spectrum
-from hotlever.lever.transient.periodic import settled
+from hotlever.lever.transient.cyclic import cyclic_steady_state
 from hotlever.lever.transient.sinusoidal import HARMONIC_COLUMNS, harmonics
 
 
@@ -33,7 +33,9 @@ def test_a_strong_drive_is_as_followed_in_time(coarse):
     period, count = 10.0, 32
     found = harmonics(coarse, 3.0, 2.0, [1e6 / period])
     times = period * np.arange(1, count + 1) / count
-    history, _ = settled(coarse, sine(3.0, 2.0, 1e6 / period), period, tolerance_K=1e-3, at=times)
+    history, _ = cyclic_steady_state(
+        coarse, sine(3.0, 2.0, 1e6 / period), period, tolerance_K=1e-3, at=times
+    )
     followed = 2.0 * np.abs(np.fft.rfft(history.lever_V.values)) / count
     for place, name in enumerate(("first", "second", "third"), start=1):
         assert found[f"{name}_harmonic_V"].item() == pytest.approx(followed[place], rel=0.02)

@@ -24,7 +24,7 @@ def test_all_frequencies_are_those_of_a_direct_solution(coarse, bias):
     data = spectrum(state, frequency)
     equations, unit = coarse.equations, np.eye(len(state.x))
     many = np.repeat(state.x, len(unit), axis=1)
-    rest, moving = equations.balance_change(many, unit), equations.stored_change(many, unit)
+    rest, moving = equations.balance_change(many, unit), equations.storage_change(many, unit)
     rest[-1] = unit[-1]
     current = equations.observed_gradient(state.x)[:, 0, 1]
     for place, omega in enumerate(2e-6 * np.pi * frequency):

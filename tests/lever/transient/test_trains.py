@@ -8,9 +8,9 @@ import pytest
 from hotlever.errors import HistoryEndError
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.transient import followed, pulse, simulate, step
-from hotlever.lever.transient.alike import Train
+from hotlever.lever.transient import integrate, pulse, simulate, step
 from hotlever.lever.transient.reduced import reduced_in_time
+from hotlever.lever.transient.trains import Train
 
 TRAIN = pulse(9.0, 4.0, 20.0, 20)
 TIMES = [4.0, 60.0, 64.0, 384.0, 396.0, 400.0]
@@ -23,12 +23,12 @@ def states():
 
 @pytest.fixture(scope="module")
 def train(coarse, states):
-    return simulate(coarse, TRAIN, at=TIMES, seen=lambda t, state: states.append((t, state)))
+    return simulate(coarse, TRAIN, at=TIMES, callback=lambda t, state: states.append((t, state)))
 
 
 @pytest.mark.slow
 def test_a_train_on_modes_is_that_of_the_full_lever(coarse, train, states):
-    full = followed(coarse, TRAIN, at=TIMES)
+    full = integrate(coarse, TRAIN, at=TIMES)
     np.testing.assert_array_equal(train.time, TIMES)
     np.testing.assert_allclose(train.tip_K, full.tip_K, atol=0.1)
     np.testing.assert_allclose(train.max_K, full.max_K, atol=0.1)
@@ -45,12 +45,12 @@ def test_a_train_on_modes_is_that_of_the_full_lever(coarse, train, states):
 def test_periods_that_are_alike_are_copied(coarse):
     """A lever on modes, with itself followed all the way, also where the train ends."""
     snapshots = []
-    followed(coarse, TRAIN, 40.0, per_step=2, seen=lambda t, state: snapshots.append(state.x))
+    integrate(coarse, TRAIN, 40.0, per_step=2, callback=lambda t, state: snapshots.append(state.x))
     reduced = reduced_in_time(coarse, np.hstack(snapshots))
     at = np.array([0.0, *TIMES, 403.0, 430.0])
-    train = Train(reduced, TRAIN, 20.0, 0.1, at)
-    copied, full = train.followed(430.0), followed(reduced, TRAIN, 430.0, at)
-    assert 4 < train.alike < 16
+    train = Train(reduced, TRAIN, 20.0, 430.0, at, 0.1)
+    copied, full = train.history, integrate(reduced, TRAIN, 430.0, at)
+    assert 4 < train.cyclic_from < 16
     np.testing.assert_array_equal(copied.time_us, at)
     np.testing.assert_array_equal(copied.bias_V, full.bias_V)
     np.testing.assert_allclose(copied.tip_K, full.tip_K, atol=0.01)
@@ -68,7 +68,7 @@ def test_what_melts_or_is_short_is_followed_in_full(coarse):
 
 def test_laws_that_are_looked_up_are_the_laws(coarse):
     snapshots = []
-    followed(coarse, step(8.0), 50.0, seen=lambda t, state: snapshots.append(state.x))
+    integrate(coarse, step(8.0), 50.0, callback=lambda t, state: snapshots.append(state.x))
     reduced = reduced_in_time(coarse, np.hstack(snapshots))
     exact = LeverEquations(reduced.space, coarse.probe.kinds, coarse.circuit)
     T = np.random.default_rng(0).uniform(293.0, 1600.0, (reduced.space.weights.size, 3))

@@ -1,6 +1,6 @@
 """Levers in time: wave forms, what a lever shows under them, and its time constants."""
 
-from hotlever.lever.transient.history import followed, history_csv, write_history
+from hotlever.lever.transient.history import history_csv, integrate, write_history
 from hotlever.lever.transient.modes import rise_times, time_constants, with_times
 from hotlever.lever.transient.small_signals import spectrum
 from hotlever.lever.transient.trains import simulate
@@ -16,8 +16,8 @@ from hotlever.lever.transient.waveform import (
 
 __all__ = [
     "Waveform",
-    "followed",
     "history_csv",
+    "integrate",
     "pulse",
     "ramp",
     "read_waveform",

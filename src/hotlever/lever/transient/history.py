@@ -15,7 +15,7 @@ from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import ComputationError, HistoryEndError, InputError
 from hotlever.lever.dataset import probe_attributes, range_notes
 from hotlever.lever.state import State
-from hotlever.lever.transient.driven import WATCHED, DrivenLever
+from hotlever.lever.transient.problem import MONITORED, TransientProblem
 from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.types import Array, Progress
@@ -28,14 +28,14 @@ TIME_COLUMNS = (
     *("time_us", "bias_V", "current_mA", "lever_V"),
     *("reader_V", "tip_K", "power_mW"),
 )
-#: What is followed between the ends of each step, in this order.
-_FOLLOWED = (
+#: What is interpolated between the ends of each step, in this order.
+_REPORTED = (
     *("lever_V", "current_mA", "reader_V", "tip_K", "max_K"),
     *("supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ"),
 )
-#: Where in `hotlever.lever.transient.driven.WATCHED` begin flows, heats, and what is at the ends.
-_PARTS_WATCHED = [WATCHED.index(name) for name in ("power_mW", "stored_nJ", "at_ends_nJ")]
-_FLOWS = slice(*_PARTS_WATCHED[:2])
+#: Where among `MONITORED` begin flows, heats, and what is at the leg ends.
+_PARTS_MONITORED = [MONITORED.index(name) for name in ("power_mW", "stored_nJ", "at_ends_nJ")]
+_FLOWS = slice(*_PARTS_MONITORED[:2])
 #: What is added up since the start.
 ENERGIES = ("supplied_nJ", "lost_nJ")
 #: Errors are at most this share of the rise that a lever would end with, so that a response is
@@ -48,21 +48,12 @@ _AIR_NOTE = (
     "up itself is left out (heat goes 15 µm into air in 10 µs)"
 )
 
-# Told a time (µs) and the state there.
-Seen = Callable[[float, State], None]
-
-
-def kept_in(states: list[tuple[float, State]]) -> Seen:
-    """Return what keeps all times and states that it is told."""
-
-    def seen(t: float, state: State) -> None:
-        states.append((t, state))
-
-    return seen
+# Called with a time (µs) and the state there.
+Callback = Callable[[float, State], None]
 
 
 class _Observer:
-    """Reads off the ends of steps, one after the other, what is `_FOLLOWED`."""
+    """Reads off the ends of steps, one after the other, what is `_REPORTED`."""
 
     def __init__(self, lever: Lever) -> None:
         self._space, base = lever.space, lever.equations.base_temperature_K
@@ -72,8 +63,8 @@ class _Observer:
 
     def read(self, step: Step) -> tuple[Array, Array]:
         """Return values and slopes (per µs) at both ends of the next step, each (9, 2)."""
-        shown, flows, held, at_ends = np.split(step.watched, _PARTS_WATCHED)
-        moving, _, held_by, at_ends_by = np.split(step.watched_slopes, _PARTS_WATCHED)
+        shown, flows, held, at_ends = np.split(step.monitored, _PARTS_MONITORED)
+        moving, _, held_by, at_ends_by = np.split(step.monitored_slopes, _PARTS_MONITORED)
         if self._at_ends is None:
             self._at_ends = float(at_ends[0, 0])
         added = self._added + np.outer(step.added[_FLOWS], [0.0, 1.0])
@@ -93,7 +84,7 @@ class _Observer:
         return rises[None, hottest, ends], slopes[None, hottest, ends]
 
 
-def follow(
+def time_steps(
     lever: Lever,
     waveform: Waveform,
     until: float,
@@ -105,14 +96,14 @@ def follow(
 
     Steps end at all stops (µs) on the way.
     """
-    begin = State(lever, _at_rest(lever, waveform.before_V)) if start is None else start
+    begin = initial_state(lever, waveform) if start is None else start
     if lever.circuit.starts_cold:
         rise = _SHARE_OF_RISE * _expected_rise(lever, waveform.highest_V)
         tolerance_K = max(min(tolerance_K, rise), _LEAST_TOLERANCE)
     length: float | None = None
     x: Array | None = None
     for piece in waveform.pieces(until):
-        problem = DrivenLever(lever.equations, lever.circuit, piece.bias)
+        problem = TransientProblem(lever.equations, lever.circuit, piece.bias)
         x = problem.start(begin) if x is None else x
         stepper = Stepper(problem, tolerance_K)
         first = None if piece.jumps else length
@@ -129,17 +120,20 @@ def _expected_rise(lever: Lever, bias: float) -> float:
     return float((bias / lever.circuit.bias(shown[0], shown[1])) ** 2)
 
 
-def _at_rest(lever: Lever, bias: float) -> Array:
-    """Return the state at rest; the other polarity has the potentials reversed."""
+def initial_state(lever: Lever, waveform: Waveform) -> State:
+    """Return the state at rest before a wave form."""
+    bias = waveform.before_V
     if not lever.circuit.starts_cold:
-        return lever.solve([bias])[0].x
+        return lever.solve([bias])[0]
     if bias == 0.0:
-        return np.zeros((lever.space.size + 1, 1))
+        return State(lever, np.zeros((lever.space.size + 1, 1)))
     (state,) = lever.solve([abs(bias)])
-    return np.where(lever.space.is_temperature[:, None], state.x, np.sign(bias) * state.x)
+    # the other polarity has the potentials reversed
+    sign = np.where(lever.space.is_temperature, 1.0, np.sign(bias))
+    return State(lever, sign[:, None] * state.x)
 
 
-def followed(
+def integrate(
     lever: Lever,
     waveform: Waveform,
     until: float | None = None,
@@ -148,10 +142,10 @@ def followed(
     tolerance_K: float = 0.1,
     per_step: int = 1,
     start: State | None = None,
-    seen: Seen | None = None,
+    callback: Callback | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Follow a lever in time under a bias that changes.
+    """Integrate a lever in time under a bias that changes.
 
     Parameters
     ----------
@@ -172,7 +166,7 @@ def followed(
         a smooth curve.
     start : State, optional
         Where the lever is when the wave form begins; at rest by default.
-    seen : callable, optional
+    callback : callable, optional
         Called with each time reported (µs) and the `State` there, whose fields it may keep.
     progress : callable, optional
         Called with the share of the time done, in thousandths, and 1000.
@@ -200,10 +194,10 @@ def followed(
         )
     if not 1e-4 <= tolerance_K <= 10.0:
         raise InputError(f"found a tolerance of {tolerance_K:g} K, expected 1e-4 to 10 K")
-    rows, reached, failure = _Rows(lever, asked, per_step, seen), 0.0, ""
+    recorder, reached, failure = _Recorder(lever, asked, per_step, callback), 0.0, ""
     try:
-        for piece, step in follow(lever, waveform, until, tolerance_K, start):
-            end = rows.add(piece, step)
+        for piece, step in time_steps(lever, waveform, until, tolerance_K, start):
+            end = recorder.add(piece, step)
             reached = step.end if end is None else end
             if end is not None:
                 failure = f"{lever.equations.limit[1]} after {end:.6g} µs"
@@ -211,22 +205,24 @@ def followed(
             if progress is not None:
                 progress(int(_PARTS * reached / until), _PARTS)
     except ComputationError as error:
-        failure = f"the lever could be followed up to {reached:.6g} µs only: {error}"
-    data = _of_rows(lever, waveform, rows)
+        failure = f"the lever could be simulated up to {reached:.6g} µs only: {error}"
+    data = _dataset(lever, waveform, recorder)
     if failure:
         raise HistoryEndError(failure, reached, data)
     return data
 
 
-class _Rows:
+class _Recorder:
     """Rows of a history: at the times asked for, or where the solver stepped."""
 
-    def __init__(self, lever: Lever, asked: Array | None, per_step: int, seen: Seen | None) -> None:
-        self._lever, self._asked, self._per_step, self._seen = lever, asked, per_step, seen
+    def __init__(
+        self, lever: Lever, asked: Array | None, per_step: int, callback: Callback | None
+    ) -> None:
+        self._lever, self._asked, self._per_step, self._callback = lever, asked, per_step, callback
         self._observer = _Observer(lever)
         self.time: list[float] = []
         self.bias: list[float] = []
-        self.followed: list[Array] = []
+        self.values: list[Array] = []
 
     def add(self, piece: Piece, step: Step) -> float | None:
         """Add the rows of a step; return when silicon melts, if it does."""
@@ -246,16 +242,16 @@ class _Rows:
     def _add(self, piece: Piece, step: Step, values: Array, slopes: Array, t: float) -> None:
         self.time.append(t)
         self.bias.append(piece.bias(t))
-        self.followed.append(hermite(step.start, step.end, values, slopes, t))
-        if self._seen is not None:
+        self.values.append(hermite(step.start, step.end, values, slopes, t))
+        if self._callback is not None:
             whole, own = step.between(t), self._lever.space.size + 1
             in_air = whole[own:] if len(whole) > own else None
-            self._seen(t, State(self._lever, whole[:own], in_air))
+            self._callback(t, State(self._lever, whole[:own], in_air))
 
 
 def _melts(step: Step, values: Array, slopes: Array, limit_K: float) -> float | None:
     """Return when the hottest place reaches a limit within a step."""
-    row = [_FOLLOWED.index("max_K")]
+    row = [_REPORTED.index("max_K")]
     if values[row[0], 1] < limit_K:
         return None
 
@@ -282,12 +278,12 @@ def checked_times(at: ArrayLike) -> Array:
     return times
 
 
-def _of_rows(lever: Lever, waveform: Waveform, rows: _Rows) -> xr.Dataset:
-    followed = np.array(rows.followed).reshape(-1, len(_FOLLOWED)).T
-    columns = dict(zip(_FOLLOWED, followed, strict=True))
+def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Dataset:
+    values = np.array(recorder.values).reshape(-1, len(_REPORTED)).T
+    columns = dict(zip(_REPORTED, values, strict=True))
     columns["power_mW"] = columns["lever_V"] * columns["current_mA"]
     # the reader, where there is none, is NaN throughout
-    variables = {"time_us": np.array(rows.time), "bias_V": np.array(rows.bias)}
+    variables = {"time_us": np.array(recorder.time), "bias_V": np.array(recorder.bias)}
     more = ("max_K", "supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ")
     variables |= {name: columns[name] for name in (*TIME_COLUMNS[2:], *more)}
     return history_dataset(lever, waveform, variables)

@@ -26,8 +26,8 @@ from hotlever.errors import ComputationError, unknown_name
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.space import LEVER
 from hotlever.lever.state import State
-from hotlever.lever.transient.driven import InCircuit
-from hotlever.lever.transient.history import followed
+from hotlever.lever.transient.history import integrate
+from hotlever.lever.transient.problem import InCircuit
 from hotlever.lever.transient.waveform import Waveform, step, switched_off
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
@@ -110,7 +110,7 @@ def _modes(
     """Return the slowest modes of a lever with a heat capacity (nJ/K) that goes along."""
 
     def relaxed(change: Array) -> Array:
-        stored = equations.stored_change(x, change.reshape(-1, 1))
+        stored = equations.storage_change(x, change.reshape(-1, 1))
         if coordinates is not None and bound is not None:
             stored[:, 0] += coordinates.T @ (bound @ (coordinates @ change.ravel()))
         return factors.solve(stored, np.arange(1))[:, 0]
@@ -224,7 +224,7 @@ def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
     Raises
     ------
     InputError, ComputationError
-        See `Lever.solve` and `hotlever.lever.transient.history.followed`.
+        See `Lever.solve` and `hotlever.lever.transient.history.integrate`.
 
     Examples
     --------
@@ -240,7 +240,7 @@ def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
         rise = state.tip_K - base
 
         def shares(waveform: Waveform, until: float = until, rise: float = rise) -> Any:
-            history = followed(lever, waveform, until, per_step=_PER_STEP)
+            history = integrate(lever, waveform, until, per_step=_PER_STEP)
             return history.time.values, (history.tip_K.values - base) / rise
 
         heating, _ = _swing(*shares(step(state.bias_V)))

@@ -1,4 +1,4 @@
-"""Steps in time of ``d/dt stored(x) + rest(t, x) = 0``. It knows no physics.
+"""Steps in time of ``d/dt storage(x) + residual(t, x) = 0``. It knows no physics.
 
 Rows in which nothing is stored are algebraic. The method is the ESDIRK part of ARK4(3)6L[2]SA
 (Kennedy and Carpenter, Appl. Numer. Math. 44, 139 (2003)): order four with an error estimate of
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -19,43 +20,8 @@ from hotlever.errors import ComputationError, NewtonError
 from hotlever.lever.space import Factors
 from hotlever.types import Array, Index
 
-#: Of the stages: the common diagonal, their times as shares of a step, their weights; the last are
-#: also those of the step. And the weights of the embedded method of order three.
-GAMMA = 1 / 4
-TIMES = np.array([0.0, 1 / 2, 83 / 250, 31 / 50, 17 / 20, 1.0])
-STAGES = np.zeros((6, 6))
-STAGES[1, :2] = 1 / 4, 1 / 4
-STAGES[2, :3] = 8611 / 62500, -1743 / 31250, 1 / 4
-STAGES[3, :4] = 5012029 / 34652500, -654441 / 2922500, 174375 / 388108, 1 / 4
-STAGES[4, :4] = (
-    15267082809 / 155376265600,
-    -71443401 / 120774400,
-    730878875 / 902184768,
-    2285395 / 8070912,
-)
-STAGES[4, 4] = 1 / 4
-STAGES[5] = 82889 / 524892, 0.0, 15625 / 83664, 69875 / 102672, -2260 / 8211, 1 / 4
-WEIGHTS = STAGES[5]
-EMBEDDED = np.array(
-    [
-        4586570599 / 29645900160,
-        0.0,
-        178811875 / 945068544,
-        814220225 / 1159782912,
-        -3700637 / 11593932,
-        61727 / 225920,
-    ]
-)
-
 #: Within this time (1/rate) nothing that is stored changes.
 INSTANT_RATE = 1e9
-#: A step is made so much shorter than its error asks for; by these factors at least and at most;
-#: and by this one where Newton's method fails.
-_SAFETY, _LEAST, _MOST, _FAILED = 0.9, 0.2, 6.0, 0.25
-#: A step changes with this power of its error, which is of order four.
-_POWER = 0.22
-#: The first step changes so many tolerances, were it explicit.
-_FIRST = 40.0
 #: Newton's method stops at this share of the tolerance: a larger one would cost the balance of what
 #: is stored. But in the first stage, which has no weight in a step; and before the first step.
 _NEWTON_SHARE, _FIRST_SHARE, _SETTLED = 1e-4, 0.1, 1e-9
@@ -65,10 +31,147 @@ _LEFT, _SLOW, _MOST_CORRECTIONS = 0.005, 0.5, 12
 #: A stage in the middle of a step. How far the cubic through the ends is from it counts as an error
 #: too, for that is shown; but stages are of order two, and the cubic is nearer to the solution.
 _MIDDLE, _OFF = 3, 0.15
-#: The slopes of what is watched are taken over a time in which the unknowns change so much (units).
+#: The slopes of what is monitored are taken over a time in which unknowns change by so many units.
 _MOMENT = 1e-4
 #: The shortest step, as a share of the time reached.
 _SHORTEST = 1e-12
+
+
+@dataclass(frozen=True)
+class Tableau:
+    """Coefficients of an implicit method whose first stage is explicit, and the others alike.
+
+    Attributes
+    ----------
+    times : ndarray, shape (stages,)
+        Of the stages, as shares of a step.
+    stages : ndarray, shape (stages, stages)
+        Weights of the slopes in each stage, lower triangular; the last are those of the step too.
+    embedded : ndarray, shape (stages,)
+        Weights of the method of lower order that tells the error.
+    """
+
+    times: Array
+    stages: Array
+    embedded: Array
+
+    @property
+    def diagonal(self) -> float:
+        """The weight that all implicit stages have of their own slope."""
+        return float(self.stages[-1, -1])
+
+    @property
+    def weights(self) -> Array:
+        """Weights of the slopes in a step."""
+        return self.stages[-1]
+
+    @cached_property
+    def predictors(self) -> tuple[Array, Array]:
+        """Weights that extrapolate to each stage.
+
+        Of the stages before it, (stages, stages), and of the slope at the start times the step,
+        (stages,). They are those by which a stage follows from the others best if what decays does
+        so at any rate; what changes steadily is met exactly. Stages are of order two, and a
+        polynomial through them would be a hundred times as far off.
+        """
+        count, one = len(self.times), np.ones((len(self.times), 1))
+        z = -np.linspace(0.0, _FASTEST, 200)
+        values = np.linalg.solve(np.eye(count) - z[:, None, None] * self.stages, one)[..., 0]
+        # what decays fast has mostly done so when steps become long
+        counted = np.exp(z) / (0.1 - z)
+        constant, straight = np.append(np.ones(count), 0.0), np.append(self.times, 1.0)
+        modes = np.column_stack([values, z]) * counted[:, None]
+        rows = np.vstack([modes, _EXACTLY * constant, _EXACTLY * straight])
+        weights = np.zeros((count, count + 1))
+        for stage in range(1, count):
+            known = [*range(stage), count]
+            weights[stage, known] = np.linalg.lstsq(rows[:, known], rows[:, stage])[0]
+        return weights[:, :-1], weights[:, -1]
+
+    @cached_property
+    def _to_end(self) -> Array:
+        """By how much the slope at the end rises with each stage, times the step."""
+        return np.linalg.inv(self.stages[1:, 1:])[-1]
+
+    def end_slope(self, stages: Array, first: Array, length: float) -> Array:
+        """Return the slopes (k,) at the end of a step of what is in its stages, (k, stages).
+
+        They are those of the same method, read as one that steps these, with the slopes at the
+        start.
+        """
+        rise = (stages[:, 1:] - stages[:, :1]) @ self._to_end
+        return np.asarray(rise / length - (self._to_end @ self.stages[1:, 0]) * first)
+
+
+#: Modes are looked at that decay so often within a step, and how much more the steady ones count.
+_FASTEST, _EXACTLY = 12.0, 1e4
+
+ARK436L2SA = Tableau(
+    times=np.array([0.0, 1 / 2, 83 / 250, 31 / 50, 17 / 20, 1.0]),
+    stages=np.array(
+        [
+            [0.0] * 6,
+            [1 / 4, 1 / 4, 0.0, 0.0, 0.0, 0.0],
+            [8611 / 62500, -1743 / 31250, 1 / 4, 0.0, 0.0, 0.0],
+            [5012029 / 34652500, -654441 / 2922500, 174375 / 388108, 1 / 4, 0.0, 0.0],
+            [
+                15267082809 / 155376265600,
+                -71443401 / 120774400,
+                730878875 / 902184768,
+                2285395 / 8070912,
+                1 / 4,
+                0.0,
+            ],
+            [82889 / 524892, 0.0, 15625 / 83664, 69875 / 102672, -2260 / 8211, 1 / 4],
+        ]
+    ),
+    embedded=np.array(
+        [
+            4586570599 / 29645900160,
+            0.0,
+            178811875 / 945068544,
+            814220225 / 1159782912,
+            -3700637 / 11593932,
+            61727 / 225920,
+        ]
+    ),
+)
+
+
+@dataclass(frozen=True)
+class StepController:
+    """How long the next step is, by the error of the last one.
+
+    Attributes
+    ----------
+    safety : float
+        A step is made so much shorter than its error asks for.
+    least, most : float
+        By these factors a step changes at least and at most.
+    failed : float
+        By this one where Newton's method fails.
+    power : float
+        A step changes with this power of its error, which is of order four.
+    first : float
+        The first step changes so many tolerances, were it explicit.
+    """
+
+    safety: float = 0.9
+    least: float = 0.2
+    most: float = 6.0
+    failed: float = 0.25
+    power: float = 0.22
+    first: float = 40.0
+
+    def change(self, share: float) -> float:
+        """Return by which factor a step changes whose error is a share of the tolerance."""
+        if not np.isfinite(share):
+            return self.failed
+        change = max(self.safety * max(share, 1e-6) ** -self.power, self.least)
+        return min(change, self.most if share <= 1.0 else self.safety)
+
+
+METHOD, CONTROLLER = ARK436L2SA, StepController()
 
 
 class Problem(Protocol):
@@ -82,27 +185,27 @@ class Problem(Protocol):
 
     scale: Array
 
-    def stored(self, x: Array) -> Array:
+    def storage(self, x: Array) -> Array:
         """Return what is stored, (size + 1, 1); zero in algebraic rows."""
         ...
 
-    def stored_change(self, x: Array, changes: Array) -> Array:
+    def storage_change(self, x: Array, changes: Array) -> Array:
         """Return how what is stored changes with the unknowns, (size + 1, 1, k), to first order."""
         ...
 
-    def rest(self, t: float, x: Array) -> Array:
+    def residual(self, t: float, x: Array) -> Array:
         """Return what is lost per unit of time, or the algebraic residual, (size + 1, 1)."""
         ...
 
     def factorised(self, x: Array, rate: float) -> Factors:
-        """Return the factorised Jacobian of ``rate × stored + rest``."""
+        """Return the factorised Jacobian of ``rate × storage + residual``."""
         ...
 
-    def size_of(self, change: Array) -> float:
+    def norm(self, change: Array) -> float:
         """Return the size of a change of the unknowns, by which tolerances are meant."""
         ...
 
-    def watched(self, x: Array) -> Array:
+    def monitored(self, x: Array) -> Array:
         """Return quantities (k, n) that are read off or added up, at states (size + 1, n)."""
         ...
 
@@ -117,8 +220,8 @@ class Step:
         Times.
     x, slopes : ndarray, shape (size + 1, 2)
         The unknowns at both ends, and their derivatives by time.
-    watched, watched_slopes : ndarray, shape (k, 2)
-        `Problem.watched` at both ends, and their derivatives by time.
+    monitored, monitored_slopes : ndarray, shape (k, 2)
+        `Problem.monitored` at both ends, and their derivatives by time.
     added : ndarray, shape (k,)
         Their integrals over the step.
     stages : ndarray, shape (size + 1, stages)
@@ -131,8 +234,8 @@ class Step:
     end: float
     x: Array
     slopes: Array
-    watched: Array
-    watched_slopes: Array
+    monitored: Array
+    monitored_slopes: Array
     added: Array
     stages: Array
     factors: Factors
@@ -151,53 +254,14 @@ def hermite(start: float, end: float, values: Array, slopes: Array, t: float) ->
     return np.asarray(values @ np.array(value) + slopes @ np.array(slope))
 
 
-def _predictors() -> tuple[Array, Array]:
-    """Return weights that extrapolate to each stage.
-
-    Of the stages before it, (stages, stages), and of the slope at the start times the step,
-    (stages,). They are those by which a stage follows from the others best if what decays does so
-    at any rate; what changes steadily is met exactly. Stages are of order two, and a polynomial
-    through them would be a hundred times as far off.
-    """
-    stages, one = len(TIMES), np.ones((len(TIMES), 1))
-    z = -np.linspace(0.0, _FASTEST, 200)
-    values = np.linalg.solve(np.eye(stages) - z[:, None, None] * STAGES, one)[..., 0]
-    # what decays fast has mostly done so when steps become long
-    counted = np.exp(z) / (0.1 - z)
-    constant, straight = np.append(np.ones(stages), 0.0), np.append(TIMES, 1.0)
-    modes = np.column_stack([values, z]) * counted[:, None]
-    rows = np.vstack([modes, _EXACTLY * constant, _EXACTLY * straight])
-    weights = np.zeros((stages, stages + 1))
-    for stage in range(1, stages):
-        known = [*range(stage), stages]
-        weights[stage, known] = np.linalg.lstsq(rows[:, known], rows[:, stage])[0]
-    return weights[:, :-1], weights[:, -1]
-
-
-#: Modes are looked at that decay so often within a step, and how much more the steady ones count.
-_FASTEST, _EXACTLY = 12.0, 1e4
-_BY_STAGE, _BY_SLOPE = _predictors()
-#: By how much the slope at the end rises with each stage, times the step; see `_end_slope`.
-_TO_END = np.linalg.inv(STAGES[1:, 1:])[-1]
-
-
-def _end_slope(stages: Array, first: Array, length: float) -> Array:
-    """Return the slopes (k,) at the end of a step of what is in its stages, (k, stages).
-
-    They are those of the same method, read as one that steps these, with the slopes at the start.
-    """
-    rise = (stages[:, 1:] - stages[:, :1]) @ _TO_END
-    return np.asarray(rise / length - (_TO_END @ STAGES[1:, 0]) * first)
-
-
 class Stepper:
-    """Steps a problem from one time to another, restarting where its `Problem.rest` jumps.
+    """Steps a problem from one time to another, restarting where its `Problem.residual` jumps.
 
     Parameters
     ----------
     problem : Problem
     tolerance : float
-        Largest estimated error of a step, by `Problem.size_of`.
+        Largest estimated error of a step, by `Problem.norm`.
 
     Attributes
     ----------
@@ -209,7 +273,7 @@ class Stepper:
 
     def __init__(self, problem: Problem, tolerance: float) -> None:
         self._problem, self._tolerance = problem, tolerance
-        self._newton = tolerance * np.where(WEIGHTS, _NEWTON_SHARE, _FIRST_SHARE)
+        self._newton = tolerance * np.where(METHOD.weights, _NEWTON_SHARE, _FIRST_SHARE)
         self.accepted = self.rejected = 0
         self.length = 0.0
 
@@ -234,19 +298,17 @@ class Stepper:
             If no step is short enough.
         """
         here = self._settled(start, x)
-        speed = max(self._problem.size_of(here.slope), 1e-300)
-        self.length = first or _FIRST * self._tolerance / speed
+        speed = max(self._problem.norm(here.slope), 1e-300)
+        self.length = first or CONTROLLER.first * self._tolerance / speed
         while here.t < end:
             stop = min((one for one in stops if here.t < one < end), default=end)
             then = _next(here.t, min(self.length, longest), stop)
             try:
                 step, there, error = self._step(here, then)
-                share = max(error / self._tolerance, 1e-6)
-                change = max(_SAFETY * share**-_POWER, _LEAST)
-                change = min(change, _MOST if share <= 1.0 else _SAFETY)
+                share = error / self._tolerance
             except NewtonError:
-                share, change = np.inf, _FAILED
-            self.length = change * (then - here.t)
+                share = np.inf
+            self.length = CONTROLLER.change(share) * (then - here.t)
             if share <= 1.0:
                 yield step
                 self.accepted, here = self.accepted + 1, there
@@ -258,51 +320,52 @@ class Stepper:
     def _settled(self, t: float, x: Array) -> _Reached:
         """Fulfil the algebraic rows, nothing that is stored being changed; and find the slopes."""
         problem, rate = self._problem, INSTANT_RATE
-        root = self._root(t, x, problem.stored(x), rate, None, _SETTLED)
+        root = self._root(t, x, problem.storage(x), rate, None, _SETTLED)
         x = root.x
-        slope = -rate * root.factors.solve(problem.rest(t + 1.0 / rate, x), _ONE)
-        flow, stored = -problem.rest(t, x), problem.stored(x)
+        slope = -rate * root.factors.solve(problem.residual(t + 1.0 / rate, x), _ONE)
+        flow, stored = -problem.residual(t, x), problem.storage(x)
         speed = max(float(np.abs(slope / problem.scale).max()), 1e-300)
-        here, soon = problem.watched(np.hstack([x, x + _MOMENT / speed * slope])).T
+        here, soon = problem.monitored(np.hstack([x, x + _MOMENT / speed * slope])).T
         return _Reached(t, x, slope, stored, flow, here, (soon - here) * (speed / _MOMENT))
 
     def _step(self, here: _Reached, then: float) -> tuple[Step, _Reached, float]:
         """Try a step; return it, what it reaches, and its error."""
         length = then - here.t
-        problem, rate, root = self._problem, 1.0 / (GAMMA * length), None
+        problem, rate, root = self._problem, 1.0 / (METHOD.diagonal * length), None
+        by_stage, by_slope = METHOD.predictors
         # one column for each stage
-        states, flows = np.empty((2, len(here.x), len(TIMES)))
+        states, flows = np.empty((2, len(here.x), len(METHOD.times)))
         states[:, :1], flows[:, :1] = here.x, here.flow
-        for stage in range(1, len(TIMES)):
+        for stage in range(1, len(METHOD.times)):
             before, now = slice(stage), slice(stage, stage + 1)
-            known = here.stored + flows[:, before] @ (length * STAGES[stage, before, None])
-            guess = states[:, before] @ _BY_STAGE[stage, before, None]
-            guess += length * _BY_SLOPE[stage] * here.slope
-            t = here.t + TIMES[stage] * length
+            known = here.stored + flows[:, before] @ (length * METHOD.stages[stage, before, None])
+            guess = states[:, before] @ by_stage[stage, before, None]
+            guess += length * by_slope[stage] * here.slope
+            t = here.t + METHOD.times[stage] * length
             root = self._root(t, guess, known, rate, root, self._newton[stage])
             states[:, now], flows[:, now] = root.x, rate * (root.stored - known)
         assert root is not None
-        slope = _end_slope(states, here.slope[:, 0], length)[:, None]
-        watched = np.column_stack([here.watched, problem.watched(states[:, 1:])])
-        watched_slope = _end_slope(watched, here.watched_slope, length)
+        slope = METHOD.end_slope(states, here.slope[:, 0], length)[:, None]
+        monitored = np.column_stack([here.monitored, problem.monitored(states[:, 1:])])
+        monitored_slopes = METHOD.end_slope(monitored, here.monitored_slopes, length)
         there = _Reached(
-            then, root.x, slope, root.stored, flows[:, -1:], watched[:, -1], watched_slope
+            then, root.x, slope, root.stored, flows[:, -1:], monitored[:, -1], monitored_slopes
         )
         step = Step(
             here.t,
             then,
             states[:, [0, -1]],
             np.hstack([here.slope, slope]),
-            watched[:, [0, -1]],
-            np.stack([here.watched_slope, watched_slope], axis=1),
-            length * (watched @ WEIGHTS),
+            monitored[:, [0, -1]],
+            np.stack([here.monitored_slopes, monitored_slopes], axis=1),
+            length * (monitored @ METHOD.weights),
             states,
             root.factors,
         )
-        difference = length * rate * (flows @ (WEIGHTS - EMBEDDED)[:, None])
-        error = problem.size_of(root.factors.solve(difference, _ONE))
-        off = step.between(here.t + TIMES[_MIDDLE] * length) - states[:, [_MIDDLE]]
-        return step, there, max(error, _OFF * problem.size_of(off))
+        difference = length * rate * (flows @ (METHOD.weights - METHOD.embedded)[:, None])
+        error = problem.norm(root.factors.solve(difference, _ONE))
+        off = step.between(here.t + METHOD.times[_MIDDLE] * length) - states[:, [_MIDDLE]]
+        return step, there, max(error, _OFF * problem.norm(off))
 
     def _root(
         self,
@@ -328,8 +391,8 @@ class Stepper:
         problem, last = self._problem, np.inf
         factors, most = (None, _LEFT) if near is None else (near.factors, near.left)
         for _ in range(_MOST_CORRECTIONS):
-            stored = problem.stored(x)
-            residual = problem.rest(t, x) + rate * (stored - known)
+            stored = problem.storage(x)
+            residual = problem.residual(t, x) + rate * (stored - known)
             if factors is None:
                 factors = problem.factorised(x, rate)
             change = -factors.solve(residual, _ONE)
@@ -339,7 +402,7 @@ class Stepper:
             left = most if last == np.inf else size / last
             most = max(most, left)
             if left * size < tolerance:
-                stored = stored + problem.stored_change(x, change[..., None])[..., 0]
+                stored = stored + problem.storage_change(x, change[..., None])[..., 0]
                 return _Root(x + change, stored, factors, most)
             if left > _SLOW:
                 factors, last, most = None, np.inf, _LEFT
@@ -360,15 +423,15 @@ class _Root:
 
 @dataclass(frozen=True)
 class _Reached:
-    """A time; the unknowns there, what is stored, and what is watched, with their slopes."""
+    """A time; the unknowns there, what is stored, and what is monitored, with their slopes."""
 
     t: float
     x: Array
     slope: Array
     stored: Array
     flow: Array
-    watched: Array
-    watched_slope: Array
+    monitored: Array
+    monitored_slopes: Array
 
 
 _ONE: Index = np.arange(1)

@@ -18,15 +18,9 @@ from hotlever.datasets import OBSERVABLES, labelled
 from hotlever.errors import HistoryEndError, InputError, unknown_name
 from hotlever.lever.dataset import probe_attributes
 from hotlever.lever.space import Factors
-from hotlever.lever.transient.driven import DrivenLever
-from hotlever.lever.transient.history import checked_times, follow
-from hotlever.lever.transient.runge_kutta import (
-    GAMMA,
-    INSTANT_RATE,
-    STAGES,
-    TIMES,
-    Step,
-)
+from hotlever.lever.transient.history import checked_times, time_steps
+from hotlever.lever.transient.problem import TransientProblem
+from hotlever.lever.transient.runge_kutta import INSTANT_RATE, METHOD, Step
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, parameters_of
@@ -110,7 +104,7 @@ def with_sensitivities(
     along = _Along(lever, names)
     stops = times.tolist()
     wanted = set(stops)
-    for piece, step in follow(lever, waveform, float(times[-1]), tolerance_K, stops=stops):
+    for piece, step in time_steps(lever, waveform, float(times[-1]), tolerance_K, stops=stops):
         first = along.time is None
         along.add(piece, step)
         if first and 0.0 in wanted:
@@ -152,7 +146,7 @@ class _Along:
     def add(self, piece: Piece, step: Step) -> None:
         """Go on over the next step."""
         x = step.x[:, :1]
-        problem = DrivenLever(self._lever.equations, self._lever.circuit, piece.bias)
+        problem = TransientProblem(self._lever.equations, self._lever.circuit, piece.bias)
         if piece is not self._piece:
             self._piece = piece
             if self.time is None:
@@ -164,33 +158,33 @@ class _Along:
         self._over(problem, step)
         self.time = step.end
 
-    def _settle(self, problem: DrivenLever, x: Array) -> None:
+    def _settle(self, problem: TransientProblem, x: Array) -> None:
         """Fulfil the algebraic rows, nothing that is stored being changed."""
         stored, rest = problem.by_parameter(x, self._names)
         known = INSTANT_RATE * (self._stored - stored) - rest
         factors = problem.factorised(x, INSTANT_RATE)
         self._changes = self._solved(problem, x, known, INSTANT_RATE, factors)
         self._flow = -problem.change(x, self._changes, 0.0) - rest
-        self._stored = problem.stored_change(x, self._changes) + stored
+        self._stored = problem.storage_change(x, self._changes) + stored
 
-    def _over(self, problem: DrivenLever, step: Step) -> None:
+    def _over(self, problem: TransientProblem, step: Step) -> None:
         """Differentiate each stage of a step."""
         length = step.end - step.start
-        rate, flows = 1.0 / (GAMMA * length), [self._flow]
+        rate, flows = 1.0 / (METHOD.diagonal * length), [self._flow]
         begin, stored = self._stored, self._stored
         changes = self._changes
-        for stage in range(1, len(TIMES)):
+        for stage in range(1, len(METHOD.times)):
             x = step.stages[:, [stage]]
-            known = begin + length * np.tensordot(STAGES[stage, :stage], flows, axes=1)
+            known = begin + length * np.tensordot(METHOD.stages[stage, :stage], flows, axes=1)
             by_stored, by_rest = problem.by_parameter(x, self._names)
             right = rate * (known - by_stored) - by_rest
             changes = self._solved(problem, x, right, rate, step.factors)
-            stored = problem.stored_change(x, changes) + by_stored
+            stored = problem.storage_change(x, changes) + by_stored
             flows.append(rate * (stored - known))
         self._changes, self._stored, self._flow = changes, stored, flows[-1]
 
     def _solved(
-        self, problem: DrivenLever, x: Array, right: Array, rate: float, factors: Factors
+        self, problem: TransientProblem, x: Array, right: Array, rate: float, factors: Factors
     ) -> Array:
         """Solve with factors of a state nearby; what they lack is removed by refinement."""
         one, scale = np.arange(1), problem.scale[..., None]

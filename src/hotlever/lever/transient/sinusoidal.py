@@ -19,7 +19,7 @@ from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.state import State
-from hotlever.lever.transient.history import followed
+from hotlever.lever.transient.history import integrate
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.reduced import space_of_modes
 from hotlever.lever.transient.small_signals import checked_frequencies
@@ -153,7 +153,7 @@ class HarmonicBalance:
         for done in range(_MOST):
             if inverses is None or done in (2, 8):
                 inverses = self._inverses(x.mean(axis=1, keepdims=True), turns, of_air)
-            stored, rest = self._equations.stored(x), self._equations.balance(x)
+            stored, rest = self._equations.storage(x), self._equations.balance(x)
             rest[-1] = self._circuit.bias(x[-1], rest[-1]) - self._bias
             residual = np.fft.rfft(rest, axis=1) + turns * np.fft.rfft(stored, axis=1)
             residual += np.einsum("kij,jk->ik", of_air, np.fft.rfft(x, axis=1))
@@ -192,7 +192,7 @@ class HarmonicBalance:
         many = np.repeat(x, len(x), axis=1)
         rest = self._equations.balance_change(many, unit)
         rest[-1] = self._circuit.bias(unit[-1], rest[-1])
-        moving = self._equations.stored_change(many, unit)
+        moving = self._equations.storage_change(many, unit)
         return np.linalg.inv(turns[:, None, None] * moving + rest + of_air)
 
 
@@ -201,13 +201,13 @@ def _steps(lever: Lever, rest: State, amplitude: float) -> Array:
     until = _SETTLED * abs(float(slowest_modes(rest)[0][0]))
     states = [rest.x]
     for bias in (rest.bias_V + amplitude, rest.bias_V - amplitude):
-        followed(
+        integrate(
             lever,
             step(bias),
             until,
             start=rest,
             tolerance_K=1e-2,
             per_step=2,
-            seen=lambda t, state: states.append(state.x),
+            callback=lambda t, state: states.append(state.x),
         )
     return np.hstack(states)

@@ -74,13 +74,13 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
     for rate in _RATES:
         factors = equations.factorised(x, LEVER, float(rate))
         answers.append(factors.solve(unit, one))
-        answers.append(factors.solve(equations.stored_change(x, answers[-1]), one))
+        answers.append(factors.solve(equations.storage_change(x, answers[-1]), one))
         tests += [factors.solve(column, one, transposed=True) for column in (current, tip)]
     trial, test = (np.linalg.qr(np.hstack(columns))[0] for columns in (answers, tests))
     many = np.repeat(x, trial.shape[1], axis=1)
     rest = equations.balance_change(many, trial)
     rest[-1] = trial[-1]
-    moving = test.T @ equations.stored_change(many, trial)
+    moving = test.T @ equations.storage_change(many, trial)
     turns = 2e-6j * np.pi * frequency
     system = turns[:, None, None] * moving + test.T @ rest
     if (air := equations.heat_in_air) is not None:

@@ -1,9 +1,9 @@
-"""Long trains of pulses, followed on modes where those are certified by the full lever.
+"""A lever in time, long trains of pulses on modes where those are certified by the full lever.
 
-Modes are those of the first periods. On them the train is followed, until its periods are alike;
-then the full lever is followed from a state late in the train, and tells, as the first periods do,
-how far the reduced one departs within a period, and from that to the next. Where it departs too
-far, what the full lever did there joins the snapshots, and the train is followed once more.
+Modes are those of the first periods. On them the train is simulated, until its periods are alike;
+then the full lever is integrated from a state late in the train, and tells, as the first periods
+do, how far the reduced one departs within a period, and from that to the next. Where it departs too
+far, what the full lever did there joins the snapshots, and the train is simulated once more.
 """
 
 from __future__ import annotations
@@ -16,23 +16,34 @@ from numpy.typing import ArrayLike
 
 from hotlever.errors import ComputationError
 from hotlever.lever.state import State
-from hotlever.lever.transient.alike import Train
-from hotlever.lever.transient.history import Seen, checked_times, followed
+from hotlever.lever.transient.cyclic import Cycles
+from hotlever.lever.transient.history import (
+    ENERGIES,
+    Callback,
+    checked_times,
+    history_dataset,
+    initial_state,
+    integrate,
+)
 from hotlever.lever.transient.reduced import on_all_nodes, reduced_in_time
-from hotlever.lever.transient.waveform import Waveform
+from hotlever.lever.transient.waveform import Polyline, Waveform
 from hotlever.threads import one_blas_thread
-from hotlever.types import Array
+from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
     from hotlever.lever.lever import Lever
 
-#: Periods from which modes pay; those that are followed to make them, or to compare; and how
+#: Periods from which modes pay; those that are integrated to make them, or to compare; and how
 #: often they are made.
 FEWEST, _PERIODS, _ROUNDS = 20, 2, 4
 #: Points of a history for each step, where levers are compared.
 _PER_STEP = 2
 #: Most of what a departure within a period grows to, as it is carried on by the next ones.
 _LARGEST_RATIO = 0.97
+#: Share of the tolerance by which all later periods together may differ from a copy.
+_ALIKE = 0.01
+#: Parts of the time that progress is told in.
+_PARTS = 1000
 
 
 @one_blas_thread
@@ -43,13 +54,13 @@ def simulate(
     at: ArrayLike | None = None,
     *,
     tolerance_K: float = 0.1,
-    seen: Seen | None = None,
+    callback: Callback | None = None,
     **options: Any,
 ) -> xr.Dataset:
     """Simulate a lever in time, on modes if the wave form is repeated often and they suffice.
 
-    Parameters and errors are those of `hotlever.lever.transient.history.followed`; ``notes`` of the
-    dataset say whether modes were used, and how far from the full lever they are.
+    Parameters and errors are those of `hotlever.lever.transient.history.integrate`; ``notes`` of
+    the dataset say whether modes were used, and how far from the full lever they are.
 
     Examples
     --------
@@ -59,103 +70,215 @@ def simulate(
     >>> history.tip_K.values.round().tolist()
     [410.0, 293.0]
     """
-    given = {"tolerance_K": tolerance_K, **options}
     end, period = waveform.usual_end if until is None else until, waveform.period
     if at is not None and until is None:
         end = float(checked_times(at)[-1])
-    often = period is not None and waveform.count >= FEWEST and FEWEST * period <= end < np.inf
+    often = waveform.count >= FEWEST and end < np.inf
     # modes are of levers that only the swept supply drives
-    if period is None or not often or lever.space.wired:
-        return followed(lever, waveform, until, at, seen=seen, **given)
-    try:
-        return _Train(lever, waveform, period, end, given).followed(at, seen)
-    except ComputationError:
-        # it melts, or is like no train that modes are good for
-        return followed(lever, waveform, until, at, seen=seen, **given)
+    if period is not None and often and FEWEST * period <= end and not lever.space.wired:
+        try:
+            return _on_modes(lever, waveform, period, end, at, tolerance_K, callback, **options)
+        except ComputationError:
+            pass  # it melts, or is like no train that modes are good for
+    options |= {"tolerance_K": tolerance_K, "callback": callback}
+    return integrate(lever, waveform, until, at, **options)
 
 
-class _Train:
-    def __init__(
-        self, lever: Lever, waveform: Waveform, period: float, end: float, options: dict[str, Any]
-    ) -> None:
-        self._lever, self._waveform, self._period = lever, waveform, period
-        self._end, self._options = end, options
-        self._tolerance_K: float = options["tolerance_K"]
-        whole = min(waveform.count, int(end / period * (1.0 + 1e-9)))
-        self._late = whole - _PERIODS
-        self._snapshots: list[Array] = []
+def _on_modes(
+    lever: Lever,
+    waveform: Waveform,
+    period: float,
+    end: float,
+    at: ArrayLike | None,
+    tolerance_K: float,
+    callback: Callback | None,
+    **options: Any,
+) -> xr.Dataset:
+    """Return the history on modes that are certified.
 
-    def followed(self, at: ArrayLike | None, seen: Seen | None) -> xr.Dataset:
-        """Return the history on modes that are certified.
+    Raises
+    ------
+    ComputationError
+        If there are none.
+    """
+    snapshots: list[Array] = []
 
-        Raises
-        ------
-        ComputationError
-            If there are none.
-        """
-        first = self._full(None)
-        asked = None if at is None else checked_times(at)
-        for _ in range(_ROUNDS):
-            reduced = reduced_in_time(self._lever, np.hstack(self._snapshots))
-            train = Train(
-                reduced,
-                self._waveform,
-                self._period,
-                self._tolerance_K,
-                asked,
-                self._options.get("per_step", 1),
-            )
-            history = train.followed(self._end, self._options.get("progress"))
-            late = train.begin(self._late)
-            away = max(
-                self._departure(first, train.begin(0)),
-                self._departure(self._full(on_all_nodes(self._lever, late)), late),
-            )
-            if away < self._tolerance_K:
-                break
-        else:
-            raise ComputationError(f"modes of the first periods are off by {away:.2g} K")
-        if seen is not None:
-            for t, state in train.states:
-                seen(t, on_all_nodes(self._lever, state))
-        note = (
-            f"followed on {reduced.space.size} modes, within {away:.1g} K of the full lever as "
-            f"compared from periods 1 and {self._late + 1} on"
-        )
-        if train.alike is not None:
-            note += f"; from period {train.alike + 1} on all are alike"
-        history.attrs["notes"] = "\n".join(filter(None, [history.attrs["notes"], note]))
-        return history
-
-    def _full(self, start: State | None) -> xr.Dataset:
-        """Follow the full lever over some periods, and keep its states."""
-
-        def seen(t: float, state: State) -> None:
-            self._snapshots.append(state.x)
-
-        return followed(
-            self._lever,
-            self._waveform,
-            _PERIODS * self._period,
+    def integrated(start: State | None) -> xr.Dataset:
+        """Integrate the full lever over some periods, and keep its states."""
+        return integrate(
+            lever,
+            waveform,
+            _PERIODS * period,
             start=start,
-            tolerance_K=self._tolerance_K,
+            tolerance_K=tolerance_K,
             per_step=_PER_STEP,
-            seen=seen,
+            callback=lambda t, state: snapshots.append(state.x),
         )
 
-    def _departure(self, full: xr.Dataset, start: State) -> float:
-        """Estimate how far (K) the reduced lever departs from the full one in the long run."""
-        other = followed(
-            start.lever,
-            self._waveform,
-            _PERIODS * self._period,
-            full.time.values,
-            start=start,
-            tolerance_K=self._tolerance_K,
+    first = integrated(None)
+    asked = None if at is None else checked_times(at)
+    for _ in range(_ROUNDS):
+        reduced = reduced_in_time(lever, np.hstack(snapshots))
+        train = Train(reduced, waveform, period, end, asked, tolerance_K, **options)
+        late = train.start(train.whole - _PERIODS)
+        away = max(
+            _departure(first, train.start(0), waveform, period, tolerance_K),
+            _departure(integrated(on_all_nodes(lever, late)), late, waveform, period, tolerance_K),
         )
-        away = np.abs(full.tip_K.values - other.tip_K.values)
-        first = full.time.values <= self._period
-        one, two = away[first], away[~first]
-        # what is carried on to a later period decays, at a rate that the ends of two tell
-        ratio = min(max(two[-1] / max(one[-1], 1e-12) - 1.0, 0.0), _LARGEST_RATIO)
-        return float(max(one.max(), two.max()) + one[-1] * ratio / (1.0 - ratio))
+        if away < tolerance_K:
+            break
+    else:
+        raise ComputationError(f"modes of the first periods are off by {away:.2g} K")
+    if callback is not None:
+        for t, state in train.states:
+            callback(t, on_all_nodes(lever, state))
+    history = train.history
+    note = (
+        f"simulated on {reduced.space.size} modes, within {away:.1g} K of the full lever as "
+        f"compared from periods 1 and {train.whole - _PERIODS + 1} on"
+    )
+    if train.cyclic_from is not None:
+        note += f"; from period {train.cyclic_from + 1} on all are alike"
+    history.attrs["notes"] = "\n".join(filter(None, [history.attrs["notes"], note]))
+    return history
+
+
+def _departure(
+    full: xr.Dataset, start: State, waveform: Waveform, period: float, tolerance_K: float
+) -> float:
+    """Estimate how far (K) the reduced lever departs from the full one in the long run."""
+    times = full.time.values
+    reduced = integrate(
+        start.lever, waveform, _PERIODS * period, times, start=start, tolerance_K=tolerance_K
+    )
+    away = np.abs(full.tip_K.values - reduced.tip_K.values)
+    first, second = away[times <= period], away[times > period]
+    # what is carried on to a later period decays, at a rate that the ends of two tell
+    ratio = min(max(second[-1] / max(first[-1], 1e-12) - 1.0, 0.0), _LARGEST_RATIO)
+    return float(away.max() + first[-1] * ratio / (1.0 - ratio))
+
+
+class Train:
+    """A train of pulses, simulated until it is in its cyclic steady state, and copied from there.
+
+    Parameters
+    ----------
+    lever : Lever
+        Of few unknowns.
+    waveform : Waveform
+    period, end : float
+        µs.
+    asked : ndarray, or None
+        Times (µs) to report; None for those at which the solver stepped.
+    tolerance_K : float
+    per_step : int
+        See `hotlever.lever.transient.history.integrate`.
+    progress : callable, optional
+
+    Attributes
+    ----------
+    history : xarray.Dataset
+    whole : int
+        Periods that are not cut off by the end.
+    cyclic_from : int or None
+        The first period that is a copy, if one is.
+    states : list of (float, State)
+        At the times reported.
+
+    Raises
+    ------
+    ComputationError
+        If silicon melts, or a step fails.
+    """
+
+    def __init__(
+        self,
+        lever: Lever,
+        waveform: Waveform,
+        period: float,
+        end: float,
+        asked: Array | None,
+        tolerance_K: float,
+        per_step: int = 1,
+        progress: Progress | None = None,
+    ) -> None:
+        self.whole = min(waveform.count, int(end / period * (1.0 + 1e-9)))
+        self._period, self._cut_off = period, end - self.whole * period
+        if self._cut_off < 1e-9 * end:
+            self._cut_off = 0.0
+        self.cyclic_from: int | None = None
+        self.states: list[tuple[float, State]] = []
+        self._starts: list[State] = []
+        self._columns: list[dict[str, Array]] = []
+        self._added = dict.fromkeys(ENERGIES, 0.0)
+        self._asked: list[Array] | None = None
+        if asked is not None:
+            ends = period * np.arange(1, self.whole + (1 if self._cut_off else 0))
+            self._asked = np.split(asked, np.searchsorted(asked, ends, side="right"))
+        options: Any = {"tolerance_K": tolerance_K, "per_step": per_step}
+        cycles = Cycles(lever, waveform, period, **options)
+        start = initial_state(lever, waveform)
+        for number in range(self.whole):
+            self._starts.append(start)
+            cycle = cycles.integrate(start, self._phases(number, number + 1))
+            self._add(number, cycle.history, cycle.states)
+            start = cycle.end
+            if progress is not None:
+                progress(int(_PARTS * (number + 1) * period / end), _PARTS)
+            if cycle.remaining_K < _ALIKE * tolerance_K:
+                self._starts.append(start)
+                self.cyclic_from = number + 1
+                cycle = cycles.integrate(start, self._phases(number + 1, self.whole))
+                for copy in range(number + 1, self.whole):
+                    self._add(copy, cycle.history, cycle.states)
+                break
+        if self._cut_off:
+            # beyond the last pulse the bias stays
+            volts = float(waveform.bias(np.array([end]))[0])
+            flat = Polyline(waveform.text, (0.0,), (volts,), self._cut_off, volts)
+            wave = flat if self.whole == waveform.count else waveform
+            cycles = Cycles(lever, wave, self._cut_off, **options)
+            cycle = cycles.integrate(start, self._phases(self.whole, self.whole + 1))
+            self._add(self.whole, cycle.history, cycle.states)
+        columns = {
+            name: np.concatenate([part[name] for part in self._columns])
+            for name in self._columns[0]
+        }
+        self.history = history_dataset(lever, waveform, columns)
+
+    def start(self, number: int) -> State:
+        """Return the state at the beginning of a period, counted from 0."""
+        return self._starts[number if self.cyclic_from is None else min(number, self.cyclic_from)]
+
+    def _length(self, number: int) -> float:
+        return self._period if number < self.whole else self._cut_off
+
+    def _within(self, number: int, times: Array) -> Array:
+        """Return times (µs) since the beginning of a period; none is beyond its ends."""
+        return np.clip(times - number * self._period, 0.0, self._length(number))
+
+    def _phases(self, first: int, last: int) -> Array | None:
+        """Return the times within a period at which one of some is asked for, and its end."""
+        if self._asked is None:
+            return None
+        asked = self._asked[first:last]
+        phases = [self._within(number, times) for number, times in enumerate(asked, first)]
+        return np.unique(np.concatenate([*phases, [self._length(first)]]))
+
+    def _add(self, number: int, history: xr.Dataset, states: list[State]) -> None:
+        """Add the rows of a period, and its energies to those before."""
+        time = history.time.values
+        if self._asked is None:
+            # the first row of a later period is the last one of that before
+            rows = np.arange(min(number, 1), time.size)
+            shown = number * self._period + time[rows]
+        else:
+            shown = self._asked[number]
+            rows = np.searchsorted(time, self._within(number, shown))
+        columns = {str(name): values.values[rows] for name, values in history.data_vars.items()}
+        columns["time_us"] = shown
+        for name, before in self._added.items():
+            columns[name] = before + columns[name]
+            self._added[name] = before + float(history[name].values[-1])
+        self._columns.append(columns)
+        self.states += [(t, states[row]) for t, row in zip(shown.tolist(), rows, strict=True)]

@@ -24,10 +24,10 @@ from hotlever.lever.state import State
 from hotlever.probe import Circuit
 from hotlever.types import Array, Index
 
-#: What is watched: V_l, I_h, V_r and the rise of the tip (K); the power and the heat that leaves as
-#: it does at rest (mW); the heat in the lever and in the air (nJ), and how much of both is tested
-#: at the leg ends.
-WATCHED = (
+#: What is monitored: V_l, I_h, V_r and the rise of the tip (K); the power and the heat that leaves
+#: as it does at rest (mW); the heat in the lever and in the air (nJ), and how much of both is
+#: tested at the leg ends.
+MONITORED = (
     *(*SHOWN, "tip_rise_K"),
     *("power_mW", "left_mW", "stored_nJ", "air_stored_nJ", "at_ends_nJ"),
 )
@@ -70,7 +70,7 @@ class InCircuit:
         return other
 
 
-class DrivenLever:
+class TransientProblem:
     """See the module's text and `hotlever.lever.transient.runge_kutta.Problem`.
 
     Where air takes up heat the unknowns are those of the lever (size + 1) and below them the
@@ -110,16 +110,16 @@ class DrivenLever:
         in_air = self._air.follows(state.x) if state.in_air is None else state.in_air
         return np.vstack([state.x, in_air])
 
-    def stored(self, x: Array) -> Array:
+    def storage(self, x: Array) -> Array:
         """Return the heat stored (nJ), and the temperatures in the air (K)."""
         lever, in_air = self.parts(x)
-        stored = self.equations.stored(lever)
+        stored = self.equations.storage(lever)
         if self._air is None:
             return stored
         stored = stored + self._air.tested(self._air.held(lever, in_air))
         return np.vstack([stored, in_air])
 
-    def rest(self, t: float, x: Array) -> Array:
+    def residual(self, t: float, x: Array) -> Array:
         """Return the residuals of heat, charge and circuit, and of the stores in the air."""
         lever, in_air = self.parts(x)
         rest = self.equations.balance(lever)
@@ -129,19 +129,19 @@ class DrivenLever:
         return np.vstack([rest, self._air.rates * (in_air - self._air.follows(lever))])
 
     def change(self, x: Array, changes: Array, rate: float) -> Array:
-        """Return how ``rate × stored + rest`` changes with the unknowns (rows, 1, k)."""
-        return rate * self.stored_change(x, changes) + self._rest_change(x, changes)
+        """Return how ``rate × storage + residual`` changes with the unknowns (rows, 1, k)."""
+        return rate * self.storage_change(x, changes) + self.residual_change(x, changes)
 
-    def stored_change(self, x: Array, changes: Array) -> Array:
-        """Return how `stored` changes with the unknowns (rows, 1, k), to first order."""
+    def storage_change(self, x: Array, changes: Array) -> Array:
+        """Return how `storage` changes with the unknowns (rows, 1, k), to first order."""
         (lever, _), (moved, in_air) = self.parts(x), self.parts(changes)
-        stored = self.equations.stored_change(lever, moved)
+        stored = self.equations.storage_change(lever, moved)
         if self._air is None:
             return stored
         held = self._air.tested(self._air.held(moved[:, 0], in_air[:, 0]))
         return np.concatenate([stored + held[:, None], in_air])
 
-    def _rest_change(self, x: Array, changes: Array) -> Array:
+    def residual_change(self, x: Array, changes: Array) -> Array:
         (lever, _), (moved, in_air) = self.parts(x), self.parts(changes)
         rest = self.equations.balance_change(lever, moved)
         rest[-1] = self._circuit.bias(moved[-1], rest[-1])
@@ -151,9 +151,9 @@ class DrivenLever:
         return np.concatenate([rest, lag[:, None]])
 
     def by_parameter(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
-        """Return how `stored` and `rest` change with parameters, each (rows, 1, k)."""
+        """Return how `storage` and `residual` change with parameters, each (rows, 1, k)."""
         lever, in_air = self.parts(x)
-        stored = self.equations.stored_by_parameter(lever, names)
+        stored = self.equations.storage_by_parameter(lever, names)
         rest = self.equations.by_parameter(lever, names)
         current = self.equations.balance(lever)[-1]
         for place, name in enumerate(names):
@@ -169,19 +169,19 @@ class DrivenLever:
         return np.concatenate([stored, np.zeros_like(lag)]), np.concatenate([rest, lag])
 
     def factorised(self, x: Array, rate: float) -> Factors:
-        """Return the factorised Jacobian of ``rate × stored + rest``."""
+        """Return the factorised Jacobian of ``rate × storage + residual``."""
         lever, _ = self.parts(x)
         factors = self.equations.factorised(lever, LEVER, rate)
         gradient = self.equations.observed_gradient(lever)
         driven = InCircuit(factors, self._circuit.bias(gradient[..., 0], gradient[..., 1]))
         return driven if self._air is None else InAir(driven, self._air, rate)
 
-    def size_of(self, change: Array) -> float:
+    def norm(self, change: Array) -> float:
         """Return the largest change of the temperature (K)."""
         return float(np.abs(self.equations.space.rises(change[: self._own])).max())
 
-    def watched(self, x: Array) -> Array:
-        """Return what is `WATCHED` at states, (9, n)."""
+    def monitored(self, x: Array) -> Array:
+        """Return what is `MONITORED` at states, (9, n)."""
         equations, space = self.equations, self.equations.space
         lever, in_air = self.parts(x)
         held, at_ends = heat_held(equations, lever)

@@ -6,12 +6,12 @@ import pytest
 
 from hotlever.errors import HistoryEndError
 from hotlever.lever.transient import pulse, simulate
-from hotlever.lever.transient.periodic import settled
+from hotlever.lever.transient.cyclic import cyclic_steady_state
 
 
 @pytest.mark.slow
 def test_a_train_settles_as_if_it_were_followed(coarse):
-    history, start = settled(coarse, pulse(8.0, 4.0), 20.0)
+    history, start = cyclic_steady_state(coarse, pulse(8.0, 4.0), 20.0)
     long = simulate(coarse, pulse(8.0, 4.0, 20.0, 12), at=[220.0, 224.0, 240.0])
     assert start.tip_K == pytest.approx(long.tip_K.values[0], abs=0.2)
     assert history.tip_K.max().item() == pytest.approx(long.tip_K.values[1], abs=0.2)
@@ -20,4 +20,4 @@ def test_a_train_settles_as_if_it_were_followed(coarse):
 
 def test_a_train_that_melts_says_when(coarse):
     with pytest.raises(HistoryEndError, match="melts after"):
-        settled(coarse, pulse(40.0, 4.0), 20.0)
+        cyclic_steady_state(coarse, pulse(40.0, 4.0), 20.0)
