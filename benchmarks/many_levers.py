@@ -29,8 +29,8 @@ import psutil
 
 from hotlever.estimation.batch import fit_many
 from hotlever.estimation.experiment_at_rest import experiment_of
+from hotlever.materials import PUBLISHED
 from hotlever.probe import Probe
-from hotlever.spieser2017 import PUBLISHED
 from problems import BIAS, processor_time, table
 
 #: Relative scatter of the parameters between levers, about that of the paper's Table II.

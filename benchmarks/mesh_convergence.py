@@ -13,8 +13,8 @@ import numpy as np
 from hotlever.lever import Lever
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace
+from hotlever.materials import published
 from hotlever.probe import MeshOptions, Probe, mesh_layout
-from hotlever.spieser2017 import published
 from problems import BIAS, processor_seconds, table
 
 

@@ -14,8 +14,8 @@ from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.reduced.training import cached_reduction
+from hotlever.materials import published
 from hotlever.probe import Probe
-from hotlever.spieser2017 import published
 
 ROOT = Path(__file__).parents[1]
 

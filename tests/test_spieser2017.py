@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.materials import PARAMETERS, Material
+from hotlever.materials import PARAMETERS, PUBLISHED, Material, published
 from hotlever.materials.silicon import inversion_temperature
-from hotlever.spieser2017 import NOMINAL_DOPING, PUBLISHED, published
+from hotlever.spieser2017 import NOMINAL_DOPING
 
 
 def test_every_row_of_both_tables_is_there():

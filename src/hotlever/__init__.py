@@ -18,8 +18,7 @@ __version__ = version("hotlever")
 #: the command line starts fast.
 _MODULES = {
     "hotlever.probe": ("Probe", "Circuit", "MeshOptions"),
-    "hotlever.materials": ("Material",),
-    "hotlever.spieser2017": ("published",),
+    "hotlever.materials": ("Material", "published"),
     "hotlever.lever": ("Lever", "Branch", "sweep", "read_sweep", "write_sweep"),
     "hotlever.lever.transient": ("simulate",),
     "hotlever.estimation": ("Measurement", "read_measurement", "FitOptions", "fit", "read_fit"),

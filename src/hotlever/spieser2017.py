@@ -4,18 +4,15 @@ M. Spieser, C. Rawlings, E. Lörtscher, U. Duerig, A. W. Knoll, "Comprehensive m
 Joule heated cantilever probes", J. Appl. Phys. 121, 174503 (2017), doi:10.1063/1.4981883,
 arXiv:1711.09582: Tables I and II, the operating points, Eq. 12 and k, the Raman thermometer, and
 how the measurements were made. The laws of Eqs. 4 to 11 and 13 are in
-`hotlever.materials.silicon` and `hotlever.materials.doping`.
+`hotlever.materials.silicon` and `hotlever.materials.doping`, the tables as sets of parameters in
+`hotlever.materials.presets`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-
-from hotlever.errors import unknown_name
-from hotlever.materials.material import Material
 
 DOI = "10.1063/1.4981883"
 
@@ -66,18 +63,6 @@ ABSORBED_SHARE = 0.10
 
 # --- Tables I and II ------------------------------------------------------------------------------
 
-
-@dataclass(frozen=True)
-class PublishedSet:
-    """One row of a published table."""
-
-    name: str
-    observables: tuple[str, ...]  #: that were fitted, of ``current``, ``reader``, ``tip``
-    material: Material
-    standard_error: Mapping[str, float]  #: by parameter; empty where the table prints none
-    inversion_temperature_K: float | None  #: as printed, where the table has it
-
-
 #: c_κ, Δ (µm), n_d (10¹⁷ cm⁻³), p, a₀ (10⁻⁴ Ω cm) and a₁ (10⁻⁶ Ω cm K⁻¹) as printed.
 _UNITS = {"c_kappa": 1.0, "delta": 1.0, "n_d": 1e17, "p": 1.0, "a0": 1e-4, "a1": 1e-6}
 _VALUES = {
@@ -93,31 +78,25 @@ _VALUES = {
     "lever 4": (0.613, 0.544, 5.93, 2.86, 10.7, 1.23),
     "lever 4, n_d fixed": (0.686, 0.716, 3.30, 2.99, 10.7, 1.26),
 }
-#: Of Table I: number of observables fitted, inversion temperature (K), standard errors.
+#: Of Table I: the observables that were fitted, the inversion temperature (K), standard errors.
 _OPTIONS = {
-    "option I": (1, 805.0, (0.007, 0.030, 0.62, 0.02, 0.21, 0.10)),
-    "option II": (2, 851.0, (0.008, 0.053, 1.40, 0.02, 0.06, 0.03)),
-    "option III": (3, 831.0, (0.005, 0.051, 0.94, 0.05, 0.15, 0.05)),
+    "option I": (("current",), 805.0, (0.007, 0.030, 0.62, 0.02, 0.21, 0.10)),
+    "option II": (("current", "reader"), 851.0, (0.008, 0.053, 1.40, 0.02, 0.06, 0.03)),
+    "option III": (("current", "reader", "tip"), 831.0, (0.005, 0.051, 0.94, 0.05, 0.15, 0.05)),
 }
 
 
-def _row(name: str) -> PublishedSet:
-    def in_units(printed: tuple[float, ...]) -> dict[str, float]:
-        pairs = zip(_UNITS.items(), printed, strict=bool(printed))
-        return {name: value * unit for (name, unit), value in pairs}
-
-    count, inversion_temperature_K, errors = _OPTIONS.get(name, (3, None, ()))
-    return PublishedSet(
-        name,
-        ("current", "reader", "tip")[:count],
-        Material(**in_units(_VALUES[name])),
-        in_units(errors),
-        inversion_temperature_K,
-    )
+def _in_units(printed: tuple[float, ...]) -> dict[str, float]:
+    pairs = zip(_UNITS.items(), printed, strict=True)
+    return {name: value * unit for (name, unit), value in pairs}
 
 
-#: Table I (lever 1, by the observables fitted) and Table II (option III, by lever).
-PUBLISHED: dict[str, PublishedSet] = {name: _row(name) for name in _VALUES}
+#: Parameters of Table I (lever 1, by the observables fitted) and Table II (option III, by lever).
+PUBLISHED_VALUES = {name: _in_units(printed) for name, printed in _VALUES.items()}
+#: Of Table I, which alone prints them.
+STANDARD_ERRORS = {name: _in_units(errors) for name, (_, _, errors) in _OPTIONS.items()}
+INVERSION_TEMPERATURES_K = {name: T for name, (_, T, _) in _OPTIONS.items()}
+FITTED_OBSERVABLES = {name: observables for name, (observables, _, _) in _OPTIONS.items()}
 
 
 @dataclass(frozen=True)
@@ -138,23 +117,3 @@ OPERATING_POINTS = (
 )
 #: Tip temperature of the simulated knee (K).
 [KNEE_PREDICTED_K] = [point.tip_K for point in OPERATING_POINTS if point.tip_K is not None]
-
-
-def published(name: str) -> PublishedSet:
-    """Return a published parameter set, such as ``option III`` or ``lever 1, n_d fixed``.
-
-    Raises
-    ------
-    InputError
-        If there is no such set; the text gives the nearest name.
-
-    Examples
-    --------
-    >>> published("option III").material.c_kappa
-    0.686
-    >>> published("option III").standard_error["c_kappa"]
-    0.005
-    """
-    if name not in PUBLISHED:
-        raise unknown_name("published parameter set", name, PUBLISHED)
-    return PUBLISHED[name]

@@ -14,9 +14,8 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.sensitivities import by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever3d import SolidLever
-from hotlever.materials import HIGH_DOPED
+from hotlever.materials import HIGH_DOPED, published
 from hotlever.probe import Probe
-from hotlever.spieser2017 import published
 from of_materials import (
     FILM,
     NITRIDE,

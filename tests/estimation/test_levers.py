@@ -12,8 +12,7 @@ from hotlever.errors import InputError
 from hotlever.estimation.batch import Batch
 from hotlever.estimation.levers import INVERSION, compare_levers, levers_csv, statements
 from hotlever.estimation.words import lever_rows
-from hotlever.materials import PARAMETERS
-from hotlever.spieser2017 import PUBLISHED
+from hotlever.materials import PARAMETERS, PUBLISHED
 from made_up import fit_of
 
 

@@ -20,6 +20,7 @@ from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.lever import Lever, read_sweep, write_sweep
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient.waveform import read_waveform
+from hotlever.materials import published
 from hotlever.measurement import Measurement, parse_columns
 from hotlever.probe import Probe
 from hotlever.raman.bias_log import read_bias_log
@@ -27,7 +28,6 @@ from hotlever.raman.calibration import published_raman_calibration, read_raman_c
 from hotlever.raman.correction import read_corrections
 from hotlever.raman.series import read_temperatures
 from hotlever.raman.spectrum import read_file
-from hotlever.spieser2017 import published
 from spectrometer_files import jcamp_bytes, spc_bytes, wdf_bytes
 
 EXAMPLES = Path(__file__).parents[2] / "src" / "hotlever" / "examples"

@@ -25,10 +25,9 @@ from hotlever.lever.sensitivities import Linearised, by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.space import LEVER, TIP
 from hotlever.lever3d import SolidLever
-from hotlever.materials import PARAMETERS
+from hotlever.materials import PARAMETERS, published
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.solid import SolidMeshOptions
-from hotlever.spieser2017 import published
 from of_materials import metal_film_probe, p_type_probe
 
 MATERIAL = published("option III").material

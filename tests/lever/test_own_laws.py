@@ -76,5 +76,5 @@ def test_a_fit_file_does_not_give_another_lever(probe, tmp_path):
 
 def test_what_has_the_usual_laws_is_read_back(tmp_path):
     usual = Probe.from_file("src/hotlever/examples/boron-lever.toml")
-    assert "laws" not in usual.values()
+    assert "laws" not in usual.sections()
     assert probe_of(Lever(usual, COARSE).sweep([1.0])).materials == usual.materials

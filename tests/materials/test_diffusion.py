@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
+from hotlever.materials import published
 from hotlever.materials.doping import (
     diffusion_length,
     phosphorus_diffusivity,
 )
-from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S, published
+from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 
 
 def test_the_slope_of_the_diffusivity_is_exact():

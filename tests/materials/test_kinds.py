@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from test_silicon import BEYOND, TEMPERATURES, numerical_derivative
 
 from hotlever.errors import InputError
-from hotlever.materials import KINDS, PARAMETERS
+from hotlever.materials import KINDS, PARAMETERS, published
 from hotlever.materials.kinds import LowDopedSilicon, PSilicon
 from hotlever.materials.p_silicon import (
     band_gap_p,
@@ -17,10 +17,9 @@ from hotlever.materials.p_silicon import (
     hole_mobility,
     inversion_temperature_p,
 )
-from hotlever.materials.presets import PRESETS, material_of
-from hotlever.materials.silicon import band_gap
-from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
-from hotlever.spieser2017 import published
+from hotlever.materials.presets import PRESETS
+from hotlever.materials.sections import material_of
+from hotlever.materials.silicon import band_gap, thermal_conductivity_of_layer
 
 OPTION_III = published("option III").material
 #: One material of each kind, and of each choice that a kind offers.

@@ -7,11 +7,10 @@ import pytest
 
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.lever import Lever
-from hotlever.materials import PARAMETERS, Material
+from hotlever.materials import PARAMETERS, PUBLISHED, Material
 from hotlever.probe import Circuit, MeshOptions, Probe, ThreeLeg, Tip, UShape, mesh_layout
 from hotlever.probe.circuit import Contact
 from hotlever.probe.solid import mesh_solid
-from hotlever.spieser2017 import PUBLISHED
 
 RECORDS = (ThreeLeg, UShape, Circuit, Contact, Material, Tip)
 NUMBERS = (float, int, float | None)

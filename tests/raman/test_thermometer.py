@@ -23,11 +23,7 @@ from hotlever.raman.peak import PeakOptions
 from hotlever.raman.series import calibrate_from, measure, read_lines, read_temperatures
 from hotlever.raman.spectrum import Spectrum, read_spectra
 from hotlever.raman.thermometer import Thermometer, laser_heating
-from hotlever.spieser2017 import (
-    HEATER_STRESS_MPA,
-    RAMAN_CONSTANT_K,
-    RAMAN_SLOPE_K_CM,
-)
+from hotlever.spieser2017 import HEATER_STRESS_MPA, RAMAN_CONSTANT_K, RAMAN_SLOPE_K_CM
 
 
 def points(temperatures, reference=521.0, noise=0.0, seed=0, stderr=0.04):

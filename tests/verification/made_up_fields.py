@@ -7,10 +7,10 @@ from bare import bare_equations
 from skfem import MeshTri
 
 from hotlever.lever.equations import LeverEquations
+from hotlever.materials import published
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.silicon import conductivity_low_doped, thermal_conductivity
 from hotlever.probe import Taper, Terminal
-from hotlever.spieser2017 import published
 
 LENGTH, WIDTH, BIAS, BASE = 2.0, 1.0, 1.5, 293.0
 TAPER = Taper((1.0, 0.5), (1.0, 0.0), 2.0)

@@ -12,8 +12,8 @@ from bare import bare_equations, state_at
 from skfem import MeshTri
 from skfem.element import ElementTriP2, ElementTriP3
 
+from hotlever.materials import published
 from hotlever.probe import Taper, Terminal
-from hotlever.spieser2017 import published
 
 SUPPLY = Terminal("supply", (2.0, 0.0), (2.0, 1.0))
 GROUND = Terminal("ground", (0.0, 2.0), (1.0, 2.0))

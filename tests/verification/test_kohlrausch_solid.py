@@ -11,9 +11,9 @@ from test_kohlrausch import GROUND, HIGH_DOPED, SUPPLY
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
+from hotlever.materials import published
 from hotlever.probe import Circuit, Layout, Region
 from hotlever.probe.solid import SolidMeshOptions, mesh_solid
-from hotlever.spieser2017 import published
 
 OUTLINE = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
 

@@ -12,8 +12,9 @@ from hotlever.lever import Lever
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import COARSE
+from hotlever.materials import PUBLISHED, published
 from hotlever.probe import MeshOptions, Probe, mesh_layout
-from hotlever.spieser2017 import OPERATING_POINTS, PUBLISHED, published
+from hotlever.spieser2017 import OPERATING_POINTS
 
 BIAS = np.linspace(1.0, 11.0, 25)
 

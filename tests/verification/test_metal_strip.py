@@ -15,9 +15,9 @@ from skfem import MeshTri
 from skfem.element import ElementTriP1, ElementTriP2, ElementTriP3
 
 from hotlever.lever import Lever
-from hotlever.materials.presets import material_of
+from hotlever.materials import published
+from hotlever.materials.sections import material_of
 from hotlever.probe import Probe, Terminal
-from hotlever.spieser2017 import published
 
 BASE, LENGTH, WIDTH = 293.0, 20.0, 2.0
 RHO, TCR, KAPPA, FILM_UM = 3e-5, 2e-3, 0.25, 0.05
@@ -104,7 +104,7 @@ def test_the_observed_order_is_that_of_the_element(element, degree):
 
 
 def test_two_films_of_half_the_thickness_are_one():
-    layers = strip().values()["layers"]
+    layers = strip().sections()["layers"]
     half = layers["metal"] | {"thickness_um": FILM_UM / 2}
     halves = {"body": layers["body"], "below": half, "above": half}
     whole, both = (Lever(one).sweep([0.1, 0.3, 0.5]) for one in (strip(), strip(layers=halves)))

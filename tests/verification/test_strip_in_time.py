@@ -13,9 +13,9 @@ from hotlever.lever.state import State
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import Stepper
+from hotlever.materials import published
 from hotlever.materials.kinds import MetalFilm
 from hotlever.probe import Circuit, Terminal
-from hotlever.spieser2017 import published
 
 MATERIAL = published("option III").material
 LENGTH, WIDTH, BIAS = 10.0, 1.0, 1.0

@@ -8,9 +8,9 @@ from bare import bare_equations
 from skfem import MeshTri
 
 from hotlever.lever.transient.sinusoidal import HarmonicBalance
+from hotlever.materials import published
 from hotlever.materials.kinds import MetalFilm
 from hotlever.probe import Circuit, Terminal
-from hotlever.spieser2017 import published
 
 LENGTH, WIDTH = 10.0, 1.0
 #: W/(cm K), S/cm, J/(cm³ K), 1/K; current (mA).

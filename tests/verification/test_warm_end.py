@@ -9,9 +9,8 @@ from skfem import MeshTri
 from hotlever.lever.balances import heat_left
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.held import at_rest
-from hotlever.materials import LOW_DOPED
+from hotlever.materials import LOW_DOPED, published
 from hotlever.probe import Circuit, Taper, Terminal
-from hotlever.spieser2017 import published
 
 LENGTH = 10.0
 

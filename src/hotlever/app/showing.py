@@ -28,7 +28,7 @@ from hotlever.estimation import Fit, read_fit, read_measurement
 from hotlever.estimation.words import parameter_rows
 from hotlever.lever.meshing import chosen_space
 from hotlever.lever.transient.waveform_texts import waveform_from_text
-from hotlever.materials.naming import sentence
+from hotlever.materials.parameters import sentence
 from hotlever.measurement import parse_columns
 from hotlever.probe import Layout, Probe
 from hotlever.probe.sections import read_sections

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from hotlever.materials.naming import parameter_named
+from hotlever.materials.parameters import parameter_named
 from hotlever.probe import Probe
 from hotlever.types import Array
 

@@ -12,7 +12,7 @@ from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
 from hotlever.estimation.result import Fit
 from hotlever.materials import PARAMETERS
-from hotlever.materials.naming import INVERSION, parameter_named
+from hotlever.materials.parameters import INVERSION, parameter_named
 
 #: Levers are said to differ if equal ones would scatter as much less often than this.
 _RARE = 0.01

@@ -40,7 +40,7 @@ from hotlever.lever.lever import Lever
 from hotlever.lever.reduced.error_estimate import estimated_error
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.materials import full_name
-from hotlever.materials.naming import INVERSION
+from hotlever.materials.parameters import INVERSION
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameters_of, usual_parameters
 from hotlever.text import BAND

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hotlever.estimation.levers import statements
-from hotlever.materials.naming import heading, parameter_named, scale_of, scaled_unit
+from hotlever.materials.parameters import heading, parameter_named, scale_of, scaled_unit
 from hotlever.probe.parameters import of_materials, parameters_of
 from hotlever.text import NOT_DETERMINED, aligned, value_with_error
 

@@ -28,7 +28,7 @@ from hotlever.figures.style import (
     from_zero,
     panel_letters,
 )
-from hotlever.materials.naming import parameter_named
+from hotlever.materials.parameters import parameter_named
 from hotlever.text import BAND, value_with_error
 from hotlever.types import Array
 

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from hotlever.errors import InputError
 from hotlever.files import whole_file
-from hotlever.materials.naming import INVERSION, parameter_named
+from hotlever.materials.parameters import INVERSION, parameter_named
 
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 #: How measured points look.

@@ -15,7 +15,7 @@ from hotlever.datasets import OBSERVABLES, QUANTITIES, csv_text, labelled, quant
 from hotlever.errors import InputError
 from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES, balance_names
-from hotlever.materials.foreign_laws import LAWS, own_laws
+from hotlever.materials.sections import LAWS, own_laws
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.probe import SECTIONS

@@ -1,24 +1,27 @@
 """Material laws, the doping profile, and the published parameter sets."""
 
-from hotlever.materials.kinds import KINDS, Kind
-from hotlever.materials.material import (
+from hotlever.materials.kinds import KINDS, Kind, Material
+from hotlever.materials.parameters import (
     HIGH_DOPED,
     LOW_DOPED,
     PARAMETERS,
-    Material,
+    Parameter,
     full_name,
     parameter,
 )
-from hotlever.materials.parameters import Parameter
+from hotlever.materials.presets import PUBLISHED, REFERENCE, published
 
 __all__ = [
     "HIGH_DOPED",
     "KINDS",
     "LOW_DOPED",
     "PARAMETERS",
+    "PUBLISHED",
+    "REFERENCE",
     "Kind",
     "Material",
     "Parameter",
     "full_name",
     "parameter",
+    "published",
 ]

@@ -6,7 +6,8 @@ import numpy as np
 
 from hotlever.materials.kinds import KINDS, Kind
 from hotlever.materials.laws import Law
-from hotlever.materials.presets import PRESETS, material_of
+from hotlever.materials.presets import PRESETS
+from hotlever.materials.sections import material_of
 from hotlever.spieser2017 import DOI
 from hotlever.text import aligned
 from hotlever.types import Array

@@ -9,22 +9,28 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from hotlever.errors import InputError
-from hotlever.materials.dielectric import dielectric_conductivity
+from hotlever.materials.films import (
+    constant_conductivity,
+    dielectric_conductivity,
+    metal_conductivity,
+    wiedemann_franz,
+)
 from hotlever.materials.heat import enthalpy, enthalpy_by_capacity
 from hotlever.materials.laws import FORMULA_TO, Evaluated, Law
-from hotlever.materials.metal import constant_conductivity, metal_conductivity, wiedemann_franz
 from hotlever.materials.p_silicon import conductivity_p, inversion_temperature_p
 from hotlever.materials.parameters import (
+    HIGH_DOPED,
+    LOW_DOPED,
+    OF_DIELECTRIC,
+    OF_METAL,
     OF_SILICON,
     Parameter,
     bounded,
-    high_doping,
-    impurity_exponent,
 )
 from hotlever.materials.silicon import (
     MELTING_POINT,
@@ -32,42 +38,23 @@ from hotlever.materials.silicon import (
     conductivity_low_doped,
     inversion_temperature,
     thermal_conductivity,
+    thermal_conductivity_of_layer,
 )
-from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
 from hotlever.records import Record
 from hotlever.types import Array
 
 #: In place of c_κ: κ follows from the thickness.
 BY_THICKNESS = "thickness"
-#: Temperature coefficients (K⁻¹) of metal films; with any of them the resistivity stays positive.
-_LEAST_TCR, _MOST_TCR = -5e-4, 5e-3
 #: Share of its resistivity at 300 K that high-doped silicon has when it is colder.
 _LEAST_LEFT = 0.1
-#: Heat a metal carries over what its electrons do.
-_LEAST_LORENZ, _MOST_LORENZ = 0.2, 5.0
 
-_METAL = {
-    known.name: known
-    for known in (
-        Parameter("resistivity", "ρ₂₉₃", "Ω cm", 1e-5, 1e-6, 1e-3, "resistivity at 293 K"),
-        Parameter(
-            *("tcr", "α", "K⁻¹", 1e-3, _LEAST_TCR, _MOST_TCR),
-            "temperature coefficient of the resistivity",
-        ),
-        Parameter(
-            *("lorenz_ratio", "L/L₀", "1", 1.0, _LEAST_LORENZ, _MOST_LORENZ),
-            "heat carried over what Wiedemann and Franz give",
-        ),
-        Parameter("kappa", "κ", "W cm⁻¹ K⁻¹", 0.01, 0.01, 5.0, "thermal conductivity"),
+
+def _impurity_exponent() -> Any:
+    return bounded(
+        OF_SILICON["impurity_exponent"],
+        default=0.0,
+        description="mobility limited by impurities rises as (T / 300 K) to this power; 0: Eq. 9",
     )
-}
-_DIELECTRIC = {
-    known.name: known
-    for known in (
-        Parameter("kappa", "κ₃₀₀", "W cm⁻¹ K⁻¹", 0.01, 1e-3, 1.0, "thermal conductivity at 300 K"),
-        Parameter("kappa_exponent", "m", "1", 1.0, -1.5, 1.5, "power of the temperature in it"),
-    )
-}
 
 
 class Kind(Record):
@@ -201,7 +188,7 @@ class LowDopedSilicon(Silicon):
     delta: float = bounded(OF_SILICON["delta"])
     n_d: float = bounded(OF_SILICON["n_d"])
     p: float = bounded(OF_SILICON["p"])
-    impurity_exponent: float = impurity_exponent()
+    impurity_exponent: float = _impurity_exponent()
 
     @property
     def laws(self) -> tuple[Law, ...]:
@@ -250,7 +237,7 @@ class HighDopedSilicon(Silicon):
     kind: Literal["high-doped-silicon"] = "high-doped-silicon"
     a0: float = bounded(OF_SILICON["a0"])
     a1: float = bounded(OF_SILICON["a1"])
-    n_hd: float = high_doping()
+    n_hd: float = bounded(OF_SILICON["n_hd"], default=2.2e20)
 
     def impossible(self, coldest_K: float) -> str:
         """Say that the straight line of Eq. 11 falls to nothing below 300 K, if it does."""
@@ -275,22 +262,17 @@ class HighDopedSilicon(Silicon):
 class MetalFilm(Stored):
     """A metal film; the values of a bulk metal are where a fit may start."""
 
-    declared: ClassVar = _METAL
+    declared: ClassVar = OF_METAL
     usual: ClassVar = ("resistivity", "tcr")
 
     kind: Literal["metal-film"] = "metal-film"
     preset: str | None = Field(default=None, description="metal whose values those left out are")
-    resistivity: float = bounded(_METAL["resistivity"])
-    tcr: float = Field(
-        ge=_LEAST_TCR,
-        le=_MOST_TCR,
-        description="temperature coefficient of the resistivity, α (K⁻¹)",
-    )
-    lorenz_ratio: float = bounded(_METAL["lorenz_ratio"], default=1.0)
-    kappa: float | None = Field(
+    resistivity: float = bounded(OF_METAL["resistivity"])
+    tcr: float = bounded(OF_METAL["tcr"])
+    lorenz_ratio: float = bounded(OF_METAL["lorenz_ratio"], default=1.0)
+    kappa: float | None = bounded(
+        OF_METAL["kappa"],
         default=None,
-        ge=_METAL["kappa"].lower / 2,
-        le=2 * _METAL["kappa"].upper,
         description="thermal conductivity (W cm⁻¹ K⁻¹); left out: by Wiedemann and Franz",
     )
     melting_point_K: float = Field(default=MELTING_POINT, ge=400, le=4000, description="K")
@@ -330,7 +312,7 @@ class MetalFilm(Stored):
 class Dielectric(Stored):
     """An insulator, which carries heat alone."""
 
-    declared: ClassVar = _DIELECTRIC
+    declared: ClassVar = OF_DIELECTRIC
     usual: ClassVar = ("kappa",)
     conducts: ClassVar = False
 
@@ -338,13 +320,8 @@ class Dielectric(Stored):
     preset: str | None = Field(
         default=None, description="dielectric whose values those left out are"
     )
-    kappa: float = bounded(_DIELECTRIC["kappa"])
-    kappa_exponent: float = Field(
-        default=0.0,
-        ge=_DIELECTRIC["kappa_exponent"].lower,
-        le=_DIELECTRIC["kappa_exponent"].upper,
-        description="power of the temperature in it, m",
-    )
+    kappa: float = bounded(OF_DIELECTRIC["kappa"])
+    kappa_exponent: float = bounded(OF_DIELECTRIC["kappa_exponent"], default=0.0)
 
     @property
     def laws(self) -> tuple[Law, ...]:
@@ -370,3 +347,40 @@ KINDS: dict[str, type[Kind]] = {
     kind.model_fields["kind"].default: kind
     for kind in (NSilicon, PSilicon, HighDopedSilicon, MetalFilm, Dielectric)
 }
+
+
+class Material(Record):
+    """Parameters of the laws in Eqs. 4 to 11 (section ``[material]`` of a probe file).
+
+    They make two kinds of silicon that share c_κ: the n-doped one of heater and reader, and the
+    high-doped one around it.
+    """
+
+    c_kappa: float = bounded(OF_SILICON["c_kappa"])
+    delta: float = bounded(OF_SILICON["delta"])
+    n_d: float = bounded(OF_SILICON["n_d"])
+    p: float = bounded(OF_SILICON["p"])
+    a0: float = bounded(OF_SILICON["a0"])
+    a1: float = bounded(OF_SILICON["a1"])
+    n_hd: float = bounded(OF_SILICON["n_hd"], default=2.2e20)
+    impurity_exponent: float = _impurity_exponent()
+    heat_capacity_scale: float = bounded(OF_SILICON["heat_capacity_scale"], default=1.0)
+
+    @model_validator(mode="after")
+    def _heater_is_the_low_doped_part(self) -> Material:
+        if self.n_d >= self.n_hd:
+            raise ValueError(f"n_d = {self.n_d:g} must be below n_hd = {self.n_hd:g}")
+        return self
+
+    @property
+    def kinds(self) -> dict[str, Kind]:
+        """The two kinds of silicon, by `LOW_DOPED` and `HIGH_DOPED`."""
+        values = dict(self)
+        made: dict[str, type[Kind]] = {LOW_DOPED: NSilicon, HIGH_DOPED: HighDopedSilicon}
+        # unchecked, since the values are checked already: fits make many
+        return {
+            name: kind.model_construct(
+                **{own: values[own] for own in kind.model_fields if own in values}
+            )
+            for name, kind in made.items()
+        }

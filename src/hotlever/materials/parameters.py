@@ -1,17 +1,58 @@
-"""Parameters of materials as users meet them."""
+"""The table of all parameters of materials: unit, bounds, scale and what is known beforehand.
+
+Kinds of material say which of them they have, probes add their dimensions, circuit and gas
+(`hotlever.probe.parameters`), and texts and axes ask here how a parameter is named.
+"""
 
 from __future__ import annotations
 
+import math
+import re
 from typing import Any, NamedTuple
 
+import numpy as np
 from pydantic import Field
+
+from hotlever.errors import unknown_name
+from hotlever.spieser2017 import PUBLISHED_VALUES
+
+INVERSION = "inversion_temperature"
+#: What the two kinds of silicon are called that the section ``[material]`` describes.
+LOW_DOPED, HIGH_DOPED = "low-doped", "high-doped"
+#: Levers whose scatter stands for that of any lever of unknown material (Table II of the paper),
+#: and by how much it is widened: four levers of one wafer differ less than those of two makers.
+SCATTER_OF, _WIDENED = ("lever 1", "lever 2", "lever 3", "lever 4"), 1.5
+#: Nominal doping is that good, where the probe file says no better (the makers' own tolerance).
+_DOPING = 0.15
+#: What is known of films of other materials: they differ from the bulk, and from each other.
+_FILM = 0.2
+#: Of the exponent of the temperature in mobility limited by impurities: half of what it is without
+#: screening, 1.5. The paper takes 0.
+_IMPURITIES = 0.75
+#: Units by the endings of names in probe files.
+_UNITS = {"um": "µm", "ohm": "Ω", "K": "K", "deg": "°"}
 
 
 class Parameter(NamedTuple):
-    """One fit parameter as users meet it: its name in files, its symbol in the paper, its unit.
+    """One quantity that a fit may vary, as users meet it.
 
     A fit divides by the `scale`, to work with numbers of order one, and stays between `lower` and
     `upper`, within which levers make sense.
+
+    Attributes
+    ----------
+    name, symbol, unit : str
+        In files, in the paper, and of its values.
+    scale, lower, upper : float
+    meaning : str
+    spread : float, optional
+        Standard deviation of the prior that it has unless another is stated; none if left out.
+    relative : bool
+        Whether that is a share of the value: a standard deviation of the logarithm.
+    in_time : bool
+        Whether it counts in time only.
+    value : float
+        What it is in a probe.
     """
 
     name: str
@@ -21,66 +62,204 @@ class Parameter(NamedTuple):
     lower: float
     upper: float
     meaning: str
+    spread: float | None = None
+    relative: bool = True
+    in_time: bool = False
+    value: float = math.nan
 
     @property
     def bounds(self) -> tuple[float, float]:
         """The lowest and the highest value."""
         return self.lower, self.upper
 
+    @property
+    def own_name(self) -> str:
+        """Its name without that of its material, ``tcr`` of ``film.tcr``."""
+        return self.name.rpartition(".")[2]
+
+
+def _scatter() -> dict[str, tuple[float, float]]:
+    """Return mean and widened standard deviation of the logarithms of published parameters."""
+    names = tuple(PUBLISHED_VALUES[SCATTER_OF[0]])
+    levers = [list(PUBLISHED_VALUES[lever].values()) for lever in SCATTER_OF]
+    logarithms = np.log(levers)
+    means, spreads = logarithms.mean(axis=0), logarithms.std(axis=0, ddof=1)
+    rows = zip(np.exp(means).tolist(), (_WIDENED * spreads).tolist(), strict=True)
+    return dict(zip(names, rows, strict=True))
+
+
+#: What is known of the silicon of any lever, by parameter: geometric mean and relative spread of
+#: the published ones, half as much again as that of the four levers.
+PUBLISHED_SCATTER = _scatter()
+_KNOWN = {name: spread for name, (_, spread) in PUBLISHED_SCATTER.items()} | {"n_d": _DOPING}
+
+
+def _table(*rows: Parameter) -> dict[str, Parameter]:
+    return {row.name: row for row in rows}
+
 
 #: All parameters of silicon: first the six that the paper fits, in its order.
-OF_SILICON: dict[str, Parameter] = {
-    parameter.name: parameter
-    for parameter in (
-        Parameter("c_kappa", "c_κ", "1", 1.0, 0.1, 1.5, "scale of the thermal conductivity"),
-        Parameter("delta", "Δ", "µm", 1.0, 0.05, 2.0, "diffusion length of the doping profile"),
-        Parameter("n_d", "n_d", "cm⁻³", 1e17, 1e16, 1e19, "doping concentration of the heater"),
-        Parameter("p", "p", "1", 1.0, 1.0, 4.0, "phonon scattering exponent"),
-        Parameter("a0", "a₀", "Ω cm", 1e-4, 1e-4, 1e-2, "high-doped resistivity at 300 K"),
-        Parameter("a1", "a₁", "Ω cm K⁻¹", 1e-6, 0.0, 1e-5, "its temperature coefficient"),
-        Parameter(
-            *("n_hd", "n_hd", "cm⁻³", 1e20, 2e18, 5e21),
-            "doping concentration of the high-doped silicon",
-        ),
-        Parameter(
-            *("impurity_exponent", "s", "1", 10.0, -2.0, 4.0),
-            "power of the temperature in mobility limited by impurities",
-        ),
-        Parameter(
-            *("heat_capacity_scale", "c_h", "1", 1.0, 0.5, 1.5),
-            "scale of the heat capacity, which counts in time",
-        ),
-    )
-}
+OF_SILICON = _table(
+    *(
+        Parameter(*row, spread=_KNOWN[row[0]])
+        for row in (
+            ("c_kappa", "c_κ", "1", 1.0, 0.1, 1.5, "scale of the thermal conductivity"),
+            ("delta", "Δ", "µm", 1.0, 0.05, 2.0, "diffusion length of the doping profile"),
+            ("n_d", "n_d", "cm⁻³", 1e17, 1e16, 1e19, "doping concentration of the heater"),
+            ("p", "p", "1", 1.0, 1.0, 4.0, "phonon scattering exponent"),
+            ("a0", "a₀", "Ω cm", 1e-4, 1e-4, 1e-2, "high-doped resistivity at 300 K"),
+            ("a1", "a₁", "Ω cm K⁻¹", 1e-6, 0.0, 1e-5, "its temperature coefficient"),
+        )
+    ),
+    Parameter(
+        *("n_hd", "n_hd", "cm⁻³", 1e20, 2e18, 5e21),
+        "doping concentration of the high-doped silicon",
+    ),
+    Parameter(
+        *("impurity_exponent", "s", "1", 10.0, -2.0, 4.0),
+        "power of the temperature in mobility limited by impurities",
+        spread=_IMPURITIES,
+        relative=False,
+    ),
+    Parameter(
+        *("heat_capacity_scale", "c_h", "1", 1.0, 0.5, 1.5),
+        "scale of the heat capacity, which counts in time",
+        in_time=True,
+    ),
+)
+#: The six fit parameters in the paper's order.
+PARAMETERS = {name: OF_SILICON[name] for name in PUBLISHED_SCATTER}
+#: Of metal films. With any of these temperature coefficients the resistivity stays positive.
+OF_METAL = _table(
+    Parameter("resistivity", "ρ₂₉₃", "Ω cm", 1e-5, 1e-6, 1e-3, "resistivity at 293 K", _FILM),
+    Parameter(
+        *("tcr", "α", "K⁻¹", 1e-3, -5e-4, 5e-3),
+        "temperature coefficient of the resistivity",
+        spread=_FILM,
+    ),
+    Parameter(
+        *("lorenz_ratio", "L/L₀", "1", 1.0, 0.2, 5.0),
+        "heat carried over what Wiedemann and Franz give",
+    ),
+    Parameter("kappa", "κ", "W cm⁻¹ K⁻¹", 0.01, 0.01, 5.0, "thermal conductivity"),
+)
+OF_DIELECTRIC = _table(
+    Parameter(
+        *("kappa", "κ₃₀₀", "W cm⁻¹ K⁻¹", 0.01, 1e-3, 1.0),
+        "thermal conductivity at 300 K",
+        spread=_FILM,
+    ),
+    Parameter("kappa_exponent", "m", "1", 1.0, -1.5, 1.5, "power of the temperature in it"),
+)
 
 
-#: Those that count in time only.
-IN_TIME = ("heat_capacity_scale",)
+def bounded(parameter: Parameter, **others: Any) -> Any:
+    """Return the field of a record for a parameter: what it is, and its bounds.
 
-
-def bounded(parameter: Parameter, **default: Any) -> Any:
-    """Return the bounds of a parameter, twice as wide as a fit's, and what it is."""
+    They are twice as wide as a fit's; those of what may be negative are the fit's own.
+    """
+    widened = 1.0 if parameter.lower < 0 else 2.0
     meaning = f"{parameter.meaning}, {parameter.symbol} ({parameter.unit})"
-    return Field(ge=parameter.lower / 2, le=2 * parameter.upper, description=meaning, **default)
+    bounds = {"ge": parameter.lower / widened, "le": widened * parameter.upper}
+    return Field(**{"description": meaning, **bounds, **others})
 
 
-def impurity_exponent() -> Any:
-    """Return the bounds of the exponent that the paper takes as 0, and what it is."""
-    known = OF_SILICON["impurity_exponent"]
-    return Field(
-        default=0.0,
-        ge=known.lower,
-        le=known.upper,
-        description="mobility limited by impurities rises as (T / 300 K) to this power; 0: Eq. 9",
-    )
+def parameter(name: str) -> Parameter:
+    """Return the fit parameter of this name.
+
+    Raises
+    ------
+    InputError
+        If there is none; the text gives the nearest one.
+
+    Examples
+    --------
+    >>> parameter("a0").unit
+    'Ω cm'
+    """
+    if name not in PARAMETERS:
+        raise unknown_name("parameter", name, PARAMETERS)
+    return PARAMETERS[name]
 
 
-def high_doping() -> Any:
-    """Return the bounds of the doping of high-doped silicon, and what it is."""
-    known = OF_SILICON["n_hd"]
-    return Field(
-        default=2.2e20,
-        ge=known.lower / 2,
-        le=2 * known.upper,
-        description=f"{known.meaning} ({known.unit})",
-    )
+# --- names --------------------------------------------------------------------------------------
+
+
+def full_name(material: str, own: str) -> str:
+    """Return the name of a material's parameter in probe files, fits and on the command line.
+
+    Examples
+    --------
+    >>> full_name("film", "tcr"), full_name("low-doped", "n_d")
+    ('film.tcr', 'n_d')
+    """
+    return own if material in (LOW_DOPED, HIGH_DOPED) else f"{material}.{own}"
+
+
+def parameter_named(name: str) -> Parameter:
+    """Return how a parameter of a material, or any other value of a probe file, is printed.
+
+    Examples
+    --------
+    >>> parameter_named("heater_width_um").symbol, parameter_named("heater_width_um").unit
+    ('heater width', 'µm')
+    >>> parameter_named("film.tcr").symbol, parameter_named("film.tcr").unit
+    ('α (film)', 'K⁻¹')
+    """
+    if name in PARAMETERS:
+        return PARAMETERS[name]
+    material, _, own = name.rpartition(".")
+    if material and (declared := (OF_DIELECTRIC | OF_METAL | OF_SILICON).get(own)):
+        return declared._replace(
+            name=name,
+            symbol=f"{declared.symbol} ({material})",
+            meaning=f"{declared.meaning}, {material}",
+        )
+    stem, _, ending = name.rpartition("_")
+    words = (stem if ending in _UNITS else name).replace("_", " ")
+    return Parameter(name, words, _UNITS.get(ending, "1"), 1.0, -math.inf, math.inf, words)
+
+
+def scaled_unit(name: str) -> str:
+    """Return the unit a parameter is printed in.
+
+    Examples
+    --------
+    >>> scaled_unit("n_d")
+    '1e17 cm⁻³'
+    """
+    printed = parameter_named(name)
+    power = "" if printed.scale == 1 else f"{printed.scale:.0e}".replace("e+", "e") + " "
+    return (power + ("" if printed.unit == "1" else printed.unit)).strip()
+
+
+def heading(name: str) -> str:
+    """Return the heading of a column with a parameter or the inversion temperature.
+
+    Examples
+    --------
+    >>> heading("n_d"), heading("p"), heading("inversion_temperature")
+    ('n_d (1e17 cm⁻³)', 'p', 'T_i (K)')
+    """
+    if name == INVERSION:
+        return "T_i (K)"
+    unit = scaled_unit(name)
+    return f"{name} ({unit})" if unit else name
+
+
+def scale_of(name: str) -> float:
+    """Return the unit, of its own, that a parameter or the inversion temperature is printed in."""
+    return parameter_named(name).scale
+
+
+def sentence(text: str) -> str:
+    """Make a note a sentence; names of parameters keep their small letters.
+
+    Examples
+    --------
+    >>> sentence("the levers differ"), sentence("n_d is not determined")
+    ('The levers differ.', 'n_d is not determined.')
+    """
+    first = re.split(r"[^\w.]", text, maxsplit=1)[0]
+    is_name = first in PARAMETERS or "." in first
+    return f"{text if is_name else text[0].upper() + text[1:]}."

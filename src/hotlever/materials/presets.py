@@ -1,17 +1,20 @@
-"""Published values of materials, and materials of what a probe file says of them."""
+"""Published values of materials: those of the paper, of metals and of dielectrics."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from hotlever.errors import InputError, quoted, unknown_name
-from hotlever.materials.kinds import KINDS, Kind
-from hotlever.materials.material import HIGH_DOPED, LOW_DOPED
-from hotlever.materials.metal import SOMMERFELD
-from hotlever.spieser2017 import published
+from hotlever.errors import unknown_name
+from hotlever.materials.films import SOMMERFELD
+from hotlever.materials.kinds import KINDS, Material
+from hotlever.spieser2017 import (
+    FITTED_OBSERVABLES,
+    INVERSION_TEMPERATURES_K,
+    PUBLISHED_VALUES,
+    STANDARD_ERRORS,
+)
 
 _CRC = (
     "CRC Handbook of Chemistry and Physics, resistivity at 293 and 400 K, κ at 300 K, heat "
@@ -70,92 +73,57 @@ PRESETS: dict[str, Preset] = {
 
 #: Lattice mobility exponent of holes; Arora et al., IEEE Trans. Electron Devices 29, 292 (1982).
 _HOLES = 2.23
-#: Names of materials.
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
-def _reference() -> dict[str, Any]:
-    """Return values for all parameters of silicon: those of the reference probe."""
-    return published("option III").material.model_dump()
+@dataclass(frozen=True)
+class PublishedSet:
+    """One row of a table of the paper."""
+
+    name: str
+    observables: tuple[str, ...]  #: that were fitted, of ``current``, ``reader``, ``tip``
+    material: Material
+    standard_error: Mapping[str, float]  #: by parameter; empty where the table prints none
+    inversion_temperature_K: float | None  #: as printed, where the table has it
+
+
+#: Table I (lever 1, by the observables fitted) and Table II (option III, by lever).
+PUBLISHED = {
+    name: PublishedSet(
+        name,
+        FITTED_OBSERVABLES.get(name, FITTED_OBSERVABLES["option III"]),
+        Material(**values),
+        STANDARD_ERRORS.get(name, {}),
+        INVERSION_TEMPERATURES_K.get(name),
+    )
+    for name, values in PUBLISHED_VALUES.items()
+}
+#: The silicon of the reference probe.
+REFERENCE = PUBLISHED["option III"].material
+
+
+def published(name: str) -> PublishedSet:
+    """Return a published parameter set, such as ``option III`` or ``lever 1, n_d fixed``.
+
+    Raises
+    ------
+    InputError
+        If there is no such set; the text gives the nearest name.
+
+    Examples
+    --------
+    >>> published("option III").material.c_kappa
+    0.686
+    >>> published("option III").standard_error["c_kappa"]
+    0.005
+    """
+    if name not in PUBLISHED:
+        raise unknown_name("published parameter set", name, PUBLISHED)
+    return PUBLISHED[name]
 
 
 def usual_values(kind: str) -> dict[str, Any]:
     """Return the values that parameters of a kind have where a probe file leaves them out."""
     if not kind.endswith("silicon"):
         return {}
-    known = _reference() | ({"p": _HOLES} if kind == "p-silicon" else {})
-    return {name: known[name] for name in KINDS[kind].declared}
-
-
-def material_of(values: Mapping[str, Any], where: str) -> Kind:
-    """Make a material of a section of a probe file.
-
-    Parameters
-    ----------
-    values : mapping
-        ``kind``, and parameters; those left out are of the ``preset`` if there is one, and in
-        silicon those of the reference probe.
-    where : str
-        Names the section in an error.
-
-    Raises
-    ------
-    InputError
-        If the kind or the preset is unknown, or a parameter is missing, misspelt or impossible.
-
-    Examples
-    --------
-    >>> material_of({"kind": "metal-film", "preset": "Pt", "tcr": 2e-3}, "here").resistivity
-    1.05e-05
-    """
-    kind = values.get("kind")
-    if kind is None:
-        raise InputError(f"{where}: kind is missing (one of: {', '.join(KINDS)})")
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise unknown_name("kind", str(kind), KINDS, where)
-    given = {**usual_values(kind), **_preset(values.get("preset"), kind, where), **values}
-    return KINDS[kind].from_values(given, where)
-
-
-def materials_of(
-    sections: Mapping[str, Any], where: str, reserved: Collection[str]
-) -> dict[str, Kind]:
-    """Make all materials of the section ``[materials]`` of a probe file.
-
-    Parameters
-    ----------
-    sections : mapping
-        Of `material_of`, by name.
-    where : str
-        Names the file in an error.
-    reserved : collection of str
-        Names that no material may have.
-
-    Raises
-    ------
-    InputError
-        See `material_of`.
-    """
-    found = {}
-    for name, section in sections.items():
-        if not _NAME.fullmatch(name) or name in (*reserved, LOW_DOPED, HIGH_DOPED):
-            raise InputError(
-                f"{where}: [materials]: {quoted(name)} cannot be the name of a material, expected "
-                "a letter, then letters, digits, - or _; and no section's name"
-            )
-        here = f"{where}: [materials.{name}]"
-        if not isinstance(section, dict):
-            raise InputError(f"{here} must be a section, found {quoted(section)}")
-        found[name] = material_of(section, here)
-    return found
-
-
-def _preset(name: Any, kind: str, where: str) -> Mapping[str, float]:
-    if name is None:
-        return {}
-    known = [one for one, preset in PRESETS.items() if preset.kind == kind]
-    if not known:
-        raise InputError(f"{where}: preset = {quoted(name)}: {kind} has no presets")
-    if name not in known:
-        raise unknown_name("preset", str(name), known, where)
-    return PRESETS[name].values
+    values = REFERENCE.model_dump() | ({"p": _HOLES} if kind == "p-silicon" else {})
+    return {name: values[name] for name in KINDS[kind].declared}

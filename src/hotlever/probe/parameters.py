@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from hotlever.errors import unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, full_name
-from hotlever.materials.naming import parameter_named
-from hotlever.materials.parameters import IN_TIME, Parameter
+from hotlever.materials.parameters import Parameter, parameter_named
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
 
 if TYPE_CHECKING:
@@ -44,7 +43,7 @@ def of_materials(probe: Probe, *, in_time: bool = False) -> dict[str, Parameter]
         full_name(material, own): known._replace(name=full_name(material, own))
         for material, kind in _kinds(probe)
         for own, known in kind.parameters.items()
-        if in_time or own not in IN_TIME
+        if in_time or not known.in_time
     }
     return {name: found[name] for name in [*usual, *(name for name in found if name not in usual)]}
 
@@ -86,7 +85,7 @@ def heat_capacities(probe: Probe) -> tuple[str, ...]:
     >>> heat_capacities(Probe.reference())
     ('heat_capacity_scale',)
     """
-    return tuple(name for name in of_materials(probe, in_time=True) if own_name(name) in IN_TIME)
+    return tuple(name for name, known in of_materials(probe, in_time=True).items() if known.in_time)
 
 
 def own_name(name: str) -> str:

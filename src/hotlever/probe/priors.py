@@ -16,8 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from hotlever.errors import InputError, unknown_name
-from hotlever.materials import PARAMETERS
-from hotlever.materials.parameters import Parameter
+from hotlever.materials.parameters import PUBLISHED_SCATTER, Parameter
 from hotlever.probe.parameters import (
     OF_THE_TIP,
     of_materials,
@@ -28,14 +27,10 @@ from hotlever.probe.parameters import (
 from hotlever.probe.prior_texts import Written, parsed
 from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.records import Number
-from hotlever.spieser2017 import published
 
 if TYPE_CHECKING:
     from hotlever.probe.probe import Probe
 
-#: Levers whose scatter stands for that of any lever of unknown material (Table II of the paper),
-#: and by how much it is widened: four levers of one wafer differ less than those of two makers.
-SCATTER_OF, _WIDENED = ("lever 1", "lever 2", "lever 3", "lever 4"), 1.5
 #: Relative spread of what the drawing says, and of a resistor that was measured.
 _DIMENSIONS, RESISTANCE = 0.05, 1e-3
 #: Of the base temperature (K): a room, or a hot plate and its thermocouple.
@@ -206,13 +201,7 @@ def published_material() -> dict[str, Prior]:
 
     Half as much again as that of the four levers, which are of one wafer.
     """
-    known = [published(name).material for name in SCATTER_OF]
-    logarithms = np.log([[getattr(material, name) for name in PARAMETERS] for material in known])
-    means, scatter = logarithms.mean(axis=0), logarithms.std(axis=0, ddof=1)
-    return {
-        name: Prior(float(np.exp(mean)), float(_WIDENED * spread))
-        for name, mean, spread in zip(PARAMETERS, means, scatter, strict=True)
-    }
+    return {name: Prior(*known) for name, known in PUBLISHED_SCATTER.items()}
 
 
 def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) -> dict[str, Prior]:

@@ -13,10 +13,9 @@ from pydantic import Field, SerializeAsAny, model_validator
 
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import write_text
-from hotlever.materials import HIGH_DOPED, LOW_DOPED, Kind, Material, full_name
-from hotlever.materials.foreign_laws import LAWS, own_laws, refuse_own_laws, with_laws_of
+from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind, Material, full_name
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
-from hotlever.materials.presets import materials_of
+from hotlever.materials.sections import LAWS, materials_of, own_laws, refuse_own_laws, with_laws_of
 from hotlever.probe.circuit import Circuit, Contact, Wiring
 from hotlever.probe.layout import Layout
 from hotlever.probe.prior_texts import PriorTexts
@@ -33,7 +32,7 @@ from hotlever.probe.shapes import (
 from hotlever.probe.surroundings import Surroundings
 from hotlever.probe.tip import Tip
 from hotlever.records import Record
-from hotlever.spieser2017 import DOI, published
+from hotlever.spieser2017 import DOI
 from hotlever.types import Array
 
 #: What the sections of a probe file hold, beside the shape in ``[probe]``.
@@ -65,7 +64,7 @@ class Probe(Record):
 
     shape: Shape
     circuit: Circuit = Circuit()
-    material: Material = published("option III").material
+    material: Material = REFERENCE
     materials: dict[str, SerializeAsAny[Kind]] = Field(default_factory=dict)
     surroundings: Surroundings = Surroundings()
     tip: Tip | None = None
@@ -175,7 +174,7 @@ class Probe(Record):
                     f'with material = "{name}"'
                 )
         parts: dict[str, Any] = {"shape": shape, _MATERIALS: materials}
-        usual = {"material": published("option III").material.model_dump()}
+        usual = {"material": REFERENCE.model_dump()}
         for name, part in _PARTS.items():
             if name in values:
                 section = {**usual.get(name, {}), **values[name]}

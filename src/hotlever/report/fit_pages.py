@@ -19,7 +19,7 @@ from hotlever.estimation.words import (
     uncertainty_tables,
 )
 from hotlever.lever import Lever
-from hotlever.materials.naming import INVERSION, sentence
+from hotlever.materials.parameters import INVERSION, sentence
 from hotlever.report.page import Block, Page
 
 #: Points of a curve without visible corners.

@@ -12,7 +12,7 @@ from hotlever.lever import Lever
 from hotlever.lever.transient import pulse, rise_times, simulate, spectrum, step, time_constants
 from hotlever.lever.transient.modes import Source
 from hotlever.lever.transient.sinusoidal import harmonics
-from hotlever.materials.naming import sentence
+from hotlever.materials.parameters import sentence
 from hotlever.report.page import Page
 from hotlever.steps import each
 from hotlever.types import Progress

@@ -15,7 +15,7 @@ from hotlever.errors import unknown_name
 from hotlever.lever import Lever
 from hotlever.materials import LOW_DOPED, full_name
 from hotlever.materials.doping import diffusion_length
-from hotlever.materials.naming import parameter_named
+from hotlever.materials.parameters import parameter_named
 from hotlever.probe import MeshOptions, Probe
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.steps import each

@@ -11,7 +11,7 @@ from hotlever.app.rooms.results import SHOWING, download_button
 from hotlever.app.rooms.room import MEDIA, REFERENCE, choice, field, several
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
-from hotlever.materials.naming import sentence
+from hotlever.materials.parameters import sentence
 from hotlever.text import value_with_error
 
 #: What a calibration rests on: the option of the command, and what it is called.

@@ -16,7 +16,7 @@ from hotlever.lever.reduced.response_surface import C_KAPPA, ParameterDomain, Re
 from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
 from hotlever.lever.sensitivities import Linearised
 from hotlever.materials import full_name
-from hotlever.materials.foreign_laws import own_laws
+from hotlever.materials.sections import own_laws
 from hotlever.probe import Probe
 from hotlever.probe.parameters import of_materials
 from hotlever.threads import one_blas_thread

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hotlever.lever import Lever
+from hotlever.materials import published
 from hotlever.probe import Probe
 from hotlever.report.page import Page
 from hotlever.report.reproduce import air, fits, thermometer, twins, vacuum
 from hotlever.report.reproduce.findings import Findings
-from hotlever.spieser2017 import published
 from hotlever.steps import each
 from hotlever.types import Progress
 

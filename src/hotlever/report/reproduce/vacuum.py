@@ -10,7 +10,7 @@ from hotlever import spieser2017 as paper
 from hotlever.calibration.power_law import EQ12, PowerLaw, fit_power_law
 from hotlever.lever import Lever
 from hotlever.lever.fields import FieldMapper, heater_profile
-from hotlever.materials import PARAMETERS
+from hotlever.materials import PARAMETERS, PUBLISHED
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import MeshOptions
 from hotlever.report.reproduce.findings import MANY, Findings
@@ -36,7 +36,7 @@ def probe_section(page: Findings) -> None:
 def parameter_section(page: Findings) -> None:
     """Tables I and II, and T_i from their values."""
     rows, away = [], []
-    for entry in paper.PUBLISHED.values():
+    for entry in PUBLISHED.values():
         material, error = entry.material, entry.standard_error
         ours = float(inversion_temperature(material.n_d, material.p))
         printed = entry.inversion_temperature_K

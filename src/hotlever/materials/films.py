@@ -1,4 +1,4 @@
-"""Metal films: resistivity by the temperature, and the heat that the electrons carry.
+"""Films on a lever: metals, which carry heat and current, and dielectrics, which carry heat alone.
 
 `T` is in K; units are cm, V, A, W and K. A film's resistivity is above that of the bulk metal and
 its temperature coefficient below: both are for a fit to find.
@@ -83,3 +83,37 @@ def constant_conductivity(T: ArrayLike, kappa: float) -> Evaluated:
     """Thermal conductivity that does not depend on the temperature, in W cm⁻¹ K⁻¹."""
     nothing = np.zeros_like(np.asarray(T, dtype=float))
     return nothing + kappa, {"T": nothing, "kappa": nothing + 1.0}
+
+
+@law(
+    meant_for=(290.0, 800.0),
+    source="power law; its values for SiO₂ and SiN are those of `hotlever.materials.presets`",
+)
+def dielectric_conductivity(T: ArrayLike, kappa: float, kappa_exponent: float) -> Evaluated:
+    """Thermal conductivity of an amorphous dielectric, κ₃₀₀ (T / 300 K)^m, in W cm⁻¹ K⁻¹.
+
+    In glasses it rises slowly: the heat capacity does, and the mean free path of the vibrations
+    hardly changes.
+
+    Parameters
+    ----------
+    T : array_like
+    kappa : float
+        κ₃₀₀, at 300 K.
+    kappa_exponent : float
+        m.
+
+    Examples
+    --------
+    >>> kappa, _ = dielectric_conductivity([300.0, 600.0], kappa=0.0138, kappa_exponent=0.33)
+    >>> (100 * kappa).round(2).tolist()  # W/(m K)
+    [1.38, 1.73]
+    """
+    hot = np.asarray(T, dtype=float) / 300.0
+    rise = hot**kappa_exponent
+    value = kappa * rise
+    return value, {
+        "T": kappa_exponent * value / (300.0 * hot),
+        "kappa": rise,
+        "kappa_exponent": value * np.log(hot),
+    }
