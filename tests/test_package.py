@@ -34,6 +34,7 @@ LAYERS = (
     ("studies",),
     ("figures",),
     ("report",),
+    ("tasks",),
     ("cli",),
 )
 

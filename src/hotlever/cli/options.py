@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import is_dataclass
 from inspect import Signature, signature
@@ -14,6 +13,7 @@ from typer import Argument, Option
 from hotlever.cli.output import note, progress
 from hotlever.errors import InputError, quoted, shown
 from hotlever.files import Outputs
+from hotlever.tasks.texts import parse_number, parse_settings
 from hotlever.units import LEAST_BIAS, MOST_BIAS
 
 if TYPE_CHECKING:
@@ -41,8 +41,6 @@ ColumnOption = Annotated[
         "or a file of such lines; repeated.",
     ),
 ]
-#: Of priors: those of a calibration, where none is stated.
-USUAL = "usual"
 PriorOption = Annotated[
     list[str] | None,
     Option(
@@ -195,110 +193,9 @@ def _parse_range(text: str, where: str, example: str, most: int) -> tuple[float,
     return start, stop, np.linspace(start, stop, int(parts[2]))
 
 
-def parse_number(text: str, where: str) -> float:
-    """Parse a finite number."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"{where}: found {quoted(text)}, expected a number")
-    return value
-
-
-def parse_priors(texts: list[str] | None, probe: Probe) -> dict[str, str] | None:
-    """Split and check ``NAME=VALUE±SPREAD``; ``none`` alone is no prior at all, nothing is None.
-
-    Examples
-    --------
-    >>> from hotlever import Probe
-    >>> parse_priors(["thickness_um=0.40±0.02"], Probe.reference())
-    {'thickness_um': '0.40±0.02'}
-    """
-    from hotlever.probe.priors import priors_of
-
-    if not texts:
-        return None
-    if texts == ["none"]:
-        return {}
-    texts = [text for text in texts if text != USUAL]
-    pairs: dict[str, str] = {}
-    for text in texts:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not equals:
-            raise InputError(
-                f"--prior {shown(text)}: expected NAME=VALUE±SPREAD, "
-                "NAME=VALUE×/FACTOR, usual, or none alone"
-            )
-        if name in pairs:
-            raise InputError(f"--prior {name}: given twice, expected once")
-        pairs[name] = value
-    priors_of(pairs, probe, "--prior")
-    return pairs
-
-
-def parse_settings(settings: list[str] | None, probe: Probe) -> dict[str, Any]:
-    """Parse ``NAME=VALUE`` for any key of a probe file: numbers, switches and words.
-
-    A key may have its section before it, and ``none`` leaves out what a file may leave out.
-
-    Examples
-    --------
-    >>> from hotlever import Probe
-    >>> probe = Probe.reference()
-    >>> parse_settings(["a0=9e-4", "chip=true", "medium=air", "tip.height_um=0.7"], probe)
-    {'a0': 0.0009, 'chip': True, 'medium': 'air', 'tip.height_um': 0.7}
-    """
-    values: dict[str, Any] = {}
-    for one in settings or []:
-        name, equals, text = (part.strip() for part in one.partition("="))
-        where = f"--set {name}"
-        if not equals:
-            raise InputError(f"--set {one}: expected NAME=VALUE")
-        section, key, record = probe.field(name)
-        if any(probe.field(other)[:2] == (section, key) for other in values):
-            raise InputError(f"{where}: given twice, expected once")
-        field = record.model_fields.get(key)
-        kinds = () if field is None else (field.annotation, *get_args(field.annotation))
-        if bool in kinds:
-            if text not in ("true", "false"):
-                raise InputError(f"{where}: found {quoted(text)}, expected true or false")
-            values[name] = text == "true"
-        elif type(None) in kinds and text == "none":
-            values[name] = None
-        elif any(text in get_args(kind) for kind in kinds):
-            values[name] = text
-        elif float in kinds or (field is None and section == "probe"):
-            values[name] = parse_number(text, where)
-        else:
-            values[name] = text.strip("\"'")
-    return values
-
-
 def check_number(option: str, value: float | None, least: float, most: float) -> None:
     """Refuse a number out of bounds."""
     if value is not None and not least <= value <= most:
         # what is too long for a float is quoted as it stands
         found = f"{value:g}" if abs(value) < 1e300 else quoted(value)
         raise InputError(f"{option} {found}: expected a number from {least:g} to {most:g}")
-
-
-def parse_values(
-    option: str, settings: list[str] | None, bare: bool = False
-) -> dict[str, float | None]:
-    """Parse ``NAME=VALUE`` pairs, or bare names where these are allowed.
-
-    Examples
-    --------
-    >>> parse_values("--fix", ["n_d=3.3e17", "p"], bare=True)
-    {'n_d': 3.3e+17, 'p': None}
-    """
-    values: dict[str, float | None] = {}
-    for one in settings or []:
-        name, equals, value = (part.strip() for part in one.partition("="))
-        if not (equals or bare):
-            raise InputError(f"{option} {one}: expected NAME=VALUE")
-        if name in values:
-            raise InputError(f"{option} {name}: given twice, expected once")
-        values[name] = parse_number(value, f"{option} {name}") if equals else None
-    return values

@@ -98,14 +98,18 @@ def tell_table(rows: Sequence[Sequence[str]]) -> None:
     from hotlever.text import aligned
 
     cells = [[_printable(cell) for cell in row] for row in rows]
-    if show("table", cells):
+    if _shown("table", cells):
         return
     for line in aligned(cells):
         _say(line)
 
 
-def show(what: str, content: Any) -> bool:
-    """Show what a terminal cannot draw to who listens; return whether somebody does."""
+def show(what: str, content: Any) -> None:
+    """Show what a terminal cannot draw to who listens."""
+    _shown(what, content)
+
+
+def _shown(what: str, content: Any) -> bool:
     listener = _listener.get()
     if listener is not None:
         listener.shown(what, content)

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import typer
 from typer import Argument, Option
 
+from hotlever.cli import output as terminal
 from hotlever.cli.application import Commands, app
 from hotlever.cli.options import File, PlotFile, ProbeFile, check_plot, load_probe
-from hotlever.cli.output import give, note
+from hotlever.cli.output import give
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import Outputs
 
@@ -85,9 +86,7 @@ def import_command(
 ) -> None:
     """Say what a drawing holds, and propose a probe file for it."""
     from hotlever.drawing.extent import UNITS
-    from hotlever.drawing.fault import DrawingError
-    from hotlever.drawing.importing import import_drawing
-    from hotlever.files import write_text
+    from hotlever.tasks.importing import propose_probe
 
     name = None if unit is None else unit.replace("µ", "u").replace("μ", "u")
     if name is not None and name not in UNITS:
@@ -96,25 +95,7 @@ def import_command(
     outputs = Outputs(drawing)
     outputs.file(output, ".toml")
     check_plot(outputs, plot)
-    found = import_drawing(drawing, cell, Path() if output is None else output.parent, name)
-    fault = found.fault
-    with outputs.together():
-        if output is not None:
-            write_text(output, found.text)
-        if plot is not None:
-            from hotlever import figures
-
-            place = fault.place if isinstance(fault, DrawingError) else None
-            title, wrong = drawing.name, "" if place is None else str(fault)
-            tip = found.proposal.tip
-            made = figures.outlines_drawing(
-                found.outlines, title, tip=tip, fault=wrong, place=place
-            )
-            figures.save_figure(made, plot)
-    give(found.text if output is None else "\n".join([*found.listing, ""]))
-    note(*found.notes)
-    if fault is not None:
-        note(f"the probe file needs an edit before it can be solved: {fault}")
+    propose_probe(terminal, drawing, cell, name, outputs, output, plot)
 
 
 @contextmanager

@@ -89,30 +89,14 @@ def raman_command(
     ),
 ) -> None:
     """Find the silicon line in Raman spectra and, calibrated, the temperature."""
-    from hotlever.raman.series import to_csv
+    from hotlever.tasks.spectra import Files, measure_spectra
 
     outputs = Outputs(*spectra, *thermometer.files)
     check_plot(outputs, plot)
     outputs.file(save_calibration)
     outputs.file(output)
-    setup = thermometer.set_up()
-    if save_calibration is not None and setup.calibration is None:
-        raise InputError("--save-calibration: there is no calibration; give --calibrate-from")
-    lines, table = setup.measure(spectra)
-    with outputs.together():
-        if plot is not None:
-            from hotlever import figures
-
-            if len(lines) == 1 and setup.calibration is None:
-                figure = figures.one_spectrum(lines[0])
-            else:
-                figure = figures.thermometry(lines, table, setup.calibration, setup.hot_plate)
-            figures.save_figure(figure, plot)
-        if save_calibration is not None and setup.calibration is not None:
-            setup.calibration.save(save_calibration)
-        if output is not None:
-            write_text(output, to_csv(table))
-    _answer(to_csv(table), output)
+    files = Files(output, plot, save_calibration)
+    _answer(measure_spectra(thermometer.set_up(), spectra, outputs, files), output)
 
 
 @app.command("join", cls=SeveralFiles)

@@ -1,0 +1,44 @@
+"""Drawings that become probe files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hotlever.drawing.fault import DrawingError
+from hotlever.drawing.importing import import_drawing
+from hotlever.files import Outputs, write_text
+from hotlever.tasks.reporter import Reporter
+
+
+def propose_probe(
+    reporter: Reporter,
+    drawing: Path,
+    cell: str | None,
+    unit: str | None,
+    outputs: Outputs,
+    output: Path | None,
+    plot: Path | None,
+) -> None:
+    """Say what a drawing holds, and propose a probe file for it."""
+    folder = Path() if output is None else output.parent
+    proposed = import_drawing(drawing, cell, folder, unit)
+    fault = proposed.fault
+    with outputs.together():
+        if output is not None:
+            write_text(output, proposed.text)
+        if plot is not None:
+            from hotlever import figures
+
+            place = fault.place if isinstance(fault, DrawingError) else None
+            figure = figures.outlines_drawing(
+                proposed.outlines,
+                drawing.name,
+                tip=proposed.proposal.tip,
+                fault="" if place is None else str(fault),
+                place=place,
+            )
+            figures.save_figure(figure, plot)
+    reporter.give(proposed.text if output is None else "\n".join([*proposed.listing, ""]))
+    reporter.note(*proposed.notes)
+    if fault is not None:
+        reporter.note(f"the probe file needs an edit before it can be solved: {fault}")
