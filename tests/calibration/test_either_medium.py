@@ -12,7 +12,7 @@ import pytest
 from hotlever.calibration.procedure import calibrate
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.either_medium import likelier
+from hotlever.estimation.inverse_problem import likelier
 from hotlever.estimation.residuals import Residuals
 from synthetic_curves import measured_curve, measurement_of
 

@@ -9,9 +9,9 @@ import pytest
 from test_fit import TRUTH, twin
 
 from hotlever.estimation import FitOptions, fit
-from hotlever.estimation.drift import Drift
 from hotlever.estimation.experiment_at_rest import reduced_experiment
 from hotlever.estimation.inverse_problem import estimate
+from hotlever.estimation.noise import Drift
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,10 @@ import pytest
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit, read_fit
 from hotlever.estimation.inverse_problem import estimate
+from hotlever.estimation.noise import CommonError, errors_of_scales
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.residuals import Residuals
-from hotlever.estimation.scales import CommonError, errors_of_scales
-from hotlever.estimation.words import fit_text
+from hotlever.estimation.summary import fit_text
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 
 from hotlever.calibration.inference import error_of_model
-from hotlever.estimation.coordinates import Coordinates
-from hotlever.estimation.objective import Objective
+from hotlever.estimation.objective import Objective, Pull, TipTemperature
 from hotlever.estimation.posterior import Posterior
-from hotlever.estimation.prior_density import PriorDensity
+from hotlever.estimation.prior_density import Coordinates, PriorDensity
 from hotlever.estimation.profile import ErrorProfile, profile_of_tip
-from hotlever.estimation.quantity import Pull, TipTemperature
 from hotlever.estimation.sampling import SampledTip, sample_tip
 from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe.priors import Prior
@@ -50,7 +48,7 @@ class OneUnknown(Objective):
             weighted=lambda values: np.zeros(0),
             jacobian=lambda slopes: np.zeros((0, 1)),
         )
-        self.prior = PriorDensity.independent({"x": Prior(0.0, 1.0, relative=False)})
+        self.prior = PriorDensity.of_priors({"x": Prior(0.0, 1.0, relative=False)})
         self._of_prior, self._pull = [0], None
 
     def values(self, probe):

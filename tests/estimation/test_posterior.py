@@ -9,8 +9,7 @@ import pytest
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Measurement, fit, uncertainty
-from hotlever.estimation.chains import effective_sample_size, split_rhat
-from hotlever.estimation.ensembles import Gaussian, sample
+from hotlever.estimation.chains import Gaussian, effective_sample_size, sample, split_rhat
 from hotlever.estimation.experiment_at_rest import experiment_of, reduced_experiment
 from hotlever.estimation.profile import profile_likelihood
 from hotlever.estimation.sampling import SampledLever, predictive_band, sample_posterior
@@ -237,7 +236,7 @@ def test_what_was_known_to_a_factor_is_compared_in_logarithms():
     known = Prior(1e18, np.log(1.5))
     fitted = SimpleNamespace(value=1.5e18, stderr=4.5e17)
     fit = SimpleNamespace(
-        probe=Probe.reference(), parameters={"n_d": fitted}, known_before={"n_d": known}
+        probe=Probe.reference(), parameters={"n_d": fitted}, stated_priors={"n_d": known}
     )
     normal = np.random.default_rng(0).standard_normal(4000)
     told = "n_d is as known before: these data do not tell"

@@ -16,7 +16,7 @@ def test_the_slope_is_that_of_the_deviation(share, spread, relative):
     prior = Prior(2.0, spread, relative)
     value, step = 2.0 * share, 1e-6 * share
     slope = (prior.deviation(value + step) - prior.deviation(value - step)) / (2 * step)
-    density = PriorDensity.independent({"a": prior})
+    density = PriorDensity.of_priors({"a": prior})
     assert density.deviations(np.array([value]))[0] == pytest.approx(prior.deviation(value))
     assert density.slopes(np.array([value]))[0, 0] == pytest.approx(slope, rel=1e-4)
     assert prior.deviation(2.0) == 0.0
@@ -47,7 +47,7 @@ def test_what_may_be_zero_is_no_logarithm_in_a_joint_prior():
 
 def test_densities_of_different_parameters_are_independent():
     values, covariance = np.array([2.0, 5.0]), np.array([[0.04, 0.03], [0.03, 0.09]])
-    own = PriorDensity.independent({"c": Prior(1.0, 0.5), "d": Prior(0.0, 2.0, relative=False)})
+    own = PriorDensity.of_priors({"c": Prior(1.0, 0.5), "d": Prior(0.0, 2.0, relative=False)})
     joint = PriorDensity.of_estimate(["a", "b"], values, covariance, np.array([True, True]))
     both, here = own.beside(joint), np.array([1.2, 3.0, 2.1, 4.9])
     parts = [own.deviations(here[:2]), joint.deviations(here[2:])]

@@ -17,9 +17,8 @@ from hotlever.estimation.experiment_at_rest import ExperimentAtRest, full_experi
 from hotlever.estimation.inverse_problem import estimate
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser
-from hotlever.estimation.options import FitOptions
+from hotlever.estimation.options import FitOptions, SearchOptions
 from hotlever.estimation.residuals import Residuals
-from hotlever.estimation.search_options import SearchOptions
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.materials import PARAMETERS

@@ -25,7 +25,7 @@ from hotlever.calibration.summary import calibration_text
 from hotlever.datasets import OBSERVABLES, QUANTITIES
 from hotlever.errors import InputError
 from hotlever.estimation import Fit, read_fit, read_measurement
-from hotlever.estimation.words import parameter_rows
+from hotlever.estimation.summary import parameter_rows
 from hotlever.lever.meshing import chosen_space
 from hotlever.lever.transient.waveform_texts import waveform_from_text
 from hotlever.materials.parameters import sentence

@@ -16,11 +16,11 @@ from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseCalibration, PulseSection
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
-from hotlever.estimation.outcome import Outcome
-from hotlever.estimation.result_file import (
+from hotlever.estimation.outcome import (
     IF_ANY,
     Columns,
     MeasurementSection,
+    Outcome,
     ResultFile,
     Vector,
     array,

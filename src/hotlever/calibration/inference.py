@@ -18,10 +18,10 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, FitOptions, Measurement
 from hotlever.estimation.experiment_at_rest import PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate, estimate
+from hotlever.estimation.objective import TIP
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.profile import profile_of_tip
-from hotlever.estimation.quantity import TIP
 from hotlever.lever import Branch
 from hotlever.lever.curve import spline_through
 from hotlever.materials import Material

@@ -24,7 +24,7 @@ from hotlever.calibration.knee import (
 )
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation.scales import METERS
+from hotlever.estimation.noise import METERS
 from hotlever.lever import Branch, OperatingPoint
 from hotlever.lever.branch import Reach, shifted
 from hotlever.lever.curve import spline_through

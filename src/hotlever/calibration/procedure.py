@@ -29,11 +29,10 @@ from hotlever.calibration.pulses import PulseTiming, pulse_calibration
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.either_medium import error_of_choice, likelier
-from hotlever.estimation.inverse_problem import Estimate
+from hotlever.estimation.inverse_problem import Estimate, error_of_choice, likelier
 from hotlever.estimation.lack_of_fit import suspicious_points
+from hotlever.estimation.objective import TIP
 from hotlever.estimation.options import UNKNOWN_MEDIUM
-from hotlever.estimation.quantity import TIP
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import given_measurement, with_measured_circuit
@@ -79,7 +78,7 @@ def calibrate(
         heats.
     medium : {"vacuum", "air", "unknown"}, optional
         What the lever is in; by default what the data file says, or else the fit or the probe. If
-        it is unknown both are tried (`hotlever.estimation.either_medium`).
+        it is unknown both are tried (`hotlever.estimation.inverse_problem`).
         With vacuum for data from air the paper's rule is used: the temperatures that the probe has
         in vacuum, at k times the power.
     priors : mapping of str to Prior or str, optional

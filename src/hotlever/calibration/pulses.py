@@ -22,7 +22,7 @@ from hotlever.calibration.inference import error_of_model, measured_range, share
 from hotlever.datasets import csv_text, labelled
 from hotlever.errors import ComputationError, InputError, unknown_name
 from hotlever.estimation.inverse_problem import Estimate
-from hotlever.estimation.result_file import Number, Section, array
+from hotlever.estimation.outcome import Number, Section, array
 from hotlever.lever import Lever
 from hotlever.lever.equations import BASE
 from hotlever.lever.lever import COARSE

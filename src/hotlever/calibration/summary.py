@@ -7,7 +7,7 @@ import xarray as xr
 
 from hotlever.calibration.calibration import Calibration
 from hotlever.calibration.pulses import PulseCalibration
-from hotlever.estimation.words import NEAREST, prior_lines
+from hotlever.estimation.summary import NEAREST, prior_lines
 from hotlever.text import aligned, significant, value_with_error
 from hotlever.types import Array
 

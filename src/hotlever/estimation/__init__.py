@@ -2,13 +2,14 @@
 
 ==============  ====================================================================================
 forward map     `experiment`: at rest, in time; `load_lines`, and the `surrogate` of a solved lever
-noise model     `residuals`: `noise`, `drift`, and the `scales` that data have in common
+noise model     `residuals`: `noise`, drift, and the scales that data have in common
 prior           `hotlever.probe.priors`, together a `prior_density`
-optimiser       of an `objective`: `optimiser`, its `subproblem`, `convergence`; where a `search`
-                begins; what steers it, `search_options`
-posterior       `posterior`: of any `quantity`, linearised; its `profile`; `sampling`
+optimiser       of an `objective`: `optimiser`, its `subproblem`; where a `search` begins
+posterior       `posterior`: of any quantity, linearised; its `profile`; `sampling` by `chains`
 diagnosis       `lack_of_fit`; `diagnosis` by `hypotheses`
-answers         `inverse_problem` puts all that together; `estimator` makes a fit of it
+problem         `inverse_problem` puts all that together, as `options` ask
+answers         `estimator` makes a fit of it: a `result`, an `outcome` as calibrations are, with
+                `summary` and `uncertainty`; a `batch` of fits, and their `levers` compared
 ==============  ====================================================================================
 """
 

@@ -12,15 +12,14 @@ import xarray as xr
 
 from hotlever.errors import unknown_name
 from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.either_medium import error_of_choice, likelier
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.experiment_in_time import PredictionInTime
-from hotlever.estimation.inverse_problem import Estimate, estimate
+from hotlever.estimation.inverse_problem import Estimate, error_of_choice, estimate, likelier
 from hotlever.estimation.lack_of_fit import suspicious_points, undescribed
+from hotlever.estimation.objective import TIP
 from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
-from hotlever.estimation.quantity import TIP
 from hotlever.estimation.result import Fit, band_dataset
-from hotlever.estimation.words import undetermined
+from hotlever.estimation.summary import undetermined
 from hotlever.measurement import Measurement, given_measurement
 from hotlever.probe import Probe
 from hotlever.types import Array, Progress
@@ -100,6 +99,7 @@ def _fit_of(estimate: Estimate) -> Fit:
     """Return what users are given of an estimate."""
     options, residuals, prediction = estimate.options, estimate.residuals, estimate.prediction
     values, posterior = prediction.values, estimate.posterior
+    in_time = estimate.measurement.time_us is not None
     notes = suspicious_points(residuals, values, options.robust)
     notes += residuals.drifting_zeros(values, posterior.slopes)
     chi_square = residuals.reduced_chi_square(values, len(options.varied))
@@ -128,7 +128,7 @@ def _fit_of(estimate: Estimate) -> Fit:
         reason=reason,
         converged=converged,
         seconds=estimate.seconds,
-        priors=estimate.priors(priors) if (priors := estimate.known) else {},
+        priors=estimate.priors(options.stated_priors(estimate.probe, in_time=in_time)),
         notes=[*estimate.notes, *notes],
     )
     return replace(result, notes=[*result.notes, *undetermined(result)])

@@ -1,4 +1,7 @@
-"""The inverse problem: what priors and a measurement make most likely of a lever."""
+"""The inverse problem: what priors and a measurement make most likely of a lever.
+
+Of a lever whose medium nobody knows both are tried, and it is said which describes the data.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,13 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Generic, NamedTuple, TypeVar, get_args
 
 import numpy as np
 
 from hotlever import memory
 from hotlever.datasets import OBSERVABLES
-from hotlever.errors import InputError
+from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.experiment_at_rest import (
     ExperimentAtRest,
@@ -19,13 +23,14 @@ from hotlever.estimation.experiment_at_rest import (
     experiment_of,
 )
 from hotlever.estimation.experiment_in_time import ExperimentInTime, known_in_time
+from hotlever.estimation.noise import errors_of_scales
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser, Optimum
 from hotlever.estimation.options import FitOptions
+from hotlever.estimation.outcome import Outcome
 from hotlever.estimation.posterior import Posterior
-from hotlever.estimation.prior_density import PriorDensity
+from hotlever.estimation.prior_density import FLAT, PriorDensity
 from hotlever.estimation.residuals import Residuals
-from hotlever.estimation.scales import errors_of_scales
 from hotlever.estimation.search import Search
 from hotlever.lever.branch import Branch
 from hotlever.measurement import (
@@ -36,12 +41,11 @@ from hotlever.measurement.averages import averaged, note_on_averages
 from hotlever.probe import Probe
 from hotlever.probe.priors import (
     ALL_DIMENSIONS,
-    SCALES,
     Prior,
     PriorUse,
     default_priors,
-    priors_of,
 )
+from hotlever.probe.surroundings import Medium
 from hotlever.types import Array, Progress
 
 #: The share of the sum of squares that another step would take away, below which a search that has
@@ -90,12 +94,6 @@ class Estimate:
     def posterior(self) -> Posterior:
         """What is known of its parameters, and of any quantity of it."""
         return Posterior(self.objective, self.prediction)
-
-    @property
-    def known(self) -> dict[str, Prior]:
-        """The priors that were asked for."""
-        in_time = self.measurement.time_us is not None
-        return priors_of(self.options.priors, self.probe, "priors", in_time=in_time)
 
     def priors(self, known: Mapping[str, Prior]) -> dict[str, PriorUse]:
         """Return what was known before, and what the data made of it."""
@@ -146,7 +144,7 @@ def estimate(
     given: Probe,
     options: FitOptions,
     *,
-    before: PriorDensity | None = None,
+    before: PriorDensity = FLAT,
     model: Callable[[Probe, Array], Experiment] | None = None,
     progress: Progress | None = None,
     seen: Callable[[Prediction], None] | None = None,
@@ -167,7 +165,7 @@ def estimate(
     probe, notes = with_measured_circuit(given, measurement, options.medium)
     notes += note_on_averages(whole, measurement)
     options = options.of(probe, in_time=in_time)
-    priors = priors_of(options.priors, probe, "priors", in_time=in_time)
+    priors = options.stated_priors(probe, in_time=in_time)
     without_effect = [name for name in options.priors if name not in (*priors, ALL_DIMENSIONS)]
     if without_effect:
         notes.append(
@@ -181,7 +179,7 @@ def estimate(
     if in_time:
         priors, more = known_in_time(probe, measurement, priors, options.varied)
         options, notes = replace(options, priors=priors), notes + more
-    informed = bool(priors) or before is not None
+    informed = bool(priors) or bool(before.names)
     enough = int(np.isfinite(measurement.current_mA).sum()) >= _ENOUGH
     options = replace(options, robust=options.robust or (enough and informed))
     observables = _observables(options, measurement, probe, notes)
@@ -196,12 +194,12 @@ def estimate(
             f"{len(options.varied)} parameters; fix some or measure at more "
             f"{'times' if in_time else 'biases'}"
         )
-    own = {name: prior for name, prior in priors.items() if name not in SCALES}
-    density = PriorDensity.independent(own) if own else None
-    if before is not None:
-        density = before if density is None else density.beside(before)
-    start = options.held(probe.replace({name: prior.value for name, prior in own.items()}))
-    search = Search(residuals, start, options.varied, options.robust, density, progress, seen)
+    density = PriorDensity.of_priors(priors)
+    known = zip(density.names, density.values.tolist(), strict=True)
+    start = options.held(probe.replace(dict(known)))
+    search = Search(
+        residuals, start, options.varied, options.robust, density.beside(before), progress, seen
+    )
     if measurement.waveform is not None:
         follow = partial(ExperimentInTime.of, waveform=measurement.waveform, names=options.varied)
         optimiser, optimum = search.near((model or follow)(probe, residuals.along), start)
@@ -238,3 +236,73 @@ def _observables(
                 f"{', '.join(measurement.observables)}"
             )
     return tuple(options.observables)
+
+
+Answer = TypeVar("Answer", bound=Outcome)
+
+
+class Likelier(NamedTuple, Generic[Answer]):
+    """Answers for a lever in either medium.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        That the answer is read from.
+    answer : Outcome
+        The one that describes the data, or describes them better.
+    other : Outcome or None
+        That in the other medium, if it describes the data too: they do not tell which it is.
+    words : str
+        How well either describes them.
+    """
+
+    estimate: Estimate
+    answer: Answer
+    other: Answer | None
+    words: str
+
+
+def likelier(answered: Callable[[Medium], tuple[Estimate, Answer]]) -> Likelier[Answer]:
+    """Answer for a lever in either medium.
+
+    Raises
+    ------
+    ComputationError
+        If the lever can be solved in neither.
+    """
+    tried: dict[Medium, tuple[Estimate, Answer]] = {}
+    failed: dict[Medium, ComputationError] = {}
+    for medium in get_args(Medium):
+        try:
+            tried[medium] = answered(medium)
+        except ComputationError as error:
+            failed[medium] = error
+    if not tried:
+        raise next(iter(failed.values()))
+
+    def unlikeliness(medium: Medium) -> tuple[bool, float]:
+        # what describes the data comes first, and of two of a kind the more probable one
+        estimate, answer = tried[medium]
+        return bool(answer.reason), estimate.posterior.deviance
+
+    best, *rest = sorted(tried, key=unlikeliness)
+    said = [f"in {medium} a lever {_how_well(*tried[medium])}" for medium in (best, *rest)]
+    said += [f"in {medium} none can be solved: {error}" for medium, error in failed.items()]
+    words = f"the medium is not known: {'; '.join(said)}"
+    estimate, answer = tried[best]
+    others = [tried[medium][1] for medium in rest if not tried[medium][1].reason]
+    if not others:
+        return Likelier(estimate, answer, None, words)
+    words += "; the data do not tell which, and the errors of the tip temperature hold both"
+    return Likelier(estimate, answer, others[0], words)
+
+
+def error_of_choice(tip_K: Array, other_K: Array) -> Array:
+    """Return the standard error (K) of a tip temperature that may as well be another one."""
+    return np.asarray(np.abs(tip_K - other_K) / np.sqrt(2.0))
+
+
+def _how_well(estimate: Estimate, answer: Outcome) -> str:
+    rms = estimate.residuals.rms(estimate.prediction.values)
+    shown = ", ".join(f"{value:.2g} {name.rsplit('_', 1)[1]}" for name, value in rms.items())
+    return f"{'does not describe' if answer.reason else 'describes'} the data (rms {shown})"

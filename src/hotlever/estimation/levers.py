@@ -12,7 +12,8 @@ from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
 from hotlever.estimation.result import Fit
 from hotlever.materials import PARAMETERS
-from hotlever.materials.parameters import INVERSION, parameter_named
+from hotlever.materials.parameters import INVERSION, heading, parameter_named, scale_of
+from hotlever.text import aligned, value_with_error
 
 #: Levers are said to differ if equal ones would scatter as much less often than this.
 _RARE = 0.01
@@ -161,6 +162,41 @@ def _by_lever(chosen: xr.DataArray) -> list[tuple[str, str]]:
 def _listed(names: Iterable[str]) -> str:
     *first, last = ["inversion temperature" if name == INVERSION else name for name in names]
     return f"{', '.join(first)} and {last}" if first else str(last)
+
+
+def lever_rows(levers: xr.Dataset) -> list[list[str]]:
+    """Return the table of `compare_levers`: columns, levers, then the mean and the scatter."""
+    names = levers.quantity.values.tolist()
+    rows = [["lever", *map(heading, names)]]
+    labels = [*levers.lever.values.tolist(), "weighted mean"]
+    values = np.vstack([levers.value, levers["mean"]])
+    errors = np.vstack([levers.stderr, levers.mean_stderr])
+    for label, *numbers in zip(labels, values.tolist(), errors.tolist(), strict=True):
+        cells = zip(names, *numbers, strict=True)
+        rows.append([str(label), *(_with_error(*cell) for cell in cells)])
+    scatter = levers.scatter.values
+    for label, numbers, form in (
+        ("scatter between levers", scatter / [scale_of(name) for name in names], ".3g"),
+        ("scatter, relative", scatter / np.abs(levers["mean"].values), ".1%"),
+        ("Birge ratio", levers.birge_ratio.values, ".2g"),
+    ):
+        rows.append(
+            [label, *("" if np.isnan(number) else f"{number:{form}}" for number in numbers)]
+        )
+    return rows
+
+
+def _with_error(name: str, value: float, stderr: float) -> str:
+    if np.isnan(value):
+        return ""
+    return value_with_error(value, stderr, scale_of(name), parameter_named(name).bounds)
+
+
+def levers_text(levers: xr.Dataset) -> str:
+    """Return the table of many levers and what follows from it as lines of text."""
+    lines = aligned(lever_rows(levers))
+    lines.insert(1 + levers.sizes["lever"], "-" * max(map(len, lines)))
+    return "\n".join(lines + statements(levers))
 
 
 def levers_csv(levers: xr.Dataset) -> str:

@@ -1,23 +1,78 @@
-"""What a fit makes small: data and priors as residuals of the parameters that it varies."""
+"""What an estimate makes small: data, priors and a pull, as residuals of what is varied."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from hotlever.estimation.coordinates import Coordinates
 from hotlever.estimation.experiment import Prediction
-from hotlever.estimation.prior_density import PriorDensity
-from hotlever.estimation.quantity import Pull
+from hotlever.estimation.prior_density import FLAT, Coordinates, PriorDensity
 from hotlever.estimation.residuals import Residuals
 from hotlever.probe import Probe
 from hotlever.types import Array
 
-if TYPE_CHECKING:
-    from hotlever.estimation.result import Fit
+#: Where predictions have the tip temperature; see `hotlever.datasets.OBSERVABLES`.
+TIP = 2
+
+
+class Quantity(Protocol):
+    """A number that follows from a lever."""
+
+    def value(self, values: Array, parameters: Array) -> float:
+        """Return it for predicted values (3, n) and the varied parameters (p,)."""
+        ...
+
+    def gradient(self, slopes: Array) -> Array:
+        """Return its derivatives by the parameters, (p,), for those of the values (3, n, p)."""
+        ...
+
+
+@dataclass(frozen=True)
+class TipTemperature:
+    """The tip temperature (K) at a row of the data."""
+
+    row: int
+
+    def value(self, values: Array, parameters: Array) -> float:
+        """See `Quantity`."""
+        return float(values[TIP, self.row])
+
+    def gradient(self, slopes: Array) -> Array:
+        """See `Quantity`."""
+        return np.asarray(slopes[TIP, self.row])
+
+
+@dataclass(frozen=True)
+class ParameterValue:
+    """One of the varied parameters, by its number, in its own unit."""
+
+    number: int
+
+    def value(self, values: Array, parameters: Array) -> float:
+        """See `Quantity`."""
+        return float(parameters[self.number])
+
+    def gradient(self, slopes: Array) -> Array:
+        """See `Quantity`."""
+        return np.asarray(np.arange(slopes.shape[-1]) == self.number, dtype=float)
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A further datum that pulls a quantity to a value, by an error in its unit.
+
+    The optimum with it lies on the profile likelihood of the quantity: of all levers with its
+    value there, it is the one nearest to data and priors.
+    """
+
+    quantity: Quantity
+    target: float
+    error: float
+
 
 #: Scaled residual given to trial parameters for which the lever has no state, so that a search
 #: turns back.
@@ -36,8 +91,8 @@ class Objective:
         Parameters of the derivatives of predictions.
     varied : list of str
         Those of them that are varied.
-    prior : PriorDensity, optional
-        Of some of these; with it residuals count standard deviations.
+    prior : PriorDensity
+        Of some of these; unless it is flat residuals count standard deviations.
 
     Attributes
     ----------
@@ -55,29 +110,20 @@ class Objective:
         probe: Probe,
         names: Sequence[str],
         varied: list[str],
-        prior: PriorDensity | None = None,
+        prior: PriorDensity = FLAT,
     ) -> None:
         self.residuals, self.names, self.varied, self.prior = residuals, tuple(names), varied, prior
         self.columns = [self.names.index(name) for name in varied]
-        logarithms: list[str] = []
-        self._of_prior: list[int] = []
-        if prior is not None:
-            self._of_prior = [varied.index(name) for name in prior.names]
-            logarithms = np.array(prior.names)[prior.relative].tolist()
-        self.coordinates = Coordinates.of(probe, varied, logarithms)
+        self._of_prior = [varied.index(name) for name in prior.names]
+        logarithms = np.array(prior.names, dtype=str)[prior.relative]
+        self.coordinates = Coordinates.of(probe, varied, logarithms.tolist())
         self.bounds = self.coordinates.bounds
         self._pull: Pull | None = None
-
-    @classmethod
-    def of_fit(cls, fit: Fit, names: Sequence[str]) -> Objective:
-        """Return what a fit has made small, by derivatives by some parameters."""
-        prior = PriorDensity.independent(fit.known_before) if fit.known_before else None
-        return cls(fit.residuals(), fit.probe, names, fit.names, prior)
 
     @property
     def informed(self) -> bool:
         """Whether there are priors."""
-        return self.prior is not None
+        return bool(self.prior.names)
 
     def pulled(self, pull: Pull) -> Objective:
         """Return the same with a further datum."""
@@ -154,14 +200,10 @@ class Objective:
 
     def from_priors(self, point: Array) -> Array:
         """Return how far parameters are from their priors, in standard deviations."""
-        if self.prior is None:
-            return np.empty(0)
         return self.prior.deviations(self.coordinates.values(point)[self._of_prior])
 
     def of_priors(self, point: Array) -> Array:
         """Return the derivatives of `from_priors` by the coordinates."""
-        if self.prior is None:
-            return np.empty((0, point.size))
         values = self.coordinates.values(point)[self._of_prior]
         rows = np.zeros((values.size, point.size))
         rows[:, self._of_prior] = self.prior.slopes(values)
@@ -193,8 +235,7 @@ class Objective:
         """
         rates, values = self.coordinates.rates(point), self.coordinates.values(point)
         logarithmic = np.zeros(point.size, dtype=bool)
-        if self.prior is not None:
-            logarithmic[self._of_prior] = self.prior.relative
+        logarithmic[self._of_prior] = self.prior.relative
         return float(np.sum(np.log(np.where(logarithmic, rates / values, rates))))
 
 

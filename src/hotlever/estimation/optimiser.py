@@ -15,16 +15,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.estimation.convergence import decrement, tolerance
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.objective import Objective, inverse_or_nan
-from hotlever.estimation.search_options import SearchOptions
+from hotlever.estimation.options import SearchOptions
 from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe import Probe
 from hotlever.types import Array, Progress
 
 #: Branches that most searches need, for a progress bar to fill.
 _USUAL_BRANCHES = 8
+#: Share of the range between its bounds within which a parameter is at one of them.
+_AT_BOUND = 1e-5
 
 
 @dataclass(frozen=True)
@@ -281,3 +282,35 @@ class Optimiser:
         if self._seen is not None:
             self._seen(prediction)
         return prediction
+
+
+def decrement(objective: Objective, at: Prediction) -> float:
+    """Return by how much Gauss and Newton's step would lower the sum of squares.
+
+    Parameters at their bounds, beyond which it leads, stay there.
+    """
+    point, residual, jacobian = objective.linearised(at)
+    low, high = objective.bounds
+    margin = _AT_BOUND * (high - low)
+    free = np.ones(point.size, dtype=bool)
+    for _ in range(point.size):
+        step = np.zeros(point.size)
+        step[free] = np.linalg.lstsq(jacobian[:, free], -residual)[0]
+        held = ((point <= low + margin) & (step < 0)) | ((point >= high - margin) & (step > 0))
+        if not (held & free).any():
+            break
+        free &= ~held
+    return float(residual @ residual - np.sum((residual + jacobian @ step) ** 2))
+
+
+def tolerance(objective: Objective, at: Prediction, options: SearchOptions) -> float:
+    """Return by how much the sum of squares may still fall where a search ends."""
+    residuals, squares = objective.residuals, objective.squares(at)
+    noise = 1.0 if objective.informed else residuals.noise_squares(at.values)
+    # so far above what noise explains that no lever is near
+    hopeless = squares > options.misfit * residuals.size * noise
+    least = (options.negligible_of_misfit if hopeless else options.negligible) * squares
+    if objective.informed:
+        return float(max(options.decrement, least))
+    precise = residuals.size * (options.precision * residuals.unit_weight) ** 2
+    return float(max(options.relative_decrement * noise, least, precise))

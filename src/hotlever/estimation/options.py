@@ -1,4 +1,4 @@
-"""What a fit is asked: the one set of options of `fit`, of batches and of the command line."""
+"""What a fit is asked, by users (`FitOptions`), and what steers its search (`SearchOptions`)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hotlever.probe.parameters import (
     parameter_of,
     usual_parameters,
 )
-from hotlever.probe.priors import SCALES, Prior
+from hotlever.probe.priors import SCALES, Prior, priors_of
 from hotlever.probe.surroundings import Medium
 
 Weights = Literal["maximum", "errors"]
@@ -47,7 +47,7 @@ class FitOptions:
         Let the zeros of I_h and V_r lie on straight lines over the order of the rows.
     medium : {"vacuum", "air", "unknown"}, optional
         What the lever was measured in; wins over measurement and probe. If it is unknown both are
-        tried (`hotlever.estimation.either_medium`).
+        tried (`hotlever.estimation.inverse_problem`).
     priors : mapping of str to Prior or str
         What is known before, of parameters of the material, dimensions, the circuit or the scales
         of meters, also as text (`hotlever.probe.priors`); all that have a prior are varied.
@@ -132,6 +132,16 @@ class FitOptions:
         usual = heat_capacities(probe) if in_time else usual_parameters(probe)
         return replace(self, usual=usual)
 
+    def stated_priors(self, probe: Probe, *, in_time: bool = False) -> dict[str, Prior]:
+        """Return the priors of what counts for a probe, those in words included.
+
+        Raises
+        ------
+        InputError
+            If a name does not exist (with the nearest that does) or a text is no prior.
+        """
+        return priors_of(self.priors, probe, "priors", in_time=in_time)
+
     @property
     def media(self) -> tuple[Medium | None, ...]:
         """What is to be tried: None is what measurement and probe say."""
@@ -157,3 +167,77 @@ class FitOptions:
         if tuple(found.pop("usual")) != tuple(PARAMETERS):
             found["usual"] = list(self.usual)
         return found
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """What steers a search.
+
+    Attributes
+    ----------
+    most_branches, most_in_all : int
+        Levers solved for one choice of weights, and for all of them, after which a search ends
+        where it is; robust fits without priors, which begin anew, take several times as many. Good
+        data take 6 to 15; those of levers of which little is known up to 30.
+    first_region, largest_region, smallest_region : float
+        How far a step goes, in units of `Coordinates.room`: logarithms, where parameters are
+        positive. Beyond a factor of two neighbours say little; below the last, only rounding
+        errors.
+    trusted, doubted : float
+        The share of the predicted gain from which on the region grows, and below which it shrinks.
+    decrement : float
+        Sum of squares that Gauss and Newton's step would still take away at an optimum, where
+        squares count standard deviations (with priors): a tenth of a standard error.
+    decrement_where_rough, rough_region : float
+        The same where no longer step than the latter gains anything, since values are not smooth
+        there, as near a fold that moves past a row: a third of a standard error.
+    relative_decrement : float
+        The same in units of the noise, where weights count no standard deviations: a thirtieth of
+        a standard error.
+    negligible, negligible_of_misfit : float
+        The same as a share of the sum of squares; the latter where that is so many times what
+        noise explains that no such lever shows the data.
+    misfit : float
+        So many times.
+    precision : float
+        Differences, as shares of the largest value of an observable, of which only rounding errors
+        are left.
+    kept : int
+        Latest predictions that tell how values bend between them.
+    scatter_rounds : int
+        Rounds in which an observable without measurement errors finds its scatter.
+    gentle_rounds, robust_rounds : int
+        Most reweightings by Huber's weights, with which there is one optimum; then by those that
+        forget outliers.
+    settled, settled_relative : float
+        A confirmation by the full lever that moves no parameter by more than these shares of its
+        standard error and of its value ends the fit: the confirmed model is exact to first order.
+    confirmations : int
+        Most of them.
+    usual_scatter : float
+        Noise that is usual, as a share of the largest value: it counts as one datum more.
+    """
+
+    most_branches: int = 25
+    most_in_all: int = 40
+    first_region: float = 0.5
+    largest_region: float = 0.7
+    smallest_region: float = 1e-6
+    trusted: float = 0.7
+    doubted: float = 0.25
+    decrement: float = 1e-2
+    decrement_where_rough: float = 0.1
+    rough_region: float = 1e-3
+    relative_decrement: float = 1e-3
+    negligible: float = 1e-6
+    negligible_of_misfit: float = 1e-3
+    misfit: float = 10.0
+    precision: float = 1e-7
+    kept: int = 5
+    scatter_rounds: int = 3
+    gentle_rounds: int = 6
+    robust_rounds: int = 14
+    settled: float = 0.5
+    settled_relative: float = 0.03
+    confirmations: int = 5
+    usual_scatter: float = 1e-3

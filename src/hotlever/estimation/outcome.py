@@ -1,20 +1,224 @@
-"""What fits and calibrations have in common: whether a lever describes what was measured."""
+"""What fits and calibrations have in common: the verdict on the data, and the file of a result.
+
+A file is a pydantic model: its schema states what is written and read. What stands in it as it is
+taken from a result by name, what stands in another form has a type that says how.
+"""
 
 from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from dataclasses import replace
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, model_validator
 
+from hotlever import __version__
 from hotlever.errors import InputError
-from hotlever.estimation.result_file import ResultFile
-from hotlever.files import write_text
-from hotlever.measurement import Measurement
+from hotlever.files import json_text, read_json, without_nan, write_text
+from hotlever.lever.transient.waveform import Polyline, Sine
+from hotlever.measurement import MEASURED, Measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import PriorUse
+from hotlever.probe.surroundings import Medium
+from hotlever.records import Number, explained, stored_as
+from hotlever.types import Array
+
+#: Columns of a measurement that are NaN where a file has none; the other errors are None then.
+_NEEDED = ("current_mA", "reader_V", "tip_K", "tip_error_K")
+#: No column of a measurement has larger values, in the units inside.
+_LARGEST = 1e9
+
+
+def array(values: Sequence[Any] | Array, shape: tuple[int, ...], where: str) -> Array:
+    """Make an array of nested lists, NaN where there is nothing.
+
+    Raises
+    ------
+    InputError
+        If it has another shape.
+    """
+    try:
+        return np.array(values, dtype=float).reshape(shape)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{where}: expected numbers in {' × '.join(map(str, shape))} places"
+        ) from None
+
+
+def _matrix(values: list[list[float]]) -> Array:
+    """Return a matrix of its rows."""
+    if len({len(row) for row in values}) > 1:
+        raise ValueError("expected rows of the same length")
+    return np.array(values, dtype=float)
+
+
+def _probe(sections: dict[str, dict[str, Any]], info: ValidationInfo) -> Probe:
+    return Probe.from_sections(sections, f"{info.context}: probe")
+
+
+def _columns(rows: list[dict[str, float]]) -> dict[str, Array]:
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: np.array([row.get(name) for row in rows], dtype=float) for name in names}
+
+
+def _rows(columns: dict[str, Array]) -> list[dict[str, float]]:
+    values = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in values]
+
+
+# Arrays of one and of two dimensions, NaN where there is nothing.
+Vector = Annotated[Array, stored_as(list[Number])]
+Matrix = Annotated[Array, stored_as(list[list[Number]], _matrix)]
+# Columns of a table, of which files hold the rows.
+Columns = Annotated[dict[str, Array], stored_as(list[dict[str, Number]], _columns, _rows)]
+_Count = Annotated[float, Field(ge=1, multiple_of=1)]
+_Counts = Annotated[
+    Array, stored_as(list[_Count], write=lambda counts: counts.astype(int).tolist())
+]
+_Times = Annotated[Array, stored_as(list[float])]
+_Probe = Annotated[Probe, stored_as(dict[str, dict[str, Any]], _probe, Probe.sections)]
+# What is not written where there is none.
+IF_ANY: Any = Field(None, exclude_if=lambda value: value is None)
+
+
+class Section(BaseModel):
+    """A part of a result file; what is not known is left alone.
+
+    While a file is read its path is pydantic's context, for errors.
+    """
+
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+    @classmethod
+    def holding(cls, source: object, **others: Any) -> Self:
+        """Return the section with the attributes of a source that have its names, and others."""
+        same = {
+            name: getattr(source, name)
+            for name in cls.model_fields
+            if name not in others and hasattr(source, name)
+        }
+        # what hotlever has made need not be checked
+        return cls.model_construct(**same, **others)
+
+    def attributes_of(self, kind: Any) -> dict[str, Any]:
+        """Return what it holds of a dataclass as it is, by attribute."""
+        names = [field.name for field in fields(kind) if field.name in type(self).model_fields]
+        return {name: getattr(self, name) for name in names}
+
+
+class MeasurementSection(Section):
+    """A measurement as fit and calibration files hold it."""
+
+    path: str = ""
+    sha256: str = ""
+    series_resistance_ohm: float | None = None
+    base_temperature_K: float | None = None
+    medium: Medium | None = None
+    gas_conductivity: float | None = None
+    pressure_mbar: float | None = None
+    columns: dict[str, Vector]
+    rows: _Counts | None = IF_ANY
+    time_us: _Times | None = IF_ANY
+    waveform: Polyline | Sine | None = IF_ANY
+
+    @classmethod
+    def of(cls, measurement: Measurement, **others: Any) -> Self:
+        """Return the section of a measurement."""
+        columns = {
+            column.symbol: values
+            for column in MEASURED
+            if (values := getattr(measurement, column.name)) is not None
+        }
+        return cls.holding(measurement, columns=columns, **others)
+
+    @model_validator(mode="after")
+    def _columns_belong_together(self, info: ValidationInfo) -> Self:
+        where = f"{info.context}: data"
+        if "V_b" not in self.columns:
+            raise InputError(f"{where}: columns: V_b is missing")
+        count, waveform = self.columns["V_b"].size, self.waveform
+        for name, values in {**self.columns, "rows": self.rows, "time_us": self.time_us}.items():
+            if values is None:
+                continue
+            array(values, (count,), f"{where}: {name}")
+            least = 0.0 if name.startswith("d") else -_LARGEST
+            wrong = values[(values <= least) | (values > _LARGEST)]
+            if wrong.size:
+                raise InputError(
+                    f"{where}: {name}: found {wrong[0]:g}, expected more than {least:g} and at "
+                    f"most {_LARGEST:g}"
+                )
+        if (waveform is None) != (self.time_us is None) or (
+            isinstance(waveform, Polyline) and len(waveform.times) != len(waveform.volts)
+        ):
+            raise InputError(f"{where}: waveform: expected the one that belongs to the times")
+        return self
+
+    def measurement(self) -> Measurement:
+        """Return the measurement."""
+        columns: dict[str, Any] = dict.fromkeys(_NEEDED, np.full(self.columns["V_b"].size, np.nan))
+        for column in MEASURED:
+            if column.symbol in self.columns:
+                columns[column.name] = self.columns[column.symbol]
+        return Measurement(**self.attributes_of(Measurement), **columns)
+
+
+class ResultFile(Section):
+    """What every result file holds; see `hotlever.estimation.outcome.Outcome`.
+
+    One that does not say whether its data are described has a reason if they are not.
+    """
+
+    describes_data: bool | None = True
+    reason: str = ""
+    priors: dict[str, PriorUse] = Field(default_factory=dict)
+    probe: _Probe
+    data: MeasurementSection
+    notes: list[str]
+    software: str = f"hotlever {__version__}"
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], kind: str) -> Self:
+        """Read a JSON file of a kind.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read or holds something else; the text names the key.
+        """
+        try:
+            return cls.model_validate(read_json(path), context=path)
+        except ValidationError as error:
+            raise explained(error, cls, f"{path}: not a {kind} file") from None
+
+    @model_validator(mode="after")
+    def _bias_heats_the_lever(self, info: ValidationInfo) -> Self:
+        cold_at_rest = self.probe.circuit.starts_cold and self.data.time_us is None
+        if cold_at_rest and not np.all(self.data.columns["V_b"] >= 0):
+            raise InputError(f"{info.context}: data: V_b: expected biases of 0 or more")
+        return self
+
+    def attributes_of(self, kind: Any) -> dict[str, Any]:
+        """Return what it holds of an outcome, by attribute."""
+        reason = self.reason or ("" if self.describes_data else "the file does not say why")
+        return super().attributes_of(kind) | {
+            "measurement": self.data.measurement(),
+            "converged": self.describes_data is not None,
+            "reason": reason,
+        }
+
+    def content(self) -> dict[str, Any]:
+        """Return what is written, in plain values: first what only files of this kind hold."""
+        values = without_nan(self.model_dump())
+        own = values.keys() - ResultFile.model_fields.keys()
+        return dict(sorted(values.items(), key=lambda entry: entry[0] not in own))
+
+    def to_json(self) -> str:
+        """Return the text of the file."""
+        return json_text(self.content())
 
 
 class Outcome(ABC):

@@ -8,24 +8,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from hotlever.errors import ComputationError
 from hotlever.estimation.experiment import Prediction
-from hotlever.estimation.objective import Objective, inverse_or_nan
-from hotlever.estimation.quantity import Quantity
+from hotlever.estimation.objective import Objective, Quantity, inverse_or_nan
 from hotlever.probe.priors import Moved
 from hotlever.types import Array
-
-if TYPE_CHECKING:
-    from hotlever.estimation.ensembles import Gaussian
 
 #: One unknown noise scale for each observable, or one for all.
 Noise = Literal["each", "common"]
 
+#: Degrees of freedom of what is drawn from a normal approximation: its tails must be wider than
+#: those of the posterior.
+_TAILS = 5.0
 #: A datum that alone decides a parameter says nothing of its own noise.
 _LEAST_FREE = 0.05
 #: Rounds in which weights and residuals settle that follow from each other.
@@ -76,7 +76,7 @@ class Posterior:
         order, a weighted sum of all of them, each with an error of its own.
         """
         objective, prior = self.objective, self.objective.prior
-        if prior is None:
+        if not objective.informed:
             return {"measurement": self.covariance}
         jacobian = objective.of_data(self.at.slopes, self._point)
         influence = self._rates[:, None] * objective.laplace(self.at.slopes, self._point)
@@ -99,8 +99,6 @@ class Posterior:
         step = -laplace @ (jacobian.T @ residual) if objective.informed else np.zeros(point.size)
         values = self.at.values + self.slopes @ (self._rates * step)
         scales = objective.residuals.in_common(values, self.slopes, self.covariance)
-        if prior is None:
-            return scales
         by = objective.of_priors(point)
         away = objective.from_priors(point) + by @ step
         left = np.sqrt(np.einsum("ij,jk,ik->i", by, laplace, by))
@@ -155,6 +153,29 @@ class Posterior:
             weighted = residuals.weighted(self.at.values)
             return residuals.size * float(np.log(weighted @ weighted))
         return float(self.objective.squares(self.at) + residuals.normalisation)
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """A normal approximation of a density of d quantities.
+
+    What is drawn from it has its middle and shape, but the wide tails of a Student's t.
+    """
+
+    mean: Array
+    covariance: Array
+
+    def wide_draws(self, count: int, random: Any) -> Array:
+        """Draw points, shape (count, d)."""
+        normal = random.normal(size=(count, self.mean.size))
+        stretch = np.sqrt(_TAILS / random.chisquare(_TAILS, size=(count, 1)))
+        return np.asarray(self.mean + stretch * (normal @ np.linalg.cholesky(self.covariance).T))
+
+    def wide_log_density(self, points: Array) -> Array:
+        """Return the logarithm of the density of such draws, up to a constant."""
+        away = points - self.mean
+        lengths = np.einsum("ij,jk,ik->i", away, np.linalg.inv(self.covariance), away)
+        return np.asarray(-0.5 * (_TAILS + self.mean.size) * np.log1p(lengths / _TAILS))
 
 
 class PosteriorDensity:
@@ -213,9 +234,6 @@ class PosteriorDensity:
         Without priors the weights follow from the residuals and the residuals from the weights; a
         few dozen rounds settle both.
         """
-        # the sampler takes a second to load, for which few estimates have to wait
-        from hotlever.estimation.ensembles import Gaussian
-
         objective, (low, high) = self.objective, self.objective.bounds
         residual, jacobian = self._residual, self._jacobian
         of_priors = objective.of_priors(self.optimum)

@@ -1,6 +1,6 @@
 """Profiles: how much worse a fit gets as a quantity is pulled off its optimum.
 
-A quantity is pulled by a further datum (`hotlever.estimation.quantity.Pull`), and all parameters
+A quantity is pulled by a further datum (`hotlever.estimation.objective.Pull`), and all parameters
 are estimated anew; the rise ΔS of the sum of squares says how many standard errors away it is. A
 calibration asks so for the tip temperature, a fit for each of its parameters.
 """
@@ -18,10 +18,9 @@ from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.experiment_at_rest import experiment_of
-from hotlever.estimation.objective import Objective
+from hotlever.estimation.objective import TIP, Objective, ParameterValue, Pull, TipTemperature
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.posterior import Posterior
-from hotlever.estimation.quantity import TIP, ParameterValue, Pull, TipTemperature
 from hotlever.estimation.result import Fit
 from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe.parameters import parameter_of, usual_parameters
@@ -205,7 +204,7 @@ def profile_likelihood(
         raise InputError("the fit meets its data exactly: without scatter nothing tells how sure")
     quantity = ParameterValue(result.names.index(name))
     names = tuple(dict.fromkeys([*usual_parameters(result.probe), *result.names]))
-    objective = Objective.of_fit(result, names)
+    objective = result.objective(names)
     residuals = objective.residuals
     model = experiment_of(result.probe, residuals.bias, names=names, reduce=True)
     # exact to first order at the optimum, and used as it is from there

@@ -9,10 +9,8 @@ import numpy as np
 
 from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError
-from hotlever.estimation.drift import Drift
-from hotlever.estimation.noise import relative_noise
+from hotlever.estimation.noise import CommonCovariance, CommonError, Drift, relative_noise
 from hotlever.estimation.options import Weights
-from hotlever.estimation.scales import CommonCovariance, CommonError
 from hotlever.measurement import Measurement
 from hotlever.measurement.scatter import noise_about_neighbours
 from hotlever.probe.priors import Moved

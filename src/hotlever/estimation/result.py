@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, Any, Literal, Self
@@ -14,26 +15,28 @@ from pydantic import Field, JsonValue, PlainSerializer, ValidationInfo, model_va
 
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
+from hotlever.estimation.noise import errors_of_scales
+from hotlever.estimation.objective import Objective
 from hotlever.estimation.options import FitOptions
-from hotlever.estimation.outcome import Outcome
-from hotlever.estimation.residuals import Residuals
-from hotlever.estimation.result_file import (
+from hotlever.estimation.outcome import (
     IF_ANY,
     Matrix,
     MeasurementSection,
+    Outcome,
     ResultFile,
     Section,
     Vector,
     array,
 )
-from hotlever.estimation.scales import errors_of_scales
+from hotlever.estimation.prior_density import PriorDensity
+from hotlever.estimation.residuals import Residuals
 from hotlever.lever.lever import Lever
 from hotlever.lever.transient import simulate
 from hotlever.materials import full_name
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameter_of, parameters_of, usual_parameters
-from hotlever.probe.priors import Prior, PriorUse, priors_of
+from hotlever.probe.priors import Prior, PriorUse
 from hotlever.records import Number, stored_as
 from hotlever.text import value_with_error
 from hotlever.types import Array
@@ -166,13 +169,9 @@ class Fit(Outcome):
         }
 
     @cached_property
-    def _stated(self) -> dict[str, Prior]:
-        return priors_of(self.options.priors, self.probe, "priors", in_time=self.in_time)
-
-    @property
-    def known_before(self) -> dict[str, Prior]:
-        """The priors of the parameters that were varied, by name."""
-        return {name: prior for name, prior in self._stated.items() if name in self.names}
+    def stated_priors(self) -> dict[str, Prior]:
+        """What was known before of parameters and scales, by name."""
+        return self.options.stated_priors(self.probe, in_time=self.in_time)
 
     @property
     def correlation(self) -> Array:
@@ -219,7 +218,7 @@ class Fit(Outcome):
 
     def residuals(self) -> Residuals:
         """Return the data with the fit's own weights, to be compared with predictions."""
-        known, base = self._stated, self.probe.circuit.base_temperature_K
+        known, base = self.stated_priors, self.probe.circuit.base_temperature_K
         common = errors_of_scales(self.measurement, self.observables, known, base) if known else []
         return Residuals(
             self.measurement,
@@ -228,6 +227,11 @@ class Fit(Outcome):
             data_weights=self.data_weights,
             common=common,
         )
+
+    def objective(self, names: Sequence[str]) -> Objective:
+        """Return what the fit has made small, by derivatives by some parameters."""
+        prior = PriorDensity.of_priors(self.stated_priors)
+        return Objective(self.residuals(), self.probe, names, self.names, prior)
 
     def file(self, request: dict[str, JsonValue] | None = None) -> FitFile:
         """Return what the fit file holds; `request` is what a batch was asked."""

@@ -16,8 +16,8 @@ import xarray as xr
 
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
-from hotlever.estimation.chains import FEWEST_EFFECTIVE
-from hotlever.estimation.ensembles import (
+from hotlever.estimation.chains import (
+    FEWEST_EFFECTIVE,
     Chains,
     independent_samples,
     rhat_of_ensembles,
@@ -28,11 +28,10 @@ from hotlever.estimation.experiment_at_rest import (
     PredictionAtRest,
     experiment_of,
 )
-from hotlever.estimation.objective import Objective
+from hotlever.estimation.objective import TIP, Objective, TipTemperature
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.posterior import Noise, Posterior, PosteriorDensity
 from hotlever.estimation.profile import ErrorProfile, hotter_rows
-from hotlever.estimation.quantity import TIP, TipTemperature
 from hotlever.estimation.result import Fit
 from hotlever.estimation.subproblem import Subproblem
 from hotlever.estimation.surrogate import ReducedSurrogate
@@ -184,7 +183,7 @@ def _lever_like(fit: Fit, probe: Probe, bias: Array) -> SampledLever:
 
 def _density_at(fit: Fit, probe: Probe, noise: Noise) -> tuple[PosteriorDensity, SampledLever]:
     """Return the density of a fit's parameters, approximated about a probe, and levers near it."""
-    objective = Objective.of_fit(fit, fit.names)
+    objective = fit.objective(fit.names)
     lever = _lever_like(fit, probe, objective.residuals.bias)
     shown = partial(_shown_at, lever.shown, objective, probe.values(lever.names))
     return PosteriorDensity(objective, lever.at, shown, noise), lever

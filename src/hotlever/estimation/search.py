@@ -20,14 +20,28 @@ from hotlever.estimation.experiment_at_rest import ExperimentAtRest
 from hotlever.estimation.lack_of_fit import undescribed
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser, Optimum
-from hotlever.estimation.prior_density import PriorDensity
+from hotlever.estimation.options import SearchOptions
+from hotlever.estimation.prior_density import FLAT, PriorDensity
 from hotlever.estimation.residuals import Residuals
-from hotlever.estimation.search_options import GROWTH, SearchOptions
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, parameters_of
 from hotlever.probe.priors import Prior, default_priors
 from hotlever.types import Progress
+
+#: A lever is far from data that differ from what it shows by this share of the largest (median).
+_FAR = 0.06
+#: Portions by which a lever grows, the last of which is all of the rows; the least rows of one.
+_PORTIONS, _FEWEST_ROWS = 6, 3
+#: By how much the usual priors are widened, and the spread of what has none, where only the
+#: directions are to be closed that a few cold rows leave open.
+_WIDENED, _OPEN = 4.0, 0.5
+#: Share of a dimension by which a mesh follows it well; edges' bias moves all of them.
+_MESH_FOLLOWS = 0.2
+#: A portion is to be met within some per cent: the next moves the lever anyway.
+_OF_PORTIONS = SearchOptions(
+    most_branches=4, decrement=2.0, scatter_rounds=0, first_region=0.7, largest_region=1.2
+)
 
 
 class End(NamedTuple):
@@ -62,7 +76,7 @@ class Search:
     varied : list of str
     robust : bool
         Whether the weight of outliers is lessened.
-    prior : PriorDensity, optional
+    prior : PriorDensity
     progress, seen : callable, optional
         See `hotlever.estimation.optimiser.Optimiser`.
     """
@@ -71,7 +85,7 @@ class Search:
     start: Probe
     varied: list[str]
     robust: bool
-    prior: PriorDensity | None = None
+    prior: PriorDensity = FLAT
     progress: Progress | None = None
     seen: Callable[[Prediction], None] | None = None
 
@@ -136,11 +150,13 @@ class Search:
         ones close what cold rows leave open.
         """
         experiment, start = experiment.coarse(), self.start
-        prior = self.prior or PriorDensity.independent(_closing(start, self.varied))
+        prior = (
+            self.prior if self.prior.names else PriorDensity.of_priors(_closing(start, self.varied))
+        )
         bias = np.abs(measurement.bias_V)
         heated = np.unique(bias[np.isfinite(measurement.current_mA) & (bias > 0)])
-        for portion in range(1, GROWTH.portions):
-            count = max(GROWTH.fewest_rows, -(-heated.size * portion // GROWTH.portions))
+        for portion in range(1, _PORTIONS):
+            count = max(_FEWEST_ROWS, -(-heated.size * portion // _PORTIONS))
             if count >= heated.size:
                 break
             part = measurement.part(bias <= heated[count - 1])
@@ -151,7 +167,7 @@ class Search:
             if _has_moved(experiment.drawn, start):
                 experiment = experiment.drawn_anew(start)
             of_part = experiment.measuring(residuals.bias, residuals.shown)
-            optimiser = self._optimiser(of_part, residuals, start, prior, GROWTH.search)
+            optimiser = self._optimiser(of_part, residuals, start, prior, _OF_PORTIONS)
             try:
                 start = optimiser.solve(start).probe
             except ComputationError:
@@ -166,14 +182,14 @@ def _is_far(residuals: Residuals, at: Prediction) -> bool:
     """Whether a lever shows something else than the data."""
     share = residuals.difference(at.values) / residuals.largest
     # a few wrong rows are no other lever
-    return bool(np.nanmax(np.nanmedian(np.abs(share), axis=1)) > GROWTH.far)
+    return bool(np.nanmax(np.nanmedian(np.abs(share), axis=1)) > _FAR)
 
 
 def _has_moved(drawn: Probe, probe: Probe) -> bool:
     """Whether a probe's dimensions are far from those that a mesh was drawn with."""
     names = dimensions_of(probe)
     before, now = drawn.values(names), probe.values(names)
-    return bool(np.any(np.abs(now - before) > GROWTH.mesh_follows * np.abs(before)))
+    return bool(np.any(np.abs(now - before) > _MESH_FOLLOWS * np.abs(before)))
 
 
 def _closing(probe: Probe, varied: Sequence[str]) -> dict[str, Prior]:
@@ -183,9 +199,9 @@ def _closing(probe: Probe, varied: Sequence[str]) -> dict[str, Prior]:
     for name, value in zip(varied, probe.values(list(varied)).tolist(), strict=True):
         if name in usual:
             prior = usual[name]
-            closing[name] = Prior(value, GROWTH.widened * prior.spread, prior.relative)
+            closing[name] = Prior(value, _WIDENED * prior.spread, prior.relative)
         elif every[name].lower > 0:
-            closing[name] = Prior(value, GROWTH.open)
+            closing[name] = Prior(value, _OPEN)
         else:
-            closing[name] = Prior(value, GROWTH.open * every[name].scale, relative=False)
+            closing[name] = Prior(value, _OPEN * every[name].scale, relative=False)
     return closing

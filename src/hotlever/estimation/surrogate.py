@@ -10,8 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
-from hotlever.estimation.coordinates import Coordinates
 from hotlever.estimation.load_lines import Rows
+from hotlever.estimation.prior_density import Coordinates
 from hotlever.lever.branch import Branch, shifted
 from hotlever.lever.curve import spline_through
 from hotlever.lever.reduced.lever import ReducedLever

@@ -5,6 +5,7 @@ In numbers for the fit file, and in words.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +16,10 @@ from hotlever.estimation.profile import profile_likelihood
 from hotlever.estimation.result import Fit
 from hotlever.estimation.sampling import BAND_QUANTILES, predictive_band, sample_posterior
 from hotlever.files import json_text
+from hotlever.materials.parameters import heading, scale_of
 from hotlever.probe.parameters import parameters_of
 from hotlever.processes import PROCESSORS, local_processes
-from hotlever.text import BAND
+from hotlever.text import BAND, aligned
 from hotlever.types import Array, Progress
 
 #: Chains are called unsettled above this R̂ (Vehtari et al., doi:10.1214/20-BA1221).
@@ -31,6 +33,10 @@ _AS_KNOWN = 0.9
 _ROUGH_ERROR_K = 1.0
 #: Intervals are said to differ from those of the standard error by more than this share of it.
 _DIFFERENT = 0.5
+
+
+# Caption, columns and rows.
+Table = tuple[str, list[str], list[list[str]]]
 
 
 @dataclass(frozen=True)
@@ -108,6 +114,39 @@ class Uncertainty:
                 unit=samples.attrs["units"],
             )
         return quantities
+
+    def tables(self) -> Iterator[Table]:
+        """Give the intervals of profiles and the quantiles of a posterior as tables."""
+        if self.profiles:
+            first = next(iter(self.profiles.values()))
+            columns = ["profile likelihood"]
+            for level in first.level.values:
+                columns += [f"{100 * level:.0f} % from", "to"]
+            rows = [
+                [heading(name), *_cells(profile.interval.values.ravel(), name, "open")]
+                for name, profile in self.profiles.items()
+            ]
+            yield "Confidence intervals of the profile likelihoods.", columns, rows
+        if self.posterior is not None:
+            quantities, sizes = self.quantities, self.posterior.sizes
+            levels = next(iter(quantities.values())).quantiles
+            columns = ["posterior", *(f"{level} %" for level in levels), "effective samples", "R̂"]
+            rows = [
+                [
+                    heading(name),
+                    *_cells(quantity.quantiles.values(), name),
+                    f"{quantity.effective_sample_size:.0f}",
+                    f"{quantity.rhat:.3f}",
+                ]
+                for name, quantity in quantities.items()
+            ]
+            count = sizes["chain"] * sizes["draw"]
+            yield f"Quantiles of {count} posterior samples.", columns, rows
+
+    def text(self) -> str:
+        """Return the tables as lines of text."""
+        tables = (aligned([columns, *rows]) for _, columns, rows in self.tables())
+        return "\n".join(line for table in tables for line in table)
 
     def to_json(self) -> str:
         """Return the fit file with the keys ``posterior`` and ``profiles`` beside its own."""
@@ -210,7 +249,7 @@ def _about(fit: Fit, name: str, values: Array) -> list[str]:
         if np.mean(np.abs(values - bound) < _NEAR * span) > _AT_BOUND:
             unit = "" if parameter.unit == "1" else f" {parameter.unit}"
             return [f"{undetermined} reaches its bound {bound:g}{unit}"]
-    prior = fit.known_before.get(name)
+    prior = fit.stated_priors.get(name)
     if prior is not None and np.std([*map(prior.deviation, values)]) > _AS_KNOWN:
         return [f"{name} is as known before: these data do not tell"]
     if values.std() > _AS_WIDE * span / np.sqrt(12.0):
@@ -225,3 +264,7 @@ def _about(fit: Fit, name: str, values: Array) -> list[str]:
         f"{name}: 95 % of the posterior lies between {sampled[0]:.4g} and {sampled[1]:.4g}, not "
         f"between {expected[0]:.4g} and {expected[1]:.4g} as its standard error says"
     ]
+
+
+def _cells(values: Iterable[float], name: str, unknown: str = "") -> list[str]:
+    return [unknown if np.isnan(value) else f"{value / scale_of(name):.4g}" for value in values]

@@ -8,16 +8,10 @@ import numpy as np
 
 from hotlever import figures
 from hotlever.estimation.batch import Batch
-from hotlever.estimation.levers import compare_levers, statements
+from hotlever.estimation.levers import compare_levers, lever_rows, statements
 from hotlever.estimation.result import Fit
+from hotlever.estimation.summary import NEAREST, conclusions, parameter_rows
 from hotlever.estimation.uncertainty import Uncertainty
-from hotlever.estimation.words import (
-    NEAREST,
-    conclusions,
-    lever_rows,
-    parameter_rows,
-    uncertainty_tables,
-)
 from hotlever.lever import Lever
 from hotlever.materials.parameters import INVERSION, sentence
 from hotlever.report.page import Block, Page
@@ -131,7 +125,7 @@ def _add_uncertainty(page: Page, found: Uncertainty) -> None:
     page.heading("How sure")
     for text in found.statements():
         page.text(sentence(text))
-    for caption, columns, rows in uncertainty_tables(found):
+    for caption, columns, rows in found.tables():
         page.table(columns, rows, caption)
     fit = found.fit
     if found.profiles:

@@ -11,9 +11,9 @@ from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation import FitOptions, Measurement, fit, read_measurement
 from hotlever.estimation.batch import Batch, fit_many
 from hotlever.estimation.experiment import Prediction
-from hotlever.estimation.levers import compare_levers, levers_csv
+from hotlever.estimation.levers import compare_levers, levers_csv, levers_text
+from hotlever.estimation.summary import fit_text
 from hotlever.estimation.uncertainty import Uncertainty, examine
-from hotlever.estimation.words import fit_text, levers_text, uncertainty_text
 from hotlever.files import Outputs, write_text
 from hotlever.lever.transient import Waveform
 from hotlever.probe import Probe
@@ -96,7 +96,7 @@ def fit_one(
                 bars: Any = {"profiling": profiling, "sampling": sampling, "banding": banding}
                 uncertainty = examine(result, **examined, **bars)
             reporter.note(*uncertainty.statements())
-            texts.append(uncertainty_text(uncertainty))
+            texts.append(uncertainty.text())
         except (HotleverError, KeyboardInterrupt) as error:
             # the fit is there; what ends this is said when it is written
             failure = error

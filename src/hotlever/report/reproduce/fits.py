@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hotlever.estimation import Fit, Measurement, fit, read_measurement
-from hotlever.estimation.words import parameter_rows
+from hotlever.estimation.summary import parameter_rows
 from hotlever.figures import correlation_matrix
 from hotlever.materials import PARAMETERS
 from hotlever.report.fit_pages import add_fit

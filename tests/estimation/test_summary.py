@@ -7,8 +7,8 @@ import re
 import numpy as np
 import xarray as xr
 
+from hotlever.estimation.levers import lever_rows, levers_text
 from hotlever.estimation.uncertainty import Uncertainty
-from hotlever.estimation.words import lever_rows, levers_text, uncertainty_text
 from made_up import levers
 
 
@@ -54,7 +54,7 @@ def found() -> Uncertainty:
 
 
 def test_intervals_are_in_the_unit_of_the_table_and_open_ones_are_said():
-    first, second = uncertainty_text(found()).splitlines()
+    first, second = found().text().splitlines()
     assert first.split() == [
         "profile",
         "likelihood",

@@ -1,23 +1,17 @@
-"""Fits in words and tables: one, many side by side, and how sure they are."""
+"""A fit in words and tables: its parameters, what they lean on, what the data leave open."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
+import xarray as xr
 
-from hotlever.estimation.levers import statements
-from hotlever.materials.parameters import heading, parameter_named, scale_of, scaled_unit
+from hotlever.estimation.result import Fit
+from hotlever.materials.parameters import scale_of, scaled_unit
 from hotlever.probe.parameters import of_materials, parameters_of
+from hotlever.probe.priors import PriorUse
 from hotlever.text import NOT_DETERMINED, aligned, value_with_error
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from hotlever.estimation.result import Fit
-    from hotlever.estimation.uncertainty import Uncertainty
-    from hotlever.probe.priors import PriorUse
 
 #: A prior is named as leaned on where its data narrow it to no less than this share, and as moved
 #: where they move it by so many of its standard deviations.
@@ -33,9 +27,6 @@ NEAREST = (
     "what follows is of the lever that comes nearest, and no estimate: errors are not stated, "
     "since they would not hold"
 )
-
-# Caption, columns and rows.
-Table = tuple[str, list[str], list[list[str]]]
 
 
 def parameter_rows(fit: Fit) -> list[tuple[str, str, str, str]]:
@@ -147,77 +138,3 @@ def undetermined(fit: Fit) -> list[str]:
             f"{largest:.1f} K from the fitted parameters"
         )
     return texts
-
-
-def lever_rows(levers: xr.Dataset) -> list[list[str]]:
-    """Return the table of `compare_levers`: columns, levers, then the mean and the scatter."""
-    names = levers.quantity.values.tolist()
-    rows = [["lever", *map(heading, names)]]
-    labels = [*levers.lever.values.tolist(), "weighted mean"]
-    values = np.vstack([levers.value, levers["mean"]])
-    errors = np.vstack([levers.stderr, levers.mean_stderr])
-    for label, *numbers in zip(labels, values.tolist(), errors.tolist(), strict=True):
-        cells = zip(names, *numbers, strict=True)
-        rows.append([str(label), *(_with_error(*cell) for cell in cells)])
-    scatter = levers.scatter.values
-    for label, numbers, form in (
-        ("scatter between levers", scatter / [scale_of(name) for name in names], ".3g"),
-        ("scatter, relative", scatter / np.abs(levers["mean"].values), ".1%"),
-        ("Birge ratio", levers.birge_ratio.values, ".2g"),
-    ):
-        rows.append(
-            [label, *("" if np.isnan(number) else f"{number:{form}}" for number in numbers)]
-        )
-    return rows
-
-
-def _with_error(name: str, value: float, stderr: float) -> str:
-    if np.isnan(value):
-        return ""
-    return value_with_error(value, stderr, scale_of(name), parameter_named(name).bounds)
-
-
-def levers_text(levers: xr.Dataset) -> str:
-    """Return the table of many levers and what follows from it as lines of text."""
-    lines = aligned(lever_rows(levers))
-    lines.insert(1 + levers.sizes["lever"], "-" * max(map(len, lines)))
-    return "\n".join(lines + statements(levers))
-
-
-def uncertainty_tables(uncertainty: Uncertainty) -> Iterator[Table]:
-    """Give the intervals of profiles and the quantiles of a posterior as tables."""
-    if uncertainty.profiles:
-        first = next(iter(uncertainty.profiles.values()))
-        columns = ["profile likelihood"]
-        for level in first.level.values:
-            columns += [f"{100 * level:.0f} % from", "to"]
-        rows = [
-            [heading(name), *_cells(profile.interval.values.ravel(), name, "open")]
-            for name, profile in uncertainty.profiles.items()
-        ]
-        yield "Confidence intervals of the profile likelihoods.", columns, rows
-    if uncertainty.posterior is not None:
-        quantities, sizes = uncertainty.quantities, uncertainty.posterior.sizes
-        levels = next(iter(quantities.values())).quantiles
-        columns = ["posterior", *(f"{level} %" for level in levels), "effective samples", "R̂"]
-        rows = [
-            [
-                heading(name),
-                *_cells(quantity.quantiles.values(), name),
-                f"{quantity.effective_sample_size:.0f}",
-                f"{quantity.rhat:.3f}",
-            ]
-            for name, quantity in quantities.items()
-        ]
-        count = sizes["chain"] * sizes["draw"]
-        yield f"Quantiles of {count} posterior samples.", columns, rows
-
-
-def _cells(values: Iterable[float], name: str, unknown: str = "") -> list[str]:
-    return [unknown if np.isnan(value) else f"{value / scale_of(name):.4g}" for value in values]
-
-
-def uncertainty_text(uncertainty: Uncertainty) -> str:
-    """Return the intervals of profiles and the quantiles of a posterior as lines of text."""
-    tables = (aligned([columns, *rows]) for _, columns, rows in uncertainty_tables(uncertainty))
-    return "\n".join(line for table in tables for line in table)
