@@ -22,7 +22,7 @@ from hotlever.errors import InputError
 from hotlever.estimation import fit, read_fit
 from hotlever.lever import Lever
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.prior_texts import PriorTexts
+from hotlever.probe.parts import PriorTexts
 from hotlever.probe.priors import Prior, default_priors, published_material
 from made_up import GONE, damaged
 from synthetic_curves import measured_curve, measurement_of

@@ -13,8 +13,7 @@ from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
-from hotlever.probe.parameters import dimensions_of
-from hotlever.probe.priors import nuisances
+from hotlever.probe.parameters import dimensions_of, nuisances
 from hotlever.probe.tip import Tip
 
 REACH = Reach(Probe.reference().circuit, 6.0)

@@ -9,12 +9,11 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameter_of, parameters_of
+from hotlever.probe.parameters import nuisances, parameter_of, parameters_of
 from hotlever.probe.priors import (
     Prior,
     default_priors,
     known_beforehand,
-    nuisances,
     priors_of,
 )
 

@@ -25,8 +25,9 @@ from hotlever.estimation.profile import profile_of_tip
 from hotlever.lever import Branch
 from hotlever.lever.curve import spline_through
 from hotlever.materials import Material
+from hotlever.materials.parameters import own_name
 from hotlever.probe import Probe
-from hotlever.probe.parameters import own_name, usual_parameters
+from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.priors import (
     SCALES,
     Prior,

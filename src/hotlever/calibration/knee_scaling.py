@@ -31,7 +31,8 @@ from hotlever.lever.curve import spline_through
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
-from hotlever.probe.priors import RESISTANCE, default_priors
+from hotlever.probe.parameters import RESISTANCE
+from hotlever.probe.priors import default_priors
 from hotlever.text import value_with_error
 from hotlever.types import Array
 

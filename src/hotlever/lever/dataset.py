@@ -18,7 +18,7 @@ from hotlever.lever.balances import BALANCES, balance_names
 from hotlever.materials.sections import LAWS, own_laws
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
-from hotlever.probe.probe import SECTIONS
+from hotlever.probe.parts import SECTIONS
 from hotlever.types import Array
 
 if TYPE_CHECKING:

@@ -72,11 +72,6 @@ class Parameter(NamedTuple):
         """The lowest and the highest value."""
         return self.lower, self.upper
 
-    @property
-    def own_name(self) -> str:
-        """Its name without that of its material, ``tcr`` of ``film.tcr``."""
-        return self.name.rpartition(".")[2]
-
 
 def _scatter() -> dict[str, tuple[float, float]]:
     """Return mean and widened standard deviation of the logarithms of published parameters."""
@@ -194,6 +189,17 @@ def full_name(material: str, own: str) -> str:
     ('film.tcr', 'n_d')
     """
     return own if material in (LOW_DOPED, HIGH_DOPED) else f"{material}.{own}"
+
+
+def own_name(name: str) -> str:
+    """Return the name of a parameter without that of its material.
+
+    Examples
+    --------
+    >>> own_name("film.tcr"), own_name("n_d")
+    ('tcr', 'n_d')
+    """
+    return name.rpartition(".")[2]
 
 
 def parameter_named(name: str) -> Parameter:

@@ -1,36 +1,54 @@
-"""What a fit may vary of a probe: its materials, its dimensions, circuit and gas."""
+"""The table of what a fit may vary of a probe: its materials, its dimensions, circuit and gas.
+
+What materials have stands in `hotlever.materials.parameters`; here dimensions and circuit are
+added, and what the probe's values say of bounds and scales.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from hotlever.errors import unknown_name
-from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, full_name
-from hotlever.materials.parameters import Parameter, parameter_named
+from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
+from hotlever.materials.parameters import parameter_named
+from hotlever.probe.parts import ProbeParts
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
-
-if TYPE_CHECKING:
-    from hotlever.probe.probe import Probe
 
 #: Shares of a dimension or a resistance, of a base temperature, and of what a gas conducts, within
 #: which a fit stays.
 _OF_THE_VALUE, _OF_THE_BASE, _OF_THE_GAS = (0.5, 1.5), (0.8, 1.2), (0.2, 5.0)
+#: Relative spreads that are known beforehand: of what the drawing says, and of a resistor that was
+#: measured.
+_DIMENSIONS, RESISTANCE = 0.05, 1e-3
+#: Of the base temperature (K): a room, or a hot plate and its thermocouple.
+_BASE_K = 1.0
+#: Of a tip, as far as it is stated: its height and half-angle, from a micrograph.
+_TIP = 0.2
+#: Of what air takes up: humidity, what is around, and dimensions as far as they matter to it.
+_GAS = 0.1
+#: Of the distance to a surface below.
+_GAP = 0.1
 #: How far off all edges usually are (µm).
 _USUAL_BIAS = 0.1
-#: Dimensions of a tip that matter to its lever.
+#: Dimensions of a tip that matter to its lever, and of a shape that do not matter to the tip.
 OF_THE_TIP = ("height_um", "half_angle_deg")
+_HARMLESS = ("reader_length_um", "reader_centre_um", EDGE_BIAS)
 
 
-def dimensions_of(probe: Probe) -> list[str]:
+def dimensions_of(probe: ProbeParts) -> list[str]:
     """Return the names of all that the drawing says, and the tip if there is one."""
     return [*probe.shape.dimensions(), *(OF_THE_TIP if probe.tip is not None else ())]
 
 
-def of_materials(probe: Probe, *, in_time: bool = False) -> dict[str, Parameter]:
+def nuisances(probe: ProbeParts) -> list[str]:
+    """Return the dimensions of the drawing that matter to the tip, each by itself."""
+    held = (*_HARMLESS, *probe.shape.tied())
+    return [name for name in probe.shape.dimensions() if name not in held]
+
+
+def of_materials(probe: ProbeParts, *, in_time: bool = False) -> dict[str, Parameter]:
     """Return all parameters of what a probe is made of, by name: first those a fit usually varies.
 
     With `in_time`, what counts in time only as well. Those of ``[material]`` keep the paper's
-    order; two kinds of silicon share c_κ there.
+    order; two kinds of silicon share c_κ there. What nothing tells of has no prior.
 
     Examples
     --------
@@ -38,17 +56,22 @@ def of_materials(probe: Probe, *, in_time: bool = False) -> dict[str, Parameter]
     >>> list(of_materials(Probe.reference()))
     ['c_kappa', 'delta', 'n_d', 'p', 'a0', 'a1', 'impurity_exponent', 'n_hd']
     """
-    usual = dict.fromkeys(usual_parameters(probe))
-    found = {
-        full_name(material, own): known._replace(name=full_name(material, own))
+    usual = usual_parameters(probe)
+    table = {
+        name: parameter._replace(
+            name=name,
+            spread=parameter.spread if name in usual or not parameter.relative else None,
+            value=float(getattr(kind, own)),
+        )
         for material, kind in _kinds(probe)
-        for own, known in kind.parameters.items()
-        if in_time or not known.in_time
+        for own, parameter in kind.parameters.items()
+        for name in [full_name(material, own)]
+        if in_time or not parameter.in_time
     }
-    return {name: found[name] for name in [*usual, *(name for name in found if name not in usual)]}
+    return {name: table[name] for name in dict.fromkeys([*usual, *table])}
 
 
-def usual_parameters(probe: Probe) -> tuple[str, ...]:
+def usual_parameters(probe: ProbeParts) -> tuple[str, ...]:
     """Return what a fit varies of a probe unless it is told otherwise: the paper's six, if it can.
 
     Of other materials what each kind says, as far as it matters here: without a border with
@@ -61,22 +84,22 @@ def usual_parameters(probe: Probe) -> tuple[str, ...]:
     ('c_kappa', 'delta', 'n_d', 'p', 'a0', 'a1')
     """
     tapered = {one.stack[0].material for one in probe.layout().regions if one.taper is not None}
-    found = [
+    usual = [
         full_name(material, own)
         for material, kind in _kinds(probe)
         for own in kind.usual
         if own in kind.parameters and (own != "delta" or material in tapered)
     ]
-    plain = [name for name in PARAMETERS if name in found]
-    return tuple(dict.fromkeys([*plain, *found]))
+    plain = [name for name in PARAMETERS if name in usual]
+    return tuple(dict.fromkeys([*plain, *usual]))
 
 
-def _kinds(probe: Probe) -> list[tuple[str, Kind]]:
+def _kinds(probe: ProbeParts) -> list[tuple[str, Kind]]:
     """Return the materials of a probe, low-doped silicon first."""
     return sorted(probe.made_of.items(), key=lambda item: item[0] != LOW_DOPED)
 
 
-def heat_capacities(probe: Probe) -> tuple[str, ...]:
+def heat_capacities(probe: ProbeParts) -> tuple[str, ...]:
     """Return what a fit varies of what was measured in time unless it is told otherwise.
 
     Examples
@@ -85,22 +108,11 @@ def heat_capacities(probe: Probe) -> tuple[str, ...]:
     >>> heat_capacities(Probe.reference())
     ('heat_capacity_scale',)
     """
-    return tuple(name for name, known in of_materials(probe, in_time=True).items() if known.in_time)
-
-
-def own_name(name: str) -> str:
-    """Return the name of a parameter without that of its material.
-
-    Examples
-    --------
-    >>> own_name("film.tcr"), own_name("n_d")
-    ('tcr', 'n_d')
-    """
-    return name.rpartition(".")[2]
+    return tuple(name for name, one in of_materials(probe, in_time=True).items() if one.in_time)
 
 
 def parameters_of(
-    probe: Probe, *, anywhere: bool = False, in_time: bool = False
+    probe: ProbeParts, *, anywhere: bool = False, in_time: bool = False
 ) -> dict[str, Parameter]:
     """Return all that a fit may vary, by name: first the materials' parameters.
 
@@ -112,34 +124,45 @@ def parameters_of(
     >>> parameters_of(Probe.reference())["heater_width_um"].unit
     'µm'
     """
-    shares = dict.fromkeys(dimensions_of(probe), _OF_THE_VALUE)
-    shares["base_temperature_K"] = _OF_THE_BASE
-    if probe.circuit.series_resistance_ohm > 0:
-        shares["series_resistance_ohm"] = _OF_THE_VALUE
-    if anywhere or probe.surroundings.medium == "air":
-        shares["gas_conductivity"] = _OF_THE_GAS
-        if probe.surroundings.surface_gap_um is not None:
-            shares["surface_gap_um"] = _OF_THE_VALUE
+    table = of_materials(probe, in_time=anywhere or in_time)
     parts = (probe.shape, probe.tip, probe.circuit, probe.surroundings)
     meaning = {name: text for part in parts if part for name, text in part.description().items()}
-    found = of_materials(probe, in_time=anywhere or in_time)
-    for (name, (least, most)), value in zip(
-        shares.items(), probe.values(list(shares)), strict=True
-    ):
-        found[name] = parameter_named(name)._replace(
-            scale=float(value),
-            lower=float(least * value),
-            upper=float(most * value),
+
+    def add(name: str, spread: float | None, within: tuple[float, float] = _OF_THE_VALUE) -> None:
+        (value,) = probe.values([name]).tolist()
+        least, most = within
+        table[name] = parameter_named(name)._replace(
+            scale=value,
+            lower=least * value,
+            upper=most * value,
             meaning=meaning[name],
+            spread=spread,
+            value=value,
         )
-    if EDGE_BIAS in found:
-        found[EDGE_BIAS] = found[EDGE_BIAS]._replace(
+
+    matter = nuisances(probe)
+    for name in probe.shape.dimensions():
+        add(name, _DIMENSIONS if name in matter else None)
+    if EDGE_BIAS in table:
+        table[EDGE_BIAS] = table[EDGE_BIAS]._replace(
             scale=_USUAL_BIAS, lower=-MOST_EDGE_BIAS, upper=MOST_EDGE_BIAS
         )
-    return found
+    for name in OF_THE_TIP if probe.tip is not None else ():
+        add(name, _TIP)
+    add("base_temperature_K", _BASE_K, _OF_THE_BASE)
+    table["base_temperature_K"] = table["base_temperature_K"]._replace(relative=False)
+    if probe.circuit.series_resistance_ohm > 0:
+        add("series_resistance_ohm", RESISTANCE)
+    if anywhere or probe.surroundings.medium == "air":
+        add("gas_conductivity", _GAS, _OF_THE_GAS)
+        if probe.surroundings.surface_gap_um is not None:
+            add("surface_gap_um", _GAP)
+    return table
 
 
-def parameter_of(probe: Probe, name: str, where: str = "", *, in_time: bool = False) -> Parameter:
+def parameter_of(
+    probe: ProbeParts, name: str, where: str = "", *, in_time: bool = False
+) -> Parameter:
     """Return one of them.
 
     Raises
@@ -147,7 +170,7 @@ def parameter_of(probe: Probe, name: str, where: str = "", *, in_time: bool = Fa
     InputError
         If there is none of this name; the text gives the nearest one.
     """
-    known = parameters_of(probe, in_time=in_time)
-    if name not in known:
-        raise unknown_name("parameter", name, known, where)
-    return known[name]
+    table = parameters_of(probe, in_time=in_time)
+    if name not in table:
+        raise unknown_name("parameter", name, table, where)
+    return table[name]

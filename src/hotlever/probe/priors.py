@@ -1,55 +1,32 @@
 """What is known of a lever before it is measured: a value and a spread for each parameter.
 
-How it is written: `hotlever.probe.prior_texts`. The name ``dimensions`` means all of the drawing
-and the thickness. The scales of meters and of the Raman thermometer have priors too, shares such as
-``± 2%``: by so much all that they show may be wrong together.
+In the section ``[prior]`` of a probe file or on the command line it is a value with a spread in its
+unit, ``0.40 ± 0.02``; with a share, ``3.3e17 ± 15%``; or with a factor, ``1e17 ×/ 3``. Without a
+value, ``± 5%`` or ``×/ 3``, it is about the probe's own. ``+-`` stands for ``±``, ``x/`` and ``*/``
+for ``×/``. A share is a standard deviation of the logarithm, and so is the logarithm of a factor.
+
+The name ``dimensions`` means all of the drawing and the thickness. The scales of meters and of the
+Raman thermometer have priors too, shares such as ``± 2%``: by so much all that they show may be
+wrong together.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials.parameters import PUBLISHED_SCATTER, Parameter
-from hotlever.probe.parameters import (
-    OF_THE_TIP,
-    of_materials,
-    own_name,
-    parameters_of,
-    usual_parameters,
-)
-from hotlever.probe.prior_texts import Written, parsed
-from hotlever.probe.shapes import EDGE_BIAS
+from hotlever.probe.parameters import nuisances, of_materials, parameters_of
+from hotlever.probe.parts import ProbeParts
 from hotlever.records import Number
 
-if TYPE_CHECKING:
-    from hotlever.probe.probe import Probe
-
-#: Relative spread of what the drawing says, and of a resistor that was measured.
-_DIMENSIONS, RESISTANCE = 0.05, 1e-3
-#: Of the base temperature (K): a room, or a hot plate and its thermocouple.
-_BASE_K = 1.0
-#: Of the exponent of the temperature in mobility limited by impurities: half of what it is without
-#: screening, 1.5. The paper takes 0.
-_IMPURITIES = 0.75
-#: Of a tip, as far as it is stated: its height and half-angle, from a micrograph.
-_TIP = 0.2
-#: Of what air takes up: humidity, what is around, and dimensions as far as they matter to it.
-_GAS = 0.1
-#: Of the distance to a surface below.
-_GAP = 0.1
-#: Nominal doping is that good, where the probe file says no better (the makers' own tolerance).
-_DOPING = 0.15
-#: What is known of films of other materials: they differ from the bulk, and from each other.
-_FILM = 0.2
-#: Dimensions that do not matter to the tip.
-_HARMLESS = ("reader_length_um", "reader_centre_um")
 ALL_DIMENSIONS = "dimensions"
 #: Scales of what is shown, and the observable that each belongs to.
 SCALES = {"current_scale": "current", "reader_scale": "reader", "raman_scale": "tip"}
@@ -60,6 +37,11 @@ _LEAST, _MOST, _LARGEST_SHARE = 1e-6, 10.0, 0.5
 #: The standard deviation of a logarithm from which on it is said as a factor: up and down are as
 #: far only by that.
 _AS_A_FACTOR = 0.4
+#: How a spread is written: in the parameter's unit, as a share of its value, or as a factor.
+Written = Literal["unit", "share", "factor"]
+_SPREAD = re.compile(r"([^±]{0,40})±([^±]{1,40})")
+_FACTOR = re.compile(r"([^/]{0,40})[×xX*] ?/([^/]{1,40})")
+_LARGEST_FACTOR = 1000.0
 
 
 @dataclass(frozen=True)
@@ -190,59 +172,36 @@ class Moved(NamedTuple):
         return self.size / float(np.sqrt(max(self.told, _LEAST_TOLD)))
 
 
-def nuisances(probe: Probe) -> list[str]:
-    """Return the dimensions of the drawing that matter to the tip, each by itself."""
-    held = (*_HARMLESS, EDGE_BIAS, *probe.shape.tied())
-    return [name for name in probe.shape.dimensions() if name not in held]
-
-
 def published_material() -> dict[str, Prior]:
-    """Return what is known of the material of any lever: the published ones, and their scatter.
-
-    Half as much again as that of the four levers, which are of one wafer.
-    """
+    """Return what is known of the material of any lever: the published ones, and their scatter."""
     return {name: Prior(*known) for name, known in PUBLISHED_SCATTER.items()}
 
 
-def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) -> dict[str, Prior]:
+def default_priors(
+    probe: ProbeParts, material: Mapping[str, Prior] | None = None
+) -> dict[str, Prior]:
     """Return what is known of a lever of which nothing but the probe file is known.
 
-    Silicon scatters about the probe's as that of the published levers does, half as much again, and
-    films of other materials within 20 %; mobility limited by impurities goes with a power of the
-    temperature, 0 as in the paper within 0.75; the doping is nominal within 15 %, dimensions are
-    within 5 %, those of a tip within 20 %, the series resistance within 0.1 %, the base temperature
-    within 1 K; what air takes up and the gap to a surface below are known to 10 %. What is known of
-    the material instead may be given; what the probe file states wins.
+    That are the spreads of `hotlever.materials.parameters` and `hotlever.probe.parameters` about
+    the probe's values, materials first, and what is known in the parameter's unit last. What is
+    known of the material instead may be given; what the probe file states wins.
     """
-    known = {name: prior.spread for name, prior in published_material().items()}
-    known["n_d"] = _DOPING
-    spreads = {name: known.get(own_name(name), _FILM) for name in usual_parameters(probe)}
-    if probe.tip is not None:
-        spreads |= dict.fromkeys(OF_THE_TIP, _TIP)
-    spreads |= dict.fromkeys(nuisances(probe), _DIMENSIONS)
-    if probe.circuit.series_resistance_ohm > 0:
-        spreads["series_resistance_ohm"] = RESISTANCE
-    if probe.surroundings.medium == "air":
-        spreads["gas_conductivity"] = _GAS
-        if probe.surroundings.surface_gap_um is not None:
-            spreads["surface_gap_um"] = _GAP
-    values = probe.values(list(spreads)).tolist()
-    found = {
-        name: Prior(value, float(spread))
-        for (name, spread), value in zip(spreads.items(), values, strict=True)
-        if value > 0
+    materials, table = of_materials(probe), parameters_of(probe)
+    known = {
+        name: Prior(one.value, one.spread, one.relative)
+        for name, one in table.items()
+        if one.spread is not None and (one.value > 0 or not one.relative)
     }
-    absolute = {"base_temperature_K": _BASE_K}
-    absolute |= {
-        name: _IMPURITIES for name in of_materials(probe) if own_name(name) == "impurity_exponent"
-    }
-    for name, spread in absolute.items():
-        found[name] = Prior(float(probe.values([name])[0]), spread, relative=False)
-    own = {name: prior for name, prior in (material or {}).items() if name in found}
-    return found | own | priors_of(probe.stated_priors, probe, "[prior]")
+    in_units = {name: name in materials for name, prior in known.items() if not prior.relative}
+    order = sorted(known, key=lambda name: (name in in_units, in_units.get(name, False)))
+    usual = {name: known[name] for name in order}
+    own = {name: prior for name, prior in (material or {}).items() if name in usual}
+    return usual | own | priors_of(probe.stated_priors, probe, "[prior]")
 
 
-def known_beforehand(probe: Probe, stated: Mapping[str, Prior | str] | None) -> dict[str, Prior]:
+def known_beforehand(
+    probe: ProbeParts, stated: Mapping[str, Prior | str] | None
+) -> dict[str, Prior]:
     """Return the usual priors, with those stated in their place; none at all for an empty mapping.
 
     Raises
@@ -256,7 +215,7 @@ def known_beforehand(probe: Probe, stated: Mapping[str, Prior | str] | None) -> 
 
 
 def priors_of(
-    stated: Mapping[str, Prior | str], probe: Probe, where: str, *, in_time: bool = False
+    stated: Mapping[str, Prior | str], probe: ProbeParts, where: str, *, in_time: bool = False
 ) -> dict[str, Prior]:
     """Return priors of which some are written as text.
 
@@ -334,3 +293,50 @@ def _check(prior: Prior, known: Parameter, where: str, written: Written) -> None
         raise InputError(
             f"{where}: a spread of {share:.2g} times the value, expected {_LEAST:g} to {_MOST:g}"
         )
+
+
+def parsed(text: str, where: str) -> tuple[float | None, float, Written]:
+    """Return value (None for the probe's own), spread, and how that is written.
+
+    The spread of a factor is its logarithm.
+
+    Raises
+    ------
+    InputError
+        If it is no prior; `where` names it.
+
+    Examples
+    --------
+    >>> parsed("0.40 ± 0.02", "here"), parsed("± 5%", "here")
+    ((0.4, 0.02, 'unit'), (None, 0.05, 'share'))
+    """
+    wrong = InputError(
+        f"{where} = '{text[:60]}', expected a value and its spread such as '3.3e17 ± 15%', "
+        "'0.40 ± 0.02', '± 5%' or '1e17 ×/ 3'"
+    )
+    plain = text.replace("+-", "±").replace("+/-", "±")
+    written: Written = "unit"
+    if (match := _FACTOR.fullmatch(plain)) is not None:
+        written = "factor"
+    elif (match := _SPREAD.fullmatch(plain)) is None:
+        raise wrong
+    first, second = (part.strip() for part in match.groups())
+    if written == "unit" and second.endswith("%"):
+        written, second = "share", second.removesuffix("%")
+    try:
+        value = float(first) if first else None
+        spread = float(second)
+    except ValueError:
+        raise wrong from None
+    if value is not None and not math.isfinite(value):
+        raise wrong
+    if written == "factor":
+        if not 1.0 < spread <= _LARGEST_FACTOR:
+            raise InputError(
+                f"{where} = '{text[:60]}': a factor of {spread:g}, expected one above 1 and at "
+                f"most {_LARGEST_FACTOR:g}"
+            )
+        return value, math.log(spread), written
+    if not 0 < spread < math.inf:
+        raise wrong
+    return value, spread / (100.0 if written == "share" else 1.0), written

@@ -2,52 +2,24 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from pydantic import Field, SerializeAsAny, model_validator
-
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import write_text
-from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind, Material, full_name
-from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
+from hotlever.materials import REFERENCE
 from hotlever.materials.sections import LAWS, materials_of, own_laws, refuse_own_laws, with_laws_of
-from hotlever.probe.circuit import Circuit, Contact, Wiring
-from hotlever.probe.layout import Layout
-from hotlever.probe.prior_texts import PriorTexts
+from hotlever.probe.parts import MATERIALS, PARTS, SECTIONS, ProbeParts
 from hotlever.probe.priors import priors_of
-from hotlever.probe.sections import read_sections, section_lines, with_values
-from hotlever.probe.shape_sections import shape_of
-from hotlever.probe.shapes import (
-    PARAMETRIC,
-    SHAPE_SECTIONS,
-    Shape,
-    ThreeLeg,
-    UShape,
-)
-from hotlever.probe.surroundings import Surroundings
+from hotlever.probe.sections import read_sections, section_lines, shape_of, with_values
+from hotlever.probe.shapes import PARAMETRIC, SHAPE_SECTIONS, ThreeLeg, UShape
 from hotlever.probe.tip import Tip
 from hotlever.records import Record
 from hotlever.spieser2017 import DOI
-from hotlever.types import Array
-
-#: What the sections of a probe file hold, beside the shape in ``[probe]``.
-_PARTS: dict[str, type[Record]] = {
-    "circuit": Circuit,
-    "material": Material,
-    "surroundings": Surroundings,
-    "tip": Tip,
-    "prior": PriorTexts,
-}
-_MATERIALS = "materials"
-SECTIONS = (*SHAPE_SECTIONS, _MATERIALS, *_PARTS)
 
 
-class Probe(Record):
+class Probe(ProbeParts):
     """Shape, circuit, material, surroundings and tip of one lever: everything a solve needs.
 
     Without a `tip` the lever is flat, as in the paper. What is known of it before it is measured
@@ -61,53 +33,6 @@ class Probe(Record):
     >>> probe.with_(n_d=4e17, series_resistance_ohm=0).material.n_d
     4e+17
     """
-
-    shape: Shape
-    circuit: Circuit = Circuit()
-    material: Material = REFERENCE
-    materials: dict[str, SerializeAsAny[Kind]] = Field(default_factory=dict)
-    surroundings: Surroundings = Surroundings()
-    tip: Tip | None = None
-    prior: PriorTexts | None = None
-
-    @model_validator(mode="after")
-    def _tip_stands_on_the_heater(self) -> Probe:
-        if self.tip is not None:
-            room = self.shape.layout().heater.narrow_um / 2
-            if not self.tip.base_radius_um < room:
-                raise ValueError(
-                    f"the tip's base has a radius of {self.tip.base_radius_um:.4g} µm, expected "
-                    f"less than {room:.4g} µm, half the heater's narrow side"
-                )
-        return self
-
-    @model_validator(mode="after")
-    def _low_doped_parts_are_the_lower(self) -> Probe:
-        for region in self.layout().regions:
-            low, high = region.stack[0].material, region.dopant_from
-            of_low, of_high = self.kinds[low], self.kinds[high]
-            if (
-                region.taper is not None
-                and isinstance(of_low, LowDopedSilicon)
-                and isinstance(of_high, HighDopedSilicon)
-                and of_low.n_d >= of_high.n_hd
-            ):
-                raise ValueError(
-                    f"{full_name(low, 'n_d')} = {of_low.n_d:g} must be below "
-                    f"{full_name(high, 'n_hd')} = {of_high.n_hd:g}"
-                )
-        return self
-
-    @model_validator(mode="after")
-    def _laws_make_sense_at_the_base(self) -> Probe:
-        for kind in self.made_of.values():
-            if reason := kind.impossible(self.circuit.base_temperature_K):
-                raise ValueError(reason)
-        return self
-
-    def __hash__(self) -> int:
-        parts = tuple(getattr(self, name) for name in _PARTS)
-        return hash((self.shape, tuple(self.materials.items()), *parts))
 
     @classmethod
     def reference(cls) -> Probe:
@@ -164,18 +89,18 @@ class Probe(Record):
                 raise InputError(f"{where}: [{name}] must be a section, found {quoted(section)}")
         if "probe" not in values:
             raise InputError(f"{where}: section [probe] is missing")
-        materials = materials_of(values.get(_MATERIALS, {}), where, SECTIONS)
+        materials = materials_of(values.get(MATERIALS, {}), where, SECTIONS)
         drawn = {name: values[name] for name in SHAPE_SECTIONS if name in values}
         shape = shape_of(drawn, where, folder, materials)
         for name in materials:
             if name not in shape.materials:
                 raise InputError(
-                    f"{where}: [{_MATERIALS}.{name}]: no layer is made of it, expected [layers.…] "
+                    f"{where}: [{MATERIALS}.{name}]: no layer is made of it, expected [layers.…] "
                     f'with material = "{name}"'
                 )
-        parts: dict[str, Any] = {"shape": shape, _MATERIALS: materials}
+        parts: dict[str, Any] = {"shape": shape, MATERIALS: materials}
         usual = {"material": REFERENCE.model_dump()}
-        for name, part in _PARTS.items():
+        for name, part in PARTS.items():
             if name in values:
                 section = {**usual.get(name, {}), **values[name]}
                 parts[name] = part.from_values(section, f"{where}: [{name}]")
@@ -203,65 +128,18 @@ class Probe(Record):
     @property
     def _records(self) -> dict[str, Record]:
         """What it consists of, beside the shape, by the section of its file."""
-        named = {f"{_MATERIALS}.{name}": kind for name, kind in self.materials.items()}
-        return named | self._parts
-
-    @property
-    def _parts(self) -> dict[str, Record]:
-        """Those of its parts that matter."""
-        parts = {name: getattr(self, name) for name in _PARTS if getattr(self, name)}
-        if not self.has_plain_silicon:
-            del parts["material"]
-        return parts
-
-    @property
-    def has_plain_silicon(self) -> bool:
-        """Whether any of it is made of the silicon of ``[material]``."""
-        return not {LOW_DOPED, HIGH_DOPED}.isdisjoint(self.layout().materials)
+        named = {f"{MATERIALS}.{name}": kind for name, kind in self.materials.items()}
+        return named | self.parts
 
     def sections(self) -> dict[str, dict[str, Any]]:
         """Return the sections as plain values: what `from_sections` takes, or refuses."""
         found: dict[str, dict[str, Any]] = self.shape.sections()
         if self.materials:
-            found[_MATERIALS] = {name: kind.model_dump() for name, kind in self.materials.items()}
-        found |= {name: part.model_dump() for name, part in self._parts.items()}
+            found[MATERIALS] = {name: kind.model_dump() for name, kind in self.materials.items()}
+        found |= {name: part.model_dump() for name, part in self.parts.items()}
         if laws := own_laws(self.made_of):
             found[LAWS] = laws
         return {name: with_values(section) for name, section in found.items()}
-
-    def field(self, name: str) -> tuple[str, str, type[Record]]:
-        """Return section, key and record of a name such as ``n_d`` or ``tip.height_um``.
-
-        Raises
-        ------
-        InputError
-            If it is no key of a probe file; the nearest one is given.
-        """
-        section, dot, key = name.rpartition(".")
-        named = {one: type(kind) for one, kind in self.materials.items()}
-        wired = {f"circuit.{name}": Contact for name in self.layout().terminal_names}
-        records: dict[str, type[Record]] = {
-            "probe": type(self.shape),
-            **named,
-            **_PARTS,
-            **wired,
-            **{f"layers.{one}": record for one, record in self.shape.layer_records().items()},
-        }
-        if dot and section not in records:
-            raise unknown_name("section", section, [*SECTIONS, *named, *wired])
-        known = {part: [*record.model_fields] for part, record in records.items()}
-        # in [probe] those of all shapes, its own first
-        known["probe"] += [key for one in PARAMETRIC.values() for key in one.model_fields]
-        own = [part for part in _PARTS if getattr(self, part)]
-        # those of a named material have its name before them
-        for part in [section] if dot else ["probe", *own, *_PARTS]:
-            if key in known[part] or (dot and records[part] is PriorTexts):
-                return part, key, records[part]
-        # a prior has the name of what it is of
-        dotted = {*named, *wired}
-        full = [f"{part}.{key}" if part in dotted else key for part in known for key in known[part]]
-        choices = known[section] if dot else full
-        raise unknown_name("name", key, dict.fromkeys(choices))
 
     def with_(self, **changes: Any) -> Probe:
         """Return a copy with some values changed, each named by its key in a probe file.
@@ -283,7 +161,7 @@ class Probe(Record):
                     f"{name} counts when a drawing is read, expected it in the probe file"
                 )
             inside, (*above, last) = sections, section.split(".")
-            for one in [_MATERIALS] if section in self.materials else above:
+            for one in [MATERIALS] if section in self.materials else above:
                 inside = inside.setdefault(one, {})
             inside.setdefault(last, {})[key] = value
         sections = {name: with_values(section) for name, section in sections.items()}
@@ -293,35 +171,6 @@ class Probe(Record):
             sections["probe"] = {key: value for key, value in own if key in shape.model_fields}
         changed: Probe = with_laws_of(self, Probe.from_sections(sections, "probe"))
         return changed
-
-    def values(self, names: Sequence[str]) -> Array:
-        """Return some of its values by their names in a probe file, shape (len(names),)."""
-        return np.array([self._value(name) for name in names], dtype=float)
-
-    def _value(self, name: str) -> Any:
-        material, dot, own = name.partition(".")
-        if dot:
-            return getattr(self.materials[material], own)
-        parts = (self.shape, *(getattr(self, part) for part in _PARTS))
-        return next(
-            getattr(part, name) for part in parts if part and name in type(part).model_fields
-        )
-
-    def replace(self, values: Mapping[str, float]) -> Probe:
-        """Return a copy with some values changed, as `with_` does but unchecked and fast."""
-        parts: dict[str, Any] = {}
-        for field in ("shape", *_PARTS):
-            part = getattr(self, field)
-            own = {
-                name: values[name] for name in values if part and name in type(part).model_fields
-            }
-            parts[field] = part.model_copy(update=own) if own else part
-        kinds = dict(self.materials)
-        for full, value in values.items():
-            name, dot, key = full.partition(".")
-            if dot:
-                kinds[name] = kinds[name].model_copy(update={key: value})
-        return self.model_copy(update={**parts, _MATERIALS: kinds})
 
     def __repr__(self) -> str:
         # the probe file without its comments
@@ -339,37 +188,6 @@ class Probe(Record):
             If the medium is neither.
         """
         return self.with_(medium=medium)
-
-    @property
-    def stated_priors(self) -> dict[str, str]:
-        """What its file says of its priors, by name."""
-        return {} if self.prior is None else self.prior.by_name
-
-    @property
-    def kinds(self) -> dict[str, Kind]:
-        """All its materials by name, the two of ``[material]`` among them."""
-        return {**self.material.kinds, **self.materials}
-
-    @property
-    def made_of(self) -> dict[str, Kind]:
-        """The materials that its layout has, by name."""
-        kinds = self.kinds
-        return {name: kinds[name] for name in self.layout().materials}
-
-    @property
-    def heater_silicon(self) -> LowDopedSilicon | None:
-        """The low-doped silicon of the heater; None if it is of another material."""
-        kind = self.kinds[self.layout().heater.stack[0].material]
-        return kind if isinstance(kind, LowDopedSilicon) else None
-
-    @property
-    def wiring(self) -> Wiring:
-        """Which of its terminals are what."""
-        return self.circuit.wiring(self.layout().terminal_names)
-
-    def layout(self) -> Layout:
-        """Return the regions, terminals and tip."""
-        return dataclasses.replace(self.shape.layout(), cone=self.tip)
 
     def to_toml(self) -> str:
         """Return the probe as a commented probe file."""

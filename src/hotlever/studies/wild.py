@@ -23,7 +23,7 @@ from hotlever.lever.full_space import FullSpace
 from hotlever.lever.meshing import chosen_space, energy_between_degrees, making
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.parameters import parameters_of
-from hotlever.probe.prior_texts import PriorTexts
+from hotlever.probe.parts import PriorTexts
 from hotlever.probe.priors import default_priors
 from hotlever.studies.twins import stated_on_that_side
 from hotlever.types import Array
