@@ -11,7 +11,6 @@ from math import isclose
 from pathlib import Path
 
 import pytest
-import typer
 
 from documents import (
     EXAMPLES,
@@ -23,7 +22,7 @@ from documents import (
     run_commands,
     without_blocks,
 )
-from hotlever.cli.commands import app
+from hotlever.cli.commands import command_line
 
 DOCS = ROOT / "docs"
 PAGES = {
@@ -84,7 +83,7 @@ def test_the_head_of_the_data_file_is_shown_as_it_is():
 
 def found_command(words):
     """The command that words name, and the words behind its name."""
-    command = typer.main.get_command(app)
+    command = command_line()
     while hasattr(command, "commands") and words and re.fullmatch(r"[a-z-]+", words[0]):
         name, *words = words
         assert name in command.commands, f"no command {name!r}"
@@ -107,7 +106,7 @@ def test_commands_and_options_exist(name):
             command, rest = found_command(words)
             used = {word for word in rest if re.match(r"--?[a-zA-Z]", word)}
             assert used <= options_of(command), words
-    known = options_of(typer.main.get_command(app))
+    known = options_of(command_line())
     for code in re.findall(r"`([^`\n]+)`", without_blocks(text)):
         if code.startswith("hotlever "):
             found_command(code.split()[1:])

@@ -221,7 +221,7 @@ def test_a_second_output_that_fails_leaves_the_first_as_it_was(run, tmp_path, mo
 
 
 def test_every_command_is_registered():
-    assert commands.app.registered_commands
+    assert commands.command_line().commands
     with pytest.raises(SystemExit) as ended:
         main(["--version"])
     assert ended.value.code == 0

@@ -9,10 +9,10 @@ from pathlib import Path
 import typer
 from typer import Argument, Option
 
-from hotlever.cli.application import app
+from hotlever.cli.commands import app
 from hotlever.cli.options import check_number
 from hotlever.cli.output import fail, tell
-from hotlever.cli.unforeseen import unforeseen_error
+from hotlever.cli.running import unforeseen_error
 from hotlever.errors import InputError
 
 #: Where a password may stand, that would be seen by others on the command line.

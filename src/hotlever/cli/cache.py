@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from typer import Option
 
-from hotlever.cli.application import app
+from hotlever.cli.commands import app
 from hotlever.cli.output import give
 
 

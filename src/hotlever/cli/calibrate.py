@@ -7,7 +7,7 @@ from pathlib import Path
 from typer import Argument, Option
 
 from hotlever.cli import output as terminal
-from hotlever.cli.application import app
+from hotlever.cli.commands import app
 from hotlever.cli.options import (
     ColumnOption,
     File,
@@ -15,12 +15,11 @@ from hotlever.cli.options import (
     PlotFile,
     PriorOption,
     check_medium,
-    check_plot,
     column_files,
     load_probe,
 )
 from hotlever.errors import InputError
-from hotlever.files import Outputs
+from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.tasks.texts import parse_timing
 
 
@@ -63,7 +62,7 @@ def calibrate_command(
     outputs = Outputs(data, *given.values(), *column_files(column))
     outputs.file(output)
     outputs.file(table, ".csv")
-    check_plot(outputs, plot)
+    outputs.file(plot, *FIGURE_TYPES)
     calibrate_file(
         terminal,
         data,

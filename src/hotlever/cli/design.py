@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typer import Option
 
-from hotlever.cli.application import app
+from hotlever.cli.commands import app
 from hotlever.cli.options import (
     File,
+    PlotFile,
     ProbeFile,
-    SweepPlot,
     check_number,
-    check_plot,
     load_probe,
     parse_vary,
 )
 from hotlever.cli.output import give, note, progress
 from hotlever.errors import InputError
-from hotlever.files import Outputs, write_text
+from hotlever.files import FIGURE_TYPES, Outputs, write_text
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
+from hotlever.tasks.files import draw
 
 
 @app.command("design")
@@ -36,7 +36,7 @@ def design_command(
     annealing_min: float = Option(ANNEALING_S / 60.0, help="Annealing (min) that the delta is of."),
     air: bool = Option(True, help="Solve in air too, for k."),
     output: File = Option(None, "-o", "--output", help="FILE.csv; standard output if left out."),
-    plot: SweepPlot = None,
+    plot: PlotFile = None,
 ) -> None:
     """Show how knee, tip temperature and loss to air depend on a probe's design."""
     from hotlever.probe.shapes import DRAWING
@@ -44,7 +44,7 @@ def design_command(
 
     outputs = Outputs(probe_file)
     outputs.file(output, ".csv")
-    check_plot(outputs, plot)
+    outputs.file(plot, *FIGURE_TYPES)
     check_number("--power", power, 1e-3, 1000)
     check_number("--annealing-K", annealing_K, 700, 1700)
     check_number("--annealing-min", annealing_min, 1e-3, 1e5)
@@ -67,9 +67,6 @@ def design_command(
     with outputs.together():
         if output is not None:
             write_text(output, study.design_csv(data))
-        if plot is not None:
-            from hotlever import figures
-
-            figures.save_figure(figures.design_sweep(data), plot)
+        draw(plot, lambda figures: figures.design_sweep(data))
     if output is None:
         give(study.design_csv(data))

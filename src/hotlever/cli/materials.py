@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from hotlever.cli.application import app
-from hotlever.cli.options import PlotFile, check_plot
+from hotlever.cli.commands import app
+from hotlever.cli.options import PlotFile
 from hotlever.cli.output import give
-from hotlever.files import Outputs
+from hotlever.files import FIGURE_TYPES, Outputs
+from hotlever.tasks.files import draw
 
 
 @app.command("materials")
@@ -14,10 +15,7 @@ def materials_command(plot: PlotFile = None) -> None:
     from hotlever.materials.catalogue import curves, listing
 
     outputs = Outputs()
-    check_plot(outputs, plot)
-    if plot is not None:
-        from hotlever import figures
-
-        with outputs.together():
-            figures.save_figure(figures.material_curves(curves()), plot)
+    outputs.file(plot, *FIGURE_TYPES)
+    with outputs.together():
+        draw(plot, lambda figures: figures.material_curves(curves()))
     give("\n".join([*listing(), ""]))

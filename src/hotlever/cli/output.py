@@ -196,4 +196,4 @@ def progress_bars(*labels: str) -> Iterator[tuple[Progress, ...]]:
             return lambda done, total: bar.update(task, completed=done, total=total, visible=True)
 
         # the first is there at once, to show that work has begun
-        yield tuple(updater(label, place == 0) for place, label in enumerate(labels))
+        yield tuple(updater(label, index == 0) for index, label in enumerate(labels))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,11 +9,12 @@ import typer
 from typer import Argument, Option
 
 from hotlever.cli import output as terminal
-from hotlever.cli.application import Commands, app
-from hotlever.cli.options import File, PlotFile, ProbeFile, check_plot, load_probe
+from hotlever.cli.commands import Commands, app
+from hotlever.cli.options import File, PlotFile, ProbeFile, load_probe
 from hotlever.cli.output import give
-from hotlever.errors import InputError, unknown_name
-from hotlever.files import Outputs
+from hotlever.errors import unknown_name
+from hotlever.files import FIGURE_TYPES, Outputs
+from hotlever.tasks.files import draw
 
 if TYPE_CHECKING:
     from hotlever.probe import Layout, Probe, ProbeMesh
@@ -53,22 +52,31 @@ def show(
     mesh: bool = Option(False, "--mesh", help="Draw the triangles of the mesh too."),
 ) -> None:
     """Draw and describe a probe."""
+    from hotlever.drawing.fault import DrawingError
     from hotlever.lever.meshing import chosen_space
 
     outputs = Outputs(probe_file)
-    check_plot(outputs, plot)
-    with _fault_drawn(outputs, plot):
+    outputs.file(plot, *FIGURE_TYPES)
+    try:
         probe = load_probe(probe_file)
-    name = "reference probe" if probe_file is None else probe_file.name
-    layout = probe.layout()
-    triangles = chosen_space(probe).mesh
-    lines = _described(probe, triangles, name)
-    if plot is not None:
-        from hotlever import figures
-
+    except DrawingError as error:
+        fault = error
         with outputs.together():
-            made = figures.probe_drawing(layout, name, mesh=triangles if mesh else None)
-            figures.save_figure(made, plot)
+            draw(
+                plot,
+                lambda figures: figures.outlines_drawing(
+                    fault.outlines, fault=str(fault), place=fault.place
+                ),
+            )
+        raise
+    name = "reference probe" if probe_file is None else probe_file.name
+    layout, triangles = probe.layout(), chosen_space(probe).mesh
+    lines = _described(probe, triangles, name)
+    with outputs.together():
+        draw(
+            plot,
+            lambda figures: figures.probe_drawing(layout, name, mesh=triangles if mesh else None),
+        )
     give("\n".join([*lines, ""]))
 
 
@@ -94,25 +102,8 @@ def import_command(
 
     outputs = Outputs(drawing)
     outputs.file(output, ".toml")
-    check_plot(outputs, plot)
+    outputs.file(plot, *FIGURE_TYPES)
     propose_probe(terminal, drawing, cell, name, outputs, output, plot)
-
-
-@contextmanager
-def _fault_drawn(outputs: Outputs, plot: Path | None) -> Iterator[None]:
-    """Draw what is wrong with a drawing, with its place marked, before the error goes on."""
-    try:
-        yield
-    except InputError as error:
-        from hotlever.drawing.fault import DrawingError
-
-        if plot is not None and isinstance(error, DrawingError):
-            from hotlever import figures
-
-            made = figures.outlines_drawing(error.outlines, fault=str(error), place=error.place)
-            with outputs.together():
-                figures.save_figure(made, plot)
-        raise
 
 
 def _described(probe: Probe, mesh: ProbeMesh, name: str) -> list[str]:

@@ -3,18 +3,88 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer.core
 from typer import Argument, Option
 
-from hotlever.cli.application import app
-from hotlever.cli.options import File, check_plot, with_groups
-from hotlever.cli.output import give, note, tell
-from hotlever.cli.thermometer import CalibrationOption, ThermometerOptions
+from hotlever.cli.commands import app
+from hotlever.cli.options import File, with_groups
+from hotlever.cli.output import give, note, progress, tell
 from hotlever.errors import InputError
-from hotlever.files import Outputs, json_text, write_text
+from hotlever.files import FIGURE_TYPES, Outputs, json_text, write_text
+from hotlever.tasks.files import draw
+
+if TYPE_CHECKING:
+    from hotlever.raman.thermometry import Thermometry
+
+CalibrationOption = Annotated[
+    str | None,
+    Option(
+        metavar="CAL.json",
+        help="A calibration that --save-calibration wrote, or 'published' for the published "
+        "laws (then --reference is needed).",
+    ),
+]
+
+
+@dataclass
+class ThermometerOptions:
+    """What `set_up` of `hotlever.raman.thermometry` takes."""
+
+    calibration: CalibrationOption = None
+    calibrate_from: list[Path] | None = Option(
+        None, metavar="FILE_OR_DIR...", help="Hot-plate spectra to calibrate from; one or more."
+    )
+    temperatures: File = Option(
+        None,
+        metavar="TABLE.csv",
+        help="Hot-plate temperatures: file name, temperature. Left out: header or file name.",
+    )
+    corrections: File = Option(
+        None,
+        metavar="TABLE.csv",
+        help="By hand: file, start_cm-1 of the line, from_cm-1 and to_cm-1 of what is fitted, use.",
+    )
+    reference: list[Path] | None = Option(
+        None,
+        metavar="FILE_OR_DIR",
+        help="Spectrum at room temperature on the instrument as it is now; may be repeated.",
+    )
+    law: str = Option("anharmonic", metavar="linear|anharmonic", help="Calibration law.")
+    shape: str | None = Option(
+        None,
+        metavar="lorentzian|voigt|fano",
+        help="Line shape; left out: that of the calibration, else lorentzian.",
+    )
+    resolution: float | None = Option(
+        None,
+        metavar="CM-1",
+        help="FWHM of the spectrometer's response, for voigt; left out: fitted.",
+    )
+    laser_power: float | None = Option(
+        None, metavar="MW", help="Laser power on the lever, for its heating."
+    )
+    thermal_resistance: float | None = Option(
+        None, metavar="K/MW", help="Thermal resistance of the lever, K per mW of heat."
+    )
+    stress: float = Option(
+        0.0, metavar="MPA", help="Unknown stress in the silicon; enters the error."
+    )
+
+    @property
+    def files(self) -> list[Path | str | None]:
+        """The files that it reads."""
+        several = [*(self.calibrate_from or []), *(self.reference or [])]
+        return [*several, self.temperatures, self.calibration, self.corrections]
+
+    def set_up(self) -> Thermometry:
+        """Set the thermometer up; what is noticed goes to standard error."""
+        from hotlever.raman import thermometry
+
+        return thermometry.set_up(**vars(self), listener=thermometry.Listener(note, progress))
 
 
 class SeveralFiles(typer.core.TyperCommand):
@@ -92,7 +162,7 @@ def raman_command(
     from hotlever.tasks.spectra import Files, measure_spectra
 
     outputs = Outputs(*spectra, *thermometer.files)
-    check_plot(outputs, plot)
+    outputs.file(plot, *FIGURE_TYPES)
     outputs.file(save_calibration)
     outputs.file(output)
     files = Files(output, plot, save_calibration)
@@ -142,15 +212,12 @@ def raman_check_command(
     from hotlever.studies.raman_check import conclusion, paper_check
 
     outputs = Outputs(calibration)
-    check_plot(outputs, plot)
+    outputs.file(plot, *FIGURE_TYPES)
     outputs.file(output)
     check = paper_check(calibration_named(calibration))
     said = conclusion(check)
     with outputs.together():
-        if plot is not None:
-            from hotlever import figures
-
-            figures.save_figure(figures.raman_check(check), plot)
+        draw(plot, lambda figures: figures.raman_check(check))
         if output is not None:
             lines = check.drop_dims("temperature_K").to_dataframe().rename_axis("name")
             numbers = {"truth": check.truth, "hottest_K": check.hottest_K}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from typer import Option
 
-from hotlever.cli.application import app
+from hotlever.cli.commands import app
 from hotlever.cli.output import give, progress_bars
 from hotlever.files import Outputs
 

@@ -29,5 +29,5 @@ from hotlever.figures.lever import (
 )
 from hotlever.figures.materials import material_curves
 from hotlever.figures.raman import one_spectrum, raman_check, thermometry
-from hotlever.figures.style import FIGURE_TYPES, save_figure
+from hotlever.figures.style import save_figure
 from hotlever.figures.transient import harmonics, history_overview, small_signals

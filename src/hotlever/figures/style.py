@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from hotlever.errors import InputError
-from hotlever.files import whole_file
+from hotlever.files import FIGURE_TYPES, whole_file
 from hotlever.materials.parameters import INVERSION, parameter_named
 
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
@@ -26,8 +26,6 @@ MEASURED: Any = {"ls": "none", "marker": "o", "mfc": "none", "color": BLACK, "la
 
 #: Title of what is drawn of a lever that does not show its data.
 NOT_DESCRIBED = "the data are not described: the nearest lever, without errors"
-
-FIGURE_TYPES = (".png", ".svg", ".pdf")
 
 _STYLE: Any = {
     "font.size": 9,

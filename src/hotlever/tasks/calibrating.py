@@ -12,6 +12,7 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import read_fit, read_measurement
 from hotlever.files import Outputs, write_text
 from hotlever.probe import Probe
+from hotlever.tasks.files import draw
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.texts import parse_priors
 
@@ -67,10 +68,7 @@ def calibrate_file(
             result.write(to.output)
         if to.table is not None:
             write_text(to.table, result.table_csv())
-        if to.plot is not None:
-            from hotlever import figures
-
-            figures.save_figure(figures.calibration_curves(result), to.plot)
+        draw(to.plot, lambda figures: figures.calibration_curves(result))
     reporter.give(calibration_text(result) + "\n")
     if not result.describes_data:
         raise ComputationError(f"{data}: {result.doubt}")

@@ -18,7 +18,7 @@ from hotlever.files import Outputs, write_text
 from hotlever.lever.transient import Waveform
 from hotlever.probe import Probe
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.texts import USUAL, parse_priors, parse_values
+from hotlever.tasks.texts import USUAL, parse_number, parse_pairs, parse_priors
 
 #: Points of a curve that is shown while the fit goes on.
 _DRAWN = 200
@@ -48,7 +48,10 @@ def fit_options(
     stated = probe.stated_priors
     return FitOptions(
         observables=None if observables is None else observables.split(","),
-        fixed=parse_values("--fix", fix, bare=True),
+        fixed={
+            name: parse_number(text, f"--fix {name}") if text else None
+            for name, text in parse_pairs("--fix", fix, bare=True).items()
+        },
         priors=stated if given is None else {**stated, **given} if given or usual else {},
         usual_priors=usual,
         free=() if free is None else tuple(name.strip() for name in free.split(",")),

@@ -7,6 +7,7 @@ from pathlib import Path
 from hotlever.drawing.fault import DrawingError
 from hotlever.drawing.importing import import_drawing
 from hotlever.files import Outputs, write_text
+from hotlever.tasks.files import draw
 from hotlever.tasks.reporter import Reporter
 
 
@@ -23,21 +24,20 @@ def propose_probe(
     folder = Path() if output is None else output.parent
     proposed = import_drawing(drawing, cell, folder, unit)
     fault = proposed.fault
+    place = fault.place if isinstance(fault, DrawingError) else None
     with outputs.together():
         if output is not None:
             write_text(output, proposed.text)
-        if plot is not None:
-            from hotlever import figures
-
-            place = fault.place if isinstance(fault, DrawingError) else None
-            figure = figures.outlines_drawing(
+        draw(
+            plot,
+            lambda figures: figures.outlines_drawing(
                 proposed.outlines,
                 drawing.name,
                 tip=proposed.proposal.tip,
                 fault="" if place is None else str(fault),
                 place=place,
-            )
-            figures.save_figure(figure, plot)
+            ),
+        )
     reporter.give(proposed.text if output is None else "\n".join([*proposed.listing, ""]))
     reporter.note(*proposed.notes)
     if fault is not None:

@@ -24,6 +24,7 @@ from hotlever.lever.transient import (
     with_times,
     write_history,
 )
+from hotlever.tasks.files import draw
 from hotlever.tasks.reporter import Reporter
 from hotlever.types import Array
 
@@ -37,16 +38,6 @@ class Files(NamedTuple):
     output: Path | None = None
     plot: Path | None = None
     fields: Path | None = None
-
-    def checked(self, outputs: Outputs) -> Files:
-        """Check that they can be written."""
-        outputs.file(self.output, ".csv", ".nc")
-        if self.plot is not None:
-            from hotlever.figures import FIGURE_TYPES
-
-            outputs.file(self.plot, *FIGURE_TYPES)
-        outputs.folder(self.fields)
-        return self
 
 
 def sweep(reporter: Reporter, lever: Lever, biases: Array, outputs: Outputs, files: Files) -> None:
@@ -69,10 +60,7 @@ def sweep(reporter: Reporter, lever: Lever, biases: Array, outputs: Outputs, fil
     with outputs.together():
         if files.output is not None:
             write_sweep(data, files.output)
-        if files.plot is not None:
-            from hotlever import figures
-
-            figures.save_figure(figures.sweep_overview(data), files.plot)
+        draw(files.plot, lambda figures: figures.sweep_overview(data))
         if files.fields is not None:
             _write_fields(lever, states, output_folder(files.fields))
     if files.output is None:
@@ -133,10 +121,8 @@ def simulate_in_time(
     with outputs.together():
         if files.output is not None:
             write_history(data, files.output)
-        if files.plot is not None and data.sizes["time"]:
-            from hotlever import figures
-
-            figures.save_figure(figures.history_overview(curve), files.plot)
+        if data.sizes["time"]:
+            draw(files.plot, lambda figures: figures.history_overview(curve))
         if files.fields is not None:
             _write_fields_in_time(lever, states, output_folder(files.fields))
     if files.output is None:
@@ -161,7 +147,7 @@ def _times(data: xr.Dataset) -> list[list[str]]:
     for name in ("start", "end"):
         constants = data.attrs.get(f"time_constants_us_at_{name}", ())
         if len(constants):
-            listed = ", ".join(f"{one:.3g}" for one in constants)
+            listed = ", ".join(f"{time:.3g}" for time in constants)
             rows.append([f"time constants at the {name}", f"{listed} µs"])
     return rows
 
@@ -175,14 +161,12 @@ def _write_fields(lever: Lever, states: list[State], folder: Path) -> None:
     from hotlever.lever3d import SolidLever
 
     if isinstance(lever, SolidLever):
-        from hotlever import figures
-        from hotlever.lever3d.fields import temperature_slices, write_solid_vtu
+        from hotlever.lever3d.fields import write_solid_vtu
 
         for state in states:
             write_solid_vtu(state, name(state, ".vtu"))
             if lever.medium == "air":
-                slices = figures.temperature_slices(temperature_slices(state))
-                figures.save_figure(slices, name(state, ".png"))
+                _draw_slices(state, name(state, ".png"))
         return
 
     from hotlever.lever.air_fields import AirFields
@@ -194,10 +178,16 @@ def _write_fields(lever: Lever, states: list[State], folder: Path) -> None:
             air.write_vtu(state, name(state, "_air.vtu"))
 
 
+def _draw_slices(state: State, path: Path) -> None:
+    from hotlever.lever3d.fields import temperature_slices
+
+    draw(path, lambda figures: figures.temperature_slices(temperature_slices(state)))
+
+
 def _write_fields_in_time(lever: Lever, states: list[tuple[float, State]], folder: Path) -> None:
     """Write the fields of states in time to a folder, with their index."""
     mapper = FieldMapper(lever)
-    names = [f"fields_{place:04d}.vtu" for place in range(len(states))]
+    names = [f"fields_{index:04d}.vtu" for index in range(len(states))]
     for name, (_, state) in zip(names, states, strict=True):
         write_vtu(mapper.map(state), folder / name)
     write_pvd([t for t, _ in states], names, folder / "fields.pvd")

@@ -10,6 +10,7 @@ from hotlever.errors import InputError
 from hotlever.files import Outputs, write_text
 from hotlever.raman.series import to_csv
 from hotlever.raman.thermometry import Thermometry
+from hotlever.tasks.files import draw
 
 
 class Files(NamedTuple):
@@ -35,14 +36,11 @@ def measure_spectra(
     lines, table = setup.measure(spectra)
     text = to_csv(table)
     with outputs.together():
-        if files.plot is not None:
-            from hotlever import figures
-
-            if len(lines) == 1 and setup.calibration is None:
-                figure = figures.one_spectrum(lines[0])
-            else:
-                figure = figures.thermometry(lines, table, setup.calibration, setup.hot_plate)
-            figures.save_figure(figure, files.plot)
+        if len(lines) == 1 and setup.calibration is None:
+            draw(files.plot, lambda figures: figures.one_spectrum(lines[0]))
+        else:
+            of = setup.calibration, setup.hot_plate
+            draw(files.plot, lambda figures: figures.thermometry(lines, table, *of))
         if files.save_calibration is not None and setup.calibration is not None:
             setup.calibration.save(files.save_calibration)
         if files.output is not None:

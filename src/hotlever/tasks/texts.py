@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, get_args
 
 from hotlever.errors import InputError, quoted, shown
@@ -28,25 +28,25 @@ def parse_number(text: str, where: str) -> float:
     return value
 
 
-def parse_values(
-    option: str, settings: Sequence[str] | None, bare: bool = False
-) -> dict[str, float | None]:
-    """Parse ``NAME=VALUE`` pairs, or bare names where these are allowed.
+def parse_pairs(
+    option: str, texts: Iterable[str] | None, expected: str = "NAME=VALUE", bare: bool = False
+) -> dict[str, str]:
+    """Split ``NAME=VALUE`` pairs, or bare names (without a value) where these are allowed.
 
     Examples
     --------
-    >>> parse_values("--fix", ["n_d=3.3e17", "p"], bare=True)
-    {'n_d': 3.3e+17, 'p': None}
+    >>> parse_pairs("--fix", ["n_d=3.3e17", "p"], bare=True)
+    {'n_d': '3.3e17', 'p': ''}
     """
-    values: dict[str, float | None] = {}
-    for one in settings or []:
-        name, equals, value = (part.strip() for part in one.partition("="))
-        if not (equals or bare):
-            raise InputError(f"{option} {one}: expected NAME=VALUE")
-        if name in values:
+    pairs: dict[str, str] = {}
+    for text in texts or []:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (equals or bare) or (equals and bare and not value):
+            raise InputError(f"{option} {shown(text)}: expected {expected}")
+        if name in pairs:
             raise InputError(f"{option} {name}: given twice, expected once")
-        values[name] = parse_number(value, f"{option} {name}") if equals else None
-    return values
+        pairs[name] = value
+    return pairs
 
 
 def parse_priors(texts: Sequence[str] | None, probe: Probe) -> dict[str, str] | None:
@@ -64,23 +64,13 @@ def parse_priors(texts: Sequence[str] | None, probe: Probe) -> dict[str, str] | 
         return None
     if list(texts) == ["none"]:
         return {}
-    texts = [text for text in texts if text != USUAL]
-    pairs: dict[str, str] = {}
-    for text in texts:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not equals:
-            raise InputError(
-                f"--prior {shown(text)}: expected NAME=VALUE±SPREAD, "
-                "NAME=VALUE×/FACTOR, usual, or none alone"
-            )
-        if name in pairs:
-            raise InputError(f"--prior {name}: given twice, expected once")
-        pairs[name] = value
+    expected = "NAME=VALUE±SPREAD, NAME=VALUE×/FACTOR, usual, or none alone"
+    pairs = parse_pairs("--prior", [text for text in texts if text != USUAL], expected)
     priors_of(pairs, probe, "--prior")
     return pairs
 
 
-def parse_settings(settings: Sequence[str] | None, probe: Probe) -> dict[str, Any]:
+def parse_settings(texts: Sequence[str] | None, probe: Probe) -> dict[str, Any]:
     """Parse ``NAME=VALUE`` for any key of a probe file: numbers, switches and words.
 
     A key may have its section before it, and ``none`` leaves out what a file may leave out.
@@ -93,29 +83,30 @@ def parse_settings(settings: Sequence[str] | None, probe: Probe) -> dict[str, An
     {'a0': 0.0009, 'chip': True, 'medium': 'air', 'tip.height_um': 0.7}
     """
     values: dict[str, Any] = {}
-    for one in settings or []:
-        name, equals, text = (part.strip() for part in one.partition("="))
-        where = f"--set {name}"
-        if not equals:
-            raise InputError(f"--set {one}: expected NAME=VALUE")
+    keys = set[tuple[str, str]]()
+    for name, text in parse_pairs("--set", texts).items():
         section, key, record = probe.field(name)
-        if any(probe.field(other)[:2] == (section, key) for other in values):
-            raise InputError(f"{where}: given twice, expected once")
+        if (section, key) in keys:
+            raise InputError(f"--set {name}: given twice, expected once")
+        keys.add((section, key))
         field = record.model_fields.get(key)
-        kinds = () if field is None else (field.annotation, *get_args(field.annotation))
-        if bool in kinds:
-            if text not in ("true", "false"):
-                raise InputError(f"{where}: found {quoted(text)}, expected true or false")
-            values[name] = text == "true"
-        elif type(None) in kinds and text == "none":
-            values[name] = None
-        elif any(text in get_args(kind) for kind in kinds):
-            values[name] = text
-        elif float in kinds or (field is None and section == "probe"):
-            values[name] = parse_number(text, where)
-        else:
-            values[name] = text.strip("\"'")
+        # a key of another shape than the probe's is a dimension
+        kind = field.annotation if field is not None else float if section == "probe" else str
+        values[name] = _as_kind(text, (kind, *get_args(kind)), f"--set {name}")
     return values
+
+
+def _as_kind(text: str, kinds: tuple[Any, ...], where: str) -> Any:
+    """Return a text as one of the kinds of value that a key of a probe file has."""
+    if bool in kinds:
+        if text not in ("true", "false"):
+            raise InputError(f"{where}: found {quoted(text)}, expected true or false")
+        return text == "true"
+    if type(None) in kinds and text == "none":
+        return None
+    if any(text in get_args(kind) for kind in kinds):
+        return text
+    return parse_number(text, where) if float in kinds else text.strip("\"'")
 
 
 def parse_timing(text: str) -> PulseTiming:

@@ -9,8 +9,12 @@ from hotlever.errors import InputError
 from hotlever.lever.transient.waveform import Waveform, pulse, ramp, sine, step
 from hotlever.units import bias_setting, setting
 
-#: What a text may be of.
-KINDS = ("step", "pulse", "ramp", "sine")
+_MAKERS: dict[str, Callable[..., Waveform]] = {
+    "step": step,
+    "pulse": pulse,
+    "ramp": ramp,
+    "sine": sine,
+}
 
 
 def waveform_from_text(
@@ -21,7 +25,7 @@ def waveform_from_text(
     Parameters
     ----------
     kind : str
-        Of `KINDS`.
+        ``step``, ``pulse``, ``ramp`` or ``sine``.
     text : str
         Such as ``4V``, ``10V,5us`` (pulse and ramp) or ``3V+0.5V@20kHz``, whose offset may be left
         out.
@@ -58,14 +62,6 @@ def waveform_from_text(
         return make(*values)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-
-
-_MAKERS: dict[str, Callable[..., Waveform]] = {
-    "step": step,
-    "pulse": pulse,
-    "ramp": ramp,
-    "sine": sine,
-}
 
 
 def _volts_and_time(text: str, where: str) -> list[Any]:
