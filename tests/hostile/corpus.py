@@ -26,8 +26,8 @@ from hotlever.probe import Probe
 from hotlever.raman.bias_log import read_bias_log
 from hotlever.raman.calibration import published_raman_calibration, read_raman_calibration
 from hotlever.raman.correction import read_corrections
+from hotlever.raman.reading import read_file
 from hotlever.raman.series import read_temperatures
-from hotlever.raman.spectrum import read_file
 from spectrometer_files import jcamp_bytes, spc_bytes, wdf_bytes
 
 EXAMPLES = Path(__file__).parents[2] / "src" / "hotlever" / "examples"

@@ -10,7 +10,7 @@ import pytest
 from hotlever.errors import InputError
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.peak import NoSiliconLine
-from hotlever.raman.spectrum import read_spectrum
+from hotlever.raman.reading import read_spectrum
 
 
 def columns(x, y):

@@ -16,6 +16,7 @@ import synthetic_spectra as synthetic
 from hotlever.cli.raman import spread_option
 from hotlever.figures import raman as figures
 from hotlever.raman.calibration import published_raman_calibration
+from hotlever.raman.reading import read_spectra
 from hotlever.raman.series import (
     COLUMNS,
     DIGITS,
@@ -24,7 +25,7 @@ from hotlever.raman.series import (
     read_lines,
     to_csv,
 )
-from hotlever.raman.spectrum import Spectrum, read_spectra
+from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.thermometer import Thermometer
 from hotlever.studies.raman_check import conclusion, paper_check
 

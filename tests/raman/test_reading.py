@@ -14,8 +14,8 @@ from hotlever.cells import decode
 from hotlever.errors import InputError
 from hotlever.raman.block import find_blocks
 from hotlever.raman.fit import fit_peak
-from hotlever.raman.spectrum import read_file, read_spectra, read_spectrum, spectrum_files
-from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
+from hotlever.raman.reading import read_file, read_spectra, read_spectrum, spectrum_files
+from hotlever.raman.spectrum import temperature_in_metadata, temperature_in_name
 
 
 def rows(x, y, separator="\t", comma=False, end="\n"):

@@ -20,8 +20,9 @@ from hotlever.raman.calibration import (
 )
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.peak import PeakOptions
+from hotlever.raman.reading import read_spectra
 from hotlever.raman.series import calibrate_from, measure, read_lines, read_temperatures
-from hotlever.raman.spectrum import Spectrum, read_spectra
+from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.thermometer import Thermometer, laser_heating
 from hotlever.spieser2017 import HEATER_STRESS_MPA, RAMAN_CONSTANT_K, RAMAN_SLOPE_K_CM
 

@@ -13,8 +13,9 @@ from hotlever.app.child import Report
 from hotlever.errors import HotleverError, InputError
 from hotlever.raman import measure, read_lines
 from hotlever.raman.peak import WINDOW, in_window
+from hotlever.raman.reading import read_file, spectrum_files
 from hotlever.raman.series import Line
-from hotlever.raman.spectrum import Spectrum, read_file, spectrum_files
+from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.thermometry import Thermometry, set_up
 from hotlever.types import Array
 

@@ -15,7 +15,7 @@ from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
-from hotlever.measurement.checks import colder_than_base
+from hotlever.measurement.contents import colder_than_base
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import Moved, Prior, PriorUse

@@ -36,7 +36,7 @@ from hotlever.estimation.options import UNKNOWN_MEDIUM
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import given_measurement, with_measured_circuit
-from hotlever.measurement.averages import averaged, note_on_averages
+from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import Prior, PriorUse, known_beforehand
 from hotlever.types import Array, Progress

@@ -37,7 +37,7 @@ from hotlever.measurement import (
     Measurement,
     with_measured_circuit,
 )
-from hotlever.measurement.averages import averaged, note_on_averages
+from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
 from hotlever.probe.priors import (
     ALL_DIMENSIONS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hotlever.estimation.residuals import Residuals
-from hotlever.measurement.scatter import noise_about_neighbours
+from hotlever.measurement.data import noise_about_neighbours
 from hotlever.types import Array
 
 #: Data are not described where they differ from the model by more than this share of the largest

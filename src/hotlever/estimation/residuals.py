@@ -12,7 +12,7 @@ from hotlever.errors import InputError
 from hotlever.estimation.noise import CommonCovariance, CommonError, Drift, relative_noise
 from hotlever.estimation.options import Weights
 from hotlever.measurement import Measurement
-from hotlever.measurement.scatter import noise_about_neighbours
+from hotlever.measurement.data import noise_about_neighbours
 from hotlever.probe.priors import Moved
 from hotlever.types import Array
 

@@ -1,7 +1,8 @@
 """Measured data of one lever: the record, and the files that it is read from.
 
 `columns` knows the names and units of the columns, `settings` the comments that give circuit and
-surroundings, `sweeps` polarities and the order of the rows, `checks` what no lever can show.
+surroundings, `bias` completes the rows, `contents` knows what no lever can show, `rows` polarities
+and the order of the rows.
 """
 
 from hotlever.measurement.columns import parse_columns

@@ -1,4 +1,4 @@
-"""A measurement file while it is read: rows and settings, and how one is refused or noted."""
+"""A measurement file while it is read: what it may hold, and how it is refused or noted."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from hotlever.datasets import COLUMNS
 from hotlever.errors import InputError, shown
 from hotlever.measurement.columns import Column
-from hotlever.measurement.data import LEVER, TIME
+from hotlever.measurement.data import LEVER, MEASURED, TIME
 from hotlever.measurement.settings import Settings
+from hotlever.probe import Circuit
 from hotlever.tables import Table
 from hotlever.types import Array
+from hotlever.units import plausible
 
 
 @dataclass
@@ -82,3 +84,96 @@ class Contents:
         if rows.any():
             others = f", and in {rows.sum() - 1} more rows" if rows.sum() > 1 else ""
             self.notes.append(f"{self.table.where(int(np.argmax(rows)))}: {text}{others}")
+
+
+#: Where the largest value of a column can lie, in the unit inside; else its unit is wrong.
+_PLAUSIBLE = {"V_b": (1e-3, 1e3), "I_h": (1e-9, 1e3), "V_r": (1e-9, 1e3), "T_tip": (0.0, 5e3)}
+#: A standard error this much smaller than the largest value is none.
+_LEAST_ERROR = 1e-9
+#: Part of the largest value by which noise and drift may push a current or voltage below 0.
+NOISE = 0.05
+#: K, and standard errors, by which a tip may seem colder than its base.
+_COLDER_K, _COLDER_ERRORS = 20.0, 4.0
+#: Resistances (kΩ) of levers, cold and hot.
+_LEVER_KOHM = (0.1, 60.0)
+#: K; probe files take no colder base.
+_COLDEST_BASE_K = 250.0
+
+
+def colder_than_base(tip_K: Array, error_K: Array, base_K: float) -> NDArray[np.bool_]:
+    """Return where a tip seems colder than its base by more than an offset or noise explain."""
+    margin = np.maximum(_COLDER_K, _COLDER_ERRORS * np.nan_to_num(error_K))
+    return np.asarray(tip_K < base_K - margin)
+
+
+def check(contents: Contents, *, signed: bool = False) -> None:
+    """Refuse what no lever can show, and note what it hardly can.
+
+    What may be of either sign is asked less: in time a current goes on or off before the bias is
+    known to, and other supplies drive a current of their own.
+
+    Raises
+    ------
+    InputError
+        If a value cannot be, or the largest of a quantity shows that its unit is wrong.
+    """
+    values, settings = contents.values, contents.settings.values
+    for symbol in (column.symbol for column in MEASURED if column.symbol in contents.columns):
+        of, data = symbol.removeprefix("d"), values[symbol]
+        unit, (low, high) = COLUMNS[of].unit, _PLAUSIBLE[of]
+        size = np.nanmax(np.abs(values[of]), initial=0.0)
+        if symbol != of:
+            expected = f"a standard error above 0 and up to {high:g} {unit}, or an empty cell"
+            contents.refuse((data <= _LEAST_ERROR * size) | (data > high), expected, symbol)
+        elif not np.isnan(data).all():
+            if symbol == "T_tip":
+                contents.refuse(data <= 0.0, "a temperature above 0 K", symbol)
+            where = f"{contents.table.path}: the largest {symbol}"
+            plausible(where, unit, size if signed else np.nanmax(data), low, high)
+            plausible(where, unit, size, low, high)
+            negative = (data < -NOISE * size) & (not signed)
+            contents.note_rows(negative, f"{symbol} is negative")
+
+    base = settings.get("base_temperature_K", _COLDEST_BASE_K)
+    contents.note_rows(
+        colder_than_base(values["T_tip"], values["dT_tip"], base),
+        f"T_tip is below the base temperature ({base:g} K), perhaps in another unit",
+    )
+    if not signed:
+        _check_lever_voltage(contents)
+
+
+def _check_lever_voltage(contents: Contents) -> None:
+    """Refuse rows whose series resistor leaves no voltage for the lever."""
+    bias, current = contents.values["V_b"], contents.values["I_h"]
+    ohm = contents.settings.values.get("series_resistance_ohm", 0.0)
+    lever = Circuit(series_resistance_ohm=ohm).lever_voltage(bias, current)
+    below = lever < -NOISE * bias.max()
+    if below.any():
+        row = int(np.argmax(below))
+        raise InputError(
+            f"{contents.table.where(row)}: V_b = {bias[row]:g} V and I_h = {current[row]:g} mA "
+            f"leave {lever[row]:.3g} V for the lever behind R_s = {ohm:g} ohm, expected a voltage "
+            f"above 0{_likely_mistakes(bias, current, ohm / 1000.0)}"
+        )
+
+
+def _likely_mistakes(bias: Array, current: Array, series_kohm: float) -> str:
+    """Ask after what would leave a lever of some kilo-ohm behind a series resistance; or nothing.
+
+    Of biases (V) and currents (mA) that leave none.
+    """
+    heated = (bias > 0) & (current > 0)
+    if not heated.any():
+        return ""
+    kohm = bias[heated] / current[heated]
+    lever_kohm = {
+        "is V_b the lever's own voltage, not the bias?": kohm,
+        "are the columns of V_b and I_h swapped?": 1.0 / kohm - series_kohm,
+        "is the unit of I_h wrong (µA labelled mA)?": 1000.0 * kohm - series_kohm,
+        "is the unit of V_b wrong (V labelled mV)?": 1000.0 * kohm - series_kohm,
+        "is the unit of R_s wrong (ohm labelled kOhm)?": kohm - series_kohm / 1000.0,
+    }
+    low, high = _LEVER_KOHM
+    questions = [ask for ask, of in lever_kohm.items() if low < of.min() and of.max() < high]
+    return f": {' or: '.join(questions)}" if questions else ""

@@ -12,19 +12,17 @@ import numpy as np
 from hotlever.datasets import COLUMNS, OBSERVABLES
 from hotlever.errors import InputError, shown
 from hotlever.lever.transient.waveform import Waveform
-from hotlever.measurement.bias import find_bias, mirror
-from hotlever.measurement.checks import check
+from hotlever.measurement.bias import check_times, find_bias, find_waveform, leave_out_jumps, mirror
 from hotlever.measurement.columns import (
     find_columns,
     is_heading,
     parse_columns,
     unused_columns,
 )
-from hotlever.measurement.contents import Contents
+from hotlever.measurement.contents import Contents, check
 from hotlever.measurement.data import MEASURED, TIME, Measurement
-from hotlever.measurement.histories import check_times, find_waveform, leave_out_jumps
+from hotlever.measurement.rows import described, disagreements, sweeps_of
 from hotlever.measurement.settings import Settings
-from hotlever.measurement.sweeps import described, disagreements, sweeps_of
 from hotlever.probe import Circuit
 from hotlever.tables import read_table
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hotlever.errors import InputError, shown
-from hotlever.raman.part import file_and_label
+from hotlever.raman.spectrum import file_and_label
 from hotlever.tables import Table, read_table
 from hotlever.units import name_and_unit
 

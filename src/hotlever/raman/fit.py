@@ -16,6 +16,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter
 
 from hotlever.raman import lineshape, noise
+from hotlever.raman.lineshape import At, Problem, Solution, width_of
 from hotlever.raman.noise import Mask
 from hotlever.raman.peak import (
     LINE_RANGE,
@@ -27,7 +28,6 @@ from hotlever.raman.peak import (
     in_window,
     observed_width,
 )
-from hotlever.raman.problem import At, Problem, Solution, width_of
 from hotlever.types import Array
 
 DETECTION_SIGMAS = 5.0  #: a line's area must exceed its standard error so many times

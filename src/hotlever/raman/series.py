@@ -16,10 +16,8 @@ from hotlever.errors import InputError, shown, unknown_name
 from hotlever.raman.calibration import Point, RamanCalibration, calibrate_raman
 from hotlever.raman.correction import Correction, of_spectrum
 from hotlever.raman.fit import fit_peak
-from hotlever.raman.part import file_and_label
 from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
-from hotlever.raman.spectrum import Spectrum
-from hotlever.raman.stated import sample_temperature
+from hotlever.raman.spectrum import Spectrum, file_and_label, sample_temperature
 from hotlever.raman.thermometer import Thermometer
 from hotlever.steps import each
 from hotlever.tables import read_table

@@ -1,34 +1,17 @@
-"""A Raman spectrum and the files it comes from."""
+"""A Raman spectrum: its name in a file, and the sample temperature that file or name states."""
 
 from __future__ import annotations
 
-import os
 import re
-import zlib
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from hotlever.cells import text_lines
-from hotlever.errors import InputError
-from hotlever.files import LARGEST_TEXT, read_bytes
-from hotlever.raman import wdf
-from hotlever.raman.block import MOST_LINES, find_blocks
-from hotlever.raman.columns import require_line
-from hotlever.raman.layout import pick_spectra
-from hotlever.raman.noise import zeros
-from hotlever.raman.part import Part, part_names
-from hotlever.raman.peak import in_window
-from hotlever.raman.stated import temperature_in_metadata, temperature_in_name
-from hotlever.raman.vendor import READERS, read_vendor
-from hotlever.steps import each
-from hotlever.types import Array, Progress
+from hotlever.types import Array
+from hotlever.units import ZERO_CELSIUS_K, quantity
 
-SKIPPED_SUFFIXES = {".md", ".json", ".toml", ".yaml", ".yml", ".py", ".ipynb", ".html", ".pdf"}
-SKIPPED_SUFFIXES |= {".png", ".jpg", ".jpeg", ".svg", ".tif", ".tiff", ".bmp", ".log", ".zip"}
-_GZIP = b"\x1f\x8b"
+_LONGEST = 60  # characters of a label
 
 
 @dataclass(frozen=True)
@@ -37,204 +20,125 @@ class Spectrum:
 
     x: Array  #: Raman shift, cm⁻¹, strictly ascending
     y: Array  #: intensity, counts (or in proportion to them less a constant)
-    #: the file, with position, column or number in brackets where it holds several spectra
+    #: the file, with position, column or number in brackets where it holds several spectra; to the
+    #: reader of its format the label alone that sets it apart
     name: str = ""
     metadata: dict[str, str] = field(default_factory=dict)  #: what the file's header says
     temperature: float | None = None  #: of the sample, K, by the header or the file's name
     folder: str = ""
 
 
-def read_spectrum(path: str | os.PathLike[str]) -> Spectrum:
-    """Read one spectrum.
-
-    Parameters
-    ----------
-    path : path
-        A text table (LabSpec, BWTek, WiRE, WITec, Ocean Optics, plain columns; any common
-        encoding, separator and decimal sign), ``.wdf``, or ``.spc`` or JCAMP-DX with the
-        ``raman`` extra installed; as it is or packed by gzip.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is no spectrum, holds several, or does not reach 520 cm⁻¹.
+def names_in_file(file: str, labels: list[str]) -> list[str]:
+    """Name the spectra of a file: by their labels, or counted from 0 where these do not tell.
 
     Examples
     --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = Path(folder) / "si_450K.txt"
-    ...     _ = file.write_text("".join(f"{400 + i};{100 + i}\\n" for i in range(200)))
-    ...     spectrum = read_spectrum(file)
-    >>> spectrum.x[0].item(), spectrum.temperature
-    (400.0, 450.0)
+    >>> names_in_file("si.txt", ["counts"]), names_in_file("map.txt", ["X=0 Y=1", "X=1 Y=1"])
+    (['si.txt'], ['map.txt[X=0 Y=1]', 'map.txt[X=1 Y=1]'])
+    >>> names_in_file("series.txt", ["counts", "counts"])
+    ['series.txt[0]', 'series.txt[1]']
     """
-    found = read_file(path)
-    if len(found) > 1:
-        raise InputError(f"{path}: holds {len(found)} spectra, expected one")
-    return found[0]
+    if len(labels) == 1:
+        return [file]
+    # a name is a cell of a CSV, and the last part of a path
+    plain = [" ".join(re.sub(r"[\[\]\\/,;|\"']", " ", one).split())[:_LONGEST] for one in labels]
+    told = all(plain) and len(set(plain)) == len(plain)
+    return [f"{file}[{one}]" for one in (plain if told else range(len(plain)))]
 
 
-def read_file(path: str | os.PathLike[str]) -> list[Spectrum]:
-    """Read every spectrum of one file; see `read_spectrum`."""
-    file = Path(path)
-    raw = _unpacked(read_bytes(file), file)
-    if not raw.strip():
-        raise InputError(f"{file}: the file is empty, expected a Raman spectrum")
-    inside = Path(file.stem) if file.suffix.lower() == ".gz" else file
-    kind = _kind(inside, raw)
-    parts = read_vendor(kind, file, raw) if kind in READERS else _in_text(file, raw)
-    if not parts:
-        raise InputError(f"{file}: holds no spectrum")
-    of_file = temperature_in_name(inside.stem)
-    found = []
-    for name, part in zip(part_names(file.name, [one.label for one in parts]), parts, strict=True):
-        x, y = _checked(part.x, part.y, str(file.with_name(name)))
-        stated = (part.temperature, temperature_in_metadata(part.metadata), of_file)
-        temperature = next((kelvin for kelvin in stated if kelvin is not None), None)
-        found.append(Spectrum(x, y, name, part.metadata, temperature, str(file.parent)))
-    return found
+def file_and_label(name: str) -> tuple[str, str]:
+    """Split a name that `names_in_file` gave; the label is empty for the only spectrum of a file.
+
+    Examples
+    --------
+    >>> file_and_label("iv.txt[5.25 V]"), file_and_label("si.txt")
+    (('iv.txt', '5.25 V'), ('si.txt', ''))
+    """
+    found = re.fullmatch(r"(.+?)\[([^\[\]]+)\]", name)
+    return (found[1], found[2]) if found else (name, "")
 
 
-def _unpacked(raw: bytes, file: Path) -> bytes:
-    """A file's content, as it was before gzip if that is what made it."""
-    if not raw.startswith(_GZIP):
-        return raw
-    content = b""
-    while raw.startswith(_GZIP):
-        unpacking = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
-        try:
-            content += unpacking.decompress(raw, LARGEST_TEXT + 1 - len(content))
-        except zlib.error as error:
-            raise InputError(f"{file}: not a readable gzip file ({error})") from None
-        if len(content) > LARGEST_TEXT:
-            raise InputError(
-                f"{file}: unpacked, larger than the {LARGEST_TEXT / 1e6:.3g} MB it may have"
-            )
-        if not unpacking.eof:
-            raise InputError(f"{file}: not a readable gzip file (cut short)")
-        raw = unpacking.unused_data
-    return content
+def positions(columns: Mapping[str, Array], count: int) -> list[str]:
+    """Label spectra by the quantities that vary between them.
+
+    Examples
+    --------
+    >>> positions({"X": np.array([0.0, 1.5]), "Y": np.array([2.0, 2.0])}, 2)
+    ['X=0', 'X=1.5']
+    """
+    varying = {name: values for name, values in columns.items() if np.ptp(values) > 0.0}
+    return [
+        " ".join(f"{name}={values[i]:.7g}" for name, values in varying.items())
+        for i in range(count)
+    ]
 
 
-def _kind(file: Path, raw: bytes) -> str:
-    """What kind of file it is, by its content, then by its name; empty for text."""
-    if raw.startswith(wdf.SIGNATURE):
-        return ".wdf"
-    if raw.lstrip(b"\xef\xbb\xbf \r\n").upper().startswith(b"##TITLE="):
-        return ".jdx"
-    # some instruments write plain columns under these names
-    binary = any(byte < 9 or 13 < byte < 32 for byte in raw[:2048])
-    return file.suffix.lower() if binary else ""
+HOTTEST = 2000.0  #: K; a higher number with the unit of a temperature is something else
+#: K; what a header calls "Temperature (C)", no more, and is lower is a detector's: Andor writes so.
+COLDEST_UNNAMED = 253.0
+
+_NUMBER = r"(-?\d+(?:[.,]\d+)?)"
+_UNIT = r"(K|kelvin|°C|ºC|degC|deg\s?C|C|celsius)"
+_IN_NAME = re.compile(rf"T?{_NUMBER}{_UNIT}")
+_SPACED = re.compile(rf"(?<![A-Za-z0-9]){_NUMBER}[\s_]{_UNIT}(?![A-Za-z0-9])")
+_KEY = re.compile(
+    r"^\W*(sample|stage|hot\s?-?plate|linkam|actual|measured|nominal|set)?[\s_]*"
+    rf"(?:temperature|temp\.?|T)[\s_]*(?:[\[(]?\s*{_UNIT}\s*[\])]?)?\s*$",
+    re.I,
+)
 
 
-def _in_text(file: Path, raw: bytes) -> list[Part]:
-    """Spectra of a text file; a block of numbers beside them may be something else."""
-    parts: list[Part] = []
-    errors: list[tuple[int, InputError]] = []
-    for block in find_blocks(text_lines(raw, str(file), MOST_LINES), str(file)):
-        try:
-            found = pick_spectra(block, str(file))
-        except InputError as error:
-            errors.append((len(block.values), error))
+def temperature_in_name(stem: str) -> float | None:
+    """Temperature (K) that a file's name states with its unit, or None.
+
+    Examples
+    --------
+    >>> temperature_in_name("si_450K"), temperature_in_name("25C"), temperature_in_name("x50")
+    (450.0, 298.15, None)
+    """
+    parts = re.split(r"[_\s;()\[\]=]+", stem)
+    # a dash may be a minus or stand between words
+    parts += [part for pair in parts for part in pair.split("-")]
+    match = next(filter(None, map(_IN_NAME.fullmatch, parts)), None) or _SPACED.search(stem)
+    return _kelvin(quantity(match[1])[0], match[2]) if match else None
+
+
+def temperature_in_metadata(metadata: dict[str, str]) -> float | None:
+    """Sample temperature (K) that a header states with its unit, or None.
+
+    A detector's temperature is not the sample's, and a bare number has no unit to trust.
+
+    Examples
+    --------
+    >>> temperature_in_metadata({"Detector temperature (°C)": "-70", "Temperature (K)": "295"})
+    295.0
+    """
+    for key, value in metadata.items():
+        match = _KEY.match(key[:80])
+        if match is None:
             continue
-        parts += [replace(part, metadata=block.metadata) for part in found]
-    if not parts and errors:
-        raise max(errors, key=lambda one: one[0])[1]
-    return parts
-
-
-def _checked(x: Array, y: Array, where: str) -> tuple[Array, Array]:
-    """Sort, merge repeated axis values, and make sure there is a silicon line to look for."""
-    if len(x) != len(y):
-        raise InputError(f"{where}: {len(x)} Raman shifts and {len(y)} intensities")
-    good = np.isfinite(x) & np.isfinite(y)
-    x, y = np.asarray(x, dtype=float)[good], np.asarray(y, dtype=float)[good]
-    require_line(x, where)
-    x, inverse, counts = np.unique(x, return_inverse=True, return_counts=True)
-    y = np.bincount(inverse, weights=y) / counts
-    inside = in_window(x, f"{where}: ")
-    if (gap := zeros(y[inside])) is not None:
-        low, high = x[inside][[gap.start, gap.stop - 1]]
-        raise InputError(
-            f"{where}: the intensities from {low:g} to {high:g} cm⁻¹ are zero beside others that "
-            "are not: a damaged or padded file? Expected a spectrum without gaps"
-        )
-    return x, y
-
-
-def spectrum_files(paths: Iterable[str | os.PathLike[str]]) -> list[tuple[Path, bool]]:
-    """List files, folders opened, in natural order; the flag is True for one from a folder.
-
-    Raises
-    ------
-    InputError
-        If a path does not exist or a folder holds no file that could be a spectrum.
-    """
-    listed: list[tuple[Path, bool]] = []
-    for path in map(Path, paths):
-        # unlike a Path's methods these do not raise on a name that is too long
-        if not os.path.isdir(path):
-            if not os.path.exists(path):
-                raise InputError(f"{path}: no such file or folder")
-            listed.append((path, False))
+        number, unit = quantity(value)
+        unit = unit.strip() or match[2] or ""
+        if (found := _kelvin(number, unit)) is None:
             continue
-        try:
-            inside = [
-                file
-                for file in path.iterdir()
-                if not file.is_dir()
-                and not file.name.startswith((".", "~"))
-                and file.suffix.lower() not in SKIPPED_SUFFIXES
-                and file.stem.upper() not in ("README", "LICENSE", "LICENCE")
-            ]
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-        if not inside:
-            raise InputError(f"{path}: the folder holds no spectrum file")
-        listed += [(file, True) for file in sorted(inside, key=_natural_key)]
-    return listed
+        whose, in_kelvin = match[1], unit[0] in "kK"
+        if whose or in_kelvin or found > COLDEST_UNNAMED:
+            return found
+    return None
 
 
-def _natural_key(path: Path) -> list[str | int]:
-    """Sort key that puts ``tip_2`` before ``tip_10``."""
-    parts = re.split(r"([0-9]+)", path.name.lower())
-    return [int(part) if place % 2 else part for place, part in enumerate(parts)]
+def sample_temperature(kelvin: float) -> float | None:
+    """Return a temperature (K), or None for what no silicon sample can have.
 
-
-def read_spectra(
-    paths: Iterable[str | os.PathLike[str]],
-    skipped: list[str] | None = None,
-    progress: Progress | None = None,
-) -> list[Spectrum]:
-    """Read files and folders of spectra, folders in natural order.
-
-    Parameters
-    ----------
-    paths : iterable of path
-        A file named here must be a spectrum; what a folder holds beside spectra is passed over.
-    skipped : list of str, optional
-        Receives one line for each file passed over.
-    progress : callable, optional
-        Called with (files done, files in all).
-
-    Raises
-    ------
-    InputError
-        As `read_file`, or if nothing is left.
+    Examples
+    --------
+    >>> sample_temperature(298.15), sample_temperature(-3.0)
+    (298.15, None)
     """
-    files = spectrum_files(paths)
-    spectra: list[Spectrum] = []
-    skipped = [] if skipped is None else skipped
-    for file, from_folder in each(files, progress):
-        try:
-            if from_folder and not file.is_file():
-                raise InputError(f"{file}: is a pipe or a device")
-            spectra += read_file(file)
-        except InputError as error:
-            if not from_folder:
-                raise
-            skipped.append(str(error))
-    if not spectra:
-        raise InputError(f"none of {len(files)} files is a spectrum; the last: {skipped[-1]}")
-    return spectra
+    return round(kelvin, 6) if 0.0 < kelvin < HOTTEST else None
+
+
+def _kelvin(number: float | None, unit: str) -> float | None:
+    if number is None or not re.fullmatch(_UNIT, unit, re.I):
+        return None
+    return sample_temperature(number if unit[0] in "kK" else number + ZERO_CELSIUS_K)

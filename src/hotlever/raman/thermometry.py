@@ -17,10 +17,10 @@ from hotlever.raman.calibration import (
     read_raman_calibration,
 )
 from hotlever.raman.correction import Correction, check_corrections, read_corrections
-from hotlever.raman.part import file_and_label
 from hotlever.raman.peak import LineShape, PeakOptions
+from hotlever.raman.reading import read_spectra
 from hotlever.raman.series import Line, measure, read_lines
-from hotlever.raman.spectrum import Spectrum, read_spectra
+from hotlever.raman.spectrum import Spectrum, file_and_label
 from hotlever.raman.thermometer import Law, Thermometer, laser_heating
 from hotlever.types import Progress
 

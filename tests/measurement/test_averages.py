@@ -11,7 +11,7 @@ from hotlever.estimation import Measurement, fit, read_fit
 from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.estimation.residuals import Residuals
 from hotlever.lever import Lever
-from hotlever.measurement.averages import MANY, averaged
+from hotlever.measurement.rows import MANY, averaged
 
 ROWS = 40_000
 
