@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hotlever.calibration.calibration import TABLE_COLUMNS, read_calibration
+from hotlever.calibration.calibration import read_calibration
 from hotlever.calibration.inference import _before
 from hotlever.calibration.knee_scaling import curve_of_law, curve_of_model
 from hotlever.calibration.power_law import EQ12, read_power_law
 from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.summary import calibration_text
+from hotlever.calibration.table import TABLE_COLUMNS
 from hotlever.errors import InputError
 from hotlever.estimation import fit, read_fit
 from hotlever.lever import Lever

@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 from hotlever import figures
 from hotlever.app.child import Report
 from hotlever.calibration import Calibration, read_calibration
-from hotlever.calibration.calibration import STATED, TABLE_COLUMNS
 from hotlever.calibration.summary import calibration_text
+from hotlever.calibration.table import STATED, TABLE_COLUMNS
 from hotlever.datasets import OBSERVABLES, QUANTITIES
 from hotlever.errors import InputError
 from hotlever.estimation import Fit, read_fit, read_measurement

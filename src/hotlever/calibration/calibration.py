@@ -14,7 +14,16 @@ from pydantic import Field, PlainSerializer, ValidationInfo, field_serializer, m
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseCalibration, PulseSection
-from hotlever.datasets import frame_text, labelled
+from hotlever.calibration.table import (
+    STATED,
+    TABLE_COLUMNS,
+    TOTAL_POWER,
+    budget_of,
+    check_rows,
+    interpolated,
+    stored_table,
+)
+from hotlever.datasets import frame_text
 from hotlever.errors import InputError
 from hotlever.estimation.outcome import (
     IF_ANY,
@@ -23,20 +32,13 @@ from hotlever.estimation.outcome import (
     Outcome,
     ResultFile,
     Vector,
-    array,
 )
 from hotlever.measurement import Measurement
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import PriorUse
 from hotlever.records import Number, stored_as
-from hotlever.text import BAND, value_with_error
+from hotlever.text import value_with_error
 from hotlever.types import Array
-
-#: Columns of a calibration's table; the last say how sure it is.
-STATED = ("tip_stderr_K", "tip_low_K", "tip_high_K")
-TABLE_COLUMNS = ("bias_V", "lever_V", "current_mA", "power_mW", "tip_K", *STATED)
-#: One more with held supplies: the power of all of them together.
-TOTAL_POWER = "total_power_mW"
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,7 @@ class Calibration(Outcome):
                 "the tip temperature by power: the power of this lever falls while the tip gets "
                 "hotter; expected to be read by bias"
             )
-        return self._read(power_mW, "power_mW", "tip_K")
+        return interpolated(self.heating, power_mW, "power_mW", "tip_K")
 
     def bias_for(self, tip_K: ArrayLike, circuit: Circuit | None = None) -> Array:
         """Return the bias (V) that heats the tip to a temperature (K).
@@ -167,7 +169,9 @@ class Calibration(Outcome):
             If the data are not described: what is set would not follow.
         """
         self.need_described("the bias for a tip temperature")
-        lever, current = (self._read(tip_K, "tip_K", name) for name in ("lever_V", "current_mA"))
+        lever, current = (
+            interpolated(self.heating, tip_K, "tip_K", name) for name in ("lever_V", "current_mA")
+        )
         return np.asarray((circuit or self.probe.circuit).bias(lever, current))
 
     @property
@@ -181,10 +185,6 @@ class Calibration(Outcome):
         """The columns of the table in a file."""
         return [name for name in (*TABLE_COLUMNS, TOTAL_POWER) if name in self.table]
 
-    def _read(self, at: ArrayLike, along: str, column: str) -> Array:
-        x, y = self.heating[along].values, self.heating[column].values
-        return np.interp(np.asarray(at, dtype=float), x, y, left=np.nan, right=np.nan)
-
     def __repr__(self) -> str:
         hottest = self.table.isel(bias=int(np.nanargmax(self.table.tip_K)))
         tip = value_with_error(hottest.tip_K.item(), hottest.tip_stderr_K.item())
@@ -193,18 +193,16 @@ class Calibration(Outcome):
 
     def file(self) -> CalibrationFile:
         """Return what the calibration file holds."""
-        budget = {
-            source: self.table.budget_K.sel(source=source)
-            for source in self.table.source.values.tolist()
-        }
+        budget = budget_of(self.table)
         return CalibrationFile.holding(
             self,
             power_law_residual_K=self.law_residual_K,
             knee=vars(self.knee) | {"tip_K": self.knee_tip_K, "measured": self.knee_measured},
-            uncertainty_budget_K={source: part.max().item() for source, part in budget.items()},
+            uncertainty_budget_K={source: part.max() for source, part in budget.items()},
             table={name: self.table[name].values for name in self.columns},
-            budget_K={source: part.values for source, part in budget.items()},
+            budget_K=budget,
             data=MeasurementSection.of(self.measurement),
+            pulse=None if self.pulse is None else self.pulse.section(),
         )
 
     def table_csv(self) -> str:
@@ -215,36 +213,13 @@ class Calibration(Outcome):
         return frame_text(frame, index=False, float_format="%.6g")
 
 
-def table_of(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:
-    """Return the table of a calibration: the columns of its file, and the error by source."""
-    errors = (("source", "bias"), np.array(list(budget.values())))
-    return labelled(
-        {**columns, "budget_K": errors},
-        coordinates={"bias": columns["bias_V"], "source": list(budget)},
-    )
+def rms(difference: Array) -> float:
+    """Return the root mean square of what is known of a difference; NaN if nothing is."""
+    present = difference[np.isfinite(difference)]
+    return float(np.sqrt(np.mean(present**2))) if present.size else float("nan")
 
 
-def table_by_bias(
-    circuit: Circuit,
-    bias: Array,
-    current: Array,
-    tip: Array,
-    parts: dict[str, Array],
-    limits: tuple[Array, Array] | None = None,
-    held_mW: Array | None = None,
-) -> xr.Dataset:
-    """Return the table of bias (V), current (mA) and tip temperature (K), with its errors.
-
-    95 % lie between the limits, or as far away as the errors say. Held supplies have a power too.
-    """
-    stderr = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
-    low, high = limits or (tip - BAND * stderr, tip + BAND * stderr)
-    lever = circuit.lever_voltage(bias, current)
-    values = (bias, lever, current, lever * current, tip, stderr, low, high)
-    columns = dict(zip(TABLE_COLUMNS, values, strict=True))
-    if held_mW is not None:
-        columns[TOTAL_POWER] = lever * current + held_mW
-    return table_of(columns, parts)
+# --- its file -----------------------------------------------------------------------------------
 
 
 def _law(values: dict[str, float], info: ValidationInfo) -> PowerLaw:
@@ -252,12 +227,7 @@ def _law(values: dict[str, float], info: ValidationInfo) -> PowerLaw:
     return PowerLaw.from_values(coefficients, f"{info.context}: power_law")
 
 
-def _pulse(section: PulseSection, info: ValidationInfo) -> PulseCalibration:
-    return section.calibration(f"{info.context}: pulse")
-
-
 _Law = Annotated[PowerLaw, stored_as(dict[str, float], _law, PowerLaw.values)]
-_Pulse = Annotated[PulseCalibration, stored_as(PulseSection, _pulse, PulseCalibration.content)]
 
 
 class CalibrationFile(ResultFile):
@@ -281,7 +251,7 @@ class CalibrationFile(ResultFile):
     table: Columns
     budget_K: dict[str, Vector]
     measured_rms_K: Number = np.nan
-    pulse: _Pulse | None = IF_ANY
+    pulse: PulseSection | None = IF_ANY
 
     @field_serializer("power_law")
     def _with_threshold(self, law: PowerLaw | None) -> dict[str, float] | None:
@@ -289,27 +259,22 @@ class CalibrationFile(ResultFile):
 
     @model_validator(mode="after")
     def _rows_belong_together(self, info: ValidationInfo) -> Self:
-        path, bias = info.context, self.table.get("bias_V", np.array([]))
-        if not bias.size or not self.budget_K or not np.all(np.diff(bias) > 0):
-            raise InputError(
-                f"{path}: table: expected rows of rising bias, and a budget of their errors"
-            )
-        for source, errors in self.budget_K.items():
-            array(errors, bias.shape, f"{path}: budget_K: {source}")
+        check_rows(self.table, self.budget_K, "bias", str(info.context))
         return self
 
     def calibration(self) -> Calibration:
         """Return the calibration, to go on with as if it had just been made."""
-        nothing = np.full_like(self.table["bias_V"], np.nan)
-        columns = dict.fromkeys(TABLE_COLUMNS, nothing) | {
-            name: self.table[name] for name in (*TABLE_COLUMNS, TOTAL_POWER) if name in self.table
-        }
         knee = {name: self.knee[name] for name in Knee.__dataclass_fields__ if name in self.knee}
+        names = [*TABLE_COLUMNS, *({TOTAL_POWER} & self.table.keys())]
         return Calibration(
             law_residual_K=self.power_law_residual_K,
             knee_tip_K=self.knee.get("tip_K", np.nan),
             **self.attributes_of(Calibration)
-            | {"knee": Knee(**knee), "table": table_of(columns, self.budget_K)},
+            | {
+                "knee": Knee(**knee),
+                "table": stored_table(self.table, self.budget_K, names),
+                "pulse": None if self.pulse is None else self.pulse.calibration(),
+            },
         )
 
 

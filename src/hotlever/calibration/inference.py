@@ -1,64 +1,51 @@
 """A calibration as an estimate: what is known of a lever, brought up to date by its measurement.
 
 Material, dimensions and circuit have priors (`hotlever.probe.priors`); the measurement moves them
-to where both are most likely, and the tip temperature with its error follows from there. No knee
-is needed: a lever that was measured below it is less certain above, and that is all.
+to where both are most likely, and the tip temperature with its error follows from there
+(`hotlever.calibration.tip_by_bias`). No knee is needed: a lever that was measured below it is less
+certain above, and that is all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 
-from hotlever.calibration.jumps import Jump, jumps_of
+from hotlever.calibration.calibration import Calibration, rms
 from hotlever.calibration.knee import Knee
-from hotlever.errors import ComputationError, InputError
+from hotlever.calibration.plausibility import misfit, what_data_lack
+from hotlever.calibration.power_law import law_of_model, power_turns
+from hotlever.calibration.tip_by_bias import (
+    OF_THE_MEASUREMENT,
+    highest_bias,
+    not_of_a_ramp,
+    tip_by_bias,
+)
+from hotlever.errors import ComputationError
 from hotlever.estimation import Fit, FitOptions, Measurement
 from hotlever.estimation.experiment_at_rest import PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate, estimate
+from hotlever.estimation.lack_of_fit import suspicious_points
 from hotlever.estimation.objective import TIP
-from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.prior_density import PriorDensity
-from hotlever.estimation.profile import profile_of_tip
-from hotlever.lever import Branch
-from hotlever.lever.curve import spline_through
-from hotlever.materials import Material
-from hotlever.materials.parameters import own_name
-from hotlever.probe import Probe
+from hotlever.lever import Branch, Lever
+from hotlever.lever.lever import COARSE
+from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.priors import (
     SCALES,
     Prior,
+    PriorUse,
     default_priors,
     known_beforehand,
     priors_of,
     published_material,
 )
-from hotlever.probe.surroundings import Surroundings
-from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
-#: Rows of the table.
-_ROWS = 101
-#: By which source of error a parameter counts.
-_CIRCUIT = {
-    "series_resistance_ohm": "electronics",
-    "gas_conductivity": "air",
-    "surface_gap_um": "air",
-    "base_temperature_K": "base temperature",
-}
-#: Share of the rise by which the flat lever, or air as panels, differ from full 3-D where the tip
-#: is no steeper in bias than that of a lever of constant properties (benchmarks/air_3d.py).
-_MODEL = {"vacuum": 3e-4, "air": 7e-4}
-#: The same by the jump of the air's temperature at surfaces, where no accommodation is stated: with
-#: one of 0.9 air takes up 6 % less, more where the lever is narrow, and an estimate without it is
-#: off by so much (rms of six twins from number 1000 on, of both shapes, linearised).
-_JUMP = 7e-3
-#: The same by the law of the mobility: how far two estimates of a lever are apart, with another law
-#: (MINIMOS) in place of Eq. 8 (rms of seven pairs of twins from number 1000 on).
-_MOBILITY = 4e-3
+#: Share of the measured biases that a lever must reach to show the data.
+_REACHED = 0.98
 
 
 def estimate_lever(
@@ -103,13 +90,15 @@ def estimate_lever(
         return fitted, before_fit
     # what that leaves of the lever itself is known before the other data; circuit and gas are
     # those of each measurement
-    own = [name for name in fitted.options.varied if name not in _CIRCUIT]
+    own = [name for name in fitted.options.varied if name not in OF_THE_MEASUREMENT]
     numbers = [fitted.options.varied.index(name) for name in own]
     values, covariance = fitted.probe.values(own), fitted.posterior.covariance
     relative = np.array([name not in before_fit or before_fit[name].relative for name in own])
     left = PriorDensity.of_estimate(own, values, covariance[np.ix_(numbers, numbers)], relative)
     probe = probe.replace(dict(zip(own, values.tolist(), strict=True)))
-    theirs = {name: prior for name, prior in known.items() if name in {*_CIRCUIT, *SCALES}}
+    theirs = {
+        name: prior for name, prior in known.items() if name in {*OF_THE_MEASUREMENT, *SCALES}
+    }
     free = tuple(name for name in own if name not in usual_parameters(probe))
     again = FitOptions(fixed=fixed, priors=theirs, free=free, medium=medium)
     try:
@@ -140,157 +129,92 @@ def _same_data(first: Measurement, second: Measurement) -> bool:
     return same and np.array_equal(first.current_mA, second.current_mA, equal_nan=True)
 
 
-# --- the tip temperature by bias ------------------------------------------------------------------
+# --- the calibration of an estimated lever ------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class TipByBias:
-    """The tip temperature at even rows over the measured range, and how sure it is.
-
-    Attributes
-    ----------
-    bias_V, current_mA, tip_K : ndarray, shape (n,)
-    parts : dict of str to ndarray
-        Standard error of the tip temperature (K) at the rows, by source; independent of each other.
-    low_K, high_K : ndarray, shape (n,)
-        What 95 % lie between; they are as far away as the errors say, unless these do not hold.
-    jumps : list of Jump
-        Between measured rows.
-    asymmetry : str
-        Where the interval is from, if not from the errors.
-    """
-
-    bias_V: Array
-    current_mA: Array
-    tip_K: Array
-    parts: dict[str, Array]
-    low_K: Array
-    high_K: Array
-    jumps: list[Jump]
-    asymmetry: str
-
-
-def measured_range(estimate: Estimate) -> Array:
-    """Return even biases (V) over the measured range, as far as the lever has states."""
-    measured, circuit = estimate.measurement, estimate.probe.circuit
-    # without a bias nothing is known of a lever that is cold then
-    heated = (measured.bias_V > 0) | (not circuit.starts_cold)
-    present = measured.bias_V[np.isfinite(measured.current_mA) & heated]
-    return np.linspace(present.min(), min(present.max(), highest_bias(estimate)), _ROWS)
-
-
-def highest_bias(estimate: Estimate) -> float:
-    """Return the highest bias (V) up to the highest measured one at which the lever has a state."""
-    measured = float(estimate.residuals.bias.max())
-    return estimate.branch.highest_bias(estimate.probe.circuit, measured)
-
-
-def tip_by_bias(
-    estimate: Estimate, samples: int = 0, progress: Progress | None = None
-) -> TipByBias:
-    """Return the tip temperature of an estimated lever with its error, by bias.
-
-    Parameters
-    ----------
-    estimate : Estimate
-    samples : int
-        Of the posterior, from which the credible interval is then taken; none by default.
-    progress : callable, optional
-
-    Raises
-    ------
-    InputError
-        If samples are asked for of an estimate without priors.
-    """
-    probe, posterior = estimate.probe, estimate.posterior
-    bias = measured_range(estimate)
-    predicted = estimate.predicted(bias)
-    tip, slopes = predicted.values[TIP], predicted.slopes[TIP][:, estimate.objective.columns]
-    variances = {
-        source: np.einsum("bi,ij,bj->b", slopes, share, slopes)
-        for source, share in shares_by_source(posterior).items()
-    }
-    stderr = np.sqrt(np.sum(list(variances.values()), axis=0))
-    rise = tip - probe.circuit.base_temperature_K
-    of_model = error_of_model(probe.surroundings, estimate.options.varied, bias, rise)
-    variances["model"] = of_model**2
-    (low, high), asymmetry = _credible_interval(estimate, tip, stderr, of_model, samples, progress)
-    at_rows = estimate.residuals.bias, estimate.prediction.values[TIP]
-    jumps = jumps_of(estimate.branch, probe.circuit, *at_rows)
-    for jump in jumps:
-        here = jump.unknown(bias)
-        low = np.where(here, np.minimum(low, jump.cold_K), low)
-        high = np.where(here, np.maximum(high, jump.hot_K), high)
-        variances["jump"] = here * ((jump.hot_K - jump.cold_K) / (2.0 * BAND)) ** 2
-    parts = {source: np.sqrt(variance) for source, variance in variances.items()}
-    return TipByBias(bias, predicted.values[0], tip, parts, low, high, jumps, asymmetry)
-
-
-def _credible_interval(
+def calibrated_by_estimate(
+    measured: Measurement,
     estimate: Estimate,
-    tip: Array,
-    stderr: Array,
-    of_model: Array,
-    samples: int,
-    progress: Progress | None,
-) -> tuple[tuple[Array, Array], str]:
-    """Return what 95 % of the tip temperatures lie between (K), and words on where that is from."""
-    posterior, away = estimate.posterior, BAND * np.hypot(stderr, of_model)
-    too_few = ""
-    if not estimate.objective.informed:
-        if samples:
-            raise InputError("posterior: expected priors, without which it is not that of a fit")
-        return (tip - away, tip + away), ""
-    if samples:
-        # what samples takes a second to load, for which few calibrations have to wait
-        from hotlever.estimation.sampling import sample_tip
+    known: Mapping[str, Prior],
+    route: str,
+    samples: int = 0,
+    progress: Progress | None = None,
+) -> Calibration:
+    """Return the calibration of an estimated lever, of which some was known beforehand.
 
-        sampled = sample_tip(posterior, estimate.optimiser, samples=samples, progress=progress)
-        if sampled.enough:
-            return sampled.profile.credible_interval(tip, stderr, of_model), sampled.note
-        too_few = sampled.note
-    profile = profile_of_tip(posterior, estimate.optimiser.model)
-    if profile.linear:
-        return (tip - away, tip + away), too_few
-    low, high = profile.credible_interval(tip, stderr, of_model)
-    note = (
-        "the tip temperature is not a linear function of what is unknown, so that its limits come "
-        f"from estimates of hotter and colder levers: at {tip[-1]:.0f} K 95 % lie from "
-        f"{low[-1]:.0f} to {high[-1]:.0f} K"
-    )
-    return (low, high), "; ".join(filter(None, (too_few, note)))
-
-
-def shares_by_source(posterior: Posterior) -> dict[str, Array]:
-    """Return what adds up to the covariance (p, p), by source of error; independent."""
-    shares: dict[str, Array] = {}
-    for name, share in posterior.shares.items():
-        source = name if name in ("measurement", "fit") else _source(name)
-        shares[source] = shares.get(source, 0.0) + share
-    return shares
-
-
-def _source(name: str) -> str:
-    of_material = "." in name or name in Material.model_fields
-    return _CIRCUIT.get(name, "material" if of_material else "geometry")
-
-
-def error_of_model(around: Surroundings, varied: Sequence[str], bias: Array, rise: Array) -> Array:
-    """Return by how much the tip may be off since the model is (K); most where the tip is steep.
-
-    The law of the mobility counts where its exponents are estimated.
+    See `hotlever.calibration.procedure.calibrate`.
     """
-    # a rise that grows as the square of the bias is that of a lever of constant properties
-    square, size = np.abs(0.5 * bias * np.gradient(rise, bias)), np.abs(rise)
-    error = _MODEL[around.medium] * np.maximum(size, square)
-    if around.medium == "air" and around.accommodation is None:
-        error = np.hypot(error, _JUMP * size)
-    if any(own_name(name) == "impurity_exponent" for name in varied):
-        error = np.hypot(error, _MOBILITY * size)
-    return np.asarray(error)
+    probe, priors = estimate.probe, estimate.priors(known)
+    circuit, medium = probe.circuit, probe.surroundings.medium
+    tip = tip_by_bias(estimate, samples, progress)
+    converged, reason = _verdict(estimate, priors)
+    notes = [*what_data_lack(measured, tip.table.tip_K.values), *estimate.notes]
+    notes += [tip.asymmetry] if tip.asymmetry and not reason else []
+    notes += [jump.note for jump in tip.jumps]
+    notes += suspicious_points(estimate.residuals, estimate.prediction.values, robust=True)
+    own, lever = estimate.branch, Lever(probe.in_medium("vacuum"), COARSE)
+    vacuum = lever.branch()
+    # beyond the measured range a coarse lever says where the knee is
+    if own.knee is None:
+        own = vacuum if medium == "vacuum" else lever.in_medium(medium).branch()
+    knee, threshold = knee_of(estimate, own), vacuum.knee
+    law, residual, k, k_stderr, turns = None, np.nan, np.nan, np.nan, ""
+    if circuit.starts_cold:
+        turns = power_turns(own, medium) or power_turns(vacuum, "vacuum")
+    # with held supplies, or where the power turns, the tip does not follow from a power
+    by_power = circuit.starts_cold and not turns
+    if own.knee is None or (by_power and threshold is None):
+        notes.append(f"the model has no knee below {vacuum.hottest_K:.0f} K; none is needed")
+    elif by_power and medium == "vacuum":
+        # the law is that of the lever itself
+        k, k_stderr, threshold = 1.0, 0.0, own.knee
+    elif by_power and threshold is not None:
+        k = own.knee.power_mW / threshold.power_mW
+        k_stderr = k * knee.power_mW_stderr / knee.power_mW
+    if turns:
+        notes.append(f"{turns}; there is no power law, and the table is read by bias")
+    if not probe.shape.outline_moves:
+        notes.append("the outline is taken to be as drawn: no error of it is in the result")
+    if by_power:
+        law, residual = law_of_model(vacuum, None if threshold is None else threshold.power_mW)
+    return Calibration(
+        table=tip.table,
+        route=route,
+        medium=medium,
+        power_law=law,
+        law_residual_K=residual,
+        k=k,
+        k_stderr=k_stderr,
+        knee=knee,
+        knee_tip_K=np.nan if own.knee is None else own.knee.tip_K,
+        measured_rms_K=rms(measured.tip_K - _tips(estimate.branch, measured, circuit)),
+        probe=probe,
+        measurement=measured,
+        priors=priors,
+        reason=reason,
+        converged=converged,
+        notes=notes,
+    )
 
 
-# --- knee and power -----------------------------------------------------------------------------
+def _verdict(estimate: Estimate, priors: Mapping[str, PriorUse]) -> tuple[bool, str]:
+    """Return whether the search came to an end, and why the data are not described, if so."""
+    residuals, values = estimate.residuals, estimate.prediction.values
+    lack_of_fit = misfit(residuals, values, priors, estimate.posterior.moved)
+    converged, reason = estimate.verdict(lack_of_fit)
+    circuit, bias = estimate.probe.circuit, residuals.bias
+    reason = reason or not_of_a_ramp(estimate.branch, circuit, bias, values[TIP])
+    highest = highest_bias(estimate)
+    if not reason and highest < _REACHED * float(bias.max()):
+        reason = f"the lever that comes nearest has no steady state above {highest:.4g} V"
+    return converged, reason
+
+
+def _tips(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
+    """Return the tip temperatures of a branch at the measured power; or bias, if not that tells."""
+    if circuit.starts_cold and branch.power_turns_K is None:
+        return branch.tip_temperature(circuit.power(measured.bias_V, measured.current_mA))
+    return branch.tip_K(branch.read(circuit, measured.bias_V).u)
 
 
 def knee_of(estimate: Estimate, branch: Branch) -> Knee:
@@ -314,12 +238,3 @@ def knee_of(estimate: Estimate, branch: Branch) -> Knee:
     changes = estimate.posterior.changes(lambda at: values(surrogate.branch_at(at)))
     errors = np.sqrt(np.sum(changes**2, axis=0))
     return Knee(*values(branch).tolist(), *errors.tolist())
-
-
-def held_power(estimate: Estimate, bias: Array) -> Array:
-    """Return the power of the held supplies at some biases (mW), within a coarse mesh's error."""
-    branch = estimate.branch
-    equations, x = branch.equations, branch.x
-    own = x[-1] * equations.observed(x)[1]
-    u = branch.read(estimate.probe.circuit, bias).u
-    return np.asarray(spline_through(branch.u, equations.power(x) - own)(u))

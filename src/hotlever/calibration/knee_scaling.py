@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hotlever.calibration.calibration import Calibration, rms
 from hotlever.calibration.knee import (
     IVCurve,
     Knee,
@@ -22,7 +23,8 @@ from hotlever.calibration.knee import (
     scale_to,
     smooth_rows,
 )
-from hotlever.calibration.power_law import PowerLaw
+from hotlever.calibration.power_law import PowerLaw, law_of_model, power_turns
+from hotlever.calibration.table import table_by_bias
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.noise import METERS
 from hotlever.lever import Branch, OperatingPoint
@@ -30,12 +32,15 @@ from hotlever.lever.branch import Reach, shifted
 from hotlever.lever.curve import spline_through
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
+from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.parameters import RESISTANCE
 from hotlever.probe.priors import default_priors
 from hotlever.text import value_with_error
 from hotlever.types import Array
 
+#: A vacuum model that needs this factor is told that its lever is probably in air.
+_LOOKS_LIKE_AIR = 1.08
 #: Largest relative error of a knee estimated from the points below it, to go on with.
 _WORST_ESTIMATE = 0.3
 #: How far (standard deviations) a parameter is moved for a derivative.
@@ -95,66 +100,87 @@ def knee_of(model: Branch) -> OperatingPoint:
     return model.knee
 
 
-@dataclass(frozen=True)
-class KneeScaling:
-    """A measured I-V curve with the temperatures of a reference at k times the power.
-
-    Attributes
-    ----------
-    knee : Knee
-        As measured, or with its power estimated.
-    bias_V, current_mA, tip_K : ndarray, shape (n,)
-        Even rows over the measured range.
-    parts : dict of str to ndarray
-        Standard error (K) at the rows, by source.
-    notes : list of str
-    """
-
-    knee: Knee
-    bias_V: Array
-    current_mA: Array
-    tip_K: Array
-    parts: dict[str, Array]
-    notes: list[str]
-
-
-def scaled_by_knee(
-    curve: IVCurve, like: Branch, probe: Probe, reference: TemperatureCurve, where: str
-) -> KneeScaling:
-    """Calibrate a measured curve by its knee.
+def calibrated_by_knee(
+    measured: Measurement, probe: Probe, law: PowerLaw | None, route: str
+) -> Calibration:
+    """Return the calibration of a lever by its knee: the temperatures of a reference at k times P.
 
     Parameters
     ----------
-    curve : IVCurve
-    like : Branch
-        Of `probe`, which resembles the lever, in the medium it is in.
-    reference : TemperatureCurve
-        Whose temperatures are taken over.
-    where : str
-        Names the measurement in errors.
+    measured : Measurement
+    probe : Probe
+        Resembles the lever; in vacuum, in the circuit of the measurement.
+    law : PowerLaw, optional
+        The reference; the probe's model in vacuum by default.
+    route : str
+        See `hotlever.calibration.calibration.Calibration`.
 
     Raises
     ------
     InputError
-        If the points neither show the knee nor tell its power to 30 %.
+        If the points neither show the knee nor tell its power to 30 %, or the power of the probe
+        turns.
+    ComputationError
+        If the probe has no knee.
     """
-    similar, notes = _similar_branches(probe, like), []
+    lever = Lever(probe)
+    vacuum, circuit = lever.branch(), probe.circuit
+    if turns := power_turns(vacuum, "vacuum"):
+        raise InputError(f"the paper's rule: {turns}; expected a lever of which it is")
+    model, similar = curve_of_model(vacuum), _similar_branches(probe, vacuum)
+    reference = model if law is None else curve_of_law(law, circuit.base_temperature_K)
+    curve = IVCurve.of(measured.bias_V, measured.current_mA, circuit)
+    notes = []
     try:
-        knee = find_knee(curve, like)
+        knee = find_knee(curve, vacuum)
     except KneeOutsideError as outside:
-        knee = _estimated_knee(curve, like, reference, similar, f"{where}: {outside}")
+        where = f"{measured.path or 'measurement'}: {outside}"
+        knee = _estimated_knee(curve, vacuum, reference, similar, where)
         notes.append(
             f"{outside}; until then the power of the knee is estimated from the points below it, "
             f"as {value_with_error(knee.power_mW, knee.power_mW_stderr)} mW"
         )
-    rows, knee_mW = smooth_rows(curve, knee.power_mW, like), knee.power_mW
-    tip = reference.at(rows.power_mW, knee_mW)
+    rows, knee_mW = smooth_rows(curve, knee.power_mW, vacuum), knee.power_mW
+    power = rows.power_mW
+    tip, of_model = reference.at(power, knee_mW), model.at(power, knee_mW)
     parts = {
-        "k": np.abs(reference.at(rows.power_mW, knee_mW + knee.power_mW_stderr) - tip),
+        "k": np.abs(reference.at(power, knee_mW + knee.power_mW_stderr) - tip),
         "electronics": _error_of_meters(reference, knee_mW, rows),
-        "other levers": _error_of_other_levers(similar, rows.power_mW / knee_mW),
+        "other levers": _error_of_other_levers(similar, power / knee_mW),
     }
-    return KneeScaling(knee, rows.bias_V, rows.current_mA, tip, parts, notes)
+    if law is not None:
+        parts["power law"] = np.abs(of_model - tip)
+    if law is None or knee_mW > _LOOKS_LIKE_AIR * reference.knee_mW:
+        in_air = curve_of_model(lever.in_medium("air").branch())
+        parts["constant k"] = np.abs(in_air.at(power, knee_mW) - of_model)
+    used, residual = (law, 0.0) if law is not None else law_of_model(vacuum, model.knee_mW)
+    k = knee_mW / used.threshold_mW
+    if k > _LOOKS_LIKE_AIR and measured.medium != "vacuum":
+        better = "--medium air is" if law is None else "a probe with --medium air would be"
+        notes.append(
+            f"the lever needs {k:.2f} times the power of the model in vacuum: it seems to be "
+            f"in air, where {better} more accurate"
+        )
+    if beyond := int(np.isnan(tip).sum()):
+        notes.append(
+            f"{beyond} rows of the table are hotter than the models go, and have no temperature"
+        )
+    own = reference.at(circuit.power(measured.bias_V, measured.current_mA), knee_mW)
+    return Calibration(
+        table=table_by_bias(circuit, rows.bias_V, rows.current_mA, tip, parts),
+        route=route,
+        medium="vacuum",
+        power_law=used,
+        law_residual_K=residual,
+        k=k,
+        k_stderr=knee.power_mW_stderr / used.threshold_mW,
+        knee=knee,
+        knee_tip_K=float(reference.at(np.array(knee_mW), knee_mW)),
+        measured_rms_K=rms(measured.tip_K - own),
+        probe=probe,
+        measurement=measured,
+        notes=notes,
+    )
 
 
 def _estimated_knee(

@@ -9,20 +9,29 @@ is that of a shorter one.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
+from pydantic import ValidationInfo, model_validator
 from scipy.integrate import simpson
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from hotlever.calibration.inference import error_of_model, measured_range, shares_by_source
-from hotlever.datasets import csv_text, labelled
+from hotlever.calibration.table import (
+    budget_of,
+    check_rows,
+    interpolated,
+    stored_table,
+    table_with_budget,
+    total_error,
+)
+from hotlever.calibration.tip_by_bias import error_of_model, errors_by_source, measured_range
+from hotlever.datasets import csv_text
 from hotlever.errors import ComputationError, InputError, unknown_name
 from hotlever.estimation.inverse_problem import Estimate
-from hotlever.estimation.outcome import Number, Section, array
+from hotlever.estimation.outcome import Columns, Section, Vector
 from hotlever.lever import Lever
 from hotlever.lever.equations import BASE
 from hotlever.lever.lever import COARSE
@@ -99,7 +108,7 @@ class PulseCalibration:
         height_V : array_like
         moment : {"peak", "end", "mean"}
         """
-        return self._read(height_V, "height_V", _column(moment))
+        return interpolated(self.table, height_V, "height_V", _column(moment))
 
     def height_for(self, tip_K: ArrayLike, moment: str = "peak") -> Array:
         """Return the height (V) of the pulse for a tip temperature (K); NaN out of range.
@@ -109,21 +118,12 @@ class PulseCalibration:
         tip_K : array_like
         moment : {"peak", "end", "mean"}
         """
-        return self._read(tip_K, _column(moment), "height_V")
+        return interpolated(self.table, tip_K, _column(moment), "height_V")
 
-    def _read(self, at: ArrayLike, along: str, column: str) -> Array:
-        x, y = self.table[along].values, self.table[column].values
-        return np.interp(np.asarray(at, dtype=float), x, y, left=np.nan, right=np.nan)
-
-    def content(self) -> dict[str, Any]:
+    def section(self) -> PulseSection:
         """Return the section of the calibration file."""
-        return {
-            **asdict(self.timing),
-            "table": self.table[list(PULSE_COLUMNS)].to_dataframe().to_dict("records"),
-            "budget_K": {
-                error.source.item(): error.values.tolist() for error in self.table.budget_K
-            },
-        }
+        table = {name: self.table[name].values for name in PULSE_COLUMNS}
+        return PulseSection.holding(self.timing, table=table, budget_K=budget_of(self.table))
 
     def table_csv(self) -> str:
         """Return the table as CSV, to load into an instrument."""
@@ -131,37 +131,27 @@ class PulseCalibration:
 
 
 class PulseSection(Section):
-    """What a calibration file holds of a pulse; see `PulseCalibration.content`."""
+    """What a calibration file holds of a pulse."""
 
     length_us: float
     period_us: float | None = None
-    table: list[dict[str, Number]]
-    budget_K: dict[str, list[Number]]
+    table: Columns
+    budget_K: dict[str, Vector]
 
-    def calibration(self, where: str) -> PulseCalibration:
-        """Return what was written; `where` names the file in an error.
-
-        Raises
-        ------
-        InputError
-            If the table is none.
-        """
-        rows = len(self.table)
-        columns = {
-            name: array([row.get(name) for row in self.table], (rows,), f"{where}: table: {name}")
-            for name in PULSE_COLUMNS
-        }
-        budget = {
-            source: array(errors, (rows,), f"{where}: budget_K: {source}")
-            for source, errors in self.budget_K.items()
-        }
-        if not rows or not budget or not np.all(np.diff(columns["height_V"]) > 0):
-            raise InputError(f"{where}: expected rows of rising height_V, and their budget")
+    @model_validator(mode="after")
+    def _belongs_together(self, info: ValidationInfo) -> Self:
+        where = f"{info.context}: pulse"
+        check_rows(self.table, self.budget_K, "height", where)
         try:
-            timing = PulseTiming(self.length_us, self.period_us)
+            PulseTiming(self.length_us, self.period_us)
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
-        return PulseCalibration(timing, _table(columns, budget))
+        return self
+
+    def calibration(self) -> PulseCalibration:
+        """Return what was written."""
+        table = stored_table(self.table, self.budget_K, PULSE_COLUMNS, "height")
+        return PulseCalibration(PulseTiming(self.length_us, self.period_us), table)
 
 
 def pulse_calibration(
@@ -305,10 +295,7 @@ def _with_errors(
     scale = np.abs(steps).max(axis=0)
     inverse = np.linalg.pinv(steps / scale) / scale[:, None]
     by_parameter = np.einsum("pd,ndm->nmp", inverse, slopes[:, :-1])
-    parts = {
-        source: np.sqrt(np.einsum("nmp,pq,nmq->nm", by_parameter, share, by_parameter))
-        for source, share in shares_by_source(estimate.posterior).items()
-    }
+    parts = errors_by_source(estimate.posterior, by_parameter)
     parts["heat capacity"] = np.abs(slopes[:, -1])
     around = probe.surroundings
     if around.medium == "air":
@@ -317,12 +304,13 @@ def _with_errors(
     of_model = [error_of_model(around, varied, bias, column) for column in rise.T]
     parts["model"] = np.stack(of_model, axis=1)
     tip = probe.circuit.base_temperature_K + rise
-    stderr = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
+    stderr = total_error(parts)
     kinds = np.stack([tip, stderr, tip - BAND * stderr, tip + BAND * stderr], axis=2)
     rows = np.column_stack([bias, kinds.reshape(len(kinds), -1)])
     columns = dict(zip(PULSE_COLUMNS, rows.T, strict=True))
     peak = MOMENTS.index("peak")
-    return PulseCalibration(timing, _table(columns, {name: parts[name][:, peak] for name in parts}))
+    budget = {source: part[:, peak] for source, part in parts.items()}
+    return PulseCalibration(timing, table_with_budget(columns, budget, "height"))
 
 
 def _share_of_air(probe: Probe, time_us: float) -> float:
@@ -336,12 +324,6 @@ def _share_of_air(probe: Probe, time_us: float) -> float:
     capacity = float(heat_capacity_of_air(T, probe.surroundings.pressure_mbar)[0])
     per_area = 2.0 * 4.0 / 3.0 * np.sqrt(kappa * capacity * 1e-6 * time_us / np.pi)
     return float(per_area / (1e-4 * probe.layout().thickness_um * heat_capacity(T)[0]))
-
-
-def _table(columns: dict[str, Array], budget: dict[str, Array]) -> xr.Dataset:
-    errors = (("source", "height"), np.array(list(budget.values())))
-    coordinates = {"height": columns["height_V"], "source": list(budget)}
-    return labelled({**columns, "budget_K": errors}, "height", coordinates)
 
 
 def _column(moment: str) -> str:

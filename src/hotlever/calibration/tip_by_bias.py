@@ -1,0 +1,275 @@
+"""The tip temperature of an estimated lever by bias, and how sure it is.
+
+Its error adds up by source: what data and priors leave of the lever, what the model leaves out, and
+where a ramp of the bias jumps between two measured rows. A ramp that passes a fold leaves the cold
+part of a branch for the hot one; the rows tell between which biases that was, and there the tip may
+still be cold, or hot already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from hotlever.calibration.table import TOTAL_POWER, table_by_bias, total_error
+from hotlever.datasets import quantity
+from hotlever.errors import InputError
+from hotlever.estimation.inverse_problem import Estimate
+from hotlever.estimation.objective import TIP
+from hotlever.estimation.posterior import Posterior
+from hotlever.estimation.profile import profile_of_tip
+from hotlever.lever import Branch
+from hotlever.lever.curve import spline_through
+from hotlever.materials import Material
+from hotlever.materials.parameters import own_name
+from hotlever.probe import Circuit
+from hotlever.probe.surroundings import Surroundings
+from hotlever.text import BAND
+from hotlever.types import Array, Progress
+
+#: Rows of the table.
+_ROWS = 101
+#: By which source of error a parameter counts that is not the lever's own.
+OF_THE_MEASUREMENT = {
+    "series_resistance_ohm": "electronics",
+    "gas_conductivity": "air",
+    "surface_gap_um": "air",
+    "base_temperature_K": "base temperature",
+}
+#: Share of the rise by which the flat lever, or air as panels, differ from full 3-D where the tip
+#: is no steeper in bias than that of a lever of constant properties (benchmarks/air_3d.py).
+_MODEL = {"vacuum": 3e-4, "air": 7e-4}
+#: The same by the jump of the air's temperature at surfaces, where no accommodation is stated: with
+#: one of 0.9 air takes up 6 % less, more where the lever is narrow, and an estimate without it is
+#: off by so much (rms of six simulated levers from number 1000 on, of both shapes, linearised).
+_JUMP = 7e-3
+#: The same by the law of the mobility: how far two estimates of a lever are apart, with another law
+#: (MINIMOS) in place of Eq. 8 (rms of seven pairs of simulated levers from number 1000 on).
+_MOBILITY = 4e-3
+#: Rows that are on another part of the branch than a ramp takes by more than so many kelvins, so
+#: many of them, show no such lever: one or two beside a jump may.
+_ASIDE_K, _ROWS_ASIDE = 20.0, 3
+#: How far above a fold the state after the jump is read, as a share of the bias.
+_BEYOND = 1e-6
+
+
+class TipByBias(NamedTuple):
+    """The tip temperature over the measured range.
+
+    Attributes
+    ----------
+    table : xarray.Dataset
+        At even biases, see `hotlever.calibration.table`; the limits are as far away as the errors
+        say, unless these do not hold.
+    jumps : list of Jump
+        Between measured rows.
+    asymmetry : str
+        Where the limits are from, if not from the errors.
+    """
+
+    table: xr.Dataset
+    jumps: list[Jump]
+    asymmetry: str
+
+
+def tip_by_bias(
+    estimate: Estimate, samples: int = 0, progress: Progress | None = None
+) -> TipByBias:
+    """Return the tip temperature of an estimated lever with its error, by bias.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    samples : int
+        Of the posterior, from which the credible interval is then taken; none by default.
+    progress : callable, optional
+
+    Raises
+    ------
+    InputError
+        If samples are asked for of an estimate without priors.
+    """
+    probe, circuit, bias = estimate.probe, estimate.probe.circuit, measured_range(estimate)
+    predicted = estimate.predicted(bias)
+    tip, slopes = predicted.values[TIP], predicted.slopes[TIP][:, estimate.objective.columns]
+    parts = errors_by_source(estimate.posterior, slopes)
+    stderr = total_error(parts)
+    rise = tip - circuit.base_temperature_K
+    parts["model"] = error_of_model(probe.surroundings, estimate.options.varied, bias, rise)
+    low, high, asymmetry = _credible_interval(
+        estimate, tip, stderr, parts["model"], samples, progress
+    )
+    measured = estimate.residuals.bias, estimate.prediction.values[TIP]
+    jumps = jumps_of(estimate.branch, circuit, *measured)
+    for jump in jumps:
+        here = jump.unknown(bias)
+        low = np.where(here, np.minimum(low, jump.cold_K), low)
+        high = np.where(here, np.maximum(high, jump.hot_K), high)
+        either = here * (jump.hot_K - jump.cold_K) / (2.0 * BAND)
+        parts["jump"] = np.hypot(parts.get("jump", 0.0), either)
+    table = table_by_bias(circuit, bias, predicted.values[0], tip, parts, (low, high))
+    if not circuit.starts_cold:
+        total = table.power_mW.values + _held_power(estimate, bias)
+        table[TOTAL_POWER] = quantity(TOTAL_POWER, "bias", total)
+    return TipByBias(table, jumps, asymmetry)
+
+
+def measured_range(estimate: Estimate) -> Array:
+    """Return even biases (V) over the measured range, as far as the lever has states."""
+    measured, circuit = estimate.measurement, estimate.probe.circuit
+    # without a bias nothing is known of a lever that is cold then
+    heated = (measured.bias_V > 0) | (not circuit.starts_cold)
+    present = measured.bias_V[np.isfinite(measured.current_mA) & heated]
+    return np.linspace(present.min(), min(present.max(), highest_bias(estimate)), _ROWS)
+
+
+def highest_bias(estimate: Estimate) -> float:
+    """Return the highest bias (V) up to the highest measured one at which the lever has a state."""
+    measured = float(estimate.residuals.bias.max())
+    return estimate.branch.highest_bias(estimate.probe.circuit, measured)
+
+
+def _held_power(estimate: Estimate, bias: Array) -> Array:
+    """Return the power of the held supplies at some biases (mW), within a coarse mesh's error."""
+    branch = estimate.branch
+    equations, x = branch.equations, branch.x
+    own = x[-1] * equations.observed(x)[1]
+    u = branch.read(estimate.probe.circuit, bias).u
+    return np.asarray(spline_through(branch.u, equations.power(x) - own)(u))
+
+
+# --- how sure it is -----------------------------------------------------------------------------
+
+
+def errors_by_source(posterior: Posterior, slopes: Array) -> dict[str, Array]:
+    """Return standard errors by source, by derivatives by the varied parameters (..., p).
+
+    Independent of each other, they add up to what the posterior says.
+    """
+    variances: dict[str, Array] = {}
+    for name, share in posterior.shares.items():
+        source = name if name in ("measurement", "fit") else _source(name)
+        variance = np.einsum("...p,pq,...q->...", slopes, share, slopes)
+        variances[source] = variances.get(source, 0.0) + variance
+    return {source: np.sqrt(variance) for source, variance in variances.items()}
+
+
+def _source(name: str) -> str:
+    of_material = "." in name or name in Material.model_fields
+    return OF_THE_MEASUREMENT.get(name, "material" if of_material else "geometry")
+
+
+def error_of_model(around: Surroundings, varied: Sequence[str], bias: Array, rise: Array) -> Array:
+    """Return by how much the tip may be off since the model is (K); most where the tip is steep.
+
+    The law of the mobility counts where its exponents are estimated.
+    """
+    # a rise that grows as the square of the bias is that of a lever of constant properties
+    square, size = np.abs(0.5 * bias * np.gradient(rise, bias)), np.abs(rise)
+    error = _MODEL[around.medium] * np.maximum(size, square)
+    if around.medium == "air" and around.accommodation is None:
+        error = np.hypot(error, _JUMP * size)
+    if any(own_name(name) == "impurity_exponent" for name in varied):
+        error = np.hypot(error, _MOBILITY * size)
+    return np.asarray(error)
+
+
+def _credible_interval(
+    estimate: Estimate,
+    tip: Array,
+    stderr: Array,
+    of_model: Array,
+    samples: int,
+    progress: Progress | None,
+) -> tuple[Array, Array, str]:
+    """Return what 95 % of the tip temperatures lie between (K), and words on where that is from."""
+    posterior, informed, too_few = estimate.posterior, estimate.objective.informed, ""
+    if samples:
+        if not informed:
+            raise InputError("posterior: expected priors, without which it is not that of a fit")
+        # what samples takes a second to load, for which few calibrations have to wait
+        from hotlever.estimation.sampling import sample_tip
+
+        sampled = sample_tip(posterior, estimate.optimiser, samples=samples, progress=progress)
+        if sampled.enough:
+            return *sampled.profile.credible_interval(tip, stderr, of_model), sampled.note
+        too_few = sampled.note
+    profile = (
+        profile_of_tip(posterior, estimate.optimiser.model) if estimate.objective.informed else None
+    )
+    if profile is None or profile.linear:
+        away = BAND * np.hypot(stderr, of_model)
+        return tip - away, tip + away, too_few
+    low, high = profile.credible_interval(tip, stderr, of_model)
+    note = (
+        "the tip temperature is not a linear function of what is unknown, so that its limits come "
+        f"from estimates of hotter and colder levers: at {tip[-1]:.0f} K 95 % lie from "
+        f"{low[-1]:.0f} to {high[-1]:.0f} K"
+    )
+    return low, high, "; ".join(filter(None, (too_few, note)))
+
+
+# --- where a lever jumps ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A jump of a slow ramp of the bias.
+
+    Attributes
+    ----------
+    from_V, to_V : float
+        The measured biases between which it was.
+    cold_K, hot_K : float
+        Tip temperatures before and after it.
+    """
+
+    from_V: float
+    to_V: float
+    cold_K: float
+    hot_K: float
+
+    @property
+    def note(self) -> str:
+        """What a user should know of it."""
+        return (
+            f"between biases of {self.from_V:.4g} and {self.to_V:.4g} V the lever jumps from a tip "
+            f"at {self.cold_K:.0f} K to {self.hot_K:.0f} K; the data do not say where"
+        )
+
+    def unknown(self, bias: Array) -> Array:
+        """Return at which biases (V), (n,), the tip may be on either side."""
+        return np.asarray((bias > self.from_V) & (bias < self.to_V))
+
+
+def jumps_of(branch: Branch, circuit: Circuit, bias: Array, tip_K: Array) -> list[Jump]:
+    """Return the jumps of a lever between measured rows, by their bias (V) and tip (K), (n,)."""
+    if not bias.size or not circuit.starts_cold:
+        return []
+    jumps = []
+    reading = branch.read(circuit, np.array([float(bias.max())]))
+    for fold_V, cold_K in reading.jumps:
+        beyond = branch.read(circuit, np.array([fold_V * (1.0 + _BEYOND)]))
+        hot_K = float(branch.tip_K(beyond.u[0]))
+        if not np.isfinite(hot_K):
+            continue
+        hot = tip_K > 0.5 * (cold_K + hot_K)
+        from_V = float(bias[~hot].max(initial=0.0))
+        to_V = float(bias[hot].min(initial=float(bias.max())))
+        jumps.append(Jump(min(from_V, fold_V), max(to_V, fold_V), cold_K, hot_K))
+    return jumps
+
+
+def not_of_a_ramp(branch: Branch, circuit: Circuit, bias: Array, tip_K: Array) -> str:
+    """Say that rows lie where a slow ramp of the bias does not come; empty if they do not."""
+    aside = np.abs(branch.tip_K(branch.read(circuit, bias).u) - tip_K) > _ASIDE_K
+    if aside.sum() < _ROWS_ASIDE:
+        return ""
+    return (
+        f"the lever that comes nearest jumps, and its rows from {bias[aside].min():.3g} to "
+        f"{bias[aside].max():.3g} V lie on another part of its branch than a ramp takes"
+    )
