@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hotlever.calibration.tip_by_bias import error_of_model
+from hotlever.calibration.tip_temperature import error_of_model
 from hotlever.estimation.objective import Objective, Pull, TipTemperature
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.prior_density import Coordinates, PriorDensity

@@ -2,8 +2,8 @@
 
 Material, dimensions and circuit have priors (`hotlever.probe.priors`); the measurement moves them
 to where both are most likely, and the tip temperature with its error follows from there
-(`hotlever.calibration.tip_by_bias`). No knee is needed: a lever that was measured below it is less
-certain above, and that is all.
+(`hotlever.calibration.tip_temperature`). No knee is needed: a lever that was measured below it is
+less certain above, and that is all.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from hotlever.calibration.calibration import Calibration, rms
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.plausibility import misfit, what_data_lack
 from hotlever.calibration.power_law import law_of_model, power_turns
-from hotlever.calibration.tip_by_bias import (
+from hotlever.calibration.tip_temperature import (
     OF_THE_MEASUREMENT,
     highest_bias,
     not_of_a_ramp,

@@ -27,7 +27,7 @@ from hotlever.calibration.table import (
     table_with_budget,
     total_error,
 )
-from hotlever.calibration.tip_by_bias import error_of_model, errors_by_source, measured_range
+from hotlever.calibration.tip_temperature import error_of_model, errors_by_source, measured_range
 from hotlever.datasets import csv_text
 from hotlever.errors import ComputationError, InputError, unknown_name
 from hotlever.estimation.inverse_problem import Estimate
