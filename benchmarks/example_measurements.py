@@ -20,10 +20,10 @@ import numpy as np
 import xarray as xr
 
 from hotlever.calibration import Calibration, calibrate
-from hotlever.drawing.importing import import_drawing
 from hotlever.files import write_text
 from hotlever.lever import Lever
 from hotlever.probe import MeshOptions, Probe
+from hotlever.probe.importing import import_drawing
 from hotlever.probe.priors import PriorUse
 from problems import EXAMPLE, peer_problem, solve_with_peer, table
 

@@ -25,7 +25,8 @@ MODULES = sorted(
 )
 #: From the ground up: a layer imports none of those behind it.
 LAYERS = (
-    ("materials", "probe", "drawing"),
+    ("materials",),
+    ("probe",),
     ("air",),
     ("lever",),
     ("lever3d", "measurement"),

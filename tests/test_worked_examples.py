@@ -11,10 +11,10 @@ from boron_lever_drawing import boron_lever
 
 from documents import ROOT, missing_lines
 from example_measurements import EXAMPLES, compare
-from hotlever.drawing.shape import TOLERANCE_UM
-from hotlever.drawing.sheet import read_sheet
 from hotlever.measurement import read_measurement
 from hotlever.probe import Probe
+from hotlever.probe.drawing.shape import TOLERANCE_UM
+from hotlever.probe.drawing.sheet import read_sheet
 from hotlever.probe.priors import Prior, default_priors
 
 #: The others take longer, and show no more of the code.

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from drawn import box, reference_points
-from hotlever.drawing.fault import DrawingError
 from hotlever.errors import InputError
 from hotlever.lever import Lever
 from hotlever.probe import Probe
+from hotlever.probe.drawing.outlines import DrawingError
 
 ENDS = {"supply": (-3.22, 3.22), "ground": (6.42, 9.88), "reader": (-9.88, -6.42)}
 BIAS = [4.0, 7.0]

@@ -10,11 +10,11 @@ from skfem import MeshTri
 
 from drawn import LAYERS, TERMINALS, TIP, box, drawn, library_of, pointed_lever, turned, written
 from drawn import reference_points as points
-from hotlever.drawing.sheet import read_sheet
 from hotlever.lever import Lever, read_sweep, write_sweep
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe, ProbeMesh, mesh_layout
+from hotlever.probe.drawing.sheet import read_sheet
 from hotlever.probe.layout import BorderTaper, Taper
 from hotlever.probe.mesh import terminal_facets
 

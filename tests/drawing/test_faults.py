@@ -9,9 +9,9 @@ import pytest
 from reference_drawing import reference_library
 
 from drawn import box, drawn, library_of, reference_points, written
-from hotlever.drawing.fault import DrawingError
 from hotlever.errors import InputError
 from hotlever.probe import Probe
+from hotlever.probe.drawing.outlines import DrawingError
 
 BOW = [[50.58, -9.88], [54.4, 9.88], [54.4, -9.88], [50, 9.88]]
 BRIDGE = box(50.58, -9.88, 54.4, 9.88)

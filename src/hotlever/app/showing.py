@@ -240,7 +240,7 @@ def _at_fault(
     InputError
         If neither has a place in a picture.
     """
-    from hotlever.drawing.fault import DrawingError
+    from hotlever.probe.drawing.outlines import DrawingError
 
     if isinstance(error, DrawingError):
         made = figures.outlines_drawing(error.outlines, fault=said, place=error.place)

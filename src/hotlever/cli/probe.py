@@ -52,8 +52,8 @@ def show(
     mesh: bool = Option(False, "--mesh", help="Draw the triangles of the mesh too."),
 ) -> None:
     """Draw and describe a probe."""
-    from hotlever.drawing.fault import DrawingError
     from hotlever.lever.meshing import chosen_space
+    from hotlever.probe.drawing.outlines import DrawingError
 
     outputs = Outputs(probe_file)
     outputs.file(plot, *FIGURE_TYPES)
@@ -93,7 +93,7 @@ def import_command(
     plot: PlotFile = None,
 ) -> None:
     """Say what a drawing holds, and propose a probe file for it."""
-    from hotlever.drawing.extent import UNITS
+    from hotlever.probe.drawing.sheet import UNITS
     from hotlever.tasks.importing import propose_probe
 
     name = None if unit is None else unit.replace("µ", "u").replace("μ", "u")

@@ -118,7 +118,9 @@ def shape_of(
     if not isinstance(name, str) or name not in SHAPES:
         raise unknown_name("shape", str(name), SHAPES, here)
     if name == DRAWING:
-        from hotlever.drawing.shape import Drawing  # most probes are drawn by their dimensions
+        from hotlever.probe.drawing.shape import (
+            Drawing,  # most probes are drawn by their dimensions
+        )
 
         return Drawing.read(sections, where, folder, materials)
     for section in SHAPE_SECTIONS[1:]:

@@ -2,7 +2,7 @@
 
 A parametric shape is made of the dimensions a designer draws with: the base of the lever is at
 x = 0, the legs run along +x, and y = 0 is the line of symmetry. The other kind of shape is a
-drawing (`hotlever.drawing.shape`).
+drawing (`hotlever.probe.drawing.shape`).
 """
 
 from __future__ import annotations

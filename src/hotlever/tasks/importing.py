@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hotlever.drawing.fault import DrawingError
-from hotlever.drawing.importing import import_drawing
 from hotlever.files import Outputs, write_text
+from hotlever.probe.drawing.outlines import DrawingError
+from hotlever.probe.importing import import_drawing
 from hotlever.tasks.files import draw
 from hotlever.tasks.reporter import Reporter
 
@@ -33,7 +33,7 @@ def propose_probe(
             lambda figures: figures.outlines_drawing(
                 proposed.outlines,
                 drawing.name,
-                tip=proposed.proposal.tip,
+                tip=proposed.inference.tip,
                 fault="" if place is None else str(fault),
                 place=place,
             ),

@@ -11,13 +11,12 @@ import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.drawing.contacts import outline_edges, terminal_edges, terminal_part
-from hotlever.drawing.cutting import Cut, cut
-from hotlever.drawing.fault import DrawingError, Ring
-from hotlever.drawing.healing import healed, parts_of, polygons, snapped
-from hotlever.drawing.layers import HEATER, SILICON
-from hotlever.drawing.shape import rings_of
-from hotlever.drawing.sheet import Layer, Sheet
+from hotlever.probe.drawing.contacts import outline_edges, terminal_edges, terminal_part
+from hotlever.probe.drawing.layers import HEATER, SILICON
+from hotlever.probe.drawing.outlines import DrawingError, Ring, healed, parts_of, polygons, snapped
+from hotlever.probe.drawing.partition import Partition, partitioned
+from hotlever.probe.drawing.shape import rings_of
+from hotlever.probe.drawing.sheet import Layer, Sheet
 from hotlever.probe.layout import Point
 
 SUPPLY, GROUND, READER = "supply", "ground", "reader"
@@ -29,7 +28,7 @@ Drawn = str | tuple[Ring, ...]
 
 
 @dataclass
-class Proposal:
+class LayerInference:
     """What is what in a drawing.
 
     Attributes
@@ -40,8 +39,6 @@ class Proposal:
         By the names that parts have in errors, and for the ``tip``.
     doubts : list of str
         What could not be told.
-    unused : list of str
-        Layers that are nothing of the lever.
     """
 
     layers: dict[str, Drawn] = field(default_factory=dict)
@@ -49,35 +46,31 @@ class Proposal:
     tip: Point | None = None
     reasons: dict[str, str] = field(default_factory=dict)
     doubts: list[str] = field(default_factory=list)
-    unused: list[str] = field(default_factory=list)
 
 
-def proposed(sheet: Sheet, tolerance: float) -> Proposal:
+def infer_layers(sheet: Sheet, tolerance: float) -> LayerInference:
     """Say which layer of a drawing is what, and why."""
-    found = Proposal()
-    shapes = _shapes(sheet, tolerance, found.doubts)
+    inferred = LayerInference()
+    shapes = _shapes(sheet, tolerance, inferred.doubts)
     judged = [_Silicon(name, sheet, shapes, tolerance) for name in shapes]
     best = max(judged, key=lambda one: one.merit, default=None)
     if best is None:
-        found.doubts.append("no layer holds a closed outline")
-        return found
-    found.layers[SILICON] = best.name
+        inferred.doubts.append("no layer holds a closed outline")
+        return inferred
+    inferred.layers[SILICON] = best.name
     touched = len(best.cutters) + len(best.touching)
-    found.reasons[SILICON] = (
+    inferred.reasons[SILICON] = (
         f"{best.shape.area:.4g} µm²; {touched} other layer{'s' * (touched != 1)} lie"
         f"{'s' * (touched == 1)} across it or touch its outline"
     )
     if len(best.pieces) > 1:
-        found.doubts.append(
+        inferred.doubts.append(
             f"layer {best.name} has {len(best.pieces)} pieces that do not touch; a lever is one"
         )
-    _low_doped(best, found)
-    _terminals(best, sheet, found)
-    _tip(best, sheet, shapes, found)
-    used = {one for one in (*found.layers.values(), *found.terminals.values()) if type(one) is str}
-    split = best.split and {best.split}
-    found.unused = [name for name in sheet.layers if name not in used | (split or set())]
-    return found
+    _low_doped(best, inferred)
+    _terminals(best, sheet, inferred)
+    _tip(best, sheet, shapes, inferred)
+    return inferred
 
 
 def _shapes(sheet: Sheet, tolerance: float, doubts: list[str]) -> dict[str, BaseGeometry]:
@@ -110,7 +103,7 @@ class _Silicon:
     def __init__(
         self, name: str, sheet: Sheet, shapes: dict[str, BaseGeometry], tolerance: float
     ) -> None:
-        self.name, self.tolerance, self.split = name, tolerance, ""
+        self.name, self.tolerance = name, tolerance
         self.pieces = sorted(parts_of(shapes[name]), key=lambda one: -one.area)
         self.shape: Polygon = self.pieces[0]
         self.areas = shapes
@@ -153,10 +146,10 @@ def _terminal(sheet: Sheet, layer: Layer) -> tuple[Ring, ...]:
 # --- low-doped parts ---------------------------------------------------------------------------
 
 
-def _low_doped(best: _Silicon, found: Proposal) -> None:
+def _low_doped(best: _Silicon, inferred: LayerInference) -> None:
     """Tell the heater among the layers that cut the silicon, and name the others."""
     if not best.cutters:
-        found.doubts.append(
+        inferred.doubts.append(
             "no layer lies across the silicon so that current has to pass it: the heater is missing"
         )
         return
@@ -164,12 +157,12 @@ def _low_doped(best: _Silicon, found: Proposal) -> None:
     reason = "the silicon falls apart without it"
     if len(best.cutters) > 1:
         reason += "; of such layers the farthest from the terminals"
-    found.layers[HEATER], found.reasons[HEATER] = heater, reason
+    inferred.layers[HEATER], inferred.reasons[HEATER] = heater, reason
     rest = [name for name in best.cutters if name != heater]
     for number, name in enumerate(rest, start=1):
         part = READER if len(rest) == 1 else f"low-doped-{number}"
-        found.layers[part] = name
-        found.reasons[part] = "the silicon falls apart without it too, nearer to the terminals"
+        inferred.layers[part] = name
+        inferred.reasons[part] = "the silicon falls apart without it too, nearer to the terminals"
 
 
 def _hinted(names: Iterable[str], words: tuple[str, ...]) -> str | None:
@@ -193,7 +186,7 @@ def _farthest(best: _Silicon) -> str:
 # --- terminals ---------------------------------------------------------------------------------
 
 
-def _terminals(best: _Silicon, sheet: Sheet, found: Proposal) -> None:
+def _terminals(best: _Silicon, sheet: Sheet, inferred: LayerInference) -> None:
     """Tell supply, ground and reader by what lies between them."""
     given: dict[str, Drawn] = {name: name for name in best.touching}
     if len(given) == 1:
@@ -201,51 +194,47 @@ def _terminals(best: _Silicon, sheet: Sheet, found: Proposal) -> None:
         rings = _terminal(sheet, sheet.layers[only])
         if len(rings) > 1:
             # several contacts on one layer
-            best.split = only
             given = {f"polygon {n} of {only}": (ring,) for n, ring in enumerate(rings, start=1)}
     why = "it touches the outline along an edge"
     if len(given) < 2:
-        heater = found.layers.get(HEATER)
+        heater = inferred.layers.get(HEATER)
         middle = best.areas[heater] if isinstance(heater, str) else best.shape.centroid
         base = _base(best.shape, middle)
         given = {f"edge {number}": (edge,) for number, edge in enumerate(base, start=1)}
         why = "one of the edges in a line far from the heater; no layer marks a terminal"
     if len(given) < 2:
-        found.doubts.append("no edges that could be terminals: supply and ground are missing")
+        inferred.doubts.append("no edges that could be terminals: supply and ground are missing")
         return
     rings_by = {
         name: _terminal(sheet, sheet.layers[one]) if isinstance(one, str) else one
         for name, one in given.items()
     }
     try:
-        named = _named(best, found, rings_by)
+        named = _named(best, inferred, rings_by)
     except DrawingError as error:
-        found.doubts.append(f"terminals cannot be told apart ({error.what})")
+        inferred.doubts.append(f"terminals cannot be told apart ({error.what})")
         named = {
             role: (name, "") for role, name in zip((SUPPLY, GROUND, READER), given, strict=False)
         }
     for role, (name, reason) in named.items():
-        found.terminals[role] = given[name]
-        found.reasons[terminal_part(role)] = "; ".join(filter(None, (why, reason)))
+        inferred.terminals[role] = given[name]
+        inferred.reasons[terminal_part(role)] = "; ".join(filter(None, (why, reason)))
 
 
 def _named(
-    best: _Silicon, found: Proposal, rings: dict[str, tuple[Ring, ...]]
+    best: _Silicon, inferred: LayerInference, rings: dict[str, tuple[Ring, ...]]
 ) -> dict[str, tuple[str, str]]:
     """Return the terminal for each role, and why."""
     low = {
         part: snapped(best.areas[name], best.shape, 1.5 * best.tolerance)
-        for part, name in found.layers.items()
+        for part, name in inferred.layers.items()
         if part != SILICON and isinstance(name, str)
     }
-    whole = cut((SILICON, best.shape), low)
-    at: dict[str, set[int]] = {}
-    for end in terminal_edges(best.shape, rings, best.tolerance):
-        middle = shapely.Point(np.mean([end.start, end.end], axis=0))
-        away = [piece.shape.distance(middle) for piece in whole.pieces]
-        at.setdefault(end.name, set()).add(int(np.argmin(away)))
-    heaters = {number for number, piece in enumerate(whole.pieces) if HEATER in piece.layers}
-    sides = _grouped(whole, at, heaters)
+    partition = partitioned((SILICON, best.shape), low)
+    ends = terminal_edges(best.shape, rings, best.tolerance)
+    at = partition.touched_by(ends, best.tolerance)
+    heaters = {number for number, piece in enumerate(partition.pieces) if HEATER in piece.layers}
+    sides = _grouped(partition, at, heaters)
     alone = next((side for side in sides if len(side) == 1), sides[0])
     others = [name for side in sides if side is not alone for name in side] or alone[1:]
     supply = _hinted(at, ("supply", "bias", "v+", "vdd")) or alone[0]
@@ -253,7 +242,7 @@ def _named(
     named = {SUPPLY: (supply, "alone on its side of the heater" if len(at) > 2 else "")}
     if not rest:
         return named
-    behind = [name for name in rest if _behind_low_doped(whole, at[name], heaters)]
+    behind = [name for name in rest if _behind_low_doped(partition, at[name], heaters)]
     ground = _hinted(rest, ("ground", "gnd")) or next(
         (name for name in rest if name not in behind), rest[0]
     )
@@ -269,11 +258,11 @@ def _named(
     return named
 
 
-def _grouped(whole: Cut, at: dict[str, set[int]], heaters: set[int]) -> list[list[str]]:
+def _grouped(partition: Partition, at: dict[str, set[int]], heaters: set[int]) -> list[list[str]]:
     """Return the terminals in groups that are connected other than through a heater."""
     groups: list[list[str]] = []
     for name in at:
-        reached = whole.reached(at[name], heaters)
+        reached = partition.reached(at[name], heaters)
         group = next((one for one in groups if at[one[0]] & reached), None)
         if group is None:
             groups.append([name])
@@ -282,11 +271,11 @@ def _grouped(whole: Cut, at: dict[str, set[int]], heaters: set[int]) -> list[lis
     return groups
 
 
-def _behind_low_doped(whole: Cut, numbers: set[int], heaters: set[int]) -> bool:
+def _behind_low_doped(partition: Partition, numbers: set[int], heaters: set[int]) -> bool:
     """Whether a terminal reaches the heater through another low-doped part only."""
-    low = {number for number, piece in enumerate(whole.pieces) if SILICON not in piece.layers}
-    reached = whole.reached(numbers, low)
-    return not any(whole.neighbours(one) & heaters for one in reached)
+    low = {number for number, piece in enumerate(partition.pieces) if SILICON not in piece.layers}
+    reached = partition.reached(numbers, low)
+    return not any(partition.neighbours(one) & heaters for one in reached)
 
 
 def _base(silicon: Polygon, heater: BaseGeometry) -> list[tuple[Point, Point]]:
@@ -306,16 +295,18 @@ def _base(silicon: Polygon, heater: BaseGeometry) -> list[tuple[Point, Point]]:
 # --- tip ---------------------------------------------------------------------------------------
 
 
-def _tip(best: _Silicon, sheet: Sheet, shapes: dict[str, BaseGeometry], found: Proposal) -> None:
+def _tip(
+    best: _Silicon, sheet: Sheet, shapes: dict[str, BaseGeometry], inferred: LayerInference
+) -> None:
     """Find the place of the tip."""
     for _, text, place in sheet.labels:
         if "tip" in text.lower() and best.shape.contains(shapely.Point(place)):
-            found.tip = (round(place[0], 6), round(place[1], 6))
-            found.reasons["tip"] = f"the text '{text.strip()[:20]}' stands there"
+            inferred.tip = (round(place[0], 6), round(place[1], 6))
+            inferred.reasons["tip"] = f"the text '{text.strip()[:20]}' stands there"
             return
-    heater = found.layers.get(HEATER)
+    heater = inferred.layers.get(HEATER)
     if isinstance(heater, str):
         inside = max(parts_of(shapes[heater].intersection(best.shape)), key=lambda one: one.area)
         middle = inside.centroid if inside.contains(inside.centroid) else inside.point_on_surface()
-        found.tip = (round(middle.x, 6), round(middle.y, 6))
-        found.reasons["tip"] = "the middle of the heater; no text in the drawing says 'tip'"
+        inferred.tip = (round(middle.x, 6), round(middle.y, 6))
+        inferred.reasons["tip"] = "the middle of the heater; no text in the drawing says 'tip'"

@@ -13,10 +13,10 @@ from typing import Any
 
 from pydantic import Field
 
-from hotlever.drawing.fault import Ring
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED, Kind
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
+from hotlever.probe.drawing.outlines import Ring
 from hotlever.records import Record
 
 SILICON, BODY, HEATER = "silicon", "body", "heater"

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,15 +17,19 @@ import shapely
 from scipy import spatial
 from shapely import LineString
 
-from hotlever.drawing.fault import Ring
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_bytes
+from hotlever.probe.drawing.outlines import Ring
 from hotlever.probe.layout import Point
 
 #: Bytes that a file may have, and of memory and seconds that reading it may take.
 _LARGEST, _MEMORY, _PATIENCE_S = 64 * 2**20, 4 * 2**30, 60.0
 #: Coordinates (µm) beyond which nothing is drawn on a wafer.
 _FARTHEST = 1e6
+#: Extent of a lever (µm).
+SMALLEST_UM, LARGEST_UM = 5.0, 2000.0
+#: Units of drawings (µm), the likeliest first.
+UNITS = {"um": 1.0, "mm": 1e3, "nm": 1e-3, "m": 1e6, "cm": 1e4, "inch": 25_400.0, "mil": 25.4}
 
 
 @dataclass(frozen=True)
@@ -145,7 +150,7 @@ def read_sheet(
 def _read_apart(
     content: bytes, path: str, cell: str | None, unit_um: float | None, tolerance_um: float
 ) -> dict[str, Any]:
-    """Read a file in a process of its own, see `hotlever.drawing.reader`."""
+    """Read a file in a process of its own, see `hotlever.probe.drawing.reader`."""
     options = {
         "cell": cell,
         "unit_um": unit_um,
@@ -208,3 +213,58 @@ def _joined(lines: tuple[Ring, ...], tolerance: float) -> tuple[tuple[Ring, ...]
     )
     rest = [line for group in (cuts, dangles) for line in shapely.get_parts(group)]
     return rings, tuple(tuple((x, y) for x, y in line.coords) for line in rest)
+
+
+# --- how large levers are, which tells a wrong unit -----------------------------------------------
+
+
+def extent_of(rings: Iterable[Ring]) -> float:
+    """Return the longer side of the box around some outlines, in their unit."""
+    points = np.array([point for ring in rings for point in ring])
+    return float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+
+
+def is_lever(extent_um: float) -> bool:
+    """Whether something is as large as a lever may be."""
+    return SMALLEST_UM <= extent_um <= LARGEST_UM
+
+
+def sensible_unit(extent_um: float, unit_um: float) -> str | None:
+    """Return the likeliest unit in which something is as large as a lever, None if there is none.
+
+    Parameters
+    ----------
+    extent_um : float
+        With one unit of the drawing being `unit_um`.
+    unit_um : float
+
+    Examples
+    --------
+    >>> sensible_unit(0.0544, 1.0), sensible_unit(54_400.0, 1000.0), sensible_unit(0.0, 1.0)
+    ('mm', 'um', None)
+    """
+    sizes = {name: extent_um / unit_um * one for name, one in UNITS.items()}
+    return next((name for name, size in sizes.items() if is_lever(size)), None)
+
+
+def doubt(extent_um: float, unit_um: float, unit: str | None, how: str) -> str:
+    """Say that something is not as large as a lever, and with which unit it would be.
+
+    Parameters
+    ----------
+    extent_um, unit_um : float
+        As in `sensible_unit`.
+    unit : str or None
+        The one that makes sense.
+    how : str
+        Where to say so, as ``--unit {unit}`` or ``unit_um = {unit_um:g}``.
+    """
+    words = (
+        f"{extent_um:.4g} µm long with one unit of the file as {unit_um:g} µm, expected "
+        f"{SMALLEST_UM:g} to {LARGEST_UM:g} µm"
+    )
+    if unit is None:
+        return words
+    size = extent_um / unit_um * UNITS[unit]
+    hint = how.format(unit=unit, unit_um=UNITS[unit])
+    return f"{words}; in {unit} it would be {size:.4g} µm: {hint}"

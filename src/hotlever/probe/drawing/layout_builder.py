@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 
-import numpy as np
 import shapely
-from shapely import LineString, Polygon
+from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.drawing.contacts import (
+from hotlever.probe.drawing.contacts import (
     REQUIRED,
     DrawnTerminal,
     check_apart,
@@ -18,21 +17,21 @@ from hotlever.drawing.contacts import (
     terminal_edges,
     terminal_part,
 )
-from hotlever.drawing.cutting import Cut, Piece, cut, taper_of
-from hotlever.drawing.etching import Etching
-from hotlever.drawing.extent import LARGEST_UM, SMALLEST_UM, extent_of
-from hotlever.drawing.fault import DrawingError, Ring
-from hotlever.drawing.healing import (
+from hotlever.probe.drawing.etching import Etching
+from hotlever.probe.drawing.layers import HEATER, DrawnLayer
+from hotlever.probe.drawing.outlines import (
     NARROWEST,
+    DrawingError,
+    Ring,
     check_widths,
     healed,
-    nearest_polygon,
     one_piece,
     parts_of,
     polygons,
     snapped,
 )
-from hotlever.drawing.layers import HEATER, DrawnLayer
+from hotlever.probe.drawing.partition import Partition, Piece, partitioned
+from hotlever.probe.drawing.sheet import LARGEST_UM, SMALLEST_UM, extent_of
 from hotlever.probe.layout import (
     BorderTaper,
     Film,
@@ -50,7 +49,7 @@ _SNAP = 1.5
 
 
 @lru_cache(maxsize=32)
-def layout_of(
+def build_layout(
     layers: tuple[DrawnLayer, ...],
     terminals: tuple[DrawnTerminal, ...],
     tip: Point,
@@ -74,28 +73,25 @@ def layout_of(
     Raises
     ------
     DrawingError
-        If the drawing is at fault; see `hotlever.drawing.healing`, `hotlever.drawing.cutting` and
-        `hotlever.drawing.contacts`.
+        If the drawing is at fault: an outline (`hotlever.probe.drawing.outlines`), a part
+        (`hotlever.probe.drawing.partition`) or a terminal (`hotlever.probe.drawing.contacts`).
     """
-    known = {layer.name: layer for layer in layers}
+    by_name = {layer.name: layer for layer in layers}
     narrowest = NARROWEST * tolerance_um
     body = next(layer.name for layer in layers if layer.is_body)
-    _check_extent(body, known[body].rings)
-    found = {name: polygons(name, one.rings, tolerance_um) for name, one in known.items()}
-    outline = one_piece(body, healed(body, found[body], tolerance_um), found[body])
-    check_widths(body, outline, found[body], narrowest)
-    shapes = dict[str, BaseGeometry]()
-    for name, areas in found.items():
-        if name != body:
-            shapes[name] = healed(name, areas, tolerance_um)
-            _check_on_body(name, areas, body, outline, tolerance_um)
-    contacts = dict[str, BaseGeometry]()
-    for terminal in terminals:
-        if terminal.by_area:
-            name = terminal_part(terminal.name)
-            found[name] = polygons(name, terminal.rings, tolerance_um)
-            contacts[terminal.name] = healed(name, found[name], tolerance_um)
-            _check_on_body(name, found[name], body, outline, tolerance_um)
+    _check_extent(body, by_name[body].rings)
+    drawn = {layer.name: polygons(layer.name, layer.rings, tolerance_um) for layer in layers}
+    outline = one_piece(body, healed(body, drawn[body], tolerance_um), drawn[body])
+    check_widths(body, outline, drawn[body], narrowest)
+    by_area = {terminal_part(one.name): one for one in terminals if one.by_area}
+    drawn |= {name: polygons(name, one.rings, tolerance_um) for name, one in by_area.items()}
+    on_body = {
+        name: healed(name, areas, tolerance_um) for name, areas in drawn.items() if name != body
+    }
+    for name in on_body:
+        _check_on_body(name, drawn[name], body, outline, tolerance_um)
+    contacts = {one.name: on_body.pop(name) for name, one in by_area.items()}
+    shapes = on_body
     edges = {one.name: one.rings for one in terminals if not one.by_area}
     ends = terminal_edges(outline, edges, tolerance_um)
     if edge_bias_um:
@@ -103,19 +99,19 @@ def layout_of(
         shapes, contacts = (
             {
                 name: etching.layer(snapped(one, outline, _SNAP * tolerance_um))
-                for name, one in group
+                for name, one in group.items()
             }
-            for group in (shapes.items(), contacts.items())
+            for group in (shapes, contacts)
         )
         outline, ends = etching.outline, etching.ends
-        check_widths(body, outline, found[body], narrowest)
+        check_widths(body, outline, drawn[body], narrowest)
     near = [outline]
     for name, shape in shapes.items():
         for one in near:
             shape = snapped(shape, one, _SNAP * tolerance_um)
         shapes[name] = shape
         # parts lie apart from each other, films on all that is below
-        if known[name].is_film:
+        if by_name[name].is_film:
             near.append(shape)
     borders = {name: shape.boundary for name, shape in shapes.items()}
     if contacts:
@@ -125,25 +121,24 @@ def layout_of(
         borders |= {terminal_part(name): area.boundary for name, area in contacts.items()}
         outline, ends = cut_away(body, outline, contacts, ends, tip)
         check_apart(ends)
-    films = {name: shape for name, shape in shapes.items() if known[name].is_film}
+    films = {name: shape for name, shape in shapes.items() if by_name[name].is_film}
     parts = {name: shape for name, shape in shapes.items() if name not in films}
-    whole = cut((body, _with_corners(outline, ends)), parts, films)
-    for piece in whole.pieces:
-        _check_piece(piece, borders, found, narrowest)
-    regions = _regions(whole, known, ends, tolerance_um)
-    for region, piece in zip(regions, whole.pieces, strict=True):
+    partition = partitioned((body, _with_corners(outline, ends)), parts, films)
+    for piece in partition.pieces:
+        _check_piece(piece, borders, drawn, narrowest)
+    regions = _regions(partition, by_name, ends, tolerance_um)
+    for region, piece in zip(regions, partition.pieces, strict=True):
         squares = region.area / region.narrow_um**2
         if HEATER in piece.layers and squares > MOST_SQUARES:
-            at = piece.shape.representative_point()
             raise DrawingError(
                 f"{region.narrow_um:.3g} µm wide and {squares:.0f} times as long, expected at most "
                 f"{MOST_SQUARES:g}",
                 HEATER,
-                nearest_polygon(found[HEATER], (at.x, at.y)),
-                (at.x, at.y),
+                drawn[HEATER],
+                piece.shape,
             )
     if not outline.contains(shapely.Point(tip)):
-        raise DrawingError(f"it lies outside the {body}", "tip_um", None, tip)
+        raise DrawingError(f"it lies outside the {body}", "tip_um", place=tip)
     return Layout(tuple(regions), tuple(ends), tip, 1.0)
 
 
@@ -154,15 +149,14 @@ def _check_extent(body: str, rings: tuple[Ring, ...]) -> None:
             f"{extent:.4g} µm long, expected {SMALLEST_UM:g} to {LARGEST_UM:g} µm; are unit and "
             "scale right?",
             body,
-            None,
-            rings[0][0],
+            place=rings[0][0],
         )
 
 
 def _check_piece(
     piece: Piece,
     borders: dict[str, BaseGeometry],
-    found: dict[str, list[Polygon]],
+    drawn: dict[str, list[Polygon]],
     narrowest: float,
 ) -> None:
     """Refuse a piece that is narrow somewhere, and name the layer whose border makes it so.
@@ -171,7 +165,7 @@ def _check_piece(
     """
     owner = piece.layers[-1]
     try:
-        check_widths(owner, piece.shape, found[owner], narrowest)
+        check_widths(owner, piece.shape, drawn[owner], narrowest)
     except DrawingError as error:
         at = shapely.Point(error.place)
         nearest = min(borders, key=lambda name: borders[name].distance(at), default=owner)
@@ -180,7 +174,7 @@ def _check_piece(
         raise DrawingError(
             f"its border leaves the {owner} with {error.what}: move it",
             nearest,
-            nearest_polygon(found[nearest], (at.x, at.y)),
+            drawn[nearest],
             error.place,
         ) from None
 
@@ -191,8 +185,7 @@ def _check_on_body(
     for number, area in enumerate(areas, start=1):
         inside = area.intersection(outline)
         if not any(one.area > tolerance**2 for one in parts_of(inside)):
-            at = area.representative_point()
-            raise DrawingError(f"it lies outside the {body}", name, number, (at.x, at.y))
+            raise DrawingError(f"it lies outside the {body}", name, number, area)
 
 
 def _with_corners(silicon: Polygon, ends: list[Terminal]) -> Polygon:
@@ -202,37 +195,37 @@ def _with_corners(silicon: Polygon, ends: list[Terminal]) -> Polygon:
 
 
 def _regions(
-    whole: Cut, known: dict[str, DrawnLayer], ends: list[Terminal], tolerance: float
+    partition: Partition, layers: dict[str, DrawnLayer], ends: list[Terminal], tolerance: float
 ) -> list[Region]:
     """Return the pieces as regions, each with what it is made of and its part in the circuit."""
-    at = _terminals_of(whole, ends, tolerance)
+    at = partition.touched_by(ends, tolerance)
     insulates = {
         number
-        for number, piece in enumerate(whole.pieces)
-        if not any(known[name].kind.conducts for name in piece.layers)
+        for number, piece in enumerate(partition.pieces)
+        if not any(layers[name].kind.conducts for name in piece.layers)
     }
-    body = next(layer.name for layer in known.values() if layer.is_body)
-    parts = _parts(whole, body, at, insulates)
+    body = next(layer.name for layer in layers.values() if layer.is_body)
+    parts = _parts(partition, body, at, insulates)
     regions, counts = [], dict[str, int]()
-    for number, piece in enumerate(whole.pieces):
+    for number, piece in enumerate(partition.pieces):
         here = [name for name, numbers in at.items() if number in numbers]
         (own, *films), name = piece.layers, piece.layers[-1]
-        if known[own].is_body:
+        if layers[own].is_body:
             name = " at ".join([name, *([", ".join(here)] if here else [])])
         counts[name] = counts.get(name, 0) + 1
         outline, *holes = (
             tuple((float(x), float(y)) for x, y in ring.coords[:-1])
             for ring in (piece.shape.exterior, *piece.shape.interiors)
         )
-        taper, dopant_from = _taper(whole, known, number, tolerance)
+        taper, dopant_from = _taper(partition, layers, number, tolerance)
         made = Region(
             name if counts[name] == 1 else f"{name} {counts[name]}",
             parts[number],
             outline,
             taper,
             tuple(holes),
-            material=known[own].material,
-            films=tuple(Film(known[one].material, known[one].thickness_um) for one in films),
+            material=layers[own].material,
+            films=tuple(Film(layers[one].material, layers[one].thickness_um) for one in films),
             insulates=number in insulates,
         )
         regions.append(made if dopant_from is None else replace(made, dopant_from=dopant_from))
@@ -240,7 +233,7 @@ def _regions(
 
 
 def _taper(
-    whole: Cut, known: dict[str, DrawnLayer], number: int, tolerance: float
+    partition: Partition, layers: dict[str, DrawnLayer], number: int, tolerance: float
 ) -> tuple[Taper | BorderTaper | None, str | None]:
     """Return how the doping of a piece is tapered, and from which material; None where it is even.
 
@@ -249,35 +242,23 @@ def _taper(
     DrawingError
         If it should border on high-doped silicon and does not, or borders on two kinds of it.
     """
-    piece = whole.pieces[number]
+    piece = partition.pieces[number]
     own = piece.layers[0]
-    if not known[own].is_low_doped:
+    if not layers[own].is_low_doped:
         return None, None
-    sources = {name for name in whole.beside(number) if known[name].is_high_doped}
-    materials = {known[name].material for name in sources}
-    at = piece.shape.representative_point()
-    if not materials and any(layer.is_body and layer.is_high_doped for layer in known.values()):
-        raise DrawingError("it borders on no high-doped silicon", own, None, (at.x, at.y))
+    sources = {name for name in partition.beside(number) if layers[name].is_high_doped}
+    materials = {layers[name].material for name in sources}
+    if not materials and any(layer.is_body and layer.is_high_doped for layer in layers.values()):
+        raise DrawingError("it borders on no high-doped silicon", own, place=piece.shape)
     if len(materials) > 1:
         what = f"it borders on high-doped silicon of {len(materials)} materials, expected one"
-        raise DrawingError(what, own, None, (at.x, at.y))
-    return taper_of(whole, number, sources, tolerance), next(iter(materials), None)
+        raise DrawingError(what, own, place=piece.shape)
+    return partition.taper(number, sources, tolerance), next(iter(materials), None)
 
 
-def _terminals_of(whole: Cut, ends: list[Terminal], tolerance: float) -> dict[str, set[int]]:
-    """Return the numbers of the pieces that each terminal touches."""
-    found: dict[str, set[int]] = {}
-    for end in ends:
-        edge = LineString([end.start, end.end])
-        along = [piece.shape.boundary.intersection(edge).length for piece in whole.pieces]
-        touched = {number for number, length in enumerate(along) if length > tolerance}
-        middle = edge.interpolate(0.5, normalized=True)
-        away = [piece.shape.boundary.distance(middle) for piece in whole.pieces]
-        found.setdefault(end.name, set()).update(touched or {int(np.argmin(away))})
-    return found
-
-
-def _parts(whole: Cut, body: str, at: dict[str, set[int]], insulates: set[int]) -> list[Part]:
+def _parts(
+    partition: Partition, body: str, at: dict[str, set[int]], insulates: set[int]
+) -> list[Part]:
     """Return what each piece is to the circuit.
 
     Without the heaters the conductor falls apart: what is left at the supply is leg 1, at ground
@@ -290,52 +271,45 @@ def _parts(whole: Cut, body: str, at: dict[str, set[int]], insulates: set[int]) 
         If a terminal touches no conductor, or current passes beside the heaters, or not through
         them.
     """
+
+    def fault(what: str, part: str, numbers: set[int]) -> DrawingError:
+        return DrawingError(what, part, place=partition.pieces[min(numbers)].shape)
+
     for name in REQUIRED:
         if at[name] <= insulates:
-            place = whole.pieces[min(at[name])].shape.representative_point()
-            what = "it touches no conductor"
-            raise DrawingError(what, terminal_part(name), None, (place.x, place.y))
-    drawn = {number for number, piece in enumerate(whole.pieces) if HEATER in piece.layers}
+            raise fault("it touches no conductor", terminal_part(name), at[name])
+    pieces = range(len(partition.pieces))
+    drawn = {number for number in pieces if HEATER in partition.pieces[number].layers}
     heaters = drawn - insulates
     if drawn and not heaters:
-        place = whole.pieces[min(drawn)].shape.representative_point()
-        raise DrawingError("it conducts no current", HEATER, None, (place.x, place.y))
-    supply, ground = (whole.reached(at[name], heaters | insulates) for name in REQUIRED)
+        raise fault("it conducts no current", HEATER, drawn)
+    at_supply, at_ground = (at[name] for name in REQUIRED)
+    supply, ground = (
+        partition.reached(start, heaters | insulates) for start in (at_supply, at_ground)
+    )
     if not heaters:
         if not supply & ground:
-            place = whole.pieces[min(at[REQUIRED[1]])].shape.representative_point()
             what = "no conductor joins it with the supply"
-            raise DrawingError(what, terminal_part(REQUIRED[1]), None, (place.x, place.y))
-        return [
-            "heater" if number in supply & ground else "reader branch"
-            for number in range(len(whole.pieces))
-        ]
+            raise fault(what, terminal_part(REQUIRED[1]), at_ground)
+        return ["heater" if number in supply & ground else "reader branch" for number in pieces]
     if not supply or not ground:
         name = REQUIRED[0] if not supply else REQUIRED[1]
-        place = whole.pieces[min(at[name])].shape.representative_point()
-        raise DrawingError("it lies on the heater", terminal_part(name), None, (place.x, place.y))
+        raise fault("it lies on the heater", terminal_part(name), at[name])
     if supply & ground:
-        place = whole.pieces[min(heaters)].shape.representative_point()
-        raise DrawingError(
-            "supply and ground are joined without it: no current has to pass",
-            HEATER,
-            None,
-            (place.x, place.y),
-        )
-    kinds: tuple[tuple[set[int], Part], ...] = (
-        (supply, "leg 1"),
-        (ground, "leg 2"),
-        (heaters, "heater"),
+        what = "supply and ground are joined without it: no current has to pass"
+        raise fault(what, HEATER, heaters)
+    legs: tuple[tuple[Part, set[int], set[int]], ...] = (
+        ("leg 1", supply, at_supply),
+        ("leg 2", ground, at_ground),
     )
-    parts: dict[int, Part] = {one: part for numbers, part in kinds for one in numbers}
-    for number in sorted(set(parts) - heaters):
-        if whole.pieces[number].layers == (body,):
-            continue
-        legs = supply if number in supply else ground
-        end = at[REQUIRED[0] if number in supply else REQUIRED[1]]
-        cut_off = legs - whole.reached(end, {*heaters, *insulates, number}) - {number}
-        # current passes it if more of the leg, with heaters at it, lies behind it
-        feeds = any(whole.neighbours(one) & heaters for one in (*cut_off, number))
-        if not feeds:
-            parts.update(dict.fromkeys((*cut_off, number), "reader branch"))
-    return [parts.get(number, "reader branch") for number in range(len(whole.pieces))]
+    parts: dict[int, Part] = dict.fromkeys(heaters, "heater")
+    for part, leg, end in legs:
+        parts |= dict.fromkeys(leg, part)
+        for number in sorted(leg):
+            if partition.pieces[number].layers == (body,):
+                continue
+            cut_off = leg - partition.reached(end, {*heaters, *insulates, number}) - {number}
+            # current passes it if more of the leg, with heaters at it, lies behind it
+            if not any(partition.neighbours(one) & heaters for one in (*cut_off, number)):
+                parts |= dict.fromkeys((*cut_off, number), "reader branch")
+    return [parts.get(number, "reader branch") for number in pieces]

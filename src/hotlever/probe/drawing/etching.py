@@ -15,9 +15,8 @@ from shapely import LinearRing, LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from hotlever.drawing.contacts import along, outline_edges
-from hotlever.drawing.fault import DrawingError
-from hotlever.drawing.healing import STANDS_OUT, parts_of
+from hotlever.probe.drawing.contacts import along, outline_edges
+from hotlever.probe.drawing.outlines import STANDS_OUT, DrawingError, parts_of
 from hotlever.probe.layout import Terminal
 from hotlever.types import Array
 
@@ -60,9 +59,8 @@ class Etching:
             moved = self.drawn.difference(strip)
         pieces = parts_of(moved.simplify(STANDS_OUT * tolerance))
         if len(pieces) != 1:
-            at = self.drawn.representative_point()
             what = f"with edge_bias_um = {bias_um:g} {len(pieces)} pieces are left, expected one"
-            raise DrawingError(what, body, None, (at.x, at.y))
+            raise DrawingError(what, body, place=self.drawn)
         self.outline: Polygon = pieces[0]
         self.ends = [moved for end in ends for moved in self._moved(end)]
 

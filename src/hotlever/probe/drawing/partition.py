@@ -12,10 +12,9 @@ from shapely import LineString, MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from hotlever.drawing.contacts import outline_edges
-from hotlever.drawing.fault import DrawingError
-from hotlever.drawing.healing import GRID, parts_of
-from hotlever.probe.layout import BorderTaper, Point, Taper
+from hotlever.probe.drawing.contacts import outline_edges
+from hotlever.probe.drawing.outlines import GRID, DrawingError, parts_of
+from hotlever.probe.layout import BorderTaper, Point, Taper, Terminal
 from hotlever.types import Array
 
 Edge = frozenset[Point]
@@ -38,7 +37,7 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Cut:
+class Partition:
     """A lever in pieces.
 
     Attributes
@@ -74,12 +73,59 @@ class Cut:
         around = set[int]().union(*(self.neighbours(one) for one in self.part_of(number)))
         return {self.pieces[one].layers[0] for one in around} - {self.pieces[number].layers[0]}
 
+    def touched_by(self, ends: list[Terminal], tolerance: float) -> dict[str, set[int]]:
+        """Return the numbers of the pieces that each terminal touches."""
+        found: dict[str, set[int]] = {}
+        for end in ends:
+            edge = LineString([end.start, end.end])
+            along = [piece.shape.boundary.intersection(edge).length for piece in self.pieces]
+            touched = {number for number, length in enumerate(along) if length > tolerance}
+            middle = edge.interpolate(0.5, normalized=True)
+            away = [piece.shape.boundary.distance(middle) for piece in self.pieces]
+            found.setdefault(end.name, set()).update(touched or {int(np.argmin(away))})
+        return found
 
-def cut(
+    def taper(self, number: int, sources: set[str], tolerance: float) -> Taper | BorderTaper | None:
+        """Return how the doping of a low-doped piece is tapered from its neighbours, if it is.
+
+        Parameters
+        ----------
+        number : int
+            Of the piece.
+        sources : set of str
+            Parts, or the body, from which dopant diffuses.
+        tolerance : float
+        """
+        group = self.part_of(number)
+        borders: list[LineString] = []
+        edges = [
+            tuple(edge)
+            for pair, edges in self.shared.items()
+            for inside, outside in (pair, pair[::-1])
+            if inside in group and self.pieces[outside].layers[0] in sources
+            for edge in edges
+        ]
+        if edges:
+            merged = shapely.line_merge(MultiLineString(edges))
+            borders = sorted(shapely.get_parts(merged).tolist(), key=lambda one: one.coords[0])
+        if not borders:
+            return None
+        shape = self.pieces[number].shape
+        if len(group) > 1:
+            # where a film ends on it is no corner of the part
+            shapes = [self.pieces[one].shape for one in sorted(group)]
+            shape = shapely.union_all(shapes).simplify(GRID)
+        strip = _strip(shape, borders, tolerance)
+        if strip is not None:
+            return strip
+        return BorderTaper(tuple(tuple((x, y) for x, y in border.coords) for border in borders))
+
+
+def partitioned(
     body: tuple[str, Polygon],
     parts: Mapping[str, BaseGeometry],
     films: Mapping[str, BaseGeometry] | None = None,
-) -> Cut:
+) -> Partition:
     """Cut a body, with its name, along the outlines of its parts and of the films on it.
 
     Raises
@@ -87,14 +133,13 @@ def cut(
     DrawingError
         If two parts overlap.
     """
-    (whole, outline), films = body, films or {}
+    (body_name, outline), films = body, films or {}
     names = list(parts)
     for place, name in enumerate(names):
         for other in names[:place]:
             both = parts[name].intersection(parts[other])
             if any(one.buffer(-10 * GRID).area > 0 for one in parts_of(both)):
-                at = both.representative_point()
-                raise DrawingError(f"it overlaps with '{other}'", name, None, (at.x, at.y))
+                raise DrawingError(f"it overlaps with '{other}'", name, place=both)
     drawn = [*parts.values(), *films.values()]
     noded = shapely.union_all(
         [outline.boundary, *(shape.boundary for shape in drawn)], grid_size=GRID
@@ -103,10 +148,10 @@ def cut(
     for face in shapely.get_parts(shapely.polygonize(list(shapely.get_parts(noded)))):
         at = face.representative_point()
         if outline.covers(at):
-            part = next((name for name in names if parts[name].covers(at)), whole)
+            part = next((name for name in names if parts[name].covers(at)), body_name)
             on_it = [name for name, shape in films.items() if shape.covers(at)]
             kinds[part, *on_it].append(face)
-    order = [*names, whole]
+    order = [*names, body_name]
     pieces = [
         Piece(kind, orient(one))
         for kind in sorted(kinds, key=lambda kind: order.index(kind[0]))
@@ -122,45 +167,7 @@ def cut(
     for edge, touching in owners.items():
         if len(touching) == 2 and touching[0] != touching[1]:
             shared[min(touching), max(touching)].append(edge)
-    return Cut(pieces, dict(shared))
-
-
-def taper_of(
-    whole: Cut, number: int, sources: set[str], tolerance: float
-) -> Taper | BorderTaper | None:
-    """Return how the doping of a low-doped piece is tapered from its neighbours, if it is.
-
-    Parameters
-    ----------
-    whole : Cut
-    number : int
-        Of the piece.
-    sources : set of str
-        Parts, or the body, from which dopant diffuses.
-    tolerance : float
-    """
-    group = whole.part_of(number)
-    borders: list[LineString] = []
-    edges = [
-        tuple(edge)
-        for pair, edges in whole.shared.items()
-        for inside, outside in (pair, pair[::-1])
-        if inside in group and whole.pieces[outside].layers[0] in sources
-        for edge in edges
-    ]
-    if edges:
-        merged = shapely.line_merge(MultiLineString(edges))
-        borders = sorted(shapely.get_parts(merged).tolist(), key=lambda one: one.coords[0])
-    if not borders:
-        return None
-    shape = whole.pieces[number].shape
-    if len(group) > 1:
-        # where a film ends on it is no corner of the part
-        shape = shapely.union_all([whole.pieces[one].shape for one in sorted(group)]).simplify(GRID)
-    strip = _strip(shape, borders, tolerance)
-    if strip is not None:
-        return strip
-    return BorderTaper(tuple(tuple((x, y) for x, y in border.coords) for border in borders))
+    return Partition(pieces, dict(shared))
 
 
 def _strip(shape: Polygon, borders: list[LineString], tolerance: float) -> Taper | None:

@@ -16,8 +16,7 @@ import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.drawing.fault import DrawingError, Ring
-from hotlever.drawing.healing import parts_of, polygons
+from hotlever.probe.drawing.outlines import DrawingError, Ring, parts_of, polygons
 from hotlever.probe.layout import Layout, Point, Terminal
 
 #: Terminals that a lever must have.
@@ -101,11 +100,11 @@ def cut_away(
     """
     for name, area in areas.items():
         if area.covers(shapely.Point(tip)):
-            raise DrawingError("it covers the tip", terminal_part(name), None, tip)
+            raise DrawingError("it covers the tip", terminal_part(name), place=tip)
     pieces = parts_of(outline.difference(shapely.union_all(list(areas.values()))))
     rest = next((one for one in pieces if one.covers(shapely.Point(tip))), None)
     if rest is None:
-        raise DrawingError(f"it lies outside the {body}", "tip_um", None, tip)
+        raise DrawingError(f"it lies outside the {body}", "tip_um", place=tip)
     found = []
     for start, end in outline_edges(rest):
         middle = LineString([start, end]).interpolate(0.5, normalized=True)
@@ -120,9 +119,8 @@ def cut_away(
     names = {end.name for end in (*left, *found)}
     for name in (*areas, *(end.name for end in ends)):
         if name not in names:
-            at = shapely.union_all([areas.get(name, outline)]).representative_point()
             what = "between it and the tip another terminal, stated by area, takes all of the "
-            raise DrawingError(f"{what}{body}", terminal_part(name), None, (at.x, at.y))
+            raise DrawingError(f"{what}{body}", terminal_part(name), place=areas.get(name, outline))
     return rest, [*left, *found]
 
 
@@ -224,7 +222,7 @@ def _touches_nothing(
         what = f"it touches no edge of the silicon; the nearest is {away[nearest]:.3g} µm away"
     else:
         what = "no edge of the silicon lies inside it from corner to corner"
-    return DrawingError(what, terminal_part(name), nearest + 1, (place[0], place[1]))
+    return DrawingError(what, terminal_part(name), nearest + 1, place)
 
 
 def check_apart(terminals: list[Terminal]) -> None:
@@ -241,4 +239,4 @@ def check_apart(terminals: list[Terminal]) -> None:
             if one.name != other.name and a.distance(b) < 1e-6:
                 at = shapely.shortest_line(a, b).coords[0]
                 what, part = f"it touches '{other.name}'", terminal_part(one.name)
-                raise DrawingError(what, part, None, (at[0], at[1]))
+                raise DrawingError(what, part, place=at)

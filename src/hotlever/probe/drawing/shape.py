@@ -11,15 +11,21 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hotlever.drawing.contacts import REQUIRED, DrawnTerminal, covered, terminal_part
-from hotlever.drawing.extent import doubt, extent_of, is_lever, sensible_unit
-from hotlever.drawing.fault import DrawingError, Ring
-from hotlever.drawing.healing import without_nested
-from hotlever.drawing.layers import BODY, DRAWN, SILICON, DrawnLayer, Made, made_of
-from hotlever.drawing.making import layout_of
-from hotlever.drawing.sheet import Layer, Sheet, read_sheet
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.materials import Kind
+from hotlever.probe.drawing.contacts import REQUIRED, DrawnTerminal, covered, terminal_part
+from hotlever.probe.drawing.layers import BODY, DRAWN, SILICON, DrawnLayer, Made, made_of
+from hotlever.probe.drawing.layout_builder import build_layout
+from hotlever.probe.drawing.outlines import DrawingError, Ring, without_nested
+from hotlever.probe.drawing.sheet import (
+    Layer,
+    Sheet,
+    doubt,
+    extent_of,
+    is_lever,
+    read_sheet,
+    sensible_unit,
+)
 from hotlever.probe.layout import Layout, Point
 from hotlever.probe.shapes import SHAPE_SECTIONS, Shape, edge_bias, thickness
 from hotlever.records import Record
@@ -126,7 +132,7 @@ class Drawing(Shape):
         )
         tip, terminals = (self.scale * x, self.scale * y), tuple(self._terminals)
         try:
-            made = layout_of(layers, terminals, tip, self.tolerance_um, self.edge_bias_um)
+            made = build_layout(layers, terminals, tip, self.tolerance_um, self.edge_bias_um)
         except DrawingError as error:
             raise error.drawn_at(self.scale) from None
         return replace(made, thickness_um=self.thickness_um)

@@ -2,22 +2,25 @@
 
 Whatever is nearer than the drawing's tolerance is the same: slits are closed, corners that are
 hardly any are dropped, and the outlines of low-doped parts snap to that of the silicon. What is
-wrong by more is an error that says where.
+wrong by more is a `DrawingError` that says where.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.drawing.fault import DrawingError, Ring
+from hotlever.errors import InputError
 from hotlever.probe.layout import Point, ring_area
 from hotlever.types import Array
+
+# A polygon, or a line of two points.
+Ring = tuple[Point, ...]
 
 #: Coordinates are rounded to this (µm) where outlines cross: far less than matters.
 GRID = 1e-9
@@ -27,6 +30,68 @@ NARROWEST = 5.0
 _MOST_CORNERS = 2000
 #: Share of the tolerance by which a corner must stand out.
 STANDS_OUT = 0.25
+
+
+class DrawingError(InputError):
+    """A drawing is at fault.
+
+    Parameters
+    ----------
+    what : str
+    part : str
+        What is drawn wrongly: ``silicon``, ``heater``, a terminal, ...
+    polygon : int or sequence of Polygon, optional
+        Its number among those of the part, from 1; or all of them, of which it is the nearest.
+    place : tuple of float or geometry, optional
+        Where (µm): a point, or some point of a shape.
+    outlines : mapping of str to rings
+        All that is drawn, by part.
+    where, drawn : str
+        The file, and the layer of the part.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        part: str,
+        polygon: int | Sequence[Polygon] | None = None,
+        place: Sequence[float] | BaseGeometry | None = None,
+        *,
+        outlines: Mapping[str, tuple[Ring, ...]] | None = None,
+        where: str = "",
+        drawn: str | None = None,
+    ) -> None:
+        if isinstance(place, BaseGeometry):
+            place = place.representative_point().coords[0]
+        self.place = None if place is None else (float(place[0]), float(place[1]))
+        if isinstance(polygon, Sequence):
+            away = [one.boundary.distance(shapely.Point(self.place)) for one in polygon]
+            polygon = 1 + int(np.argmin(away))
+        self.what, self.part, self.polygon = what, part, polygon
+        self.outlines = dict(outlines or {})
+        words = [part if drawn is None else f"{part} (layer {drawn})"]
+        if polygon is not None:
+            words.append(f"polygon {polygon}")
+        if self.place is not None:
+            words.append(f"at ({self.place[0]:.3f}, {self.place[1]:.3f}) µm")
+        start = f"{where}: " if where else ""
+        super().__init__(f"{start}{', '.join(words)}: {what}")
+
+    def drawn_at(self, scale: float) -> DrawingError:
+        """Return the same with its place on the drawing, of which the lever is `scale` times."""
+        place = None if self.place is None else (self.place[0] / scale, self.place[1] / scale)
+        return DrawingError(self.what, self.part, self.polygon, place)
+
+    def of_file(
+        self, where: str, drawn: Mapping[str, str], outlines: Mapping[str, tuple[Ring, ...]]
+    ) -> DrawingError:
+        """Return the same with the file's name, the layers' names and all that is drawn."""
+        return DrawingError(
+            *(self.what, self.part, self.polygon, self.place),
+            outlines=outlines,
+            where=where,
+            drawn=drawn.get(self.part),
+        )
 
 
 def polygons(part: str, rings: Iterable[Ring], tolerance: float) -> list[Polygon]:
@@ -63,9 +128,8 @@ def _unfolded(polygon: Polygon, part: str, number: int) -> Polygon:
     if unfolded.geom_type == "Polygon" and math.isclose(unfolded.area, enclosed, rel_tol=1e-6):
         return unfolded
     reason = shapely.is_valid_reason(polygon)
-    place = tuple(map(float, reason.partition("[")[2].rstrip("]").split()[:2]))
-    where = (place[0], place[1]) if len(place) == 2 else None
-    raise DrawingError("an outline that crosses or touches itself", part, number, where)
+    place = tuple(map(float, reason.partition("[")[2].rstrip("]").split()[:2])) or None
+    raise DrawingError("an outline that crosses or touches itself", part, number, place)
 
 
 def together(found: list[Polygon]) -> BaseGeometry:
@@ -153,15 +217,9 @@ def one_piece(part: str, shape: BaseGeometry, found: list[Polygon]) -> Polygon:
     raise DrawingError(
         f"{len(pieces)} pieces, {min(apart):.3g} µm apart, expected one piece",
         part,
-        nearest_polygon(found, place),
-        (place[0], place[1]),
+        found,
+        place,
     )
-
-
-def nearest_polygon(found: list[Polygon], place: Point | tuple[float, ...]) -> int:
-    """Return the number, from 1, of the drawn polygon whose outline is nearest to a place."""
-    point = shapely.Point(place[0], place[1])
-    return 1 + int(np.argmin([one.boundary.distance(point) for one in found]))
 
 
 def snapped(shape: BaseGeometry, outline: BaseGeometry, distance: float) -> BaseGeometry:
@@ -215,13 +273,12 @@ def check_widths(part: str, shape: Polygon, found: list[Polygon], narrowest: flo
             points = shapely.points(starts[corner])
             distance = shapely.distance(points, edges[edge])
             worst = int(distance.argmin())
-            place = (float(points[worst].x), float(points[worst].y))
             raise DrawingError(
                 f"a corner only {distance[worst]:.3g} µm from another edge of its outline, "
                 f"expected {narrowest:g} µm or more",
                 part,
-                nearest_polygon(found, place),
-                place,
+                found,
+                points[worst],
             )
     _check_angles(part, shape, found)
 
@@ -245,11 +302,9 @@ def _check_angles(part: str, shape: Polygon, found: list[Polygon]) -> None:
         cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
         angle = np.abs(np.arctan2(cross, (before * after).sum(axis=1)))
         if angle.min() < _SHARPEST:
-            place = corners[int(angle.argmin())]
-            at = (float(place[0]), float(place[1]))
             raise DrawingError(
                 f"a corner of {math.degrees(angle.min()):.2g}°, expected 1° or more",
                 part,
-                nearest_polygon(found, at),
-                at,
+                found,
+                corners[int(angle.argmin())],
             )

@@ -2,8 +2,8 @@
 
 The libraries that read these files take damaged ones for valid memory, and deep arrays for short
 work; a process that is started for one file can fail or be stopped. So this module is run as a
-script (see `hotlever.drawing.sheet`), imports nothing of hotlever, and prints JSON: the sheet, or
-an error in one line.
+script (see `hotlever.probe.drawing.sheet`), imports nothing of hotlever, and prints JSON: the
+sheet, or an error in one line.
 """
 
 from __future__ import annotations

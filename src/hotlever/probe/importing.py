@@ -9,14 +9,21 @@ from pathlib import Path
 
 import numpy as np
 
-from hotlever.drawing.contacts import REQUIRED, terminal_part
-from hotlever.drawing.extent import UNITS, doubt, extent_of, is_lever, sensible_unit
-from hotlever.drawing.fault import Ring
-from hotlever.drawing.layers import HEATER, SILICON
-from hotlever.drawing.proposal import Drawn, Proposal, proposed
-from hotlever.drawing.shape import TOLERANCE_UM
-from hotlever.drawing.sheet import Sheet, read_sheet
 from hotlever.errors import InputError
+from hotlever.probe.drawing.contacts import REQUIRED, terminal_part
+from hotlever.probe.drawing.layer_inference import Drawn, LayerInference, infer_layers
+from hotlever.probe.drawing.layers import HEATER, SILICON
+from hotlever.probe.drawing.outlines import Ring
+from hotlever.probe.drawing.shape import TOLERANCE_UM
+from hotlever.probe.drawing.sheet import (
+    UNITS,
+    Sheet,
+    doubt,
+    extent_of,
+    is_lever,
+    read_sheet,
+    sensible_unit,
+)
 from hotlever.probe.layout import Point, ring_area
 from hotlever.probe.probe import Probe
 from hotlever.probe.sections import commented
@@ -33,7 +40,7 @@ class Imported:
     Attributes
     ----------
     sheet : Sheet
-    proposal : Proposal
+    inference : LayerInference
     listing : list of str
         What the file holds and what is proposed, in lines.
     text : str
@@ -45,7 +52,7 @@ class Imported:
     """
 
     sheet: Sheet
-    proposal: Proposal
+    inference: LayerInference
     listing: list[str]
     text: str
     fault: InputError | None
@@ -54,7 +61,7 @@ class Imported:
     @property
     def outlines(self) -> dict[str, tuple[Ring, ...]]:
         """All that is drawn, by what it is and by layer."""
-        roles = _by_part(self.proposal)
+        roles = _by_part(self.inference)
         of_layer = {one: role for role, one in roles.items() if isinstance(one, str)}
         found = {}
         for name, layer in self.sheet.layers.items():
@@ -75,7 +82,7 @@ def import_drawing(path: Path, cell: str | None, folder: Path, unit: str | None 
     folder : path
         Where the probe file will stand: the name of the drawing is relative to it.
     unit : str, optional
-        Of the file's numbers, as ``mm`` (`hotlever.drawing.extent`); what it says if left out.
+        Of the file's numbers, as ``mm`` (`hotlever.probe.drawing.sheet`); what it says if left out.
 
     Raises
     ------
@@ -84,21 +91,21 @@ def import_drawing(path: Path, cell: str | None, folder: Path, unit: str | None 
     """
     unit_um = None if unit is None else UNITS[unit]
     sheet = read_sheet(path, cell, unit_um=unit_um, tolerance_um=TOLERANCE_UM)
-    proposal = proposed(sheet, TOLERANCE_UM)
-    _check_unit(sheet, proposal, unit)
-    listing = _listing(sheet, proposal)
+    inference = infer_layers(sheet, TOLERANCE_UM)
+    _check_unit(sheet, inference, unit)
+    listing = _listing(sheet, inference)
     name = _relative(path, folder)
-    text = _probe_file(sheet, proposal, listing, name, unit)
+    text = _probe_file(sheet, inference, listing, name, unit)
     fault: InputError | None = None
     notes: list[str] = []
     try:
         notes = Probe.from_sections(tomllib.loads(text), str(path), folder).shape.notes()
     except InputError as error:
         fault = error
-    return Imported(sheet, proposal, listing, text, fault, notes)
+    return Imported(sheet, inference, listing, text, fault, notes)
 
 
-def _check_unit(sheet: Sheet, proposal: Proposal, unit: str | None) -> None:
+def _check_unit(sheet: Sheet, inference: LayerInference, unit: str | None) -> None:
     """Refuse a drawing that is a lever in another unit only.
 
     One without a heater is read in other units, since its parts may be lost in the tolerance of
@@ -106,15 +113,15 @@ def _check_unit(sheet: Sheet, proposal: Proposal, unit: str | None) -> None:
     """
     extents = {name: extent_of((*one.rings, *one.lines)) for name, one in sheet.layers.items()}
     name, better = max(extents, key=lambda one: extents[one]), None
-    if HEATER in proposal.layers:
-        name = str(proposal.layers[SILICON])
+    if HEATER in inference.layers:
+        name = str(inference.layers[SILICON])
         if is_lever(extents[name]):
             return
     elif unit is None and not sheet.unit_stated:
         tried = ((one, _silicon_in(sheet, one)) for one in UNITS)
         better, name = next(((one, layer) for one, layer in tried if layer), (None, name))
     if better is None:
-        if HEATER not in proposal.layers and any(map(is_lever, extents.values())):
+        if HEATER not in inference.layers and any(map(is_lever, extents.values())):
             return
         better = sensible_unit(extents[name], sheet.unit_um)
     words = doubt(extents[name], sheet.unit_um, better, "--unit {unit}")
@@ -127,17 +134,17 @@ def _silicon_in(sheet: Sheet, unit: str) -> str | None:
         other = read_sheet(sheet.file, sheet.cell, unit_um=UNITS[unit], tolerance_um=TOLERANCE_UM)
     except InputError:  # it would be larger than any wafer
         return None
-    layers = proposed(other, TOLERANCE_UM).layers
+    layers = infer_layers(other, TOLERANCE_UM).layers
     silicon = layers.get(SILICON)
     if HEATER not in layers or not isinstance(silicon, str):
         return None
     return silicon if is_lever(extent_of(other.layers[silicon].rings)) else None
 
 
-def _by_part(proposal: Proposal) -> dict[str, Drawn]:
+def _by_part(inference: LayerInference) -> dict[str, Drawn]:
     """Return what is drawn by what it is taken as."""
-    ends = {terminal_part(name): one for name, one in proposal.terminals.items()}
-    return proposal.layers | ends
+    ends = {terminal_part(name): one for name, one in inference.terminals.items()}
+    return inference.layers | ends
 
 
 def _relative(path: Path, folder: Path) -> str:
@@ -147,7 +154,7 @@ def _relative(path: Path, folder: Path) -> str:
         return path.resolve().as_posix()
 
 
-def _listing(sheet: Sheet, proposal: Proposal) -> list[str]:
+def _listing(sheet: Sheet, inference: LayerInference) -> list[str]:
     """Return what the file holds, line by line."""
     lines = [f"{Path(sheet.file).name}: {sheet.kind}"]
     if sheet.cell is not None:
@@ -158,7 +165,7 @@ def _listing(sheet: Sheet, proposal: Proposal) -> list[str]:
         lines.append("the file states no unit: taken to be in µm; see --unit and unit_um")
     elif sheet.cell is None:
         lines.append(f"one unit of the file is {sheet.unit_um:g} µm")
-    roles = _by_part(proposal)
+    roles = _by_part(inference)
     of_layer = {one: role for role, one in roles.items() if isinstance(one, str)}
     rows = [["layer", "outlines", "area (µm²)", "x (µm)", "y (µm)", "taken as"]]
     for name, layer in list(sheet.layers.items())[:_MOST_LISTED]:
@@ -171,15 +178,15 @@ def _listing(sheet: Sheet, proposal: Proposal) -> list[str]:
     lines += aligned(rows)
     if len(sheet.layers) > _MOST_LISTED:
         lines.append(f"and {len(sheet.layers) - _MOST_LISTED} more layers")
-    lines += [f"{label}: {reason}" for label, reason in proposal.reasons.items()]
+    lines += [f"{label}: {reason}" for label, reason in inference.reasons.items()]
     if sheet.left_out:
         kinds = ", ".join(f"{count} {kind}" for kind, count in sheet.left_out.items())
         lines.append(f"left out, since they draw no outline: {kinds}")
-    return lines + [f"to be checked: {doubt}" for doubt in proposal.doubts]
+    return lines + [f"to be checked: {doubt}" for doubt in inference.doubts]
 
 
 def _probe_file(
-    sheet: Sheet, proposal: Proposal, listing: list[str], name: str, unit: str | None
+    sheet: Sheet, inference: LayerInference, listing: list[str], name: str, unit: str | None
 ) -> str:
     reference = Probe.reference()
     lines = ["# A hotlever probe file: lengths in µm, temperatures in K.", "#"]
@@ -194,15 +201,15 @@ def _probe_file(
         f"thickness_um = {reference.layout().thickness_um:<17g}# that of the reference probe: a "
         "drawing does not say"
     )
-    lines.append(_entry("tip_um", proposal.tip, proposal.reasons.get("tip"), (0.0, 0.0)))
-    reasons = proposal.reasons
+    lines.append(_entry("tip_um", inference.tip, inference.reasons.get("tip"), (0.0, 0.0)))
+    reasons = inference.reasons
     lines += ["", "[layers]"]
-    for role in dict.fromkeys((SILICON, HEATER, *proposal.layers)):
-        lines.append(_entry(role, proposal.layers.get(role), reasons.get(role), "1/0"))
+    for role in dict.fromkeys((SILICON, HEATER, *inference.layers)):
+        lines.append(_entry(role, inference.layers.get(role), reasons.get(role), "1/0"))
     lines += ["", "[terminals]"]
-    for role in dict.fromkeys((*REQUIRED, *proposal.terminals)):
+    for role in dict.fromkeys((*REQUIRED, *inference.terminals)):
         reason = reasons.get(terminal_part(role))
-        lines.append(_entry(role, proposal.terminals.get(role), reason, "10/0"))
+        lines.append(_entry(role, inference.terminals.get(role), reason, "10/0"))
     return "\n".join(lines) + "\n" + reference.other_sections()
 
 
