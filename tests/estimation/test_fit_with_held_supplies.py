@@ -69,7 +69,7 @@ def test_predictions_are_states_and_their_slopes_have_taylor_order_two(circuit):
 
 def test_the_other_polarity_is_that_of_supplies_reversed(coarse):
     other = coarse.with_probe(coarse.probe.with_(**{"circuit.reader.bias_V": -2.0}))
-    down, up = coarse.sweep(-BIAS), other.sweep(BIAS)
+    down, up = coarse.dataset(coarse.solve(-BIAS)), other.dataset(other.solve(BIAS))
     np.testing.assert_allclose(down.tip_K, up.tip_K, rtol=1e-9)
     for column in ("current_mA", "lever_V", "reader_V", "reader_mA"):
         np.testing.assert_allclose(down[column], -up[column], rtol=1e-7, atol=1e-9)

@@ -9,7 +9,7 @@ import pytest
 
 from hotlever.errors import BranchEndError, ComputationError, InputError
 from hotlever.lever import Branch, Lever
-from hotlever.lever.following import Follower
+from hotlever.lever.continuation import continued
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
 
@@ -71,7 +71,7 @@ def test_a_warm_leg_end_may_be_the_hottest():
 def test_a_branch_ends_where_its_hottest_place_melts(lever):
     branch = lever.branch(1550.0)
     assert branch.melts
-    highest = branch.base_temperature_K + branch.states.highest_rise_at(np.array([branch.end_u]))[0]
+    highest = branch.base_temperature_K + branch.highest_rise_at(np.array([branch.end_u]))[0]
     assert highest == pytest.approx(lever.equations.limit[0], abs=1e-3)
     # the heater, where the tip is, is far from melting
     assert branch.hottest_K < highest - 150.0
@@ -85,7 +85,7 @@ def test_the_curve_converges_with_the_spacing_of_the_states(coarse):
 
     sparse = smooth_curve(branch.u[some], branch.values[some], branch.value_slopes[some])
     middle = branch.u[3:-1:2]
-    dense = Follower(coarse.equations, branch).until(lambda _: True).curve(middle)
+    dense = continued(coarse.equations, lambda _: True, branch).curve(middle)
     away = np.abs(sparse(middle) - dense)[:, 1] / dense[:, 1]
     assert away.max() < 3e-3
 
@@ -125,9 +125,9 @@ def test_nothing_is_said_beyond_the_hottest_state_or_below_the_base(reference):
 
 
 def test_a_branch_goes_on_where_it_was(coarse):
-    short = Follower(coarse.equations).until(lambda branch: branch.u[-1] ** 2 > 300)
-    longer = Follower(coarse.equations, short).until(lambda branch: branch.u[-1] ** 2 > 700)
-    whole = Follower(coarse.equations).until(lambda branch: branch.u[-1] ** 2 > 700)
+    short = continued(coarse.equations, lambda branch: branch.u[-1] ** 2 > 300)
+    longer = continued(coarse.equations, lambda branch: branch.u[-1] ** 2 > 700, short)
+    whole = continued(coarse.equations, lambda branch: branch.u[-1] ** 2 > 700)
     np.testing.assert_array_equal(longer.u[: short.u.size], short.u)
     u = np.linspace(0.0, min(longer.u[-1], whole.u[-1]), 50)
     np.testing.assert_allclose(longer.curve(u), whole.curve(u), rtol=1e-4, atol=1e-6)
@@ -155,7 +155,7 @@ def test_the_knee_does_not_depend_on_the_circuit(coarse):
 
 
 def test_a_lever_too_cold_has_no_knee_yet(coarse):
-    branch = Follower(coarse.equations).until(lambda branch: branch.u[-1] ** 2 > 400)
+    branch = continued(coarse.equations, lambda branch: branch.u[-1] ** 2 > 400)
     assert branch.knee is None
 
 
@@ -176,7 +176,7 @@ def test_without_a_series_resistor_the_ramp_ends_at_the_knee(coarse):
 
 
 def test_what_was_reached_before_a_failure_is_kept(coarse, monkeypatch):
-    short = Follower(coarse.equations).until(lambda branch: branch.u[-1] ** 2 > 300)
+    short = continued(coarse.equations, lambda branch: branch.u[-1] ** 2 > 300)
 
     def fails(*_):
         raise ComputationError("no state was found", partial=short)

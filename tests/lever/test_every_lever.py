@@ -131,13 +131,13 @@ def test_the_jacobian_passes_a_taylor_test(branch):
     np.testing.assert_allclose(orders, 2.0, atol=0.1)
 
 
-@pytest.mark.parametrize("pin", [TIP, LEVER], ids=["tip", "lever voltage"])
-def test_linear_systems_are_solved(branch, pin):
+@pytest.mark.parametrize("constraint", [TIP, LEVER], ids=["tip", "lever voltage"])
+def test_linear_systems_are_solved(branch, constraint):
     equations, x = branch.equations, hot(branch)[:, -2:]
     wanted = np.random.default_rng(0).normal(size=(*x.shape, 3)) * equations.scale[..., None]
     right = equations.balance_change(x, wanted)
-    right[-1] = pin.of(equations.space, wanted)
-    found = equations.solve_linear(x, equations.factorised(x, pin), right, pin)
+    right[-1] = constraint.of(equations.space, wanted)
+    found = equations.solve_linear(x, equations.factorised(x, constraint), right, constraint)
     np.testing.assert_allclose(
         found / equations.scale[..., None], wanted / equations.scale[..., None], atol=1e-4
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hotlever import Lever, Probe
-from hotlever.errors import InputError
+from hotlever.errors import ComputationError, InputError
 from hotlever.lever.dataset import probe_of, read_sweep, sweep_csv, write_sweep
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import simulate, step
@@ -78,10 +78,12 @@ def test_the_linear_limit_is_reciprocal():
 
 
 def test_which_supply_is_swept_changes_nothing():
-    by_held = Lever(wired(reader=HEATED).with_(series_resistance_ohm=0.0), COARSE).sweep([1.0])
+    held = Lever(wired(reader=HEATED).with_(series_resistance_ohm=0.0), COARSE)
+    by_held = held.dataset(held.solve([1.0]))
     changes = {"circuit.supply.kind": "supply", "circuit.supply.bias_V": 1.0}
     probe = Probe.reference().with_(swept="reader", series_resistance_ohm=0.0, **changes)
-    by_swept = Lever(probe, COARSE).sweep([2.0])
+    swept = Lever(probe, COARSE)
+    by_swept = swept.dataset(swept.solve([2.0]))
     np.testing.assert_allclose(by_swept.tip_K, by_held.tip_K, rtol=1e-9)
     np.testing.assert_allclose(by_swept.supply_mA, by_held.current_mA, rtol=1e-8)
     np.testing.assert_allclose(by_swept.current_mA, by_held.reader_mA, rtol=1e-8)
@@ -97,6 +99,11 @@ def test_a_current_supply_does_what_a_voltage_supply_of_that_current_does():
     second = other.dataset(other.solve([5.0]))
     np.testing.assert_allclose(second.tip_K, first.tip_K, rtol=1e-9)
     np.testing.assert_allclose(second.reader_V, first.reader_V, rtol=1e-9)
+
+
+def test_a_lever_that_melts_without_a_bias_says_so():
+    with pytest.raises(ComputationError, match="without a bias silicon melts"):
+        Lever(wired(reader={"kind": "supply", "bias_V": 4.0}), COARSE).sweep([1.0])
 
 
 def test_a_step_ends_where_the_lever_rests_and_its_heat_is_balanced():

@@ -135,8 +135,8 @@ def test_a_sweep_goes_on_from_the_states_in_the_cache(monkeypatch):
     monkeypatch.setattr(
         SolidLever,
         "polished",
-        lambda self, guess, value, *pin, polished=SolidLever.polished: (
-            solved.append(value) or polished(self, guess, value, *pin)
+        lambda self, guess, value, *constraint, polished=SolidLever.polished: (
+            solved.append(value) or polished(self, guess, value, *constraint)
         ),
     )
     resumed = SolidLever(Probe.reference(), COARSE).sweep(bias)

@@ -9,11 +9,11 @@ from skfem import MeshTri
 from skfem.element import Element
 
 from hotlever.lever.branch import Branch, Reach
+from hotlever.lever.continuation import continued
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.following import Follower
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.pinned import state_at_bias
+from hotlever.lever.parametrisation import state_at_bias
 from hotlever.materials import Kind, Material
 from hotlever.probe import Circuit, Layout, ProbeMesh, Region, Taper, Terminal
 from hotlever.probe.layout import Film
@@ -65,6 +65,6 @@ def bare_equations(
 def state_at(equations: LeverEquations, voltage: float) -> np.ndarray:
     """The state at a voltage between the terminals, solved to rounding errors."""
     circuit = Circuit(series_resistance_ohm=0.0)
-    branch: Branch = Follower(equations).until(Reach(circuit, voltage))
+    branch: Branch = continued(equations, Reach(circuit, voltage))
     guess = branch.states(branch.read(circuit, np.array([voltage])).u)
     return state_at_bias(equations, circuit, voltage, guess)

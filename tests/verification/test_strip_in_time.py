@@ -9,7 +9,7 @@ import pytest
 from bare import bare_equations
 from skfem import MeshTri
 
-from hotlever.lever.state import State
+from hotlever.lever.lever import State
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import Stepper

@@ -7,8 +7,8 @@ from bare import bare_equations
 from skfem import MeshTri
 
 from hotlever.lever.balances import heat_left
+from hotlever.lever.continuation import without_bias
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.held import at_rest
 from hotlever.materials import LOW_DOPED, published
 from hotlever.probe import Circuit, Taper, Terminal
 
@@ -26,7 +26,7 @@ def test_without_power_the_integral_of_kappa_is_linear_between_the_ends():
         {"ground": {"kind": "ground", "base_temperature_K": 593.0}}, "test"
     )
     equations = LeverEquations(cold.space, cold.materials, circuit)
-    rest = at_rest(equations)
+    rest = without_bias(equations)
     T, V = cold.space.nodal(rest[:, 0], 293.0, equations.end_rises)
     assert np.abs(V).max() < 1e-12
     np.testing.assert_allclose(heat_left(equations, rest), 0.0, atol=1e-10)

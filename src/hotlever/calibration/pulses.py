@@ -34,9 +34,8 @@ from hotlever.estimation.inverse_problem import Estimate
 from hotlever.estimation.outcome import Columns, Section, Vector
 from hotlever.lever import Lever
 from hotlever.lever.equations import BASE
-from hotlever.lever.lever import COARSE
+from hotlever.lever.lever import COARSE, State
 from hotlever.lever.similar import SimilarLevers
-from hotlever.lever.state import State
 from hotlever.lever.transient import pulse, simulate
 from hotlever.lever.transient.cyclic import cyclic_steady_state
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air

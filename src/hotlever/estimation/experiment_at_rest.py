@@ -17,12 +17,12 @@ from scipy.interpolate import BSpline
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.surrogate import CurveSurrogate
 from hotlever.lever.branch import Branch, Reach, shifted
+from hotlever.lever.continuation import at_places_of, continued
 from hotlever.lever.curve import spline_through
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.held import at_places_of, followed
 from hotlever.lever.lever import COARSE, Lever
-from hotlever.lever.newton import NewtonOptions, find_roots
-from hotlever.lever.pinned import Pinned
+from hotlever.lever.newton import NewtonOptions
+from hotlever.lever.parametrisation import solve_at
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.reduced.space import ReducedSpace
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
@@ -202,7 +202,8 @@ class ExperimentAtRest:
         values = shown.T - fast.curve(u)[:, :count]
         slopes = np.zeros(by_fast.shape)
         if self.first_order:
-            slopes = by_parameter(equations, x, self.names, pin=fast.sections.pin(u)) - by_fast
+            constraint = fast.parametrisation.constraint(u)
+            slopes = by_parameter(equations, x, self.names, constraint=constraint) - by_fast
         if equations.circuit.starts_cold:
             # without power nothing is lacking
             u = np.append(0.0, u)
@@ -219,11 +220,11 @@ class ExperimentAtRest:
         """
         space = fast.equations.space
         if not isinstance(space, ReducedSpace):
-            branch = at_places_of(fast, followed(equations, self.reach(probe)))
+            branch = at_places_of(fast, continued(equations, self.reach(probe)))
             return branch.u[branch.solved], branch.x[:, branch.solved]
         some = np.unique(np.linspace(1, fast.u.size - 1, _CORRECTED_AT).astype(int))
         u, guess = fast.u[some], space.expanded(fast.x[:, some])
-        return u, find_roots(Pinned(equations, u**2), guess, NewtonOptions(tolerance=1e-5)).x
+        return u, solve_at(equations, u, guess, NewtonOptions(tolerance=1e-5)).x
 
 
 def full_experiment(lever: Lever, bias: Array) -> ExperimentAtRest:

@@ -15,8 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from hotlever.lever.branch import Branch
-from hotlever.lever.curve import piecewise, spline_through
-from hotlever.lever.ramp import crossing
+from hotlever.lever.curve import crossing, piecewise, spline_through
 from hotlever.lever.sensitivities import at_fixed_bias
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array, Index

@@ -2,8 +2,7 @@
 
 from hotlever.lever.branch import Branch, OperatingPoint
 from hotlever.lever.dataset import probe_of, read_sweep, sweep_csv, write_sweep
-from hotlever.lever.lever import Lever, sweep
-from hotlever.lever.state import State
+from hotlever.lever.lever import Lever, State, sweep
 
 __all__ = [
     "Branch",

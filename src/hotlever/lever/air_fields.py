@@ -17,9 +17,8 @@ from hotlever.air.panels import Panels
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file
-from hotlever.lever.lever import Lever
+from hotlever.lever.lever import Lever, State
 from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
-from hotlever.lever.state import State
 from hotlever.materials.air import temperature_from_kirchhoff
 from hotlever.types import Array
 

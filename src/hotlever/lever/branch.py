@@ -1,23 +1,20 @@
-"""A lever as one curve: everything it shows, by its tip temperature.
+"""The branch of a lever: one curve by tip temperature, which every circuit reads.
 
 At a tip temperature a lever has one state, whatever the circuit: current, lever voltage and
 fields follow from the temperature, folds or not. So states are solved at tip temperatures
-(`hotlever.lever.following`), with their exact derivatives along the curve, and smooth curves
+(`hotlever.lever.continuation`), with their exact derivatives along the curve, and smooth curves
 through both give every state between. All curves run over u = √(T_tip − T_base), in which they are
-smooth down to zero power: the potential begins as u, the temperature as u².
+smooth down to zero power: the potential begins as u, the temperature as u². The curves of a lever
+that more than the swept supply heats run over their length.
 
-A lever that more than the swept supply heats is followed otherwise (`hotlever.lever.held`).
-
-A sweep reads the branch in a circuit: a slow ramp of the bias takes the first state whose bias
-V_l + R_s I_h has been reached. The fold of a ramp is a maximum of that bias, the knee of the I-V
-curve the maximum of V_l.
+A sweep reads the branch in a circuit, as a slow ramp of the bias does (`hotlever.lever.ramp`). The
+fold of a ramp is a maximum of that bias, the knee of the I-V curve the maximum of V_l.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,8 +24,9 @@ from hotlever.errors import BranchEndError
 from hotlever.lever.by_power import ByPower
 from hotlever.lever.curve import piecewise
 from hotlever.lever.equations import SHOWN, LeverEquations
-from hotlever.lever.ramp import Reading, crossing
-from hotlever.lever.sections import UNIT_K, UNIT_V, Across, ByTip, Sections
+from hotlever.lever.newton import NewtonResult
+from hotlever.lever.parametrisation import UNIT_K, UNIT_V, Natural, Parametrisation, PseudoArclength
+from hotlever.lever.ramp import Reading, slow_ramp
 from hotlever.lever.solved_states import SolvedStates
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
@@ -38,10 +36,10 @@ if TYPE_CHECKING:
 
 #: A bias (V) that is none.
 _NO_BIAS = 1e-9
-#: The places of a lever that starts cold.
-BY_TIP = ByTip()
 #: Where a branch's values have the rise of the tip.
 TIP_RISE = len(SHOWN)
+#: The places of a lever that starts cold.
+_NATURAL = Natural()
 
 
 @dataclass(frozen=True)
@@ -61,44 +59,12 @@ class OperatingPoint:
 
 
 @dataclass(frozen=True)
-class Reach:
-    """How far a branch must go: until a bias in a circuit, and one state beyond.
-
-    The curve between two states depends on the next one as well. A lever that does not start cold
-    may be asked for biases of the other polarity, down to a lowest one.
-    """
-
-    circuit: Circuit
-    bias_V: float
-    lowest_V: float | None = None
-
-    @property
-    def mirrored(self) -> Reach:
-        """How far the branch of the other polarity must go."""
-        return Reach(self.circuit, -(self.lowest_V or 0.0))
-
-    def count(self, values: Array) -> int | None:
-        """Return how many states suffice, by their V_l and I_h, (k, 2 or more); None if not all."""
-        above = np.flatnonzero(self.circuit.bias(values[:, 0], values[:, 1]) >= self.bias_V)
-        return int(above[0]) + 2 if above.size and above[0] + 2 <= len(values) else None
-
-    def __call__(self, branch: Branch) -> bool:
-        """Return whether a branch goes far enough."""
-        return self.count(branch.values) is not None
-
-
-@dataclass(frozen=True)
-class Branch:
-    """States of a lever one after the other, and the curves through them.
+class Branch(SolvedStates):
+    """States of a lever one after the other, and the curves through what they show.
 
     Attributes
     ----------
-    states : SolvedStates
-        Of a lever that starts cold at u = √(T_tip − T_base) (K^½).
-    values, value_slopes : ndarray, shape (k, 4)
-        V_l (V), I_h (mA), V_r (V) and the rise of the tip (K) of each state, and their derivatives
-        by u.
-    places : Sections, optional
+    places : Parametrisation, optional
         Of a lever that does not start cold: what the places u of similar levers have in common, if
         they are not lines across this branch itself.
 
@@ -110,75 +76,59 @@ class Branch:
     (900, [2.02, 2.6])
     """
 
-    states: SolvedStates
-    values: Array
-    value_slopes: Array
-    places: Sections | None = None
+    places: Parametrisation | None = None
+
+    @classmethod
+    def of_roots(
+        cls,
+        equations: LeverEquations,
+        u: Array,
+        roots: NewtonResult,
+        places: Parametrisation = _NATURAL,
+    ) -> Branch:
+        """Return the branch of states that were found at some places u, and differentiate them."""
+        along = equations.along(roots.x, roots.factors, places.constraint(u))
+        rate = places.rate(u, equations.space, roots.x)
+        return cls.of(equations, u, roots.x, rate * along)
+
+    @classmethod
+    def whole(
+        cls,
+        equations: LeverEquations,
+        u: Array,
+        roots: NewtonResult,
+        places: Parametrisation = _NATURAL,
+    ) -> Branch:
+        """Return the same, beginning without power if the lever starts cold."""
+        branch = cls.of_roots(equations, u, roots, places)
+        if not equations.circuit.starts_cold:
+            return replace(branch, places=places)
+        return cls.cold(equations, equations.cold()[0]).followed_by(branch)
 
     # --- the curves -------------------------------------------------------------------------------
-
-    @property
-    def equations(self) -> LeverEquations:
-        """What was solved."""
-        return self.states.equations
-
-    @property
-    def u(self) -> Array:
-        """Where the states are, (k,)."""
-        return self.states.u
-
-    @property
-    def x(self) -> Array:
-        """The states, (size + 1, k)."""
-        return self.states.x
 
     @cached_property
     def curve(self) -> PPoly:
         """V_l (V), I_h (mA), V_r (V) and the rise of the tip (K) by u."""
-        return self.states.through(self.values, self.value_slopes)
+        return self.through(self.values, self.value_slopes)
 
     @cached_property
-    def sections(self) -> Sections:
+    def parametrisation(self) -> Parametrisation:
         """What a place on the branch of a similar lever has in common with one on this."""
         if self.equations.circuit.starts_cold:
-            return BY_TIP
-        if self.places is not None:
-            return self.places
-        return Across(self.path)
+            return _NATURAL
+        return self.places or PseudoArclength(self.path)
 
     @cached_property
     def path(self) -> PPoly:
-        """Tip and lever voltage by u, in the units of `hotlever.lever.sections.in_plane`."""
+        """Tip and lever voltage by u, in the units of `hotlever.lever.parametrisation.in_plane`."""
         own = self.curve.c[..., [TIP_RISE, 0]] / np.array([UNIT_K, UNIT_V])
         return piecewise(own, self.curve.x)
-
-    @property
-    def solved(self) -> slice:
-        """The states that were solved: all but the one without power."""
-        return slice(int(self.equations.circuit.starts_cold), None)
-
-    @cached_property
-    def mirrored(self) -> Branch:
-        """The same with all potentials and currents reversed, followed the other way."""
-        sign = np.ones(self.values.shape[1])
-        sign[: len(SHOWN)] = -1.0
-        values, slopes = sign * self.values[::-1], -sign * self.value_slopes[::-1]
-        return Branch(self.states.mirrored, values, slopes)
 
     @property
     def base_temperature_K(self) -> float:
         """Temperature without power (K)."""
         return self.equations.base_temperature_K
-
-    @property
-    def end_u(self) -> float:
-        """Where the branch ends: at its last state, or where something begins to melt."""
-        return self.states.end_u
-
-    @property
-    def melts(self) -> bool:
-        """Whether the branch ends because something melts: silicon, or another material."""
-        return self.states.melts
 
     @property
     def hottest_K(self) -> float:
@@ -201,7 +151,7 @@ class Branch:
     def shown(self, u: ArrayLike) -> dict[str, Array]:
         """Return what an instrument shows, by name: ``lever_V``, ``current_mA``, ``reader_V``."""
         values = self.curve(np.asarray(u, dtype=float))
-        return {name: values[..., place] for place, name in enumerate(SHOWN)}
+        return {name: values[..., column] for column, name in enumerate(SHOWN)}
 
     def lever_voltage(self, tip_K: ArrayLike) -> Array:
         """Return V_l (V) by tip temperature (K); NaN outside the branch."""
@@ -227,7 +177,7 @@ class Branch:
     @cached_property
     def by_power(self) -> ByPower:
         """The tip temperature by power, as far as that is a function."""
-        return ByPower(self.states, self.curve, self.values, self.value_slopes)
+        return ByPower(self, self.curve)
 
     @property
     def highest_power_mW(self) -> float:
@@ -253,7 +203,7 @@ class Branch:
     def knee_u(self) -> float | None:
         """Where the knee is."""
         lever_V = piecewise(self.curve.c[..., 0], self.curve.x)
-        falling = [u for u in self.states.turns(lever_V).tolist() if lever_V(u, 2) < 0]
+        falling = [u for u in self.turns(lever_V).tolist() if lever_V(u, 2) < 0]
         return falling[0] if falling else None
 
     @property
@@ -295,24 +245,14 @@ class Branch:
     def _ramp(self, circuit: Circuit, bias: Array) -> Reading:
         """Find the states that a slow ramp takes from zero upwards."""
         curve = self.bias_by_u(circuit)
-        u, start = np.full(bias.shape, np.nan), self._without_bias(curve)
-        # what is at no bias is found to rounding errors
-        reading = Reading(u, [], min(0.0, float(curve(start))), start, float(self.tip_K(start)))
-        turns = [turn for turn in self.states.turns(curve).tolist() if turn > start]
-        for low, high in pairwise([start, *turns, self.end_u]):
-            highest = float(curve(high))
-            if highest <= reading.last_V:
-                continue  # the bias falls here, or has been as high before
-            fell = float(curve(low)) < reading.last_V
-            jumps = [*reading.jumps, (reading.last_V, reading.last_K)] if fell else reading.jumps
-            here = np.flatnonzero(np.isnan(u) & (bias <= highest))
-            u[here] = crossing(curve, low, high, bias[here])
-            reading = Reading(u, jumps, highest, high, float(self.tip_K(high)))
-        return reading
+        start = self._without_bias(curve)
+        turns = self.turns(curve)
+        ends = [start, *turns[turns > start].tolist(), self.end_u]
+        return slow_ramp(curve, ends, bias, self.tip_K)
 
     def _without_bias(self, curve: PPoly) -> float:
         """Return where a curve of the bias by u is zero: near where it was followed from."""
-        if self.equations.circuit.starts_cold or abs(float(curve(0.0))) < _NO_BIAS:
+        if abs(float(curve(0.0))) < _NO_BIAS:
             return 0.0
         # a similar lever has no bias elsewhere
         roots = curve.roots(extrapolate=False)
@@ -347,6 +287,33 @@ class Branch:
         return BranchEndError(text, bias_reached=bias)
 
 
+@dataclass(frozen=True)
+class Reach:
+    """How far a branch must go: until a bias in a circuit, and one state beyond.
+
+    The curve between two states depends on the next one as well. A lever that does not start cold
+    may be asked for biases of the other polarity, down to a lowest one.
+    """
+
+    circuit: Circuit
+    bias_V: float
+    lowest_V: float | None = None
+
+    @property
+    def mirrored(self) -> Reach:
+        """How far the branch of the other polarity must go."""
+        return Reach(self.circuit, -(self.lowest_V or 0.0))
+
+    def count(self, values: Array) -> int | None:
+        """Return how many states suffice, by their V_l and I_h, (k, 2 or more); None if not all."""
+        above = np.flatnonzero(self.circuit.bias(values[:, 0], values[:, 1]) >= self.bias_V)
+        return int(above[0]) + 2 if above.size and above[0] + 2 <= len(values) else None
+
+    def __call__(self, branch: Branch) -> bool:
+        """Return whether a branch goes far enough."""
+        return self.count(branch.values) is not None
+
+
 def shifted(branch: Branch, changes: Array, slopes: Array) -> Branch:
     """Return a branch with V_l, I_h and V_r changed by (k, 3); by (k, 4) the rise of the tip too.
 
@@ -354,6 +321,6 @@ def shifted(branch: Branch, changes: Array, slopes: Array) -> Branch:
     """
     columns = slice(changes.shape[1])
     moved = branch.values.copy(), branch.value_slopes.copy()
-    for known, change in zip(moved, (changes, slopes), strict=True):
-        known[:, columns] += change
+    for curve, change in zip(moved, (changes, slopes), strict=True):
+        curve[:, columns] += change
     return replace(branch, values=moved[0], value_slopes=moved[1])

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hotlever.lever.curve import piecewise, smooth_curve
-from hotlever.lever.ramp import crossing
+from hotlever.lever.curve import crossing, piecewise, smooth_curve
 from hotlever.lever.solved_states import SolvedStates
 from hotlever.types import Array
 
@@ -28,21 +27,19 @@ class ByPower:
     ----------
     states : SolvedStates
     curve : PPoly
-        V_l (V) and I_h (mA) by u, and what else a branch shows.
-    values, slopes : ndarray, shape (k, 2 or more)
-        The same of the states, and their derivatives by u.
+        V_l (V) and I_h (mA) by u, and what else they show.
     """
 
-    def __init__(self, states: SolvedStates, curve: PPoly, values: Array, slopes: Array) -> None:
-        self._states, self._curve, self._values, self._slopes = states, curve, values, slopes
+    def __init__(self, states: SolvedStates, curve: PPoly) -> None:
+        self._states, self._curve = states, curve
 
     @cached_property
     def _power(self) -> PPoly:
         """P_l (mW) by u."""
-        lever, current = (self._curve.c[..., place] for place in (0, 1))
+        lever, current = (self._curve.c[..., column] for column in (0, 1))
         product = np.zeros((len(lever) + len(current) - 1, lever.shape[1]))
-        for place, row in enumerate(lever):
-            product[place : place + len(current)] += row * current
+        for power, row in enumerate(lever):
+            product[power : power + len(current)] += row * current
         return piecewise(product, self._curve.x)
 
     @cached_property
@@ -82,11 +79,12 @@ class ByPower:
     @cached_property
     def _by_root(self) -> PPoly:
         """u by the root of the power, which is nearly a straight line."""
-        u, values, slopes = self._states.u, self._values, self._slopes
+        states = self._states
+        values, slopes = states.values, states.value_slopes
         power = values[:, 0] * values[:, 1]
         slope = slopes[:, 0] * values[:, 1] + values[:, 0] * slopes[:, 1]
         root = np.sqrt(power)
         # at zero power both begin as u
         by_u = np.append(np.sqrt(slopes[0, 0] * slopes[0, 1]), slope[1:] / (2.0 * root[1:]))
-        bent = root[np.isin(u, self._states.steps)]
-        return smooth_curve(root, u, 1.0 / by_u, bent)
+        bent = root[np.isin(states.u, states.steps)]
+        return smooth_curve(root, states.u, 1.0 / by_u, bent)

@@ -12,6 +12,10 @@ from hotlever.types import Array
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline, PPoly
 
+#: Points between two nodes at which a value is first looked for, and steps of Newton's method from
+#: there.
+_SAMPLES, _NEWTON_STEPS = 8, 6
+
 
 def piecewise(coefficients: Array, u: Array) -> PPoly:
     """Return the polynomials between nodes, (degree + 1, k - 1, ...), the highest power first."""
@@ -107,3 +111,24 @@ def hermite_weights(nodes: Array, at: Array, derivative: int = 0) -> Array:
     weights = np.linalg.solve(np.swapaxes(moments, 1, 2), wanted)[:, :, 0]
     weights[:, nodes.shape[1] :] *= width
     return np.asarray(weights / width**derivative)
+
+
+def crossing(curve: PPoly, low: float, high: float, values: Array) -> Array:
+    """Return where a curve that rises from `low` to `high` has some values, or begins above."""
+    at = _samples(curve, low, high)
+    heights = np.maximum.accumulate(curve(at))
+    before = np.clip(np.searchsorted(heights, values) - 1, 0, at.size - 2)
+    left, right = at[before], at[before + 1]
+    u = np.interp(values, heights, at)
+    for _ in range(_NEWTON_STEPS):
+        slope = np.maximum(curve(u, 1), 1e-12)
+        u = np.clip(u - (curve(u) - values) / slope, left, right)
+    return np.where(values <= heights[0], low, u)
+
+
+def _samples(curve: PPoly, low: float, high: float) -> Array:
+    """Return points between which a curve is smooth enough for a few steps of Newton's method."""
+    inner = curve.x[(curve.x > low) & (curve.x < high)]
+    ends = np.concatenate([[low], inner, [high]])
+    shares = np.arange(_SAMPLES) / _SAMPLES
+    return np.append((ends[:-1, None] + np.diff(ends)[:, None] * shares).ravel(), high)

@@ -15,6 +15,7 @@ from hotlever.datasets import OBSERVABLES, QUANTITIES, csv_text, labelled, quant
 from hotlever.errors import InputError
 from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES, balance_names
+from hotlever.materials import Kind
 from hotlever.materials.sections import LAWS, own_laws
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
@@ -23,8 +24,6 @@ from hotlever.types import Array
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from hotlever.lever.lever import Lever
 
 #: Columns of a sweep file.
 SWEEP_COLUMNS = (
@@ -39,19 +38,19 @@ _MORE = (
 
 
 def sweep_dataset(
-    lever: Lever,
+    probe: Probe,
+    made_of: Mapping[str, Kind],
     shown: Mapping[str, Array],
     balances: Array,
     notes: Sequence[str],
     sensitivities: Array | None = None,
 ) -> xr.Dataset:
-    """Return what is observed of n states of a lever.
+    """Return what is observed of n states of a probe's lever, whose materials may be other ones.
 
     Shown are ``lever_V``, ``current_mA``, ``reader_V``, ``tip_K`` and ``max_K``; the balances,
     (n, k), are `balance_columns`; sensitivities, (3, n, p), are of `OBSERVABLES` by what a fit
     usually varies.
     """
-    probe = lever.probe
     names = balance_names(probe.wiring)
     columns = {**shown, **dict(zip(names, balances.T, strict=True))}
     at_terminals = names[len(BALANCES) :]
@@ -75,9 +74,9 @@ def sweep_dataset(
     data = labelled(
         variables,
         coordinates=coordinates,
-        **probe_attributes(lever),
+        **probe_attributes(probe, made_of),
         notes="\n".join(
-            [*notes, *range_notes(lever, "a bias of {} V", columns["bias_V"], columns["max_K"])]
+            [*notes, *range_notes(made_of, "a bias of {} V", columns["bias_V"], columns["max_K"])]
         ),
     )
     for column in at_terminals:
@@ -103,13 +102,13 @@ def _resistance(heat_mW: Array, current_mA: Array) -> Array:
     return np.divide(1000.0 * heat_mW, current_mA**2, out=nothing, where=current_mA != 0)
 
 
-def range_notes(lever: Lever, where: str, along: Array, max_K: Array) -> list[str]:
-    """Say from where on the laws are used beyond the temperatures they are meant for.
+def range_notes(made_of: Mapping[str, Kind], where: str, along: Array, max_K: Array) -> list[str]:
+    """Say from where on the laws of materials are used beyond the temperatures they are meant for.
 
     `where` has the place of a number in it, the least of those of `along` that it is true of.
     """
-    made_of = lever.equations.made_of.values()
-    limit = min(law.temperature_range[1] for kind in made_of for law in kind.laws)
+    laws = [law for kind in made_of.values() for law in kind.laws]
+    limit = min(law.temperature_range[1] for law in laws)
     beyond = along[max_K > limit]
     if not beyond.size:
         return []
@@ -120,16 +119,16 @@ def range_notes(lever: Lever, where: str, along: Array, max_K: Array) -> list[st
     ]
 
 
-def probe_attributes(lever: Lever) -> dict[str, str]:
-    """Return what a dataset says of the probe of a lever, which `probe_of` reads.
+def probe_attributes(probe: Probe, made_of: Mapping[str, Kind]) -> dict[str, str]:
+    """Return what a dataset says of a probe, which `probe_of` reads.
 
-    The lever may follow other laws than its probe.
+    Its lever may be made of materials with other laws.
     """
-    values: dict[str, Any] = lever.probe.sections()
-    if laws := own_laws(lever.equations.made_of):
+    values: dict[str, Any] = probe.sections()
+    if laws := own_laws(made_of):
         values[LAWS] = laws
     sections = {name: json.dumps(section) for name, section in values.items()}
-    return {**sections, "medium": lever.medium}
+    return {**sections, "medium": probe.surroundings.medium}
 
 
 def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:

@@ -141,7 +141,7 @@ class FiniteElements:
     def _lattice(self) -> Array:
         """The basis functions on a lattice over an element, (nodes, points)."""
         steps = product(range(_STEPS + 1), repeat=len(self.positions))
-        points = np.array([one for one in steps if sum(one) <= _STEPS]).T / _STEPS
+        points = np.array([point for point in steps if sum(point) <= _STEPS]).T / _STEPS
         nodes = range(self.dofs.shape[1])
         return np.stack([self.basis.elem.lbasis(points, node)[0] for node in nodes])
 

@@ -6,7 +6,7 @@ Heat (paper's first equation, with the sign corrected) and charge::
 
 with T = base temperature at all terminals (or what each is held at), V = 0 at ground, V = V_l on
 the contact of the swept supply, no current into sense contacts, and into other contacts what their
-supplies give by Ohm's law, J − G V. One more condition, the *pin*, selects a state: its tip
+supplies give by Ohm's law, J − G V. One more condition, the *constraint*, selects a state: its tip
 temperature. What is behind the swept supply does not enter: what a lever shows at a tip temperature
 does not depend on it. Units are µm, V, mA, mW and K. Several states stand side by side, see
 `hotlever.lever.space`.
@@ -18,20 +18,20 @@ operator fills the plate itself with air too; κ is therefore κ_Si − κ_air w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from hotlever.lever.points import LawsAtPoints, square
+from hotlever.lever.laws import GAS, LawsAtPoints, square
 from hotlever.lever.space import (
     LEVER,
     TIP,
     AirTangent,
+    Constraint,
     Factors,
     Fluxes,
-    Pin,
     Tangent,
 )
-from hotlever.lever.stack import GAS
 from hotlever.types import Array
 
 #: What an instrument shows of a state, in the order of `LeverEquations.observed`.
@@ -63,54 +63,43 @@ class LeverEquations(LawsAtPoints):
         potential = x[self.space.contacts]
         return self.conductance.reshape(-1, *(1,) * (x.ndim - 1)) * potential
 
-    def factorised(self, x: Array, pin: Pin = TIP, per_us: float = 0.0) -> Factors:
-        """Return the factorised Jacobians of states, with the row of a pin last.
+    def factorised(self, x: Array, constraint: Constraint = TIP, per_us: float = 0.0) -> Factors:
+        """Return the factorised Jacobians of states, with the row of a constraint last.
 
         They are those of `balance` and so many times (1/µs) that of the heat stored, with what the
         air takes up where things change so fast.
         """
-        fields, laws = self.at(x)
-        heat_source_T = -laws.sigma_by["T"] * square(fields.grad_V)
+        tangent = self.tangent(x)
         if per_us:
-            heat_source_T = heat_source_T + per_us * self.heat_density(fields.T)[1]
-        tangent = Tangent(
-            heat_source_T=heat_source_T,
+            stored = per_us * self.heat_density(self.at(x)[0].T)[1]
+            tangent = replace(tangent, heat_source_T=tangent.heat_source_T + stored)
+        air = None
+        if self.space.air is not None:
+            own = self.heat_in_air if per_us else None
+            taken_up = None if own is None else own.taken_up(per_us)
+            air = AirTangent(self.kirchhoff(x)[1], taken_up)
+        return self.space.factorised(tangent, air, constraint, self.conductance)
+
+    # --- derivatives --------------------------------------------------------------------------
+
+    def tangent(self, x: Array) -> Tangent:
+        """Return how the fluxes of states change with their fields, to first order."""
+        fields, laws = self.at(x)
+        return Tangent(
+            heat_source_T=-laws.sigma_by["T"] * square(fields.grad_V),
             heat_flux_T=laws.kappa_by["T"] * fields.grad_T,
             kappa=laws.kappa,
             heat_source_V=-2.0 * laws.sigma * fields.grad_V,
             charge_flux_T=laws.sigma_by["T"] * fields.grad_V,
             sigma=laws.sigma,
         )
-        air = None
-        if self.space.air is not None:
-            own = self.heat_in_air if per_us else None
-            taken_up = None if own is None else own.taken_up(per_us)
-            air = AirTangent(self.kirchhoff(x)[1], taken_up)
-        return self.space.factorised(tangent, air, pin, self.conductance)
-
-    # --- derivatives --------------------------------------------------------------------------
 
     def flux_changes(self, x: Array, change: Array) -> Fluxes:
         """Return how the fluxes of states (size + 1, n) change with the unknowns, to first order.
 
         There may be one change of each state, (size + 1, n), or several, (size + 1, n, k).
         """
-        fields, laws = self.at(x)
-        moved = self.space.fields(change)
-
-        def fitting(known: Array) -> Array:
-            return known if change.ndim == 2 else known[..., None]
-
-        grad_T, grad_V = fitting(fields.grad_T), fitting(fields.grad_V)
-        sigma = fitting(laws.sigma_by["T"]) * moved.T
-        kappa = fitting(laws.kappa_by["T"]) * moved.T
-        heat_source = sigma * fitting(square(fields.grad_V))
-        heat_source += 2.0 * fitting(laws.sigma) * (grad_V * moved.grad_V).sum(axis=0)
-        return Fluxes(
-            -heat_source,
-            kappa * grad_T + fitting(laws.kappa) * moved.grad_T,
-            sigma * grad_V + fitting(laws.sigma) * moved.grad_V,
-        )
+        return self.tangent(x).fluxes(self.space.fields(change))
 
     def balance_change(self, x: Array, change: Array) -> Array:
         """Return how `balance` changes with the unknowns: the Jacobian times changes."""
@@ -124,7 +113,7 @@ class LeverEquations(LawsAtPoints):
 
     def by_parameter(self, x: Array, names: Sequence[str]) -> Array:
         """Return how `balance` changes with parameters or dimensions, (size + 1, n, k)."""
-        fields, known = self.at(x)
+        fields, now = self.at(x)
         # a base temperature that rises takes the whole lever with it
         by = ["T" if name == BASE else name for name in names]
         laws = self.conductivities(fields.T, by)
@@ -134,35 +123,35 @@ class LeverEquations(LawsAtPoints):
         heat = -sigma * square(fields.grad_V)[..., None]
         changes = Fluxes(heat, kappa * grad_T, sigma * grad_V)
         if self.end_rises and BASE in names:
-            self._without_ends(changes, names.index(BASE), known.kappa)
-        for place in (place for place, name in enumerate(names) if name in self.motions):
-            motion = self.motions[names[place]]
-            moved = motion.of_fluxes(fields, self.fluxes(x), known.kappa, known.sigma)
-            changes.heat_source[..., place] += moved.heat_source
-            changes.heat[..., place] += moved.heat
-            changes.charge[..., place] += moved.charge
+            self._without_ends(changes, names.index(BASE), now.kappa)
+        for column in (names.index(name) for name in names if name in self.motions):
+            motion = self.motions[names[column]]
+            moved = motion.of_fluxes(fields, self.fluxes(x), now.kappa, now.sigma)
+            changes.heat_source[..., column] += moved.heat_source
+            changes.heat[..., column] += moved.heat
+            changes.charge[..., column] += moved.charge
         weak = self.space.weak_form(changes)
         if self.space.air is None:
             return weak
         air, (theta, kappa_air) = self.space.air, self.kirchhoff(x)
-        for place, name in enumerate(names):
+        for column, name in enumerate(names):
             if name == GAS:
-                weak[..., place] += air.weak_form(theta / air.gas_conductivity)
+                weak[..., column] += air.weak_form(theta / air.gas_conductivity)
             elif name == BASE:
                 cold = self.kirchhoff(np.zeros_like(x))[1]
-                weak[..., place] += air.weak_form(kappa_air - cold)
+                weak[..., column] += air.weak_form(kappa_air - cold)
             elif name == GAP:
-                weak[..., place] += air.change_with_gap(theta)
+                weak[..., column] += air.change_with_gap(theta)
         return weak
 
-    def _without_ends(self, changes: Fluxes, place: int, kappa: Array) -> None:
+    def _without_ends(self, changes: Fluxes, column: int, kappa: Array) -> None:
         """Correct changes with the base temperature: leg ends of their own do not move with it."""
         tests = [self.space.end_tests[name][..., None] for name in self.end_rises]
         value, slope = np.split(np.sum(tests, axis=0), [1])
-        changes.heat_source[..., place] *= 1.0 - value[0]
-        changes.heat[..., place] *= 1.0 - value[0]
-        changes.heat[..., place] -= kappa * slope
-        changes.charge[..., place] *= 1.0 - value[0]
+        changes.heat_source[..., column] *= 1.0 - value[0]
+        changes.heat[..., column] *= 1.0 - value[0]
+        changes.heat[..., column] -= kappa * slope
+        changes.charge[..., column] *= 1.0 - value[0]
 
     def tip_by_parameter(self, x: Array, names: Sequence[str]) -> Array:
         """Return how the tip's rise (K) changes with parameters, the unknowns being the same.
@@ -179,19 +168,20 @@ class LeverEquations(LawsAtPoints):
         x: Array,
         factors: Factors,
         right_hand_side: Array,
-        pin: Pin = TIP,
+        constraint: Constraint = TIP,
     ) -> Array:
-        """Solve Jacobian at `x` times change = right-hand side, the last row that of the pin.
+        """Solve Jacobian at `x` times change = right-hand side, the constraint being the last row.
 
-        The factors, with the same pin, may be those of states nearby: what they lack is removed by
-        refinement. Right-hand sides are one of each state or several, as in `flux_changes`.
+        The factors, with the same constraint, may be those of states nearby: what they lack is
+        removed by refinement. Right-hand sides are one of each state or several, as in
+        `flux_changes`.
         """
         states = np.arange(x.shape[1])
         scale = self.scale.reshape(-1, *(1,) * (right_hand_side.ndim - 1))
         change = factors.solve(right_hand_side, states)
         for _ in range(_MOST_ROUNDS):
             rest = right_hand_side - self.balance_change(x, change)
-            rest[-1] = right_hand_side[-1] - pin.of(self.space, change)
+            rest[-1] = right_hand_side[-1] - constraint.of(self.space, change)
             correction = factors.solve(rest, states)
             change = change + correction
             ratio = _length(correction / scale) / _length(change / scale)
@@ -200,11 +190,11 @@ class LeverEquations(LawsAtPoints):
                 break
         return change
 
-    def along(self, x: Array, factors: Factors, pin: Pin = TIP) -> Array:
-        """Return the derivative of states by the tip temperature (K) or another pin."""
+    def along(self, x: Array, factors: Factors, constraint: Constraint = TIP) -> Array:
+        """Return the derivative of states by the tip temperature (K) or another constraint."""
         unit = np.zeros_like(x)
         unit[-1] = 1.0
-        return self.solve_linear(x, factors, unit, pin)
+        return self.solve_linear(x, factors, unit, constraint)
 
     def cold(self) -> tuple[Array, Array]:
         """Return how the state leaves the one without power, by u = √(rise of the tip).
@@ -253,16 +243,16 @@ class LeverEquations(LawsAtPoints):
 
         Those of V_r are zero without a reader.
         """
-        fields, laws = self.at(x)
+        tangent = self.tangent(x)
         unit = np.zeros((len(x), 1))
         unit[-1] = 1.0
         # the current is the charge equation tested with the function that is one on the supply
         supply = self.space.fields(unit).grad_V
-        along = laws.sigma_by["T"] * (fields.grad_V * supply).sum(axis=0)
-        flat = np.zeros_like(fields.grad_V)
+        along = (tangent.charge_flux_T * supply).sum(axis=0)
+        flat = np.zeros_like(tangent.charge_flux_T)
         gradient = np.zeros((*x.shape, len(SHOWN)))
         gradient[-1, :, 0] = 1.0
-        gradient[..., 1] = self.space.weak_form(Fluxes(along, flat, laws.sigma * supply))
+        gradient[..., 1] = self.space.weak_form(Fluxes(along, flat, tangent.sigma * supply))
         if self.space.reader is not None:
             unknowns, weights = self.space.reader
             # the nodes of a contact share one unknown
@@ -276,7 +266,12 @@ def _length(columns: Array) -> Array:
 
 
 def steps_of(equations: LeverEquations) -> Array:
-    """Return u where the tip passes a step of a law, at which the curves bend sharply."""
+    """Return u where the tip passes a step of a law, at which the curves bend sharply.
+
+    Of a lever that does not start cold, whose u is not of its tip, they are not known.
+    """
+    if not equations.circuit.starts_cold:
+        return np.empty(0)
     laws = [law for kind in equations.made_of.values() for law in kind.laws]
     steps = sorted({T for law in laws for T in law.steps})
     rises = np.array(steps) - equations.base_temperature_K

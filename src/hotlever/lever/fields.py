@@ -18,9 +18,8 @@ from hotlever.files import whole_file, write_text
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.lever import Lever
+from hotlever.lever.lever import Lever, State
 from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
-from hotlever.lever.state import State
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.kinds import HighDopedSilicon
 from hotlever.types import Array
@@ -112,7 +111,7 @@ def _resistivity(thickness_um: float | Array, sigma: Array) -> Array:
 def _cut_triangle(cuts: int) -> MeshTri:
     """The reference triangle, cut into equal ones."""
     points = [(i, j) for j in range(cuts + 1) for i in range(cuts + 1 - j)]
-    number = {point: place for place, point in enumerate(points)}
+    number = {point: index for index, point in enumerate(points)}
     triangles = []
     for i, j in points:
         if i + j < cuts:

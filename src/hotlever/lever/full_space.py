@@ -22,8 +22,8 @@ from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.space import (
     FAR,
     AirTangent,
+    Constraint,
     LinearMap,
-    Pin,
     PlacedFilm,
     Space,
     Tangent,
@@ -107,7 +107,7 @@ class FullSpace(Space):
         }
         region = np.repeat(mesh.region, self.elements.per_element)
         self._place_films(region)
-        parts = np.array([one.part for one in mesh.layout.regions])[region]
+        parts = np.array([region.part for region in mesh.layout.regions])[region]
         self.parts = {part: np.flatnonzero(parts == part) for part in get_args(Part)}
 
     # --- where things are -------------------------------------------------------------------------
@@ -165,10 +165,11 @@ class FullSpace(Space):
         flat = len(positions) == 2
         body = thickness_at(layout, positions[:2])
         where: dict[tuple[int, Film, str | None], list[int]] = {}
-        for number, one in enumerate(layout.regions):
-            for place, film in enumerate(one.stack):
-                source = None if place or one.taper is None else one.dopant_from
-                where.setdefault((place, film, source), []).append(number)
+        for number, of_layout in enumerate(layout.regions):
+            for level, film in enumerate(of_layout.stack):
+                tapered = not level and of_layout.taper is not None
+                source = of_layout.dopant_from if tapered else None
+                where.setdefault((level, film, source), []).append(number)
         films = []
         for (_, film, source), numbers in where.items():
             points = np.flatnonzero(np.isin(region, numbers))
@@ -196,15 +197,15 @@ class FullSpace(Space):
 
     def _from_borders(self, region: Index, points: Index) -> Array:
         """Return how far points in low-doped regions are from the borders of each one's region."""
-        tapers, of_points = [one.taper for one in self.mesh.layout.regions], region[points]
-        known = {
+        tapers, of_points = [part.taper for part in self.mesh.layout.regions], region[points]
+        by_region = {
             number: taper.distances(self.elements.positions[:2, points[of_points == number]])
             for number in np.unique(of_points)
             if (taper := tapers[number]) is not None
         }
-        distances = np.full((max(map(len, known.values())), points.size, 1), FAR)
-        for number, found in known.items():
-            distances[: len(found), of_points == number, 0] = found
+        distances = np.full((max(map(len, by_region.values())), points.size, 1), FAR)
+        for number, away in by_region.items():
+            distances[: len(away), of_points == number, 0] = away
         return distances
 
     def nodal(
@@ -274,8 +275,8 @@ class FullSpace(Space):
         """
         # any element around a node knows where its diagonal entry is
         _, first = np.unique(self.elements.dofs, return_index=True)
-        element, place = np.divmod(first[surface], self.elements.dofs.shape[1])
-        slots = self._slots[element, place, place][:, None, None]
+        element, node = np.divmod(first[surface], self.elements.dofs.shape[1])
+        slots = self._slots[element, node, node][:, None, None]
         space = copy(self)
         shares = np.ones((surface.size, 1))
         space.air = AirLoss(air, self._T[surface, None], shares, slots, self.size + 1)
@@ -284,49 +285,51 @@ class FullSpace(Space):
     # --- the matrix -------------------------------------------------------------------------------
 
     def _lay_out_matrix(self) -> None:
-        """Find the structure of the Jacobian; its last row pins the tip temperature."""
+        """Find the structure of the Jacobian; its last row is that of a constraint."""
         count = self.size + 1
         dofs = self.elements.dofs
         unknowns = np.concatenate([self._T[dofs], self._V[dofs]], axis=1)
         keys = np.where(
-            # the row of V_l is the current, which the pin replaces
+            # the row of V_l is the current, which the constraint replaces
             (unknowns[:, :, None] >= 0)
             & (unknowns[:, :, None] < self.size)
             & (unknowns[:, None, :] >= 0),
             unknowns[:, None, :] * count + unknowns[:, :, None],
             count**2,  # after all others: dropped
         )
-        pin = np.append(self.tip[0], self.size) * count + self.size
+        of_constraint = np.append(self.tip[0], self.size) * count + self.size
         diagonal = self.contacts * (count + 1)
-        every = np.concatenate([keys.ravel(), pin, diagonal])
+        every = np.concatenate([keys.ravel(), of_constraint, diagonal])
         unique, slots = np.unique(every, return_inverse=True)
         unique = unique[unique < count**2]
         self._entries = unique.size
         self._slots = slots[: keys.size].reshape(keys.shape)
-        self._pin_slots, self._contact_slots = np.split(slots[keys.size :], [pin.size])
+        self._constraint_slots, self._contact_slots = np.split(
+            slots[keys.size :], [of_constraint.size]
+        )
         self._rows = (unique % count).astype(np.int32)
         self._starts = np.searchsorted(unique // count, np.arange(count + 1)).astype(np.int32)
 
     def factorised(
-        self, tangent: Tangent, air: AirTangent | None, pin: Pin, conductance: Array
+        self, tangent: Tangent, air: AirTangent | None, constraint: Constraint, conductance: Array
     ) -> SparseFactors:
-        """Put the Jacobians of all states together, the row of the pin last, and factorise."""
+        """Put the Jacobians of all states together, the constraint last, and factorise."""
         solvers = []
         for state in range(tangent.sigma.shape[-1]):
             entries = self._assembled(tangent.of(state))
             entries[self._contact_slots] += conductance
             if self.air is None or air is None:
-                solvers.append(self._lu(entries, pin.among(state)))
+                solvers.append(self._lu(entries, constraint.among(state)))
                 continue
             kappa = air.kappa[:, state]
             local = entries + self.air.local_entries(kappa, self._entries)
             solvers.append(
-                AirSolver(self._lu(local, pin.among(state)), self.air, kappa, air.taken_up)
+                AirSolver(self._lu(local, constraint.among(state)), self.air, kappa, air.taken_up)
             )
         return SparseFactors(solvers)
 
     def _assembled(self, tangent: Tangent) -> Array:
-        """Return the entries of one state's Jacobian, without the pin."""
+        """Return the entries of one state's Jacobian, without the constraint."""
         elements, nodes = self.elements.dofs.shape
         matrices = self.elements.matrices
         element = np.empty((elements, 2 * nodes, 2 * nodes))
@@ -340,9 +343,9 @@ class FullSpace(Space):
         element[:, nodes:, nodes:] = matrices(slope_slope=tangent.sigma)
         return sums_by_index(self._slots, element, self._entries + 1)[: self._entries]
 
-    def _lu(self, entries: Array, pin: Pin) -> SuperLU:
+    def _lu(self, entries: Array, constraint: Constraint) -> SuperLU:
         """Factorise; the unknowns are already ordered for little fill."""
-        entries[self._pin_slots] = np.append(pin.tip * self.tip[1], pin.lever)
+        entries[self._constraint_slots] = np.append(constraint.tip * self.tip[1], constraint.lever)
         count = self.size + 1
         return splu(
             csc_matrix((entries, self._rows, self._starts), shape=(count, count)),
@@ -361,8 +364,8 @@ class SparseFactors:
     def solve(self, right_hand_side: Array, states: Index, *, transposed: bool = False) -> Array:
         """Solve for right-hand sides (size + 1, n) or (size + 1, n, k) of these n states."""
         solution, how = np.empty_like(right_hand_side), "T" if transposed else "N"
-        for place, state in enumerate(states):
-            solution[:, place] = self._solvers[state].solve(right_hand_side[:, place], how)
+        for column, state in enumerate(states):
+            solution[:, column] = self._solvers[state].solve(right_hand_side[:, column], how)
         return solution
 
     def replaced(self, states: Index, other: SparseFactors) -> SparseFactors:

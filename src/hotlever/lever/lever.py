@@ -1,11 +1,12 @@
-"""A probe made ready to solve: its branch, its states, its sweeps."""
+"""A probe made ready to solve: its branch, its sweeps, its solved states."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,16 +18,15 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.lever.around import AroundLever
 from hotlever.lever.balances import balance_columns, balance_slopes
 from hotlever.lever.branch import Branch, Reach
+from hotlever.lever.continuation import continued
 from hotlever.lever.dataset import at_bias, checked_bias, sweep_dataset
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.held import followed, pin_along
 from hotlever.lever.meshing import chosen_space, flat_space
-from hotlever.lever.pinned import state_at_bias
+from hotlever.lever.parametrisation import state_at_bias
 from hotlever.lever.ramp import Reading
 from hotlever.lever.sensitivities import sensitivities_of
-from hotlever.lever.space import TIP, Pin
-from hotlever.lever.state import State
+from hotlever.lever.space import TIP, Constraint
 from hotlever.materials import Material
 from hotlever.probe import Circuit, Layout, MeshOptions, Probe
 from hotlever.probe.parameters import usual_parameters
@@ -103,8 +103,8 @@ class Lever:
 
     def air_by_inverse_gap(self) -> Array:
         """Return how the operator of the air changes with the inverse of the gap, in µm²."""
-        place = self._plate, self.probe.surroundings, self.circuit.base_temperature_K
-        return change_with_gap(self.space.air.operator, *place, self.panels)
+        around = self._plate, self.probe.surroundings, self.circuit.base_temperature_K
+        return change_with_gap(self.space.air.operator, *around, self.panels)
 
     @property
     def _plate(self) -> Layout:
@@ -168,7 +168,9 @@ class Lever:
         ComputationError
             If a state was not found.
         """
-        return self._followed(lambda one: bool(one.tip_K(one.u[-1]) >= hottest_K), progress)
+        return self._followed(
+            lambda branch: bool(branch.tip_K(branch.u[-1]) >= hottest_K), progress
+        )
 
     def _followed(
         self, enough: Callable[[Branch], bool], progress: Progress | None = None
@@ -180,7 +182,7 @@ class Lever:
                 progress(branch.u.size, max(_USUAL_STATES, branch.u.size + 1))
 
         try:
-            self._branch = followed(self.equations, enough, self._branch, told)
+            self._branch = continued(self.equations, enough, self._branch, told)
         except ComputationError as error:
             self._branch = error.partial
             raise
@@ -235,7 +237,8 @@ class Lever:
 
     def _state_at(self, branch: Branch, u: float, bias: float) -> State:
         """Solve at a bias (V) from a place of the branch."""
-        return self.polished(branch.states(np.array([u])), bias, pin_along(branch, u))
+        at = np.array([u])
+        return self.polished(branch.states(at), bias, branch.parametrisation.constraint(at))
 
     def _read(
         self, bias: Array, progress: Progress | None = None
@@ -254,11 +257,11 @@ class Lever:
         return branch, reading, (failure or branch.ended(reading)) if missing else None
 
     @one_blas_thread
-    def polished(self, guess: Array, bias: float, pin: Pin = TIP) -> State:
+    def polished(self, guess: Array, bias: float, constraint: Constraint = TIP) -> State:
         """Solve at a bias (V) from a nearby state, (size + 1, 1); see `state_at_bias`."""
         if bias == 0.0 and self.circuit.starts_cold:
             return State(self, np.zeros_like(guess))
-        return State(self, state_at_bias(self.equations, self.circuit, bias, guess, pin))
+        return State(self, state_at_bias(self.equations, self.circuit, bias, guess, constraint))
 
     @one_blas_thread
     def sweep(
@@ -299,51 +302,45 @@ class Lever:
         -----
         Between the states of the branch curves are within 2e-5 in V_l and I_h and 0.02 K of solved
         ones (`solve`), a third of the mesh's error, the highest temperature too; 5e-5 and 0.05 K
-        where a leg gets hot faster than the tip. With held supplies each is solved by itself.
+        where a leg gets hot faster than the tip.
         """
         values = checked_bias(bias, self.circuit)
         branch, reading, failure = self._read(values, progress)
-        here = np.flatnonzero(np.isfinite(reading.u))
-        u, notes, found = reading.u[here], reading.notes(values[here]), None
-        cold, states = self.circuit.starts_cold, []
-        if not cold:
-            states = [self._state_at(branch, *at) for at in zip(u, values[here], strict=True)]
+        reached = np.flatnonzero(np.isfinite(reading.u))
+        u, slopes = reading.u[reached], None
         if sensitivities:
-            names = usual_parameters(self.probe)
-            found = sensitivities_of(branch, u, self.circuit, names, states)
-        more = notes, found
-        data = self._dataset(branch, u, *more) if cold else self.dataset(states, *more)
-        data = at_bias(data, values[here])
+            slopes = sensitivities_of(branch, u, self.circuit, usual_parameters(self.probe))
+        data = self._dataset(branch, u, reading.notes(values[reached]), slopes)
+        data = at_bias(data, values[reached])
         if failure is not None:
             failure.partial = data
             raise failure
         return data
 
     @one_blas_thread
-    def dataset(
-        self, states: Sequence[State], notes: Sequence[str] = (), sensitivities: Array | None = None
-    ) -> xr.Dataset:
+    def dataset(self, states: Sequence[State], notes: Sequence[str] = ()) -> xr.Dataset:
         """Return what is observed of solved states, as `sweep` does."""
         space, equations = self.space, self.equations
         x = np.concatenate([np.zeros((space.size + 1, 0)), *(state.x for state in states)], axis=1)
         base = self.circuit.base_temperature_K
         shown = dict(zip(SHOWN, equations.observed(x), strict=True))
         shown |= {"tip_K": base + space.tip_rise(x), "max_K": base + equations.highest_rise(x)}
-        return sweep_dataset(self, shown, balance_columns(equations, x), notes, sensitivities)
+        balances = balance_columns(equations, x)
+        return sweep_dataset(self.probe, equations.made_of, shown, balances, notes)
 
     @one_blas_thread
     def _dataset(
-        self, branch: Branch, u: Array, notes: list[str], sensitivities: Array | None = None
+        self, branch: Branch, u: Array, notes: Sequence[str], slopes: Array | None = None
     ) -> xr.Dataset:
-        """Return what is observed at some places of the branch."""
-        balances = balance_columns(self.equations, branch.x)
-        slopes = balance_slopes(self.equations, branch.x, branch.states.slopes)
-        base = self.circuit.base_temperature_K
+        """Return what is observed at some places of the branch, perhaps with its sensitivities."""
+        equations, base = self.equations, self.circuit.base_temperature_K
         shown = branch.shown(u)
-        shown |= {"tip_K": branch.tip_K(u), "max_K": base + branch.states.highest_rise_at(u)}
-        return sweep_dataset(
-            self, shown, branch.states.through(balances, slopes)(u), notes, sensitivities
-        )
+        shown |= {"tip_K": branch.tip_K(u), "max_K": base + branch.highest_rise_at(u)}
+        balances = branch.through(
+            balance_columns(equations, branch.x),
+            balance_slopes(equations, branch.x, branch.slopes),
+        )(u)
+        return sweep_dataset(self.probe, equations.made_of, shown, balances, notes, slopes)
 
     def knee(self) -> xr.Dataset:
         """Return the knee of the I-V curve, dV_l/dI_h = 0, as a sweep of one state.
@@ -361,6 +358,61 @@ class Lever:
             end = f"{self.equations.limit[1]}, with the tip at {branch.hottest_K:.0f} K"
             raise ComputationError(f"V_l rises until {end}: there is no knee")
         return self._dataset(branch, np.array([branch.knee_u]), [])
+
+
+@dataclass(frozen=True)
+class State:
+    """A solved state of a lever in its circuit.
+
+    Attributes
+    ----------
+    lever : Lever
+    x : ndarray, shape (size + 1, 1)
+        Unknowns, see `hotlever.lever.space`.
+    in_air : ndarray, shape (stores, 1), or None
+        Temperatures in the air in time, see `hotlever.lever.heat_in_air`; None at rest.
+    """
+
+    lever: Lever
+    x: Array
+    in_air: Array | None = None
+
+    @cached_property
+    def _shown(self) -> list[float]:
+        return list(self.lever.equations.observed(self.x)[:, 0].tolist())
+
+    @property
+    def lever_V(self) -> float:
+        """Lever voltage V_l (V)."""
+        return self._shown[0]
+
+    @property
+    def current_mA(self) -> float:
+        """Heater current I_h (mA)."""
+        return self._shown[1]
+
+    @property
+    def reader_V(self) -> float:
+        """Reader voltage V_r (V); NaN without a reader."""
+        return self._shown[2]
+
+    @property
+    def bias_V(self) -> float:
+        """Bias V_b (V) in the lever's circuit."""
+        return float(self.lever.circuit.bias(self.lever_V, self.current_mA))
+
+    @property
+    def tip_K(self) -> float:
+        """Tip temperature (K)."""
+        rise = self.lever.space.tip_rise(self.x)
+        return self.lever.circuit.base_temperature_K + float(rise[0])
+
+    @cached_property
+    def nodal(self) -> tuple[Array, Array]:
+        """Temperature (K) and potential (V) at the nodes of the elements."""
+        equations = self.lever.equations
+        base = equations.base_temperature_K
+        return self.lever.space.nodal(self.x[:, 0], base, equations.end_rises)
 
 
 def sweep(

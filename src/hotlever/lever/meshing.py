@@ -39,7 +39,7 @@ def flat_space(layout: Layout, mesh: MeshOptions, wiring: Wiring) -> FullSpace:
 
 def chosen_space(probe: Probe) -> FullSpace:
     """Return mesh and operators of a probe in vacuum, fine enough for its shape and materials."""
-    held, kinds = (tuple(one.items()) for one in (probe.circuit.contacts, probe.made_of))
+    held, kinds = tuple(probe.circuit.contacts.items()), tuple(probe.made_of.items())
     base = probe.circuit.base_temperature_K
     return _chosen(probe.layout(), probe.wiring, held, kinds, base)
 
@@ -96,16 +96,16 @@ def energy_between_degrees(space: FullSpace, kinds: Mapping[str, Kind], circuit:
         space.mesh, FiniteElements(space.mesh.elements, ElementTriP2()), space.wiring
     )
     slopes = []
-    for one in (quadratic, space):
+    for of_degree in (quadratic, space):
         # held supplies and warm leg ends are switched off
-        equations = LeverEquations(one, kinds, circuit).driven(0.0)
-        potential, rise = (one.fields(x) for x in equations.cold())
+        equations = LeverEquations(of_degree, kinds, circuit).driven(0.0)
+        potential, rise = (of_degree.fields(x) for x in equations.cold())
         slopes.append((potential.grad_V, rise.grad_T))
     laws = equations.at(np.zeros((space.size + 1, 1)))[1]
-    found = np.zeros(len(space.elements.dofs))
+    energy = np.zeros(len(space.elements.dofs))
     for coefficient, low, high in zip((laws.sigma, laws.kappa), *slopes, strict=True):
         weight = space.weights * coefficient
         whole = (weight * (high**2).sum(axis=0)).sum()
         apart = weight * ((high - low) ** 2).sum(axis=0)
-        found += apart.reshape(len(found), -1).sum(axis=1) / whole
-    return found
+        energy += apart.reshape(len(energy), -1).sum(axis=1) / whole
+    return energy

@@ -100,8 +100,8 @@ def find_roots(
         shortening = np.maximum(1.0, _length(step / equations.step_limit))
         x[:, active] = here + step / shortening
         # nothing is known yet of an old Jacobian's first step
-        known = np.isfinite(last[active])
-        old = np.where(known, length / np.where(known, last[active], 1.0), 1.0)
+        has_last = np.isfinite(last[active])
+        old = np.where(has_last, length / np.where(has_last, last[active], 1.0), 1.0)
         ratio = np.where(fresh[active], length, old)
         done = (shortening == 1.0) & (length * ratio < options.tolerance)
         fresh[active], last[active] = False, length

@@ -1,20 +1,22 @@
-"""A slow ramp of the bias along the curve of a lever: where it finds the biases asked for."""
+"""A slow ramp of the bias along the curve of a lever: where it finds the biases asked for.
+
+It takes the first state whose bias V_l + R_s I_h has been reached.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hotlever.lever.curve import crossing
 from hotlever.types import Array
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
-
-#: Points between two states at which a bias is first looked for, and steps of Newton's method
-#: from there.
-_SAMPLES, _NEWTON_STEPS = 8, 6
 
 
 @dataclass(frozen=True)
@@ -53,22 +55,32 @@ class Reading:
         ]
 
 
-def _samples(curve: PPoly, low: float, high: float) -> Array:
-    """Return points between which a curve is smooth enough for a few steps of Newton's method."""
-    inner = curve.x[(curve.x > low) & (curve.x < high)]
-    ends = np.concatenate([[low], inner, [high]])
-    shares = np.arange(_SAMPLES) / _SAMPLES
-    return np.append((ends[:-1, None] + np.diff(ends)[:, None] * shares).ravel(), high)
+def slow_ramp(
+    curve: PPoly, ends: list[float], bias: Array, tip_K: Callable[[float], Array]
+) -> Reading:
+    """Find the states that a slow ramp takes from zero upwards.
 
-
-def crossing(curve: PPoly, low: float, high: float, values: Array) -> Array:
-    """Return where a curve that rises from `low` to `high` has some values, or begins above."""
-    at = _samples(curve, low, high)
-    known = np.maximum.accumulate(curve(at))
-    place = np.clip(np.searchsorted(known, values) - 1, 0, at.size - 2)
-    left, right = at[place], at[place + 1]
-    u = np.interp(values, known, at)
-    for _ in range(_NEWTON_STEPS):
-        slope = np.maximum(curve(u, 1), 1e-12)
-        u = np.clip(u - (curve(u) - values) / slope, left, right)
-    return np.where(values <= known[0], low, u)
+    Parameters
+    ----------
+    curve : PPoly
+        The bias (V) by u.
+    ends : list of float
+        Where the ramp begins, each u at which the curve is level, and where the branch ends.
+    bias : ndarray, shape (n,)
+        What is looked for, in any order.
+    tip_K : callable
+        The tip temperature by u.
+    """
+    u, start = np.full(bias.shape, np.nan), ends[0]
+    # what is at no bias is found to rounding errors
+    reading = Reading(u, [], min(0.0, float(curve(start))), start, float(tip_K(start)))
+    for low, high in pairwise(ends):
+        highest = float(curve(high))
+        if highest <= reading.last_V:
+            continue  # the bias falls here, or has been as high before
+        fell = float(curve(low)) < reading.last_V
+        jumps = [*reading.jumps, (reading.last_V, reading.last_K)] if fell else reading.jumps
+        here = np.flatnonzero(np.isnan(u) & (bias <= highest))
+        u[here] = crossing(curve, low, high, bias[here])
+        reading = Reading(u, jumps, highest, high, float(tip_K(high)))
+    return reading

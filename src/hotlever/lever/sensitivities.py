@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.lever.branch import TIP_RISE, Branch
+from hotlever.lever.continuation import continued
 from hotlever.lever.curve import spline_through
 from hotlever.lever.equations import SHOWN, LeverEquations
-from hotlever.lever.held import followed
-from hotlever.lever.space import TIP, Factors, Pin
-from hotlever.lever.state import State
+from hotlever.lever.space import TIP, Constraint, Factors
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit
@@ -27,21 +26,21 @@ def by_parameter(
     x: Array,
     names: Sequence[str] = tuple(PARAMETERS),
     factors: Factors | None = None,
-    pin: Pin = TIP,
+    constraint: Constraint = TIP,
 ) -> Array:
     """Return how V_l, I_h and V_r change with parameters at fixed rises of the tip, (n, 3, k).
 
-    At another fixed pin the rise of the tip changes too, (n, 4, k). Beside those of the material
-    the parameters may be dimensions whose motions the equations know. The states have power;
-    factors are those of these very states. Adjoint: one solve for each of these quantities and each
-    state, however many parameters there are.
+    At another fixed constraint the rise of the tip changes too, (n, 4, k). Beside those of the
+    material the parameters may be dimensions whose motions the equations know. The states have
+    power; factors are those of these very states. Adjoint: one solve for each of these quantities
+    and each state, however many parameters there are.
     """
-    factors = factors or equations.factorised(x, pin)
+    factors = factors or equations.factorised(x, constraint)
     direct, of_tip = equations.by_parameter(x, names), equations.tip_by_parameter(x, names)
     missing = -direct
-    missing[-1] = -np.reshape(pin.tip, (-1, 1)) * of_tip
+    missing[-1] = -np.reshape(constraint.tip, (-1, 1)) * of_tip
     gradient = equations.observed_gradient(x)
-    if pin is not TIP:
+    if constraint is not TIP:
         unknowns, weights = equations.space.tip
         tip = np.zeros((*x.shape, 1))
         tip[unknowns, :, 0] = weights[:, None]
@@ -80,7 +79,7 @@ def at_fixed_bias(
 ) -> Array:
     """Return derivatives of I_h, V_r and T_tip by parameters at a fixed bias.
 
-    A parameter moves the curves at fixed rises of the tip, or another fixed pin; the circuit then
+    A parameter moves the curves at fixed rises of the tip, or another constraint; the circuit then
     moves the state along its branch until the bias is what it was.
 
     Parameters
@@ -115,23 +114,17 @@ def at_fixed_bias(
     )
 
 
-def sensitivities_of(
-    branch: Branch, u: Array, circuit: Circuit, names: Sequence[str], states: Sequence[State] = ()
-) -> Array:
-    """Return the derivatives of `at_fixed_bias` by parameters at any u of a branch, exact.
-
-    The states there may have been solved by themselves; else they are those of the curves.
-    """
+def sensitivities_of(branch: Branch, u: Array, circuit: Circuit, names: Sequence[str]) -> Array:
+    """Return the derivatives of `at_fixed_bias` by parameters at any u of a branch."""
     cold = branch.equations.circuit.starts_cold
     shown = np.zeros((u.size, len(SHOWN) + (not cold), len(names)))
     # without power nothing depends on the material
     hot = np.flatnonzero(u > 0) if cold else np.arange(u.size)
     for start in range(0, hot.size, _AT_ONCE):
         some = hot[start : start + _AT_ONCE]
-        pin = branch.sections.pin(u[some])
-        solved = [states[one].x for one in some] if states else [branch.states(u[some])]
-        x = np.concatenate(solved, axis=1)
-        shown[some] = by_parameter(branch.equations, x, names, pin=pin)
+        constraint = branch.parametrisation.constraint(u[some])
+        x = branch.states(u[some])
+        shown[some] = by_parameter(branch.equations, x, names, constraint=constraint)
     return at_fixed_bias(branch.curve(u, 1), circuit, shown)
 
 
@@ -139,7 +132,8 @@ def sensitivities_of(
 class Linearised:
     """A branch, and how it changes with some parameters at fixed places of it.
 
-    Places are rises of the tip, or other pins; see `hotlever.lever.sections`.
+    Places are rises of the tip, or other constraints; see
+    `hotlever.lever.parametrisation`.
 
     Attributes
     ----------
@@ -173,17 +167,17 @@ class Linearised:
         derivatives: LeverEquations | None = None,
         factors: Factors | None = None,
     ) -> Linearised:
-        """Follow a branch until it goes far enough (see `Follower.until`), and differentiate it.
+        """Follow a branch until it goes far enough (see `continued`), and differentiate it.
 
         With equations for the derivatives, which may differ a little and cost less, the states are
         differentiated as well; the factors may then be those of states nearby.
         """
-        longer = followed(branch.equations, enough, branch)
+        longer = continued(branch.equations, enough, branch)
         x, changes = longer.x[:, longer.solved], np.empty(0)
         if derivatives is None:
-            pin = longer.sections.pin(longer.u[longer.solved])
-            factors = longer.equations.factorised(x, pin)
-            shown = by_parameter(longer.equations, x, names, factors, pin)
+            constraint = longer.parametrisation.constraint(longer.u[longer.solved])
+            factors = longer.equations.factorised(x, constraint)
+            shown = by_parameter(longer.equations, x, names, factors, constraint)
         else:
             if factors is None or longer is not branch:
                 factors = derivatives.factorised(x)

@@ -5,15 +5,14 @@ from __future__ import annotations
 from copy import copy
 
 from hotlever.lever.air_loss import AirLoss
-from hotlever.lever.branch import Reach
+from hotlever.lever.branch import Branch, Reach
+from hotlever.lever.continuation import continued
 from hotlever.lever.equations import GAP, LeverEquations
-from hotlever.lever.following import branch_of
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.held import followed
 from hotlever.lever.lever import Lever
 from hotlever.lever.motion import motion_of
-from hotlever.lever.newton import NewtonOptions, find_roots
-from hotlever.lever.pinned import Pinned
+from hotlever.lever.newton import NewtonOptions
+from hotlever.lever.parametrisation import solve_at
 from hotlever.lever.sensitivities import Linearised
 from hotlever.probe import Probe
 from hotlever.probe.moving import MovingMesh
@@ -110,11 +109,10 @@ class SimilarLevers:
         names = usual_parameters(probe) if names is None else names
         equations = self.equations(probe, names)
         if near is None:
-            branch = followed(equations, reach)
+            branch = continued(equations, reach)
         else:
-            known, sections = near.branch, near.branch.sections
-            u, guess = known.u[known.solved], near.states(probe)[:, known.solved]
-            pinned = Pinned(equations, sections.values(u), sections.pin(u))
-            found = find_roots(pinned, guess, NewtonOptions(), near.factors)
-            branch = branch_of(equations, u, found, sections)
+            places, solved = near.branch.parametrisation, near.branch.solved
+            u, guess = near.branch.u[solved], near.states(probe)[:, solved]
+            roots = solve_at(equations, u, guess, NewtonOptions(), near.factors, places)
+            branch = Branch.whole(equations, u, roots, places)
         return Linearised.of(probe, names, branch, reach)

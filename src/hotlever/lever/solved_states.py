@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from hotlever.lever.curve import smooth_curve
-from hotlever.lever.equations import LeverEquations, steps_of
+from hotlever.lever.equations import SHOWN, LeverEquations, steps_of
 from hotlever.types import Array
 
 if TYPE_CHECKING:
@@ -42,6 +42,9 @@ class SolvedStates:
         on the way to biases of the other polarity.
     x, slopes : ndarray, shape (size + 1, k)
         The states, and their derivatives by u.
+    values, value_slopes : ndarray, shape (k, 4)
+        V_l (V), I_h (mA), V_r (V) and the rise of the tip (K) of each state, and their derivatives
+        by u.
     highest_rise : ndarray, shape (k,)
         The highest rise (K) anywhere in the lever.
     """
@@ -50,15 +53,54 @@ class SolvedStates:
     u: Array
     x: Array
     slopes: Array
+    values: Array
+    value_slopes: Array
     highest_rise: Array
 
-    def __call__(self, u: Array) -> Array:
+    @classmethod
+    def of(cls, equations: LeverEquations, u: Array, x: Array, slopes: Array) -> Self:
+        """Return states, and what they show, from their slopes by u."""
+        values = np.vstack([equations.observed(x), equations.space.tip_rise(x)])
+        by_u = equations.observed_change(x, slopes), equations.space.tip_rise(slopes)
+        return cls(equations, u, x, slopes, values.T, np.vstack(by_u).T, equations.highest_rise(x))
+
+    @classmethod
+    def cold(cls, equations: LeverEquations, slope: Array) -> Self:
+        """Return the state without power, whose slope is given."""
+        return cls.of(equations, np.zeros(1), np.zeros_like(slope), slope)
+
+    def followed_by(self, after: Self) -> Self:
+        """Return the same with others after them."""
+        return type(self)(
+            equations=self.equations,
+            u=np.append(self.u, after.u),
+            x=np.hstack([self.x, after.x]),
+            slopes=np.hstack([self.slopes, after.slopes]),
+            values=np.vstack([self.values, after.values]),
+            value_slopes=np.vstack([self.value_slopes, after.value_slopes]),
+            highest_rise=np.append(self.highest_rise, after.highest_rise),
+        )
+
+    @cached_property
+    def mirrored(self) -> Self:
+        """The same with all potentials and currents reversed, followed the other way."""
+        sign = np.where(self.equations.space.is_temperature, 1.0, -1.0)[:, None]
+        of_values = np.append(-np.ones(len(SHOWN)), 1.0)
+        return type(self)(
+            equations=self.equations.mirrored,
+            u=-self.u[::-1],
+            x=sign * self.x[:, ::-1],
+            slopes=-sign * self.slopes[:, ::-1],
+            values=of_values * self.values[::-1],
+            value_slopes=-of_values * self.value_slopes[::-1],
+            highest_rise=self.highest_rise[::-1],
+        )
+
+    # --- between them -----------------------------------------------------------------------------
+
+    def states(self, u: Array) -> Array:
         """Return the states at some u, shape (size + 1, n)."""
         return np.asarray(self._curve(u)).T
-
-    def slope(self, u: Array) -> Array:
-        """Return the derivatives of the states by u at some u, shape (size + 1, n)."""
-        return np.asarray(self._curve(u, 1)).T
 
     @cached_property
     def _curve(self) -> PPoly:
@@ -71,25 +113,12 @@ class SolvedStates:
     @cached_property
     def steps(self) -> Array:
         """Where higher derivatives by u step."""
-        return steps_of(self.equations) if self.equations.circuit.starts_cold else np.empty(0)
+        return steps_of(self.equations)
 
     @property
-    def mirrored(self) -> SolvedStates:
-        """The same with all potentials and currents reversed, followed the other way."""
-        sign = np.where(self.equations.space.is_temperature, 1.0, -1.0)[:, None]
-        x, slopes = sign * self.x[:, ::-1], -sign * self.slopes[:, ::-1]
-        mirrored = self.equations.mirrored
-        return SolvedStates(mirrored, -self.u[::-1], x, slopes, self.highest_rise[::-1])
-
-    def followed_by(self, after: SolvedStates) -> SolvedStates:
-        """Return the same with others after them."""
-        return SolvedStates(
-            self.equations,
-            np.append(self.u, after.u),
-            np.hstack([self.x, after.x]),
-            np.hstack([self.slopes, after.slopes]),
-            np.append(self.highest_rise, after.highest_rise),
-        )
+    def solved(self) -> slice:
+        """The states that were solved: all but the one without power."""
+        return slice(0 if self.x[:, 0].any() else 1, None)
 
     # --- how hot they get -------------------------------------------------------------------------
 

@@ -29,7 +29,7 @@ FAR = 1e6
 
 
 class Factors(Protocol):
-    """Factorised Jacobians of some states, the last row being that of the pin."""
+    """Factorised Jacobians of some states, the last row being that of the constraint."""
 
     def solve(self, right_hand_side: Array, states: Index, *, transposed: bool = False) -> Array:
         """Solve for right-hand sides (size + 1, n) or (size + 1, n, k) of these n states."""
@@ -188,7 +188,18 @@ class Tangent:
 
     def of(self, state: int) -> Tangent:
         """Return the coefficients of one state."""
-        return Tangent(*(getattr(self, name)[..., state] for name in self.__dataclass_fields__))
+        return Tangent(*(coefficient[..., state] for coefficient in vars(self).values()))
+
+    def fluxes(self, changes: Fields) -> Fluxes:
+        """Return the changes of the fluxes with one change of each state, or with several."""
+        at = self
+        if changes.T.ndim > self.sigma.ndim:
+            at = Tangent(*(coefficient[..., None] for coefficient in vars(self).values()))
+        return Fluxes(
+            at.heat_source_T * changes.T + (at.heat_source_V * changes.grad_V).sum(axis=0),
+            at.heat_flux_T * changes.T + at.kappa * changes.grad_T,
+            at.charge_flux_T * changes.T + at.sigma * changes.grad_V,
+        )
 
 
 @dataclass(frozen=True)
@@ -208,10 +219,10 @@ class AirTangent:
 
 
 @dataclass(frozen=True)
-class Pin:
+class Constraint:
     """The condition that selects a state: ``tip × rise of the tip + lever × V_l = value``.
 
-    All states have the same pin, or each has its own: numbers, or arrays of shape (n,).
+    All states have the same one, or each has its own: numbers, or arrays of shape (n,).
     """
 
     tip: float | Array
@@ -219,19 +230,21 @@ class Pin:
 
     def of(self, space: Space, x: Array) -> Array:
         """Return the left side for states or for changes of them, shape (n, ...)."""
-        tip, lever = (np.reshape(one, (-1, *(1,) * (x.ndim - 2))) for one in (self.tip, self.lever))
+        tip, lever = (
+            np.reshape(factor, (-1, *(1,) * (x.ndim - 2))) for factor in (self.tip, self.lever)
+        )
         return np.asarray(tip * space.tip_rise(x) + lever * x[-1])
 
-    def among(self, states: Index | int) -> Pin:
+    def among(self, states: Index | int) -> Constraint:
         """Return that of some of the states."""
         if np.ndim(self.tip) == 0:
             return self
-        return Pin(np.asarray(self.tip)[states], np.asarray(self.lever)[states])
+        return Constraint(np.asarray(self.tip)[states], np.asarray(self.lever)[states])
 
 
 #: A given tip temperature, which selects one state wherever there is power; and a given lever
 #: voltage, which does so without.
-TIP, LEVER = Pin(1.0, 0.0), Pin(0.0, 1.0)
+TIP, LEVER = Constraint(1.0, 0.0), Constraint(0.0, 1.0)
 
 
 class Space(ABC):
@@ -335,9 +348,9 @@ class Space(ABC):
 
     @abstractmethod
     def factorised(
-        self, tangent: Tangent, air: AirTangent | None, pin: Pin, conductance: Array
+        self, tangent: Tangent, air: AirTangent | None, constraint: Constraint, conductance: Array
     ) -> Factors:
-        """Put the Jacobians of all states together, the row of the pin last, and factorise.
+        """Put the Jacobians of all states together, the constraint last, and factorise.
 
         Behind each of the contacts is a conductance (mA/V).
         """

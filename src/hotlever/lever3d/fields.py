@@ -12,8 +12,8 @@ from hotlever.air.chip import lever_axes
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file
+from hotlever.lever.lever import State
 from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
-from hotlever.lever.state import State
 from hotlever.lever3d.lever import SolidLever, surface_nodes
 from hotlever.lever3d.still_air import ngsolve
 from hotlever.materials.air import temperature_from_kirchhoff

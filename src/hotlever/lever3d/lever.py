@@ -19,9 +19,7 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.lever.dataset import at_bias, checked_bias
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.held import pin_along
-from hotlever.lever.lever import Lever
-from hotlever.lever.state import State
+from hotlever.lever.lever import Lever, State
 from hotlever.lever3d.still_air import OpenAir, ngsolve
 from hotlever.probe import Probe
 from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid, middle_and_reach
@@ -180,8 +178,8 @@ class SolidLever(Lever):
         base = self.circuit.base_temperature_K
         guess = self.space.from_nodal(T - base, V, flat.lever_V)[:, None]
         branch = self._flat.branch_to(bias)
-        (u,) = branch.read(self.circuit, np.array([bias])).u
-        state = self.polished(guess, bias, pin_along(branch, u))
+        u = branch.read(self.circuit, np.array([bias])).u
+        state = self.polished(guess, bias, branch.parametrisation.constraint(u))
         store_arrays(self._file(bias), {"x": state.x})
         return state
 

@@ -12,9 +12,10 @@ import numpy as np
 from hotlever.lever.branch import Branch
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import Lever
-from hotlever.lever.pinned import Pinned
+from hotlever.lever.parametrisation import Constrained
 from hotlever.lever.reduced.space import ReducedSpace
 from hotlever.lever.sensitivities import at_fixed_bias
+from hotlever.lever.space import TIP
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -47,7 +48,7 @@ def estimated_error(lever: Lever, branch: Branch, u: Array) -> Array:
     equations = LeverEquations(lever.space, branch.equations.materials, lever.circuit)
     reduced = branch.states(u)
     x, every = space.expanded(reduced), np.arange(u.size)
-    problem = Pinned(equations, u**2)
+    problem = Constrained(equations, TIP, u**2)
     factors = problem.factorised(x, every)
     first = x - factors.solve(problem.residual(x, every), every)
     second = -factors.solve(problem.residual(first, every), every)

@@ -15,10 +15,9 @@ import numpy as np
 
 from hotlever.lever.branch import Branch, Reach
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.following import branch_of
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
-from hotlever.lever.pinned import Pinned
+from hotlever.lever.newton import NewtonOptions, NewtonResult
+from hotlever.lever.parametrisation import solve_at
 from hotlever.lever.reduced.response_surface import ParameterDomain, ResponseSurface
 from hotlever.lever.reduced.space import ReducedSpace
 from hotlever.lever.sensitivities import Linearised
@@ -82,7 +81,7 @@ class ReducedLever:
             If a state was not found.
         """
         few = self._equations(probe, self.hyper_reduced)
-        return few, find_roots(Pinned(few, u**2), guess, _NEARLY, factors)
+        return few, solve_at(few, u, guess, _NEARLY, factors)
 
     @one_blas_thread
     def branch(self, probe: Probe, reach: Reach) -> Branch:
@@ -95,7 +94,7 @@ class ReducedLever:
         """
         u, guess = self._start(probe, reach)
         few, roots = self.solved(probe, u, guess)
-        return branch_of(few, u, roots)
+        return Branch.whole(few, u, roots)
 
     def _start(self, probe: Probe, reach: Reach) -> tuple[Array, Array]:
         """Return u of the states that suffice, and guesses of them."""
@@ -124,9 +123,9 @@ class ReducedLever:
             u, guess, factors = near.branch.u[1:], near.states(probe)[:, 1:], near.factors
         few, roots = self.solved(probe, u, guess, factors)
         every = self._equations(probe, self.space)
-        roots = find_roots(Pinned(every, u**2), roots.x, _DONE, roots.factors)
+        roots = solve_at(every, u, roots.x, _DONE, roots.factors)
         # derivatives by the material are taken at the few points: exact ones cost too much here
-        branch = branch_of(every, u, roots)
+        branch = Branch.whole(every, u, roots)
         return Linearised.of(probe, names, branch, reach, few, roots.factors)
 
     # --- on disk ----------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from scipy.optimize import nnls
 from hotlever.lever.air_loss import AirLoss
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.heat_in_air import HeatInAir
-from hotlever.lever.space import AirTangent, LinearMap, Pin, Space, Tangent, at_some
+from hotlever.lever.space import AirTangent, Constraint, LinearMap, Space, Tangent, at_some
 from hotlever.types import Array, Index
 
 #: Random combinations of the training integrals that a cubature is made to reproduce.
@@ -202,9 +202,9 @@ class ReducedSpace(Space):
         return np.concatenate([np.tensordot(orthonormal, free, axes=1), x[-1:]])
 
     def factorised(
-        self, tangent: Tangent, air: AirTangent | None, pin: Pin, conductance: Array
+        self, tangent: Tangent, air: AirTangent | None, constraint: Constraint, conductance: Array
     ) -> DenseFactors:
-        """Put the Jacobians of all states together, the row of the pin last, and invert them."""
+        """Put the Jacobians of all states together, the constraint last, and invert them."""
         states = tangent.sigma.shape[-1]
         matrices = np.zeros((states, self.size + 1, self.size + 1))
         for state in range(states):
@@ -213,8 +213,8 @@ class ReducedSpace(Space):
                 of_air = self.air.matrix(air.kappa[:, state], air.taken_up)
                 matrices[state, : self.count, : self.count] += of_air
         matrices[:, -1] = 0.0
-        matrices[:, -1, : self.count] = np.multiply.outer(pin.tip, self.tip[1])
-        matrices[:, -1, -1] = pin.lever
+        matrices[:, -1, : self.count] = np.multiply.outer(constraint.tip, self.tip[1])
+        matrices[:, -1, -1] = constraint.lever
         return DenseFactors(np.asarray(np.linalg.inv(matrices), dtype=float))
 
     def _assemble(self, tangent: Tangent, matrix: Array) -> None:

@@ -164,7 +164,7 @@ def _space(
 ) -> ReducedSpace:
     """Find the modes of states, and of their changes with parameters and along the branch."""
     full = lever.space
-    cold = training[0].branch.states.slopes[:, 0]
+    cold = training[0].branch.slopes[:, 0]
     lift = np.where(full.is_temperature[:-1], 0.0, cold[:-1] / cold[-1])
     widths = domain.widths
     if full.air is not None and domain.scale:
@@ -173,7 +173,7 @@ def _space(
     for linearised in training:
         branch = linearised.branch
         snapshots.append(branch.x[:, 1:])
-        snapshots.append(branch.states.slopes[:, 1:] * (_BRANCH_STEP / (2.0 * branch.u[1:])))
+        snapshots.append(branch.slopes[:, 1:] * (_BRANCH_STEP / (2.0 * branch.u[1:])))
         for name, width in widths.items():
             change = linearised.changes[:, 1:, domain.parameters.index(name)]
             snapshots.append(change * (_PARAMETER_STEP * width))

@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from hotlever.errors import ComputationError
-from hotlever.lever.state import State
+from hotlever.lever.lever import State
 from hotlever.lever.transient.history import initial_state, integrate
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.types import Array

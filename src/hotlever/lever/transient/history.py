@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import ComputationError, HistoryEndError, InputError
 from hotlever.lever.dataset import probe_attributes, range_notes
-from hotlever.lever.state import State
+from hotlever.lever.lever import State
 from hotlever.lever.transient.problem import MONITORED, TransientProblem
 from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
 from hotlever.lever.transient.waveform import Piece, Waveform
@@ -294,12 +294,12 @@ def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Arra
     time = columns["time_us"]
     at_rest = lever.space.air is not None and lever.equations.heat_in_air is None
     notes = [_AIR_NOTE] if at_rest else []
-    notes += range_notes(lever, "{} µs on", time, columns["max_K"])
+    notes += range_notes(lever.equations.made_of, "{} µs on", time, columns["max_K"])
     return labelled(
         columns,
         "time",
         {"time": time},
-        **probe_attributes(lever),
+        **probe_attributes(lever.probe, lever.equations.made_of),
         waveform=waveform.text,
         notes="\n".join(notes),
     )

@@ -24,8 +24,8 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, unknown_name
 from hotlever.lever.equations import LeverEquations
+from hotlever.lever.lever import State
 from hotlever.lever.space import LEVER
-from hotlever.lever.state import State
 from hotlever.lever.transient.history import integrate
 from hotlever.lever.transient.problem import InCircuit
 from hotlever.lever.transient.waveform import Waveform, step, switched_off

@@ -18,9 +18,9 @@ import numpy as np
 from hotlever.lever.balances import heat_held, heat_left
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.heat_in_air import HeatInAir
+from hotlever.lever.laws import GAS
+from hotlever.lever.lever import State
 from hotlever.lever.space import LEVER, Factors
-from hotlever.lever.stack import GAS
-from hotlever.lever.state import State
 from hotlever.probe import Circuit
 from hotlever.types import Array, Index
 

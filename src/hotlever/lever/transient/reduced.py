@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from hotlever.lever.equations import LeverEquations
+from hotlever.lever.laws import Conductivities
+from hotlever.lever.lever import State
 from hotlever.lever.reduced.space import (
     ReducedSpace,
     empirical_cubature,
     proper_orthogonal_modes,
 )
 from hotlever.lever.space import Space
-from hotlever.lever.stack import Conductivities
-from hotlever.lever.state import State
 from hotlever.materials import Kind
 from hotlever.probe import Circuit
 from hotlever.threads import one_blas_thread
@@ -138,7 +138,7 @@ class TabulatedEquations(LeverEquations):
     def conductivities(self, T: Array, names: Sequence[str] = ("T",)) -> Conductivities:
         """Return κ and σ; derivatives by parameters are not looked up.
 
-        See `hotlever.lever.points.LawsAtPoints.conductivities`.
+        See `hotlever.lever.laws.LawsAtPoints.conductivities`.
         """
         if tuple(names) != ("T",):
             return super().conductivities(T, names)
@@ -146,7 +146,7 @@ class TabulatedEquations(LeverEquations):
         return Conductivities(values[0], values[1], {"T": slopes[0]}, {"T": slopes[1]})
 
     def heat_density(self, T: Array) -> tuple[Array, Array]:
-        """See `hotlever.lever.points.LawsAtPoints.heat_density`."""
+        """See `hotlever.lever.laws.LawsAtPoints.heat_density`."""
         values, slopes = self._look_up(T)
         return values[2], slopes[2]
 

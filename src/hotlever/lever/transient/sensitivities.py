@@ -129,7 +129,7 @@ def with_sensitivities(
         },
         "time",
         {"time": times, "observable": list(OBSERVABLES), "parameter": list(names)},
-        **probe_attributes(lever),
+        **probe_attributes(lever.probe, lever.equations.made_of),
         waveform=waveform.text,
     )
 

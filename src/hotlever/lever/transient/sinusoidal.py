@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.state import State
+from hotlever.lever.lever import State
 from hotlever.lever.transient.history import integrate
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.reduced import space_of_modes

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
+from hotlever.lever.lever import State
 from hotlever.lever.space import LEVER
-from hotlever.lever.state import State
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 

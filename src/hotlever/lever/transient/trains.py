@@ -15,7 +15,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from hotlever.errors import ComputationError
-from hotlever.lever.state import State
+from hotlever.lever.lever import State
 from hotlever.lever.transient.cyclic import Cycles
 from hotlever.lever.transient.history import (
     ENERGIES,

@@ -1,0 +1,322 @@
+"""Continuation of a lever's curve: the next state is predicted, corrected, or tried from nearer by.
+
+A lever that starts cold is followed in its natural parameter, the tip temperature, to hotter and
+hotter tips. One that held supplies heat, or that has leg ends of different temperatures, is warm
+before the swept supply heats it, and may cool at first as that takes current from the others: so
+neither its tip temperature nor its voltage need rise along the branch, and it is followed by the
+length of its curve in the plane of both, in units of 60 K and 1 V. The other polarity of the bias
+is another part of the same curve.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import ClassVar
+
+import numpy as np
+
+from hotlever.errors import ComputationError, NewtonError
+from hotlever.lever.branch import Branch, Reach
+from hotlever.lever.curve import hermite_weights
+from hotlever.lever.equations import LeverEquations, steps_of
+from hotlever.lever.newton import NewtonOptions
+from hotlever.lever.parametrisation import PseudoArclength, in_plane, solve_at, state_at_bias
+from hotlever.lever.space import LEVER
+from hotlever.types import Array
+
+#: Far below what the curves between the states are off by.
+_OPTIONS = NewtonOptions(tolerance=1e-5)
+#: States that the next one is predicted from, and how many a branch has at most.
+_BEHIND, _MOST = 3, 2000
+#: In the natural parameter: steps in u (K^½) where it is cold, in the tip temperature (K) where it
+#: is hot.
+_STEP_U, _STEP_K = 4.0, 60.0
+#: Half the step (K) after a step of a law; and by how much some place must get hotter per kelvin of
+#: the tip to halve the steps.
+_AFTER_STEP_K, _MUCH_FASTER = 5.0, 2.0
+#: By arc length: the first step and the largest.
+_FIRST, _LARGEST = 0.1, 0.5
+#: Smallest share of what is held by which it may rise, from nothing to its values.
+_SMALLEST_SHARE = 1.0 / 64.0
+#: Points for each state at which the nearest place on another branch is looked for.
+_LOOKED_AT = 20
+#: Points of Gauss's rule and rounds by which the length of a piece of the curve is found.
+_GAUSS, _ROUNDS = np.polynomial.legendre.leggauss(5), 6
+
+
+def continued(
+    equations: LeverEquations,
+    enough: Callable[[Branch], bool],
+    start: Branch | None = None,
+    seen: Callable[[Branch], None] = lambda branch: None,
+) -> Branch:
+    """Follow a lever until its branch is long enough or something melts, or on from a branch of it.
+
+    A reach may ask for biases of the other polarity too. Each longer branch is shown to `seen`.
+
+    Raises
+    ------
+    ComputationError
+        If a state was not found; ``partial`` holds the branch up to there.
+    """
+
+    def far_enough(branch: Branch) -> bool:
+        seen(branch)
+        return enough(branch)
+
+    if equations.circuit.starts_cold:
+        return NaturalContinuation(equations, start).until(far_enough)
+    branch = ArclengthContinuation(equations, start).until(far_enough)
+    if not isinstance(enough, Reach) or enough.lowest_V is None:
+        return branch
+    other, back = enough.mirrored, branch.mirrored
+    if other(back):
+        return branch
+    try:
+        return ArclengthContinuation(back.equations, back).until(other).mirrored
+    except ComputationError as error:
+        error.partial = error.partial.mirrored
+        raise
+
+
+class Continuation(ABC):
+    """Follows the curve of a lever, from its beginning or on from a branch of it."""
+
+    #: The smallest step that is tried.
+    smallest: ClassVar[float]
+
+    def __init__(self, equations: LeverEquations, start: Branch | None, step: float) -> None:
+        self._equations, self._step = equations, step
+        self._branch = self._beginning() if start is None else start
+
+    def until(self, enough: Callable[[Branch], bool]) -> Branch:
+        """Go on until the branch is long enough, or something melts.
+
+        Raises
+        ------
+        ComputationError
+            If the next state was not found; ``partial`` holds the branch up to there.
+        """
+        while not (self._branch.melts or enough(self._branch)):
+            step = self._proposed()
+            while (part := self._next(step)) is None:
+                step /= 2.0
+                if step < self.smallest:
+                    raise self._lost("no state was found beyond one with")
+            self._branch, self._step = self._branch.followed_by(part), step
+            if self._branch.u.size > _MOST:
+                raise self._lost(f"a branch of {_MOST} states is not long enough: the last has")
+        return self._branch
+
+    def _lost(self, what: str) -> ComputationError:
+        tip = float(self._branch.tip_K(self._branch.u[-1]))
+        return ComputationError(f"{what} a tip at {tip:.0f} K", partial=self._branch)
+
+    def _next(self, step: float) -> Branch | None:
+        """Find the state after a step; None if it could lie on another branch."""
+        u = self._landing(step)
+        expected = self._expected(u)
+        try:
+            part = self._solved(u, expected)
+        except NewtonError:
+            return None
+        astray = np.abs(part.x - expected)[self._equations.space.is_temperature].max()
+        return part if astray <= self._trusted(step) and self._goes_on(part) else None
+
+    def _expected(self, u: float) -> Array:
+        """Predict the state at u from the last ones and their slopes."""
+        branch, behind = self._branch, slice(-_BEHIND, None)
+        if branch.u.size == 1:
+            return branch.x + (u - branch.u[-1]) * branch.slopes
+        weights = hermite_weights(branch.u[None, behind], np.array([u]))[0]
+        states = np.concatenate([branch.x[:, behind], branch.slopes[:, behind]], axis=1)
+        return np.asarray(states @ weights[:, None])
+
+    @abstractmethod
+    def _beginning(self) -> Branch:
+        """Return the first states."""
+
+    @abstractmethod
+    def _proposed(self) -> float:
+        """Return the step that is tried first."""
+
+    @abstractmethod
+    def _landing(self, step: float) -> float:
+        """Return u after a step."""
+
+    @abstractmethod
+    def _solved(self, u: float, guess: Array) -> Branch:
+        """Find the state at u near a guess, and its slope."""
+
+    @abstractmethod
+    def _trusted(self, step: float) -> float:
+        """Return how far (K) from where it is expected a state surely is on the same branch."""
+
+    def _goes_on(self, part: Branch) -> bool:
+        """Return whether a state continues the branch in its direction."""
+        return True
+
+
+class NaturalContinuation(Continuation):
+    """Follows a lever that starts cold to hotter and hotter tips; steps are in kelvin."""
+
+    smallest = 0.5
+
+    def __init__(self, equations: LeverEquations, start: Branch | None = None) -> None:
+        self._bends = steps_of(equations)
+        super().__init__(equations, start, _STEP_K)
+
+    def _beginning(self) -> Branch:
+        first, second = self._equations.cold()
+        branch = Branch.cold(self._equations, first)
+        for u in (0.5 * _STEP_U, _STEP_U):
+            try:
+                branch = branch.followed_by(self._solved(u, u * first + u**2 * second))
+            except NewtonError as error:
+                tip = self._equations.base_temperature_K + u**2
+                raise ComputationError(
+                    f"no state was found with a tip at {tip:.0f} K: {error}"
+                ) from error
+        return branch
+
+    def _proposed(self) -> float:
+        # where a law settles after a step, the curve bends
+        u = float(self._branch.u[-1])
+        last = _AFTER_STEP_K if u in self._bends else self._step
+        # A leg may get hotter faster than the tip. Steps are halved then, not scaled, so that
+        # branches of similar levers still have most of their places in common.
+        slopes = self._equations.space.rises(self._branch.slopes[:, -1:])
+        faster = max(1.0, float(slopes.max()) / (2.0 * u) / _MUCH_FASTER)
+        longest = _STEP_K / 2.0 ** np.ceil(np.log2(faster))
+        return float(min((u + _STEP_U) ** 2 - u**2, longest, 2.0 * last))
+
+    def _landing(self, step: float) -> float:
+        # or at a step of a law on the way
+        u = float(self._branch.u[-1])
+        after = float(np.sqrt(u**2 + step))
+        between = self._bends[(self._bends > u) & (self._bends < after)]
+        return float(between[0]) if between.size else after
+
+    def _solved(self, u: float, guess: Array) -> Branch:
+        roots = solve_at(self._equations, np.array([u]), guess, _OPTIONS)
+        return Branch.of_roots(self._equations, np.array([u]), roots)
+
+    def _trusted(self, step: float) -> float:
+        return 0.5 * step
+
+
+class ArclengthContinuation(Continuation):
+    """Follows a lever from where it is without a bias, along its curve; steps are lengths of it."""
+
+    smallest = 1e-4
+
+    def __init__(self, equations: LeverEquations, start: Branch | None = None) -> None:
+        super().__init__(equations, start, _FIRST)
+
+    def _beginning(self) -> Branch:
+        equations = self._equations
+        rest = without_bias(equations)
+        along = equations.along(rest, equations.factorised(rest, LEVER), LEVER)
+        shown = equations.observed_change(rest, along)
+        # the bias rises
+        along = along * np.sign(float(equations.circuit.bias(shown[0], shown[1])[0]))
+        slope = along / np.linalg.norm(in_plane(equations.space, along))
+        branch = Branch.of(equations, np.zeros(1), rest, slope)
+        if branch.melts:
+            raise ComputationError(f"without a bias {equations.limit[1]}: held supplies heat it")
+        self._branch = branch
+        part = self._next(_FIRST)
+        return branch if part is None else branch.followed_by(part)
+
+    def _proposed(self) -> float:
+        return min(1.5 * self._step, _LARGEST)
+
+    def _landing(self, step: float) -> float:
+        return float(self._branch.u[-1]) + step
+
+    def _tangent(self) -> Array:
+        """Return the unit tangent at the last state in the plane of tip and lever voltage."""
+        tangent = in_plane(self._equations.space, self._branch.slopes[:, -1:])[0]
+        return np.asarray(tangent / np.linalg.norm(tangent))
+
+    def _solved(self, u: float, guess: Array) -> Branch:
+        equations, branch, tangent = self._equations, self._branch, self._tangent()
+        space, at = equations.space, np.array([u])
+        origin = in_plane(space, branch.x[:, -1:])[0]
+        lines = PseudoArclength.across_tangent(float(branch.u[-1]), origin, tangent)
+        roots = solve_at(equations, at, guess, _OPTIONS, parametrisation=lines)
+        slope = equations.along(roots.x, roots.factors, lines.constraint(at))
+        # by the length of the curve, not by that of its tangent
+        slope = slope / np.linalg.norm(in_plane(space, slope))
+        away = in_plane(space, roots.x)[0] - origin
+        length = _length_between(tangent, in_plane(space, slope)[0], away)
+        return Branch.of(equations, branch.u[-1:] + length, roots.x, slope)
+
+    def _trusted(self, step: float) -> float:
+        return 3.0
+
+    def _goes_on(self, part: Branch) -> bool:
+        return bool(self._tangent() @ in_plane(self._equations.space, part.slopes)[0] > 0.5)
+
+
+def _length_between(start: Array, end: Array, away: Array) -> float:
+    """Return the length of a curve with these unit tangents (2,) that ends so far away (2,).
+
+    It is that of the cubic through both ends, whose slopes are of unit length.
+    """
+    length = float(np.linalg.norm(away))
+    t, weights = 0.5 * (_GAUSS[0] + 1.0), 0.5 * _GAUSS[1]
+    for _ in range(_ROUNDS):
+        slopes = (
+            np.outer(6 * t - 6 * t**2, away)
+            + length * np.outer(1 - 4 * t + 3 * t**2, start)
+            + length * np.outer(3 * t**2 - 2 * t, end)
+        )
+        length = float(weights @ np.linalg.norm(slopes, axis=1))
+    return length
+
+
+def without_bias(equations: LeverEquations) -> Array:
+    """Return the state without a bias, (size + 1, 1): what is held rises from nothing.
+
+    Raises
+    ------
+    ComputationError
+        If the lever has no such state.
+    """
+    x, share, step = np.zeros((equations.space.size + 1, 1)), 0.0, 1.0
+    while share < 1.0:
+        driven = equations.driven(min(share + step, 1.0))
+        try:
+            x = state_at_bias(driven, equations.circuit, 0.0, x, LEVER)
+        except NewtonError as error:
+            step /= 2.0
+            if step < _SMALLEST_SHARE:
+                raise ComputationError(
+                    "without a bias no steady state was found: held supplies lead to one up to "
+                    f"{share:.0%} of their values"
+                ) from error
+            continue
+        share += step
+    return x
+
+
+def at_places_of(similar: Branch, branch: Branch) -> Branch:
+    """Return a branch with its states at the places of a similar one, and their u.
+
+    Of a lever that starts cold it is returned as it is: its own places are as good.
+
+    Raises
+    ------
+    NewtonError
+        If a state was not found.
+    """
+    equations, places = branch.equations, similar.parametrisation
+    if equations.circuit.starts_cold:
+        return branch
+    u = np.linspace(branch.u[0], branch.u[-1], _LOOKED_AT * branch.u.size)
+    away = branch.path(u) - similar.path(similar.u)[:, None]
+    nearest = branch.states(u[np.argmin((away**2).sum(axis=-1), axis=1)])
+    roots = solve_at(equations, similar.u, nearest, _OPTIONS, parametrisation=places)
+    return Branch.whole(equations, similar.u, roots, places)

@@ -1,0 +1,178 @@
+"""Parametrisations of a lever's curve: which constraint selects the state at each of its places.
+
+A constraint is a line in the plane of tip temperature and lever voltage, and its state is the one
+on that line. A lever that starts cold has one state at each tip temperature: its natural parameter.
+Another one is warm without a bias and may cool at first; its places are lines across a curve
+(pseudo-arclength; H. B. Keller, in Applications of Bifurcation Theory, 359 (1977)), its own or that
+of a similar lever, so that the states of both can be compared.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from hotlever.errors import NewtonError
+from hotlever.lever.curve import piecewise
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
+from hotlever.lever.space import TIP, Constraint, Factors, Space
+from hotlever.probe.circuit import Circuit
+from hotlever.types import Array, Index
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+#: Units in which changes of the tip (K) and of the lever voltage (V) compare.
+UNIT_K, UNIT_V = 60.0, 1.0
+
+
+def in_plane(space: Space, x: Array) -> Array:
+    """Return tip and lever voltage of states, or of changes of them, in their units, (n, 2)."""
+    return np.stack([space.tip_rise(x) / UNIT_K, x[-1] / UNIT_V], axis=-1)
+
+
+class Parametrisation(Protocol):
+    """The constraints of the places u (n,) of a branch."""
+
+    def constraint(self, u: Array) -> Constraint:
+        """Return the constraint of each place."""
+        ...
+
+    def values(self, u: Array) -> Array:
+        """Return the value that the constraint has there, (n,)."""
+        ...
+
+    def rate(self, u: Array, space: Space, x: Array) -> Array:
+        """Return how fast the values pass states (size + 1, n), by u, (n,)."""
+        ...
+
+
+class Natural:
+    """The places of a lever that starts cold: u = √(T_tip − T_base)."""
+
+    def constraint(self, u: Array) -> Constraint:
+        """See `Parametrisation`."""
+        return TIP
+
+    def values(self, u: Array) -> Array:
+        """See `Parametrisation`."""
+        return np.asarray(u**2)
+
+    def rate(self, u: Array, space: Space, x: Array) -> Array:
+        """See `Parametrisation`."""
+        return np.asarray(2.0 * u)
+
+
+class PseudoArclength:
+    """Lines across a curve in the plane of tip and lever voltage.
+
+    Parameters
+    ----------
+    curve : PPoly
+        Both by u, see `in_plane`.
+    """
+
+    def __init__(self, curve: PPoly) -> None:
+        self._curve = curve
+
+    @classmethod
+    def across_tangent(cls, u: float, origin: Array, tangent: Array) -> PseudoArclength:
+        """Return the lines across a straight line, given by where it is at u and its tangent."""
+        return cls(piecewise(np.stack([tangent, origin])[:, None], np.array([u, u + 1.0])))
+
+    def constraint(self, u: Array) -> Constraint:
+        """See `Parametrisation`."""
+        tip, lever = self._curve(u, 1).T
+        return Constraint(tip / UNIT_K, lever / UNIT_V)
+
+    def values(self, u: Array) -> Array:
+        """See `Parametrisation`."""
+        return np.asarray((self._curve(u, 1) * self._curve(u)).sum(axis=1))
+
+    def rate(self, u: Array, space: Space, x: Array) -> Array:
+        """See `Parametrisation`."""
+        along, bend = self._curve(u, 1), self._curve(u, 2)
+        # the lines turn, so that they pass faster on the outside of a bend than on the inside
+        aside = in_plane(space, x) - self._curve(u)
+        return np.asarray((along**2 - bend * aside).sum(axis=1))
+
+
+class Constrained:
+    """The equations of states with given values of a constraint, (n,); see `newton.Equations`."""
+
+    def __init__(self, equations: LeverEquations, constraint: Constraint, values: Array) -> None:
+        self._equations, self._constraint, self._values = equations, constraint, values
+        self.scale, self.step_limit = equations.scale, equations.step_limit
+
+    def residual(self, x: Array, which: Index) -> Array:
+        """Return the residuals of heat, charge and constraint, (size + 1, n)."""
+        residual = self._equations.balance(x)
+        left = self._constraint.among(which).of(self._equations.space, x)
+        residual[-1] = left - self._values[which]
+        return residual
+
+    def factorised(self, x: Array, which: Index) -> Factors:
+        """Return the factorised Jacobians."""
+        return self._equations.factorised(x, self._constraint.among(which))
+
+
+def solve_at(
+    equations: LeverEquations,
+    u: Array,
+    guess: Array,
+    options: NewtonOptions,
+    factors: Factors | None = None,
+    parametrisation: Parametrisation | None = None,
+) -> NewtonResult:
+    """Find the states at some places u, (size + 1, n), from guesses of them.
+
+    The factors may be those of states nearby; the parametrisation is the natural one by default.
+
+    Raises
+    ------
+    NewtonError
+        If a state was not found.
+    """
+    places = parametrisation or Natural()
+    problem = Constrained(equations, places.constraint(u), places.values(u))
+    return find_roots(problem, guess, options, factors)
+
+
+def state_at_bias(
+    equations: LeverEquations,
+    circuit: Circuit,
+    bias: float,
+    guess: Array,
+    constraint: Constraint = TIP,
+) -> Array:
+    """Return the state at a bias (V) in a circuit, (size + 1, 1), from one nearby.
+
+    The state at the guess's tip temperature, or other constraint that changes along the branch, is
+    moved along it until it has the bias.
+
+    Raises
+    ------
+    NewtonError
+        If the guess is too far from a solution.
+    """
+
+    def bias_of(shown: Array) -> Array:
+        return np.asarray(circuit.bias(shown[0], shown[1]))
+
+    options = NewtonOptions()
+    x, factors, along = guess, None, None
+    for _ in range(options.max_iterations):
+        here = Constrained(equations, constraint, constraint.of(equations.space, x))
+        root = find_roots(here, x, options, factors)
+        if along is None:
+            along = equations.along(root.x, root.factors, constraint)
+            bias_by = bias_of(equations.observed_change(root.x, along))
+        factors = root.factors
+        step = along * (bias - bias_of(equations.observed(root.x))) / bias_by
+        step /= max(1.0, float(np.abs(step / equations.step_limit).max()))
+        x = root.x + step
+        if np.abs(step / equations.scale).max() < options.tolerance:
+            return x
+    raise NewtonError(f"no state was found at a bias of {bias:g} V", partial=x)
