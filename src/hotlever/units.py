@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from typing import NamedTuple
 
 from hotlever.errors import InputError, shown
 
@@ -18,36 +19,14 @@ LEAST_BIAS, MOST_BIAS = 1e-6, 1e4
 NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 LONGEST_NUMBER = 60  #: characters
 
-_PREFIXES = {
-    "": 0,
-    "d": -1,
-    "c": -2,
-    "m": -3,
-    "u": -6,
-    "μ": -6,
-    "n": -9,
-    "p": -12,
-    "f": -15,
-    "a": -18,
-    "da": 1,
-    "h": 2,
-    "k": 3,
-    "K": 3,
-    "M": 6,
-    "G": 9,
-    "T": 12,
-    "P": 15,
-    "E": 18,
-}
+_PREFIXES = {"": 0, "d": -1, "c": -2, "m": -3, "u": -6, "μ": -6, "n": -9, "p": -12, "f": -15}
+_PREFIXES |= {"a": -18, "da": 1, "h": 2, "k": 3, "K": 3, "M": 6, "G": 9, "T": 12, "P": 15, "E": 18}
 _PREFIX_WORDS = {"": 0, "milli": -3, "micro": -6, "nano": -9, "pico": -12, "kilo": 3, "mega": 6}
 #: Quantity (its unit), and what one of a unit is of it.
 _SYMBOLS = {
-    "V": ("V", 1.0),
-    "A": ("A", 1.0),
-    "K": ("K", 1.0),
+    **{symbol: (symbol, 1.0) for symbol in ("V", "A", "K", "s", "Hz", "bar")},
     **dict.fromkeys(("ohm", "Ohm", "OHM", "Ω"), ("ohm", 1.0)),
     **dict.fromkeys(("torr", "Torr"), ("bar", 1.01325 / 760.0)),
-    "bar": ("bar", 1.0),
     "Pa": ("bar", 1e-5),
 }
 _WORDS = {
@@ -55,58 +34,42 @@ _WORDS = {
     **dict.fromkeys(("amp", "amps", "ampere", "amperes"), ("A", 1.0)),
     **dict.fromkeys(("ohm", "ohms"), ("ohm", 1.0)),
     **dict.fromkeys(("kelvin", "kelvins"), ("K", 1.0)),
+    **dict.fromkeys(("sec", "second", "seconds"), ("s", 1.0)),
     **dict.fromkeys(("pascal", "pascals"), ("bar", 1e-5)),
     "atm": ("bar", 1.01325),
     "mmhg": ("bar", 1.01325 / 760.0),
 }
-#: Of settings alone: in a heading `V_s` is no voltage in seconds.
-_SETTINGS = {
-    prefix + symbol: (symbol, power)
-    for prefix, power in _PREFIXES.items()
-    for symbol in ("s", "Hz", "V")
-}
-#: By name: quantity, power of ten, and what else one of the unit is.
+
+
+class _Unit(NamedTuple):
+    quantity: str  #: named by its unit
+    power: int  #: of ten
+    factor: float  #: what else one of the unit is of the quantity
+
+
 _UNITS = {
-    prefix + symbol: (quantity, power, factor)
+    prefix + symbol: _Unit(quantity, power, factor)
     for prefix, power in _PREFIXES.items()
     for symbol, (quantity, factor) in _SYMBOLS.items()
 }
 #: The same for words, in small letters.
 _UNIT_WORDS = {
-    prefix + word: (quantity, power, factor)
+    prefix + word: _Unit(quantity, power, factor)
     for prefix, power in _PREFIX_WORDS.items()
     for word, (quantity, factor) in _WORDS.items()
 }
+#: Of settings alone: in a heading `V_s` is no voltage in seconds.
+_OF_SETTINGS = {"s", "Hz"}
 #: Headings that name a time; of these alone a unit of time is one.
 TIMES = {"t", "time", "relative time", "elapsed time"}
-_TIME_WORDS = {
-    prefix + word: power
-    for prefix, power in _PREFIX_WORDS.items()
-    for word in ("sec", "second", "seconds")
-}
 _CELSIUS = {"°C", "degC", "C", "oC", "celsius", "Celsius", "degreesC", "degreesCelsius"}
 #: What µ, Ω and °C of other encodings (UTF-8 read twice, DOS, GBK, Shift-JIS, Mac) look like when
-#: a file is read as Windows' Latin-1.
+#: a file is read as Windows' Latin-1; what is part of another stands behind it.
 _MISREAD = {
-    "Âµ": "µ",
-    "Î¼": "µ",
-    "â„¦": "Ω",
-    "Î©": "Ω",
+    **dict.fromkeys(("â„ƒ", "øC", "¡æ", "¡ãC", "�Ž", "�‹C", "¡C"), "°C"),
+    **dict.fromkeys(("â„¦", "Î©", "ê", "¦¸", "ƒ¶", "½"), "Ω"),
+    **dict.fromkeys(("Âµ", "Î¼", "æ", "¦Ì", "ƒÊ"), "µ"),
     "Â°": "°",
-    "â„ƒ": "°C",
-    "æ": "µ",
-    "¦Ì": "µ",
-    "ƒÊ": "µ",
-    "ê": "Ω",
-    "¦¸": "Ω",
-    "ƒ¶": "Ω",
-    "½": "Ω",
-    "øC": "°C",
-    "¡æ": "°C",
-    "¡ãC": "°C",
-    "�Ž": "°C",
-    "�‹C": "°C",
-    "¡C": "°C",
 }
 #: Units a thousand times smaller, with which one is confused.
 _SMALLER = {"V": "mV", "mA": "µA"}
@@ -114,24 +77,18 @@ _SMALLER = {"V": "mV", "mA": "µA"}
 _BETWEEN = ("/", ",", " in ", " ", "_")
 
 
-def _known(unit: str) -> tuple[str, int, float] | None:
-    """Look up a unit: quantity, power of ten and factor; degrees Celsius have the quantity °C."""
-    if not 0 < len(unit) < 20:
+def _unit(text: str) -> _Unit | None:
+    """Look up a unit; degrees Celsius have the quantity °C."""
+    if not 0 < len(text) < 20:
         return None
+    misread = next((misread for misread in _MISREAD if misread in text), None)
+    if misread is not None:
+        text = text.replace(misread, _MISREAD[misread])
     # one spelling for the two signs of micro, of ohm, and for the compact degree
-    unit = unicodedata.normalize("NFKC", _as_meant(unit)).replace(" ", "")
-    if unit in _CELSIUS:
-        return "°C", 0, 1.0
-    return _UNITS.get(unit) or _UNIT_WORDS.get(unit.casefold())
-
-
-def _as_meant(unit: str) -> str:
-    """Return a unit as it was meant, if its file was read by another encoding."""
-    for misread, meant in _MISREAD.items():
-        # the longest first, as they stand in the list
-        if misread in unit:
-            return unit.replace(misread, meant)
-    return unit
+    text = unicodedata.normalize("NFKC", text).replace(" ", "")
+    if text in _CELSIUS:
+        return _Unit("°C", 0, 1.0)
+    return _UNITS.get(text) or _UNIT_WORDS.get(text.casefold())
 
 
 def is_unit(text: str) -> bool:
@@ -142,7 +99,8 @@ def is_unit(text: str) -> bool:
     >>> is_unit("µA"), is_unit("Volts"), is_unit("h")
     (True, True, False)
     """
-    return _known(text.strip()) is not None
+    unit = _unit(text.strip())
+    return unit is not None and unit.quantity not in _OF_SETTINGS
 
 
 def conversion(unit: str, inside: str, difference: bool = False) -> tuple[float, float] | None:
@@ -156,25 +114,15 @@ def conversion(unit: str, inside: str, difference: bool = False) -> tuple[float,
     >>> conversion("µA", "mA"), conversion("°C", "K"), conversion("degC", "K", difference=True)
     ((0.001, 0.0), (1.0, 273.15), (1.0, 0.0))
     """
-    if _SETTINGS.get(inside, ("",))[0] == "s":
-        power = _power_of_seconds(unit)
-        return None if power is None else (10.0 ** (power - _SETTINGS[inside][1]), 0.0)
-    found, (wanted, ours, part) = _known(unit), _UNITS[inside]
-    if found is None:
+    theirs, ours = _unit(unit), _UNITS[inside]
+    if theirs is None:
         return None
-    measured, theirs, factor = found
-    if (measured, wanted) == ("°C", "K"):
-        return 10.0**-ours, 0.0 if difference else ZERO_CELSIUS_K * 10.0**-ours
-    return (10.0 ** (theirs - ours) * (factor / part), 0.0) if measured == wanted else None
-
-
-def _power_of_seconds(unit: str) -> int | None:
-    """Return the power of ten that a unit of time is of a second; None if it is another unit."""
-    if not 0 < len(unit) < 20:
+    if (theirs.quantity, ours.quantity) == ("°C", "K"):
+        scale = 10.0**-ours.power
+        return scale, 0.0 if difference else ZERO_CELSIUS_K * scale
+    if theirs.quantity != ours.quantity:
         return None
-    plain = unicodedata.normalize("NFKC", _as_meant(unit)).replace(" ", "")
-    symbol, power = _SETTINGS.get(plain, ("", 0))
-    return power if symbol == "s" else _TIME_WORDS.get(plain.casefold())
+    return 10.0 ** (theirs.power - ours.power) * (theirs.factor / ours.factor), 0.0
 
 
 def unknown_unit(unit: str, inside: str, where: str) -> InputError:
@@ -204,7 +152,7 @@ def name_and_unit(heading: str) -> tuple[str, str | None]:
     for mark in _BETWEEN:
         name, _, unit = heading.rpartition(mark)
         name, unit = name.strip(" _/,"), unit.strip()
-        of_time = name.casefold() in TIMES and _power_of_seconds(unit) is not None
+        of_time = name.casefold() in TIMES and conversion(unit, "s") is not None
         if name and (is_unit(unit) or of_time):
             return name, unit
     return heading, None
@@ -230,11 +178,11 @@ def quantity(text: str) -> tuple[float | None, str]:
     >>> quantity("5,6e3 Ohm"), quantity("20°C"), quantity("many")
     ((5600.0, ' Ohm'), (20.0, '°C'), (None, 'many'))
     """
-    found = NUMBER.match(text[:LONGEST_NUMBER])
-    if found is None:
+    match = NUMBER.match(text[:LONGEST_NUMBER])
+    if match is None:
         return None, text
-    value = float(found[0].replace(",", ".").lower().replace("d", "e"))
-    return value if abs(value) <= LARGEST_NUMBER else None, text[found.end() :]
+    value = float(match[0].replace(",", ".").lower().replace("d", "e"))
+    return value if abs(value) <= LARGEST_NUMBER else None, text[match.end() :]
 
 
 def unit_behind(text: str) -> str:
@@ -314,15 +262,13 @@ def setting(text: str, inside: str, where: str, *, bare: bool = False) -> float:
     (5.0, 20000.0)
     """
     value, unit = quantity(text.strip())
-    unit = unicodedata.normalize("NFKC", unit).replace(" ", "")
-    symbol, theirs = _SETTINGS.get(unit or inside * bare, ("", 0))
-    wanted, ours = _SETTINGS[inside]
-    if value is None or symbol != wanted:
+    theirs, ours = _unit(unit or inside * bare), _UNITS[inside]
+    if value is None or theirs is None or theirs.quantity != ours.quantity:
         raise InputError(
             f"{where}: found '{shown(text)}', expected a number with a unit like {inside}"
         )
     # whole powers are exact: 250 ns are 0.25 µs to the last digit
-    power = theirs - ours
+    power = theirs.power - ours.power
     return value * 10.0**power if power >= 0 else value / 10.0**-power
 
 
