@@ -7,10 +7,10 @@ import time
 import numpy as np
 import pytest
 
+from hotlever import blocks
+from hotlever.blocks import find_blocks
 from hotlever.cells import number, text_lines
 from hotlever.errors import InputError
-from hotlever.raman import block
-from hotlever.raman.block import find_blocks
 from hotlever.tables import read_table
 from hotlever.units import conversion
 
@@ -137,7 +137,7 @@ def test_no_line_takes_long_to_read(tmp_path, part):
 def test_a_map_of_millions_of_numbers_is_read_and_more_are_refused(monkeypatch):
     lines = ["\t".join(["1234.5"] * 2000)] * 100
     assert find_blocks(lines, "map")[0].values.shape == (100, 2000)
-    monkeypatch.setattr(block, "MOST_NUMBERS", 100_000)
+    monkeypatch.setattr(blocks, "MOST_NUMBERS", 100_000)
     with pytest.raises(InputError, match="map: more than 100000 numbers"):
         find_blocks(lines, "map")
 

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import csv
 import math
+import re
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
 
 from hotlever.errors import InputError
+from hotlever.types import Array
 from hotlever.units import LARGEST_NUMBER, LONGEST_NUMBER, NUMBER
 
 MOST_LINES = 200_000  #: of a file, unless its reader says otherwise
 LONGEST_LINE = 2**17  #: characters; a spectrometer's map has some 40 000
 
+#: A line of nothing but numbers, in any dialect.
+_PLAIN = re.compile(r"[-+.0-9eE\s;,|]*", re.ASCII)
 _MISSING = {"", "nan", "-", "--", "n/a", "na"}
 #: What SCPI instruments write for "not a number".
 _NOT_A_NUMBER = 9.91e37
@@ -65,16 +73,6 @@ def text_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[str]:
     return lines
 
 
-def cells_of(line: str, separator: str | None) -> list[str]:
-    """Cells of a line (between any blanks without a separator); csv.Error if quotes do not end."""
-    if separator is None:
-        return [cell.strip('"') for cell in line.split()]
-    if '"' in line:
-        quoted = csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True)
-        return [cell.strip() for cell in next(quoted)]
-    return [cell.strip() for cell in line.split(separator)]
-
-
 def number(cell: str, decimal_comma: bool = False) -> float | None:
     """Return a cell's number: NaN where it says that there is none, None if it is something else.
 
@@ -92,3 +90,64 @@ def number(cell: str, decimal_comma: bool = False) -> float | None:
             return math.nan
         return value if abs(value) <= LARGEST_NUMBER else None
     return math.nan if cell.lower() in _MISSING else None
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How lines are cells and cells numbers."""
+
+    separator: str | None  #: None is any run of blanks
+    decimal_comma: bool = False
+    grouped: bool = False  #: whether the other sign may stand between thousands
+
+    def cells(self, line: str) -> list[str] | None:
+        """Return a line's cells, None if quotes do not end."""
+        line = line.strip(" ")
+        if self.separator is None:
+            return [cell.strip('"') for cell in line.split()]
+        if '"' not in line:
+            return [cell.strip() for cell in line.split(self.separator)]
+        quoted = csv.reader([line], delimiter=self.separator, skipinitialspace=True, strict=True)
+        try:
+            return [cell.strip() for cell in next(quoted)]
+        except csv.Error:
+            return None
+
+    def number(self, cell: str) -> float | None:
+        """Return a cell's number as `number` does, with marks of thousands if they are grouped."""
+        value = number(cell, self.decimal_comma)
+        if value is not None or not self.grouped:
+            return value
+        sign, other = ",." if self.decimal_comma else ".,"
+        grouped = rf"[+-]?[1-9]\d{{0,2}}([{other}'’\s]\d{{3}})+([{sign}]\d*)?"
+        if not re.fullmatch(grouped, cell[:LONGEST_NUMBER]):
+            return None
+        return number(re.sub(rf"[^\d{sign}+-]", "", cell), self.decimal_comma)
+
+    def row(self, line: str) -> Array | None:
+        """Return the numbers of a line, NaN for blank cells, None if it holds anything else."""
+        comma = self.decimal_comma
+        plain = _PLAIN.fullmatch(line) and not (comma and "." in line)
+        cells = self.cells(line.replace(",", ".") if plain and comma else line)
+        if not cells:
+            return None
+        # nearly every line has nothing but numbers, and maps have millions
+        if plain:
+            with suppress(ValueError):
+                row = np.array([float(cell) if cell else math.nan for cell in cells])
+                # fmax leaves NaN out
+                largest = np.fmax.reduce(np.abs(row))
+                return row if largest <= LARGEST_NUMBER else None
+            cells = self.cells(line) or []
+        values = [self.number(cell) for cell in cells]
+        row = np.array(values, dtype=float)
+        return None if None in values or np.isnan(row).all() else row
+
+
+#: In the order in which they are tried.
+DIALECTS = [
+    Dialect(separator, decimal_comma)
+    for separator in ("\t", ";", ",", "|", None)
+    for decimal_comma in (False, True)
+    if (separator, decimal_comma) != (",", True)
+]

@@ -6,17 +6,15 @@ the lines above them mean is for the caller to know.
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import os
 import re
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from hotlever.cells import cells_of, number, text_lines
+from hotlever.cells import DIALECTS, Dialect, text_lines
 from hotlever.errors import InputError, quoted, shown, unknown_name
 from hotlever.files import read_bytes
 from hotlever.types import Array
@@ -55,8 +53,7 @@ class Table:
     names: list[str]
     rows: list[list[str]]  #: each as long as `names`
     lines: list[int]  #: numbers of the header row (or the first) and of each row
-    separator: str | None  #: None is any run of blanks
-    decimal_comma: bool
+    dialect: Dialect
     #: Rows without numbers between header and data, with their numbers.
     remarks: list[tuple[int, str]] = field(default_factory=list)
 
@@ -99,14 +96,14 @@ class Table:
             If a cell is something else, or may be of thousands; it names the quantity as `name`.
         """
         cells = [row[column] for row in self.rows]
-        values = [number(cell, self.decimal_comma) for cell in cells]
+        values = [self.dialect.number(cell) for cell in cells]
         if None in values:
             row = values.index(None)
-            hint = " with a decimal comma, as elsewhere in the file" * self.decimal_comma
+            hint = " with a decimal comma, as elsewhere in the file" * self.dialect.decimal_comma
             raise InputError(
                 f"{self.where(row)}: {name}: found '{shown(cells[row])}', expected a number{hint}"
             )
-        if self.decimal_comma:
+        if self.dialect.decimal_comma:
             commas = [row for row, cell in enumerate(cells) if "," in cell]
             if (
                 commas
@@ -193,7 +190,8 @@ def read_table(
     if reader.skipping or not rows:
         where = f"line {reader.skipping}: another table" if reader.skipping else "no data rows"
         raise InputError(f"{path}: {where} after the header")
-    comma = any("," in cell and number(cell, True) is not None for row in rows for cell in row)
+    with_comma = Dialect(reader.separator, decimal_comma=True)
+    comma = any("," in cell and with_comma.number(cell) is not None for row in rows for cell in row)
     return Table(
         path=str(path),
         sha256=hashlib.sha256(raw).hexdigest(),
@@ -201,8 +199,7 @@ def read_table(
         names=[] if at is None else reader.with_units(comments) if known else names,
         rows=rows,
         lines=places,
-        separator=reader.separator,
-        decimal_comma=comma,
+        dialect=Dialect(reader.separator, comma),
         remarks=reader.remarks,
     )
 
@@ -244,13 +241,13 @@ class _Reader:
             self.names[0] = self.names[0].lstrip(_MARKS)
 
     def _cells(self, place: int, line: str, separator: str | None) -> list[str]:
-        try:
-            return cells_of(line, separator)
-        except csv.Error:
+        cells = Dialect(separator).cells(line)
+        if cells is None:
             raise InputError(
                 f"{self._path}: line {place}: found '{shown(line)}', expected quotes in pairs "
                 "around a cell"
-            ) from None
+            )
+        return cells
 
     def takes(self, place: int, line: str) -> bool:
         """Take a line as a row if it is one; return whether it has been used."""
@@ -316,17 +313,14 @@ def _row_of_numbers(line: str, width: int | None = None) -> tuple[str | None, in
     """Return separator and number of cells of a row of nothing but numbers; None if it is not."""
     if not NUMBER.match(line.lstrip('" \t;,')[:LONGEST_NUMBER]):
         return None
-    for separator in ("\t", ";", ",", None):
-        try:
-            cells = cells_of(line, separator)
-        except csv.Error:
+    for dialect in DIALECTS:
+        row = dialect.row(line)
+        if row is None:
             continue
-        while width and len(cells) > width and not cells[-1]:
-            cells.pop()
-        values = [value for cell in cells for value in (number(cell), number(cell, True))]
-        pairs = list(zip(values[::2], values[1::2], strict=True))
-        if len(cells) == (width or len(cells)) > 1 and all(pair != (None, None) for pair in pairs):
-            return separator, len(cells)
+        blank = width is not None and row.size > width and bool(np.isnan(row[width:]).all())
+        count = width if width is not None and blank else row.size
+        if count == (width or count) > 1:
+            return dialect.separator, count
     return None
 
 
@@ -334,9 +328,8 @@ def _headings(line: str) -> list[str]:
     """Split a header row; one without separators between its names, not before a unit."""
     line = line.strip(_MARKS)
     separator = next((mark for mark in "\t;," if mark in line), None)
-    if separator is not None:
-        with suppress(csv.Error):
-            return cells_of(line, separator)
+    if separator is not None and (cells := Dialect(separator).cells(line)) is not None:
+        return cells
     names: list[str] = []
     for word in line.split():
         if names and (word[0] in "([{</" or names[-1].endswith("/")):

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from hotlever.blocks import find_blocks
 from hotlever.cells import decode
 from hotlever.errors import InputError
-from hotlever.raman.block import find_blocks
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.reading import read_file, read_spectra, read_spectrum, spectrum_files
 from hotlever.raman.spectrum import temperature_in_metadata, temperature_in_name

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hotlever.cells import number, text_lines
+from hotlever.cells import text_lines
 from hotlever.datasets import COLUMNS, OBSERVABLES
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_bytes
@@ -222,7 +222,7 @@ def _told(symbol: str, heading: str = "HEADING") -> str:
 
 def _are_brief(table: Table, column: Column) -> bool:
     """Whether times are numbers, and close enough to each other for what is measured in time."""
-    if number(table.rows[0][column.place], table.decimal_comma) is None:
+    if table.dialect.number(table.rows[0][column.place]) is None:
         return False  # clocks show no numbers
     times = column.values(table)
     return bool(0.0 < np.nanmax(times, initial=-np.inf) - np.nanmin(times, initial=np.inf) <= BRIEF)

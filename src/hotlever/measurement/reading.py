@@ -137,8 +137,10 @@ def _complete_at_rest(contents: Contents, circuit: Circuit | None) -> str:
 def _understood(contents: Contents, order: str) -> tuple[tuple[str, ...], ...]:
     """Return what was understood, as rows of a table: what, as what, and where it stands."""
     table = contents.table
-    separator = {"\t": "tabs", ";": "semicolons", ",": "commas", None: "blanks"}[table.separator]
-    rows = [(table.path, separator + ", decimal comma" * table.decimal_comma, order)]
+    dialect = table.dialect
+    separator = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", None: "blanks"}
+    cells = separator[dialect.separator] + ", decimal comma" * dialect.decimal_comma
+    rows = [(table.path, cells, order)]
     for symbol, column in COLUMNS.items():
         values = contents.values[symbol]
         count = int(np.isfinite(values).sum())

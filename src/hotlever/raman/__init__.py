@@ -1,9 +1,9 @@
 """Raman thermometry: from silicon's spectra to the tip temperature with its error.
 
-Section III of Spieser et al. 2017. A spectrum (`spectrum`) is read from a file (`reading`; `block`
-and `layout` know text, `makers` their own formats) and fitted for its line (`lineshape`, `noise`,
-`fit`, `peak`), with what is said of it by hand (`correction`); a hot-plate series (`series`) gives
-a calibration (`calibration`); a thermometer (`thermometer`) turns line positions into temperatures.
+Section III of Spieser et al. 2017. A spectrum (`spectrum`) is read from a file (`reading`; `layout`
+knows text, `makers` their own formats) and fitted for its line (`lineshape`, `noise`, `fit`,
+`peak`), with what is said of it by hand (`correction`); a hot-plate series (`series`) gives a
+calibration (`calibration`); a thermometer (`thermometer`) turns line positions into temperatures.
 """
 # ruff: noqa: F401 (what is imported here is what the package offers)
 

@@ -70,7 +70,7 @@ def join(log: Table, spectra: xr.Dataset) -> str:
     out = io.StringIO()
     for _, line in log.comments:
         out.write(line + "\n")
-    writer = csv.writer(out, delimiter=log.separator or ",", lineterminator="\n")
+    writer = csv.writer(out, delimiter=log.dialect.separator or ",", lineterminator="\n")
     writer.writerow([log.names[j] for j in keep] + [TEMPERATURE, ERROR])
     temperature, error = spectra.temperature_K.values, spectra.temperature_error_K.values
     for cells, found in zip(log.rows, matched, strict=True):
@@ -79,7 +79,7 @@ def join(log: Table, spectra: xr.Dataset) -> str:
             # an error is never written as 0
             digits = ".1f" if error[found] >= 0.1 else ".2g"
             numbers = [f"{temperature[found]:.1f}", f"{error[found]:{digits}}"]
-            if log.decimal_comma:
+            if log.dialect.decimal_comma:
                 numbers = [number.replace(".", ",") for number in numbers]
         writer.writerow([cells[j] for j in keep] + numbers)
     return out.getvalue()

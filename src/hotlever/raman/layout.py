@@ -11,8 +11,8 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from hotlever.blocks import Block
 from hotlever.errors import InputError, shown
-from hotlever.raman.block import Block
 from hotlever.raman.peak import MIN_SAMPLES, WINDOW, in_window
 from hotlever.raman.spectrum import (
     Spectrum,

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
+from hotlever.blocks import MOST_LINES, find_blocks
 from hotlever.cells import text_lines
 from hotlever.errors import InputError
 from hotlever.files import LARGEST_TEXT, read_bytes
-from hotlever.raman.block import MOST_LINES, find_blocks
 from hotlever.raman.layout import pick_spectra, require_line
 from hotlever.raman.makers import MAKERS, WDF_SIGNATURE, read_makers
 from hotlever.raman.noise import zeros

@@ -6,65 +6,28 @@ file rows of numbers.
 
 from __future__ import annotations
 
-import csv
-import math
 import re
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
 
-from hotlever.cells import cells_of, number
+from hotlever.cells import DIALECTS, Dialect
 from hotlever.errors import InputError, shown
 from hotlever.types import Array
-from hotlever.units import LARGEST_NUMBER, key_and_value
+from hotlever.units import key_and_value
 
 #: Of a file; a map of 500 spectra below each other has half a million lines.
 MOST_LINES, MOST_NUMBERS = 600_000, 10_000_000
 
 
-@dataclass(frozen=True)
-class Dialect:
-    """How lines are cells and cells numbers."""
-
-    separator: str | None  #: None is any run of blanks
-    comma: bool  #: the decimal sign
-    grouped: bool = False  #: whether the other sign may stand between thousands
-
-    def number(self, cell: str) -> float | None:
-        """Return a cell's number, NaN for a blank, None if it is something else."""
-        found = number(cell, self.comma)
-        if found is None and self.grouped:
-            sign, other = ",." if self.comma else ".,"
-            if re.fullmatch(
-                rf"[+-]?[1-9]\d{{0,2}}([{other}'’\s]\d{{3}})+([{sign}]\d*)?", cell[:60]
-            ):
-                return number(re.sub(rf"[^\d{sign}+-]", "", cell), self.comma)
-        return found
-
-    def cells(self, line: str) -> list[str] | None:
-        """Return a line's cells, None if quotes do not end."""
-        try:
-            return cells_of(line.strip(" "), self.separator)
-        except csv.Error:
-            return None
-
-
-_DIALECTS = [
-    Dialect(separator, comma)
-    for separator in ("\t", ";", ",", "|", None)
-    for comma in (False, True)
-    if (separator, comma) != (",", True)
-]
 _SAMPLE_LINES = 40
 _RIVAL = 0.25  # part of the rows that may be of another width
 _MOST_GAPS = 0.1  # of rows; where more have no number, the file means something else
 _SPLIT = re.compile(r",0\d+(,|$)")  # a decimal comma's digits, taken for a cell
 _FEWEST_ROWS = 12  # of a further block; a spectrum has more
-_PLAIN = re.compile(r"[-+.0-9eE\s;,|]*", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -105,7 +68,7 @@ def find_blocks(lines: list[str], where: str) -> list[Block]:
     rows: list[Array | None] = []
     size = 0
     for line in lines:
-        rows.append(row := _row(line, dialect))
+        rows.append(row := dialect.row(line))
         size += 0 if row is None else row.size
         if size > MOST_NUMBERS:
             raise InputError(f"{where}: more than {MOST_NUMBERS} numbers, expected fewer")
@@ -204,37 +167,13 @@ def _dialect(lines: list[str]) -> Dialect:
     sample = tail[:: max(len(tail) // _SAMPLE_LINES, 1)]
 
     def fit(dialect: Dialect) -> tuple[int, int]:
-        rows = [row for line in sample if (row := _row(line, dialect)) is not None]
+        rows = [row for line in sample if (row := dialect.row(line)) is not None]
         return sum(int(np.count_nonzero(~np.isnan(row)) >= 2) for row in rows), len(rows)
 
-    best = max(_DIALECTS, key=fit)
-    grouped = [replace(dialect, grouped=True) for dialect in _DIALECTS]
+    best = max(DIALECTS, key=fit)
+    grouped = [replace(dialect, grouped=True) for dialect in DIALECTS]
     # 1,234 is a number with a decimal comma before it is one in the thousands
     return replace(best, grouped=True) if fit(best)[0] else max(grouped, key=fit)
-
-
-def _row(line: str, dialect: Dialect) -> Array | None:
-    """The numbers of a line, NaN for blank cells, or None if it holds anything else."""
-    comma = dialect.comma
-    plain = _PLAIN.fullmatch(line) and not (comma and "." in line)
-    cells = dialect.cells(line.replace(",", ".") if plain and comma else line)
-    if not cells:
-        return None
-    # nearly every line has nothing but numbers, and maps have millions
-    if plain:
-        with suppress(ValueError):
-            row = np.array([float(cell) if cell else math.nan for cell in cells])
-            # fmax leaves NaN out
-            largest = np.fmax.reduce(np.abs(row))
-            return row if largest <= LARGEST_NUMBER else None
-        cells = dialect.cells(line) or []
-    values = []
-    for cell in cells:
-        if (value := dialect.number(cell)) is None:
-            return None
-        values.append(value)
-    row = np.array(values)
-    return None if np.isnan(row).all() else row
 
 
 def _names(above: list[str], dialect: Dialect, width: int) -> tuple[list[str], int]:
