@@ -32,7 +32,7 @@ CASES = (
 def solved(problem: TransientProblem, x: np.ndarray, stops: np.ndarray) -> np.ndarray:
     """Return the unknowns at some times, the first where they are `x`, (times, size + 1)."""
     equations, space = problem.equations, problem.equations.space
-    stored, one, rate, begins = space.is_temperature, np.arange(1), 1e9, float(stops[0])
+    stored, rate, begins = space.is_temperature, 1e9, float(stops[0])
     known: dict[str, Any] = {}
 
     def residual(t, y, moving, out):
@@ -48,14 +48,14 @@ def solved(problem: TransientProblem, x: np.ndarray, stops: np.ndarray) -> np.nd
         known["factors"] = problem.factorised(np.array(y)[:, None], rate)
 
     def precondition(t, y, moving, rest, right, out, rate, delta):
-        out[:] = known["factors"].solve(np.array(right)[:, None], one)[:, 0]
+        out[:] = known["factors"].solve(np.array(right)[:, None])[:, 0]
 
     # the potentials that belong to the temperatures, and slopes, as if within an instant
     for _ in range(4):
         rest = problem.residual(begins, x)
         rest[stored] = 0.0
-        x = x - problem.factorised(x, rate).solve(rest, one)
-    slope = -rate * problem.factorised(x, rate).solve(problem.residual(begins + 1.0 / rate, x), one)
+        x = x - problem.factorised(x, rate).solve(rest)
+    slope = -rate * problem.factorised(x, rate).solve(problem.residual(begins + 1.0 / rate, x))
     solver = ida.IDA(
         residual,
         algebraic_idx=np.flatnonzero(~stored),
@@ -78,7 +78,7 @@ def by_ida(lever: Lever, waveform: Waveform, times: np.ndarray) -> np.ndarray:
     equations, space = lever.equations, lever.space
     x = np.zeros((space.size + 1, 1))
     if waveform.before_V:
-        x = lever.solve([waveform.before_V])[0].x
+        x = lever.solve([waveform.before_V])[0].unknowns
     found: list[list[float]] = []
     for piece in waveform.pieces(float(times[-1])):
         inside = times[(times > piece.start) & (times <= piece.end)]

@@ -103,4 +103,4 @@ def test_a_lever_without_reader_works_in_air():
 def test_a_space_in_vacuum_is_surrounded_as_the_probe_says(coarse, in_air):
     lever = Lever(in_air.probe, COARSE, space=coarse.space)
     np.testing.assert_array_equal(lever.space.air.operator.matrix, in_air.space.air.operator.matrix)
-    assert Lever(coarse.probe, COARSE, space=in_air.space).space.air is None
+    assert Lever(coarse.probe, COARSE, space=in_air.space).space.air.medium == "vacuum"

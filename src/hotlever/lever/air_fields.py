@@ -37,7 +37,7 @@ class AirFields:
     """
 
     def __init__(self, lever: Lever) -> None:
-        if lever.space.air is None:
+        if lever.medium == "vacuum":
             raise InputError("the lever is in vacuum, expected one in air")
         self._lever, self._air = lever, lever.space.air
         self._base = lever.circuit.base_temperature_K

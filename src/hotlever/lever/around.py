@@ -10,10 +10,9 @@ from scipy.sparse.linalg import eigsh
 
 from hotlever.air.operator import PanelledAir
 from hotlever.air.panels import PanelOptions
-from hotlever.air.stores import AirStores, stores_of
+from hotlever.air.stores import AirStores, HeatInAir, stores_of
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.space import PER_CM3_TO_NANO_PER_UM3, PER_CM_TO_MILLI_PER_UM
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
 from hotlever.probe import Layout
@@ -29,7 +28,7 @@ _MODES, _PANELS = 48, PanelOptions(refinement=0.5)
 class AroundLever:
     """Makes the heat in the air around a lever once it is asked for.
 
-    See `hotlever.lever.heat_in_air`.
+    See `hotlever.air.stores`.
     """
 
     def __init__(

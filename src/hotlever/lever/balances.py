@@ -54,20 +54,19 @@ def balance_columns(equations: LeverEquations, x: Array) -> Array:
     Currents and heats at terminals are consistent fluxes: reactions of the weak form at the nodes
     of each. The names are `balance_names`.
     """
-    theta = None if equations.space.air is None else equations.kirchhoff(x)[0]
+    theta = equations.kirchhoff(x)[0]
     return _balances(equations, x, equations.fluxes(x), theta)
 
 
 def balance_slopes(equations: LeverEquations, x: Array, slopes: Array) -> Array:
     """Return how the `balance_columns` of states change with changes (size + 1, n) of them."""
-    air = equations.space.air
-    theta = None if air is None else equations.kirchhoff(x)[1] * air.rise(slopes)
+    theta = equations.kirchhoff(x)[1] * equations.space.air.rise(slopes)
     return _balances(equations, slopes, equations.flux_changes(x, slopes), theta)
 
 
 def heat_left(equations: LeverEquations, x: Array) -> Array:
     """Return the heat that leaves states by the leg ends and into the air (mW), (n,)."""
-    theta = None if equations.space.air is None else equations.kirchhoff(x)[0]
+    theta = equations.kirchhoff(x)[0]
     by_ends, into_air, _ = _heat_out(equations.space, equations.fluxes(x), theta)
     return by_ends + into_air
 
@@ -79,18 +78,15 @@ def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
     return heat.sum(axis=0), space.end_test[0] @ heat
 
 
-def _heat_out(space: Space, fluxes: Fluxes, theta: Array | None) -> tuple[Array, Array, Array]:
+def _heat_out(space: Space, fluxes: Fluxes, theta: Array) -> tuple[Array, Array, Array]:
     """Return the heat through the leg ends and into the air, and the heat source by point."""
     heat = space.weighted(np.concatenate([fluxes.heat_source[None], fluxes.heat]))
     by_ends = -np.einsum("dp,dpn->n", space.end_test, heat)
-    into_air = np.zeros_like(by_ends)
-    if theta is not None:
-        into_air, at_ends = space.air.heat(theta)
-        by_ends = by_ends - at_ends
-    return by_ends, into_air, heat[0]
+    into_air, at_ends = space.air.heat(theta)
+    return by_ends - at_ends, into_air, heat[0]
 
 
-def _balances(equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array | None) -> Array:
+def _balances(equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array) -> Array:
     """Return the balances of states, fluxes and θ at the sites of the air; all are linear."""
     space = equations.space
     assert isinstance(space, FullSpace)  # a reduced lever has no ends

@@ -54,9 +54,7 @@ class LeverEquations(LawsAtPoints):
         weak = self.space.weak_form(self.fluxes(x))
         if self.space.wired:
             weak[self.space.contacts] += self._into_contacts(x) - self.source_mA[:, None]
-        if self.space.air is not None:
-            weak += self.space.air.weak_form(self.kirchhoff(x)[0])
-        return weak
+        return weak + self.space.air.weak_form(self.kirchhoff(x)[0])
 
     def _into_contacts(self, x: Array) -> Array:
         """Return G V (mA) at the contacts, (contacts, ...), of states or of changes of them."""
@@ -73,11 +71,8 @@ class LeverEquations(LawsAtPoints):
         if per_us:
             stored = per_us * self.heat_density(self.at(x)[0].T)[1]
             tangent = replace(tangent, heat_source_T=tangent.heat_source_T + stored)
-        air = None
-        if self.space.air is not None:
-            own = self.heat_in_air if per_us else None
-            taken_up = None if own is None else own.taken_up(per_us)
-            air = AirTangent(self.kirchhoff(x)[1], taken_up)
+        taken_up = self.heat_in_air.taken_up(per_us) if per_us else None
+        air = AirTangent(self.kirchhoff(x)[1], taken_up)
         return self.space.factorised(tangent, air, constraint, self.conductance)
 
     # --- derivatives --------------------------------------------------------------------------
@@ -105,11 +100,9 @@ class LeverEquations(LawsAtPoints):
         """Return how `balance` changes with the unknowns: the Jacobian times changes."""
         weak = self.space.weak_form(self.flux_changes(x, change))
         weak[self.space.contacts] += self._into_contacts(change)
-        if self.space.air is not None:
-            kappa = self.kirchhoff(x)[1]
-            kappa = kappa if change.ndim == 2 else kappa[..., None]
-            weak += self.space.air.weak_form(kappa * self.space.air.rise(change))
-        return weak
+        kappa = self.kirchhoff(x)[1]
+        kappa = kappa if change.ndim == 2 else kappa[..., None]
+        return weak + self.space.air.weak_form(kappa * self.space.air.rise(change))
 
     def by_parameter(self, x: Array, names: Sequence[str]) -> Array:
         """Return how `balance` changes with parameters or dimensions, (size + 1, n, k)."""
@@ -131,8 +124,6 @@ class LeverEquations(LawsAtPoints):
             changes.heat[..., column] += moved.heat
             changes.charge[..., column] += moved.charge
         weak = self.space.weak_form(changes)
-        if self.space.air is None:
-            return weak
         air, (theta, kappa_air) = self.space.air, self.kirchhoff(x)
         for column, name in enumerate(names):
             if name == GAS:

@@ -15,10 +15,10 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
+from hotlever.air.coupling import AirLoss
 from hotlever.air.operator import AirOperator
-from hotlever.lever.air_loss import AirLoss, AirSolver
+from hotlever.air.stores import HeatInAir
 from hotlever.lever.elements import FiniteElements, sums_by_index
-from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.space import (
     FAR,
     AirTangent,
@@ -66,7 +66,7 @@ class FullSpace(Space):
         elements: FiniteElements | None = None,
         wiring: Wiring | None = None,
     ) -> None:
-        self.mesh, self.air = mesh, None
+        self.mesh = mesh
         self.wiring = wiring or Circuit().wiring(mesh.terminal_facets)
         self.elements = elements or FiniteElements(mesh.elements)
         self.end_nodes = {
@@ -89,6 +89,7 @@ class FullSpace(Space):
         self.wired = self.wiring.contacts
         self.contacts = np.array([self._V[self.contact_nodes[name][0]] for name in self.wired], int)
         self._lay_out_matrix()
+        self.air = AirLoss.nothing(self.size + 1)
         measured = "reader" in (*self.wiring.senses, *self.wired)
         self.reader = self.potential_at("reader") if measured else None
         sampling, points = self.elements.sampling, self.elements.weights.size
@@ -247,19 +248,24 @@ class FullSpace(Space):
 
     # --- the air ----------------------------------------------------------------------------------
 
-    def in_air(
-        self, air: AirOperator | None, around: Callable[[float], HeatInAir] | None = None
-    ) -> FullSpace:
-        """Return the same space with this air around it, or in vacuum; everything is shared."""
+    def in_vacuum(self) -> FullSpace:
+        """Return the same space in vacuum; everything is shared."""
         space = copy(self)
-        space.air = None
-        if air is not None:
-            element, shares, _ = self.elements.at_points(air.sites)
-            nodes = self.elements.dofs.shape[1]
-            slots = self._slots[element, :nodes, :nodes]
-            unknowns = self._T[self.elements.dofs[element]]
-            space.air = AirLoss(air, unknowns, shares, slots, self.size + 1)
-            space.air.around = around
+        space.air = AirLoss.nothing(self.size + 1)
+        return space
+
+    def in_air(self, air: AirOperator, around: Callable[[float], HeatInAir]) -> FullSpace:
+        """Return the same space with this air around it; everything is shared.
+
+        What the air takes up in time is made once it is asked for.
+        """
+        element, shares, _ = self.elements.at_points(air.sites)
+        nodes = self.elements.dofs.shape[1]
+        slots = self._slots[element, :nodes, :nodes]
+        unknowns = self._T[self.elements.dofs[element]]
+        space = copy(self)
+        space.air = AirLoss(air, unknowns, shares, slots, self.size + 1)
+        space.air.around = around
         return space
 
     def in_gas(self, conductivity: float) -> FullSpace:
@@ -311,21 +317,17 @@ class FullSpace(Space):
         self._starts = np.searchsorted(unique // count, np.arange(count + 1)).astype(np.int32)
 
     def factorised(
-        self, tangent: Tangent, air: AirTangent | None, constraint: Constraint, conductance: Array
+        self, tangent: Tangent, air: AirTangent, constraint: Constraint, conductance: Array
     ) -> SparseFactors:
         """Put the Jacobians of all states together, the constraint last, and factorise."""
         solvers = []
         for state in range(tangent.sigma.shape[-1]):
+            kappa = air.kappa[:, state]
             entries = self._assembled(tangent.of(state))
             entries[self._contact_slots] += conductance
-            if self.air is None or air is None:
-                solvers.append(self._lu(entries, constraint.among(state)))
-                continue
-            kappa = air.kappa[:, state]
-            local = entries + self.air.local_entries(kappa, self._entries)
-            solvers.append(
-                AirSolver(self._lu(local, constraint.among(state)), self.air, kappa, air.taken_up)
-            )
+            entries += self.air.local_entries(kappa, self._entries)
+            factors = self._lu(entries, constraint.among(state))
+            solvers.append(self.air.solver(factors, kappa, air.taken_up))
         return SparseFactors(solvers)
 
     def _assembled(self, tangent: Tangent) -> Array:

@@ -15,8 +15,8 @@ from typing import Self
 
 import numpy as np
 
+from hotlever.air.stores import HeatInAir
 from hotlever.errors import ComputationError
-from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.motion import Motion
 from hotlever.lever.space import (
     PER_CM3_TO_NANO_PER_UM3,
@@ -209,7 +209,7 @@ class LawsAtPoints:
         total = Conductivities.zero(T.shape, names)
         for film in self._films:
             film.add_to(total, T, names)
-        if self.space.air is not None:
+        if self.space.air.filling:
             self._take_off_air(total, T, names)
         return total
 
@@ -276,7 +276,10 @@ class LawsAtPoints:
     def kirchhoff(self, x: Array) -> tuple[Array, Array]:
         """Return θ (mW/µm) and κ (mW/(K µm)) of the gas at the sites of the air operator."""
         base = self.base_temperature_K
-        theta, by = kirchhoff_variable(base + self.space.air.rise(x), base)
+        rise = self.space.air.rise(x)
+        if not rise.size:
+            return rise, rise
+        theta, by = kirchhoff_variable(base + rise, base)
         unit = PER_CM_TO_MILLI_PER_UM * self.space.air.gas_conductivity
         return unit * theta, unit * by["T"]
 
@@ -310,9 +313,10 @@ class LawsAtPoints:
         return changes
 
     @property
-    def heat_in_air(self) -> HeatInAir | None:
-        """Heat that the air takes up itself; None in vacuum, or where that is not known."""
-        return None if self.space.air is None else self.space.air.stores
+    def heat_in_air(self) -> HeatInAir:
+        """Heat that the air takes up itself; nothing in vacuum, or where that is not known."""
+        stores: HeatInAir = self.space.air.stores
+        return stores
 
     @cached_property
     def _cold_heat(self) -> Array:

@@ -84,7 +84,7 @@ class Lever:
         if space is None and mesh is None:
             space = chosen_space(self.probe)
         self.space = space or flat_space(self.probe.layout(), self._mesh, self.probe.wiring)
-        if (self.space.air is None) != (self.medium == "vacuum"):
+        if self.space.air.medium != self.medium:
             self.space = self._surrounded(self.space, progress)
         self._prepare()
 
@@ -95,7 +95,7 @@ class Lever:
     def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
         """Return a space in the probe's surroundings."""
         if self.medium == "vacuum":
-            return space.in_air(None)
+            return space.in_vacuum()
         base, around = self.circuit.base_temperature_K, self.probe.surroundings
         air = air_operator(self._plate, around, base, self.panels, progress)
         lever = AroundLever(space, self._plate, around, base)
@@ -370,12 +370,20 @@ class State:
     x : ndarray, shape (size + 1, 1)
         Unknowns, see `hotlever.lever.space`.
     in_air : ndarray, shape (stores, 1), or None
-        Temperatures in the air in time, see `hotlever.lever.heat_in_air`; None at rest.
+        Temperatures in the air in time, see `hotlever.air.stores`; None at rest.
     """
 
     lever: Lever
     x: Array
     in_air: Array | None = None
+
+    @property
+    def unknowns(self) -> Array:
+        """The unknowns and below them the temperatures in the air, (size + 1 + stores, 1)."""
+        in_air = self.in_air
+        if in_air is None:
+            in_air = self.lever.equations.heat_in_air.follows(self.x)
+        return np.concatenate([self.x, in_air])
 
     @cached_property
     def _shown(self) -> list[float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 
-from hotlever.lever.air_loss import AirLoss
+from hotlever.air.coupling import AirLoss
 from hotlever.lever.branch import Branch, Reach
 from hotlever.lever.continuation import continued
 from hotlever.lever.equations import GAP, LeverEquations
@@ -65,11 +65,9 @@ class SimilarLevers:
         space.air = self._air(probe, names)
         return space
 
-    def _air(self, probe: Probe, names: tuple[str, ...]) -> AirLoss | None:
+    def _air(self, probe: Probe, names: tuple[str, ...]) -> AirLoss:
         """Return the air around a similar probe."""
         air, around = self._lever.space.air, probe.surroundings
-        if air is None:
-            return None
         if around.gas_conductivity != air.gas_conductivity:
             air = air.in_gas(around.gas_conductivity)
         own = self._lever.probe.surroundings.surface_gap_um

@@ -211,7 +211,7 @@ class AirTangent:
     kappa : ndarray, shape (sites, n)
         κ of the air at the sites (mW/(K µm)).
     taken_up : ndarray, shape (m, m), or None
-        What the air takes up itself, see `hotlever.lever.heat_in_air`; None at rest.
+        What the air takes up itself, see `hotlever.air.stores`; None at rest.
     """
 
     kappa: Array
@@ -278,8 +278,8 @@ class Space(ABC):
         The same of each terminal by itself, where leg ends may differ.
     elements : FiniteElements
         Of the nodes; see `hotlever.lever.elements`.
-    air : AirLoss, ReducedAir or None
-        The air around the lever; see `hotlever.lever.air_loss`.
+    air : AirLoss or ReducedAir
+        The air around the lever; see `hotlever.air.coupling`.
     """
 
     #: Whether its states are combinations of modes, which are good so far as they were made for.
@@ -348,7 +348,7 @@ class Space(ABC):
 
     @abstractmethod
     def factorised(
-        self, tangent: Tangent, air: AirTangent | None, constraint: Constraint, conductance: Array
+        self, tangent: Tangent, air: AirTangent, constraint: Constraint, conductance: Array
     ) -> Factors:
         """Put the Jacobians of all states together, the constraint last, and factorise.
 

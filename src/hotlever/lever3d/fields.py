@@ -57,10 +57,10 @@ def _of_vertices(state: State) -> tuple[Array, Array]:
 def _temperature(state: State) -> Array:
     """Return the temperature (K) at all vertices of Netgen's mesh; without meaning in the image."""
     lever = _solid(state)
-    solid, base, air = lever.solid, lever.circuit.base_temperature_K, lever.space.air
+    solid, base, air = lever.solid, lever.circuit.base_temperature_K, lever.space.air.operator
     temperature = np.full(len(solid.netgen.Coordinates()), base)
-    if air is not None:
-        theta = air.operator.at_vertices(lever.in_the_air(state)[0])
+    if lever.medium == "air":
+        theta = air.at_vertices(lever.in_the_air(state)[0])
         temperature = temperature_from_kirchhoff(theta / PER_CM_TO_MILLI_PER_UM, base)
     temperature[solid.vertices] = _of_vertices(state)[0]
     return temperature
@@ -82,7 +82,7 @@ def temperature_at(state: State, points: Array) -> Array:
         K, linear between the vertices of the mesh; NaN outside the sphere.
     """
     lever = _solid(state)
-    if lever.space.air is None:
+    if lever.medium == "vacuum":
         raise InputError("this lever is in vacuum: expected one in air")
     air = lever.space.air.operator
     ng = ngsolve()

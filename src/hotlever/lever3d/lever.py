@@ -189,7 +189,7 @@ class SolidLever(Lever):
         return None if x is None or len(x) != self.space.size + 1 else State(self, x)
 
     def _file(self, bias: float) -> Path | None:
-        air = None if self.space.air is None else self.space.air.operator
+        air = None if self.medium == "vacuum" else self.space.air.operator
         facts = {
             "probe": self.probe.sections(),
             "nodes": self.space.elements.nodes,
@@ -222,10 +222,11 @@ class SolidLever(Lever):
         InputError
             If the lever is in vacuum.
         """
-        air = self.space.air
-        if air is None:
+        if self.medium == "vacuum":
             raise InputError("this lever is in vacuum: it gives no heat to air")
-        coefficients, heat = air.operator.solve(self.equations.kirchhoff(state.x)[0][:, 0])
+        coefficients, heat = self.space.air.operator.solve(
+            self.equations.kirchhoff(state.x)[0][:, 0]
+        )
         return coefficients, heat
 
 

@@ -131,7 +131,7 @@ class OpenAir:
 
     @property
     def matrix(self) -> LinearOperator:
-        """The operator from θ to heat, for `hotlever.lever.air_loss.AirLoss`."""
+        """The operator from θ to heat, for `hotlever.air.coupling.AirLoss`."""
         return self.less(np.zeros(self._to_coefficients.shape[1]))
 
     @property

@@ -9,6 +9,7 @@ import pytest
 from scipy.sparse import csr_matrix
 
 from hotlever.air.operator import PanelledAir
+from hotlever.air.stores import HeatInAir
 from hotlever.air.surface import PanelOptions
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.transient import pulse, simulate, sine, step
@@ -33,7 +34,8 @@ def answering_at_once(in_air):
     lever = copy(in_air)
     lever.space = copy(in_air.space)
     lever.space.air = copy(in_air.space.air)
-    lever.space.air.around = None
+    nothing = HeatInAir.nothing(lever.space.size + 1)
+    lever.space.air.around = lambda gas_conductivity: nothing
     lever.equations = LeverEquations(lever.space, lever.probe.kinds, lever.circuit)
     return lever
 

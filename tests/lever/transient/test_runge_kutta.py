@@ -43,16 +43,13 @@ def test_what_decays_fast_is_gone_after_one_step():
 
 
 class Dense:
-    """The inverse of a small matrix, as `Factors`."""
+    """The inverse of a small matrix, as `LinearSolver`."""
 
     def __init__(self, matrix: np.ndarray) -> None:
         self.matrix = matrix
 
-    def solve(self, right_hand_side, states, *, transposed=False):
+    def solve(self, right_hand_side):
         return np.linalg.solve(self.matrix, right_hand_side[:, 0])[:, None]
-
-    def replaced(self, states, other):
-        return other
 
 
 class Pendulum:

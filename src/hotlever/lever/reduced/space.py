@@ -10,15 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from copy import copy
-from functools import cached_property
 from typing import Self
 
 import numpy as np
 from scipy.optimize import nnls
 
-from hotlever.lever.air_loss import AirLoss
+from hotlever.air.coupling import ReducedAir
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.space import AirTangent, Constraint, LinearMap, Space, Tangent, at_some
 from hotlever.types import Array, Index
 
@@ -137,7 +135,7 @@ class ReducedSpace(Space):
             self.reader = (np.arange(self.count, self.size + 1), values)
         self.elements = full.elements
         self._hot = modes_T if hot is None else modes_T[:, hot]
-        self.air = None if full.air is None else ReducedAir(full.air, modes_T, self.size)
+        self.air = ReducedAir(full.air, modes_T, self.size)
 
     @classmethod
     def of_snapshots(
@@ -202,16 +200,15 @@ class ReducedSpace(Space):
         return np.concatenate([np.tensordot(orthonormal, free, axes=1), x[-1:]])
 
     def factorised(
-        self, tangent: Tangent, air: AirTangent | None, constraint: Constraint, conductance: Array
+        self, tangent: Tangent, air: AirTangent, constraint: Constraint, conductance: Array
     ) -> DenseFactors:
         """Put the Jacobians of all states together, the constraint last, and invert them."""
         states = tangent.sigma.shape[-1]
         matrices = np.zeros((states, self.size + 1, self.size + 1))
         for state in range(states):
             self._assemble(tangent.of(state), matrices[state])
-            if self.air is not None and air is not None:
-                of_air = self.air.matrix(air.kappa[:, state], air.taken_up)
-                matrices[state, : self.count, : self.count] += of_air
+            of_air = self.air.matrix(air.kappa[:, state], air.taken_up)
+            matrices[state, : self.count, : self.count] += of_air
         matrices[:, -1] = 0.0
         matrices[:, -1, : self.count] = np.multiply.outer(constraint.tip, self.tip[1])
         matrices[:, -1, -1] = constraint.lever
@@ -258,50 +255,3 @@ class DenseFactors:
         inverses = self._inverses.copy()
         inverses[states] = other._inverses
         return DenseFactors(inverses)
-
-
-class ReducedAir:
-    """The air operator between temperature modes; see `AirLoss`."""
-
-    def __init__(self, full: AirLoss, modes: Array, size: int) -> None:
-        self.filling, self.gas_conductivity = full.filling, full.gas_conductivity
-        self._size, self._count, self.heat = size, len(modes), full.heat
-        self._samples = full.sampling[:, : modes.shape[1]] @ modes.T
-        self._spread = self._samples.T @ full.operator.matrix
-        self._full = full
-        self._changes = np.zeros((modes.shape[1] + 1, size + 1))
-        self._changes[:-1, : self._count] = modes.T
-
-    @cached_property
-    def _stores(self) -> tuple[HeatInAir | None, Array]:
-        full = self._full.stores
-        return (None, np.empty((0, 0))) if full is None else full.between(self._changes)
-
-    @property
-    def stores(self) -> HeatInAir | None:
-        """Heat that the air takes up itself; see `AirLoss`."""
-        return self._stores[0]
-
-    def expanded(self, in_air: Array) -> Array:
-        """Return the temperatures in the air around the full lever."""
-        shares = self._stores[1]
-        many = in_air.reshape(-1, shares.shape[1], in_air.shape[1])
-        return np.einsum("mk,skn->smn", shares, many).reshape(-1, in_air.shape[1])
-
-    def rise(self, x: Array) -> Array:
-        """Return the rise of the temperature (K) at the sites, (sites, ...)."""
-        return np.asarray(np.tensordot(self._samples, x[: self._count], axes=1))
-
-    def weak_form(self, theta: Array) -> Array:
-        """Return the heat lost for θ (mW/µm) at the sites, tested with the modes."""
-        weak = np.zeros((self._size + 1, *theta.shape[1:]))
-        weak[: self._count] = np.tensordot(self._spread, theta, axes=1)
-        return weak
-
-    def matrix(self, kappa: Array, taken_up: Array | None) -> Array:
-        """Return what the air adds to the Jacobian of one state, (modes, modes)."""
-        added = self._spread @ (kappa[:, None] * self._samples)
-        if taken_up is not None and self.stores is not None:
-            own = self.stores.coordinates[:, : self._count]
-            added = added + own.T @ taken_up @ own
-        return np.asarray(added)

@@ -142,7 +142,7 @@ def _file(lever: Lever, domain: ParameterDomain) -> Path | None:
         "nodes": elements.nodes,
         "elements": elements.dofs,
         "points": elements.positions,
-        "air": np.empty(0) if air is None else air.operator.matrix,
+        "air": air.operator.matrix,
     }
     return cache_file("reduced", facts)
 
@@ -167,7 +167,7 @@ def _space(
     cold = training[0].branch.slopes[:, 0]
     lift = np.where(full.is_temperature[:-1], 0.0, cold[:-1] / cold[-1])
     widths = domain.widths
-    if full.air is not None and domain.scale:
+    if full.air.medium == "air" and domain.scale:
         widths[C_KAPPA] = _C_KAPPA_IN_AIR
     snapshots = []
     for linearised in training:

@@ -17,7 +17,6 @@ from hotlever.errors import ComputationError
 from hotlever.lever.lever import State
 from hotlever.lever.transient.history import initial_state, integrate
 from hotlever.lever.transient.waveform import Waveform
-from hotlever.types import Array
 
 if TYPE_CHECKING:
     from hotlever.lever.lever import Lever
@@ -166,25 +165,17 @@ def _with_steady_air(cycle: Cycle, period: float) -> State:
 
     Air far away takes milliseconds to get warm, but hardly matters to the lever.
     """
-    before, after = cycle.start, cycle.end
-    air = after.lever.equations.heat_in_air
-    if air is None or after.in_air is None:
-        return after
-    begin = air.follows(before.x) if before.in_air is None else before.in_air
-    return State(after.lever, after.x, air.settled(begin, after.in_air, period))
+    begin, end = cycle.start.unknowns, cycle.end.unknowns
+    own, air = len(cycle.end.x), cycle.end.lever.equations.heat_in_air
+    return State(cycle.end.lever, end[:own], air.settled(begin[own:], end[own:], period))
 
 
 def _extrapolated(starts: list[State], lever: Lever) -> State:
     """Extrapolate states at the beginning of successive periods to their limit."""
     own = lever.space.size + 1
-    columns = np.hstack([_unknowns(state) for state in starts])
+    columns = np.hstack([state.unknowns for state in starts])
     changes = np.diff(lever.space.rises(columns[:own]), axis=1)
     bends = np.diff(changes, axis=1)
     shares, *_ = np.linalg.lstsq(bends, -changes[:, 0], rcond=1e-8)
     limit = columns[:, :1] + np.diff(columns, axis=1)[:, : shares.size] @ shares[:, None]
-    return State(lever, limit[:own], limit[own:] if len(limit) > own else None)
-
-
-def _unknowns(state: State) -> Array:
-    """Return the unknowns of a state, with those of the air."""
-    return state.x if state.in_air is None else np.vstack([state.x, state.in_air])
+    return State(lever, limit[:own], limit[own:])

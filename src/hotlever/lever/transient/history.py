@@ -101,10 +101,9 @@ def time_steps(
         rise = _SHARE_OF_RISE * _expected_rise(lever, waveform.highest_V)
         tolerance_K = max(min(tolerance_K, rise), _LEAST_TOLERANCE)
     length: float | None = None
-    x: Array | None = None
+    x = begin.unknowns
     for piece in waveform.pieces(until):
         problem = TransientProblem(lever.equations, lever.circuit, piece.bias)
-        x = problem.start(begin) if x is None else x
         stepper = Stepper(problem, tolerance_K)
         first = None if piece.jumps else length
         for step in stepper.steps(piece.start, piece.end, x, piece.longest, first, stops):
@@ -244,9 +243,8 @@ class _Recorder:
         self.bias.append(piece.bias(t))
         self.values.append(hermite(step.start, step.end, values, slopes, t))
         if self._callback is not None:
-            whole, own = step.between(t), self._lever.space.size + 1
-            in_air = whole[own:] if len(whole) > own else None
-            self._callback(t, State(self._lever, whole[:own], in_air))
+            unknowns, own = step.between(t), self._lever.space.size + 1
+            self._callback(t, State(self._lever, unknowns[:own], unknowns[own:]))
 
 
 def _melts(step: Step, values: Array, slopes: Array, limit_K: float) -> float | None:
@@ -292,7 +290,7 @@ def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Datase
 def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Array]) -> xr.Dataset:
     """Return the dataset of a history of its columns, with notes on what it leaves out."""
     time = columns["time_us"]
-    at_rest = lever.space.air is not None and lever.equations.heat_in_air is None
+    at_rest = lever.medium == "air" and not lever.equations.heat_in_air.size
     notes = [_AIR_NOTE] if at_rest else []
     notes += range_notes(lever.equations.made_of, "{} µs on", time, columns["max_K"])
     return labelled(

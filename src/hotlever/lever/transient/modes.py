@@ -85,7 +85,7 @@ def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tupl
         raise ComputationError("without power nothing is held where the source holds the power")
     factors = InCircuit(equations.factorised(x, LEVER), row)
     constants, changes = _modes(equations, x, factors, count)
-    if (air := equations.heat_in_air) is None:
+    if not (air := equations.heat_in_air).size:
         return constants, changes
     for place in range(count):
         # what goes along with the lever depends on how fast it goes
@@ -113,7 +113,7 @@ def _modes(
         stored = equations.storage_change(x, change.reshape(-1, 1))
         if coordinates is not None and bound is not None:
             stored[:, 0] += coordinates.T @ (bound @ (coordinates @ change.ravel()))
-        return factors.solve(stored, np.arange(1))[:, 0]
+        return factors.solve(stored)[:, 0]
 
     size = len(x)
     operator: Any = LinearOperator((size, size), matvec=relaxed, dtype=float)

@@ -6,7 +6,7 @@ rise of the enthalpy in the heat balance and, in place of the pin, the circuit::
     V_l + R_s I_h = V_b(t)
 
 Air lets heat through as it does at rest, and holds some itself: the temperatures of its stores
-(`hotlever.lever.heat_in_air`) follow the unknowns of the lever, each at its own rate.
+(`hotlever.air.stores`) follow the unknowns of the lever, each at its own rate.
 """
 
 from __future__ import annotations
@@ -15,11 +15,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from hotlever.air.stores import HeatInAir
 from hotlever.lever.balances import heat_held, heat_left
 from hotlever.lever.equations import SHOWN, LeverEquations
-from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.lever.laws import GAS
-from hotlever.lever.lever import State
 from hotlever.lever.space import LEVER, Factors
 from hotlever.probe import Circuit
 from hotlever.types import Array, Index
@@ -31,6 +30,9 @@ MONITORED = (
     *(*SHOWN, "tip_rise_K"),
     *("power_mW", "left_mW", "stored_nJ", "air_stored_nJ", "at_ends_nJ"),
 )
+
+
+_ONE: Index = np.arange(1)
 
 
 class InCircuit:
@@ -51,30 +53,42 @@ class InCircuit:
         self._factors = factors
         last = np.zeros_like(bias_by)
         last[-1] = 1.0
-        self._last, self._more = last, bias_by - last
-        self._moved: dict[bool, Array] = {}
+        self._row = bias_by - last
+        self._moved = factors.solve(last, _ONE)
 
-    def solve(self, right_hand_side: Array, states: Index, *, transposed: bool = False) -> Array:
+    def solve(self, right_hand_side: Array) -> Array:
         """Solve for right-hand sides (size + 1, 1) or (size + 1, 1, k)."""
-        column, row = (self._more, self._last) if transposed else (self._last, self._more)
-        if transposed not in self._moved:
-            self._moved[transposed] = self._factors.solve(column, states, transposed=transposed)
-        moved = self._moved[transposed]
-        solution = self._factors.solve(right_hand_side, states, transposed=transposed)
+        solution = self._factors.solve(right_hand_side, _ONE)
         columns = solution.reshape(len(solution), -1)
-        share = (row.T @ columns) / (1.0 + row.T @ moved)
-        return np.asarray((columns - moved * share).reshape(solution.shape))
+        share = (self._row.T @ columns) / (1.0 + self._row.T @ self._moved)
+        return np.asarray((columns - self._moved * share).reshape(solution.shape))
 
-    def replaced(self, states: Index, other: InCircuit) -> InCircuit:
-        """Return the other factors: there is one state."""
-        return other
+
+class WithStores:
+    """A factorised Jacobian with the rows of the stores in the air below it.
+
+    These are eliminated: what they take up at the rate of the Jacobian is part of the factors.
+    """
+
+    def __init__(self, factors: InCircuit, air: HeatInAir, rate: float) -> None:
+        self._factors, self._air, self._rate = factors, air, rate
+
+    def solve(self, right_hand_side: Array) -> Array:
+        """Solve for right-hand sides (rows, 1) or (rows, 1, k)."""
+        air, rate = self._air, self._rate
+        flat = right_hand_side.reshape(len(right_hand_side), -1)
+        above, below = np.split(flat, [len(flat) - air.size])
+        above = above - rate * air.tested(air.lagging(below, rate))
+        lever = self._factors.solve(above[:, None])[:, 0]
+        in_air = (below + air.rates * air.follows(lever)) / (rate + air.rates)
+        return np.concatenate([lever, in_air]).reshape(right_hand_side.shape)
 
 
 class TransientProblem:
     """See the module's text and `hotlever.lever.transient.runge_kutta.Problem`.
 
-    Where air takes up heat the unknowns are those of the lever (size + 1) and below them the
-    temperatures of the stores in the air.
+    The unknowns are those of the lever (size + 1) and below them the temperatures of the stores in
+    the air, if it takes up heat itself.
 
     Parameters
     ----------
@@ -89,44 +103,24 @@ class TransientProblem:
     ) -> None:
         self.equations, self._circuit, self._bias = equations, circuit, bias
         self._air, self._own = equations.heat_in_air, len(equations.scale)
-        self.scale = equations.scale
-        self._latest: tuple[Array, Array] | None = None
-        if self._air is not None:
-            self.scale = np.vstack([self.scale, np.ones((self._air.size, 1))])
+        self.scale = np.concatenate([equations.scale, np.ones((self._air.size, 1))])
 
     def parts(self, x: Array) -> tuple[Array, Array]:
         """Return the unknowns of the lever, and the temperatures in the air."""
-        if self._air is None:
-            return x, x[len(x) :]
-        # the equations know what they evaluated last by the array itself
-        if self._latest is None or self._latest[0] is not x:
-            self._latest = x, x[: self._own]
-        return self._latest[1], x[self._own :]
-
-    def start(self, state: State) -> Array:
-        """Return the unknowns at a state; the air is at rest if the state does not say."""
-        if self._air is None:
-            return state.x
-        in_air = self._air.follows(state.x) if state.in_air is None else state.in_air
-        return np.vstack([state.x, in_air])
+        return x[: self._own], x[self._own :]
 
     def storage(self, x: Array) -> Array:
         """Return the heat stored (nJ), and the temperatures in the air (K)."""
         lever, in_air = self.parts(x)
-        stored = self.equations.storage(lever)
-        if self._air is None:
-            return stored
-        stored = stored + self._air.tested(self._air.held(lever, in_air))
-        return np.vstack([stored, in_air])
+        held = self._air.tested(self._air.held(lever, in_air))
+        return np.concatenate([self.equations.storage(lever) + held, in_air])
 
     def residual(self, t: float, x: Array) -> Array:
         """Return the residuals of heat, charge and circuit, and of the stores in the air."""
         lever, in_air = self.parts(x)
-        rest = self.equations.balance(lever)
-        rest[-1] = self._circuit.bias(lever[-1], rest[-1]) - self._bias(t)
-        if self._air is None:
-            return rest
-        return np.vstack([rest, self._air.rates * (in_air - self._air.follows(lever))])
+        balance = self.equations.balance(lever)
+        balance[-1] = self._circuit.bias(lever[-1], balance[-1]) - self._bias(t)
+        return np.concatenate([balance, self._air.rates * (in_air - self._air.follows(lever))])
 
     def change(self, x: Array, changes: Array, rate: float) -> Array:
         """Return how ``rate × storage + residual`` changes with the unknowns (rows, 1, k)."""
@@ -136,17 +130,14 @@ class TransientProblem:
         """Return how `storage` changes with the unknowns (rows, 1, k), to first order."""
         (lever, _), (moved, in_air) = self.parts(x), self.parts(changes)
         stored = self.equations.storage_change(lever, moved)
-        if self._air is None:
-            return stored
         held = self._air.tested(self._air.held(moved[:, 0], in_air[:, 0]))
         return np.concatenate([stored + held[:, None], in_air])
 
     def residual_change(self, x: Array, changes: Array) -> Array:
+        """Return how `residual` changes with the unknowns (rows, 1, k), to first order."""
         (lever, _), (moved, in_air) = self.parts(x), self.parts(changes)
         rest = self.equations.balance_change(lever, moved)
         rest[-1] = self._circuit.bias(moved[-1], rest[-1])
-        if self._air is None:
-            return rest
         lag = self._air.rates * (in_air[:, 0] - self._air.follows(moved[:, 0]))
         return np.concatenate([rest, lag[:, None]])
 
@@ -159,8 +150,6 @@ class TransientProblem:
         for place, name in enumerate(names):
             by = rest[-1, :, place]
             rest[-1, :, place] = self._circuit.bias(0.0, by) + self._circuit.bias_by(name, current)
-        if self._air is None:
-            return stored, rest
         lag = np.zeros((len(in_air), 1, len(names)))
         for place in (place for place, name in enumerate(names) if name == GAS):
             # stores in a gas that conducts better follow faster
@@ -168,13 +157,13 @@ class TransientProblem:
             lag[..., place] = away / self.equations.space.air.gas_conductivity
         return np.concatenate([stored, np.zeros_like(lag)]), np.concatenate([rest, lag])
 
-    def factorised(self, x: Array, rate: float) -> Factors:
+    def factorised(self, x: Array, rate: float) -> InCircuit | WithStores:
         """Return the factorised Jacobian of ``rate × storage + residual``."""
         lever, _ = self.parts(x)
         factors = self.equations.factorised(lever, LEVER, rate)
         gradient = self.equations.observed_gradient(lever)
         driven = InCircuit(factors, self._circuit.bias(gradient[..., 0], gradient[..., 1]))
-        return driven if self._air is None else InAir(driven, self._air, rate)
+        return WithStores(driven, self._air, rate) if self._air.size else driven
 
     def norm(self, change: Array) -> float:
         """Return the largest change of the temperature (K)."""
@@ -185,36 +174,7 @@ class TransientProblem:
         equations, space = self.equations, self.equations.space
         lever, in_air = self.parts(x)
         held, at_ends = heat_held(equations, lever)
-        held_by_air = np.zeros_like(held)
-        if self._air is not None:
-            held_by_air, more = self._air.heat(self._air.held(lever, in_air))
-            at_ends = at_ends + more
+        held_by_air, more = self._air.heat(self._air.held(lever, in_air))
         shown = *equations.observed(lever), space.tip_rise(lever)
         flows = equations.power(lever), heat_left(equations, lever)
-        return np.stack([*shown, *flows, held, held_by_air, at_ends])
-
-
-class InAir:
-    """A factorised Jacobian with the rows of the stores in the air below it.
-
-    These are eliminated: what they take up at the rate of the Jacobian is part of the factors.
-    """
-
-    def __init__(self, factors: InCircuit, air: HeatInAir, rate: float) -> None:
-        self._factors, self._air, self._rate = factors, air, rate
-
-    def solve(self, right_hand_side: Array, states: Index, *, transposed: bool = False) -> Array:
-        """Solve for right-hand sides (rows, 1) or (rows, 1, k)."""
-        if transposed:
-            raise NotImplementedError("the air's stores are solved for forward only")
-        air, rate = self._air, self._rate
-        flat = right_hand_side.reshape(len(right_hand_side), -1)
-        above, below = flat[: -air.size], flat[-air.size :]
-        above = above - rate * air.tested(air.lagging(below, rate))
-        lever = self._factors.solve(above[:, None], states)[:, 0]
-        in_air = (below + air.rates * air.follows(lever)) / (rate + air.rates)
-        return np.vstack([lever, in_air]).reshape(right_hand_side.shape)
-
-    def replaced(self, states: Index, other: InAir) -> InAir:
-        """Return the other factors: there is one state."""
-        return other
+        return np.stack([*shown, *flows, held, held_by_air, at_ends + more])

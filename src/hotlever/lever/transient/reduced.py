@@ -89,8 +89,8 @@ def space_of_modes(lever: Lever, snapshots: Array, origin: Array | None = None) 
 def on_all_nodes(lever: Lever, state: State) -> State:
     """Return the state of a full lever that one of its reduced lever stands for."""
     space = cast("ReducedSpace", state.lever.space)
-    in_air = None if state.in_air is None else space.air.expanded(state.in_air)
-    return State(lever, space.expanded(state.x), in_air)
+    in_air = state.unknowns[len(state.x) :]
+    return State(lever, space.expanded(state.x), space.air.expanded(in_air))
 
 
 class TabulatedEquations(LeverEquations):

@@ -17,8 +17,7 @@ from typing import Protocol
 import numpy as np
 
 from hotlever.errors import ComputationError, NewtonError
-from hotlever.lever.space import Factors
-from hotlever.types import Array, Index
+from hotlever.types import Array
 
 #: Within this time (1/rate) nothing that is stored changes.
 INSTANT_RATE = 1e9
@@ -174,6 +173,14 @@ class StepController:
 METHOD, CONTROLLER = ARK436L2SA, StepController()
 
 
+class LinearSolver(Protocol):
+    """A factorised Jacobian."""
+
+    def solve(self, right_hand_side: Array) -> Array:
+        """Solve for right-hand sides (size + 1, 1) or (size + 1, 1, k)."""
+        ...
+
+
 class Problem(Protocol):
     """What is stepped in time, for one column of unknowns (size + 1, 1).
 
@@ -197,7 +204,7 @@ class Problem(Protocol):
         """Return what is lost per unit of time, or the algebraic residual, (size + 1, 1)."""
         ...
 
-    def factorised(self, x: Array, rate: float) -> Factors:
+    def factorised(self, x: Array, rate: float) -> LinearSolver:
         """Return the factorised Jacobian of ``rate × storage + residual``."""
         ...
 
@@ -226,7 +233,7 @@ class Step:
         Their integrals over the step.
     stages : ndarray, shape (size + 1, stages)
         The unknowns at the start and in each stage.
-    factors : Factors
+    factors : LinearSolver
         Of the Jacobian of all stages, nearly.
     """
 
@@ -238,7 +245,7 @@ class Step:
     monitored_slopes: Array
     added: Array
     stages: Array
-    factors: Factors
+    factors: LinearSolver
 
     def between(self, t: float) -> Array:
         """Return the unknowns at a time within the step, (size + 1, 1)."""
@@ -322,7 +329,7 @@ class Stepper:
         problem, rate = self._problem, INSTANT_RATE
         root = self._root(t, x, problem.storage(x), rate, None, _SETTLED)
         x = root.x
-        slope = -rate * root.factors.solve(problem.residual(t + 1.0 / rate, x), _ONE)
+        slope = -rate * root.factors.solve(problem.residual(t + 1.0 / rate, x))
         flow, stored = -problem.residual(t, x), problem.storage(x)
         speed = max(float(np.abs(slope / problem.scale).max()), 1e-300)
         here, soon = problem.monitored(np.hstack([x, x + _MOMENT / speed * slope])).T
@@ -363,7 +370,7 @@ class Stepper:
             root.factors,
         )
         difference = length * rate * (flows @ (METHOD.weights - METHOD.embedded)[:, None])
-        error = problem.norm(root.factors.solve(difference, _ONE))
+        error = problem.norm(root.factors.solve(difference))
         off = step.between(here.t + METHOD.times[_MIDDLE] * length) - states[:, [_MIDDLE]]
         return step, there, max(error, _OFF * problem.norm(off))
 
@@ -395,7 +402,7 @@ class Stepper:
             residual = problem.residual(t, x) + rate * (stored - known)
             if factors is None:
                 factors = problem.factorised(x, rate)
-            change = -factors.solve(residual, _ONE)
+            change = -factors.solve(residual)
             size = float(np.abs(change / problem.scale).max())
             if not np.isfinite(size):
                 break
@@ -417,7 +424,7 @@ class _Root:
 
     x: Array
     stored: Array
-    factors: Factors
+    factors: LinearSolver
     left: float
 
 
@@ -432,9 +439,6 @@ class _Reached:
     flow: Array
     monitored: Array
     monitored_slopes: Array
-
-
-_ONE: Index = np.arange(1)
 
 
 def _next(t: float, length: float, end: float) -> float:

@@ -17,10 +17,9 @@ from numpy.typing import ArrayLike
 from hotlever.datasets import OBSERVABLES, labelled
 from hotlever.errors import HistoryEndError, InputError, unknown_name
 from hotlever.lever.dataset import probe_attributes
-from hotlever.lever.space import Factors
 from hotlever.lever.transient.history import checked_times, time_steps
 from hotlever.lever.transient.problem import TransientProblem
-from hotlever.lever.transient.runge_kutta import INSTANT_RATE, METHOD, Step
+from hotlever.lever.transient.runge_kutta import INSTANT_RATE, METHOD, LinearSolver, Step
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, parameters_of
@@ -184,13 +183,13 @@ class _Along:
         self._changes, self._stored, self._flow = changes, stored, flows[-1]
 
     def _solved(
-        self, problem: TransientProblem, x: Array, right: Array, rate: float, factors: Factors
+        self, problem: TransientProblem, x: Array, right: Array, rate: float, factors: LinearSolver
     ) -> Array:
         """Solve with factors of a state nearby; what they lack is removed by refinement."""
-        one, scale = np.arange(1), problem.scale[..., None]
-        changes = factors.solve(right, one)
+        scale = problem.scale[..., None]
+        changes = factors.solve(right)
         for _ in range(_MOST_ROUNDS):
-            correction = factors.solve(right - problem.change(x, changes, rate), one)
+            correction = factors.solve(right - problem.change(x, changes, rate))
             changes = changes + correction
             size = np.abs(changes / scale).max(axis=(0, 1))
             if (np.abs(correction / scale).max(axis=(0, 1)) <= _EXACT * size).all():

@@ -180,9 +180,7 @@ class HarmonicBalance:
 
     def _taken_up(self, turns: Complex) -> Complex:
         """Return what the air takes up of each harmonic, (harmonics, size + 1, size + 1)."""
-        size, air = len(self._start), self._equations.heat_in_air
-        if air is None:
-            return np.zeros((turns.size, size, size), dtype=complex)
+        air = self._equations.heat_in_air
         own = air.coordinates
         return np.array([own.T @ air.taken_up(turn) @ own for turn in turns])
 

@@ -83,9 +83,9 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
     moving = test.T @ equations.storage_change(many, trial)
     turns = 2e-6j * np.pi * frequency
     system = turns[:, None, None] * moving + test.T @ rest
-    if (air := equations.heat_in_air) is not None:
-        before, after = test.T @ air.coordinates.T, air.coordinates @ trial
-        system = system + np.array([before @ air.taken_up(turn) @ after for turn in turns])
+    air = equations.heat_in_air
+    before, after = test.T @ air.coordinates.T, air.coordinates @ trial
+    system = system + np.array([before @ air.taken_up(turn) @ after for turn in turns])
     right = np.broadcast_to(test.T @ unit, (frequency.size, trial.shape[1], 1))
     # rational Krylov spaces are nearly dependent: least squares instead of elimination
     shares = np.stack(

@@ -7,18 +7,20 @@ Krylov's method for the rest.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import SuperLU
 
+from hotlever.air.operator import AirOperator
+from hotlever.air.stores import HeatInAir
 from hotlever.errors import ComputationError
-from hotlever.lever.elements import sums_by_index
-from hotlever.lever.heat_in_air import HeatInAir
 from hotlever.types import Array, Index
 
 #: Krylov's method stops at this residual, relative to the right-hand side; what is left is small
@@ -49,8 +51,9 @@ class AirLoss:
     ----------
     gas_conductivity : float
         Of the gas, over that of air.
-    around : callable or None
-        Makes what a gas of some conductivity takes up in time, once it is asked for.
+    around : callable
+        Makes what a gas of some conductivity takes up in time, once it is asked for; nothing, if
+        it is not replaced.
     gap_um : float
         To a surface below; NaN without one.
     by_inverse_gap : ndarray, shape (sites, sites)
@@ -58,13 +61,15 @@ class AirLoss:
     """
 
     gas_conductivity, gap_um = 1.0, float("nan")
-    around: Callable[[float], HeatInAir] | None = None
+    around: Callable[[float], HeatInAir]
     by_inverse_gap = np.empty((0, 0))
 
     def __init__(
         self, operator: Any, unknowns: Index, shares: Array, slots: Index, size: int
     ) -> None:
         self._take(operator)
+        nothing = HeatInAir.nothing(size)
+        self.around = lambda gas_conductivity: nothing
         held = unknowns < 0
         self._held = np.where(held, shares, 0.0).sum(axis=1)
         rows = np.broadcast_to(np.arange(len(unknowns))[:, None], unknowns.shape)
@@ -80,10 +85,22 @@ class AirLoss:
         self._local = operator.matrix @ np.ones(len(operator.sites))
         self.rest = operator.less(self._local)
 
+    @classmethod
+    def nothing(cls, size: int) -> AirLoss:
+        """Return that of a lever in vacuum: air that takes nothing from anywhere."""
+        vacuum = AirOperator(np.empty((0, 2)), np.empty((0, 0)), filling=0.0)
+        sites = np.empty((0, 1), dtype=np.intp)
+        return cls(vacuum, sites, np.empty((0, 1)), sites[..., None], size)
+
     @property
-    def stores(self) -> HeatInAir | None:
-        """What the air takes up itself; None where that is not known."""
-        return None if self.around is None else self.around(self.gas_conductivity)
+    def medium(self) -> str:
+        """What is around the lever: vacuum is air without sites."""
+        return "air" if len(self._local) else "vacuum"
+
+    @property
+    def stores(self) -> HeatInAir:
+        """What the air takes up itself; nothing in vacuum, or where that is not known."""
+        return self.around(self.gas_conductivity)
 
     def in_gas(self, conductivity: float) -> AirLoss:
         """Return the loss to a gas that conducts so many times as well as air."""
@@ -123,7 +140,60 @@ class AirLoss:
         Each site loses as it would in a lever of one temperature.
         """
         values = (self._local * kappa)[:, None, None] * self._products
-        return sums_by_index(self._slots, values, entries + 1)[:entries]
+        # numpy's stubs overlook that weights make the counts floats
+        sums: Array = np.bincount(self._slots.ravel(), values.ravel(), minlength=entries + 1)  # type: ignore[assignment]
+        return sums[:entries]
+
+    def solver(self, factors: SuperLU, kappa: Array, taken_up: Array | None) -> Any:
+        """Return what solves the whole linear system, of the factors of its local part."""
+        return AirSolver(factors, self, kappa, taken_up) if len(kappa) else factors
+
+
+class ReducedAir:
+    """The air operator between temperature modes; see `AirLoss`."""
+
+    def __init__(self, full: AirLoss, modes: Array, size: int) -> None:
+        self.filling, self.gas_conductivity = full.filling, full.gas_conductivity
+        self._size, self._count, self.heat = size, len(modes), full.heat
+        self._samples = full.sampling[:, : modes.shape[1]] @ modes.T
+        self._spread = self._samples.T @ full.operator.matrix
+        self._full = full
+        self._changes = np.zeros((modes.shape[1] + 1, size + 1))
+        self._changes[:-1, : self._count] = modes.T
+
+    @cached_property
+    def _stores(self) -> tuple[HeatInAir, Array]:
+        return self._full.stores.between(self._changes)
+
+    @property
+    def stores(self) -> HeatInAir:
+        """Heat that the air takes up itself; see `AirLoss`."""
+        return self._stores[0]
+
+    def expanded(self, in_air: Array) -> Array:
+        """Return the temperatures in the air around the full lever."""
+        shares = self._stores[1]
+        stores, columns = len(self.stores.stores.rates), in_air.shape[1]
+        many = in_air.reshape(stores, shares.shape[1], columns)
+        return np.einsum("mk,skn->smn", shares, many).reshape(stores * len(shares), columns)
+
+    def rise(self, x: Array) -> Array:
+        """Return the rise of the temperature (K) at the sites, (sites, ...)."""
+        return _columnwise(self._samples, x[: self._count])
+
+    def weak_form(self, theta: Array) -> Array:
+        """Return the heat lost for θ (mW/µm) at the sites, tested with the modes."""
+        weak = np.zeros((self._size + 1, *theta.shape[1:]))
+        weak[: self._count] = _columnwise(self._spread, theta)
+        return weak
+
+    def matrix(self, kappa: Array, taken_up: Array | None) -> Array:
+        """Return what the air adds to the Jacobian of one state, (modes, modes)."""
+        added = self._spread @ (kappa[:, None] * self._samples)
+        if taken_up is not None:
+            own = self.stores.coordinates[:, : self._count]
+            added = added + own.T @ taken_up @ own
+        return np.asarray(added)
 
 
 class AirSolver:
@@ -139,7 +209,7 @@ class AirSolver:
         self, factors: SuperLU, air: AirLoss, kappa: Array, taken_up: Array | None = None
     ) -> None:
         sites, modes, more = len(kappa), np.empty((0, air.sampling.shape[1])), np.empty((0, 0))
-        if taken_up is not None and air.stores is not None:
+        if taken_up is not None:
             modes, more = air.stores.coordinates, taken_up
 
         def sampled(x: Array) -> Array:
@@ -230,4 +300,5 @@ class _Directions:
 
 def _columnwise(matrix: Any, x: Array) -> Array:
     """Return a matrix times an array of one, two or three axes."""
-    return np.asarray(matrix @ x.reshape(len(x), -1)).reshape(-1, *x.shape[1:])
+    product = matrix @ x.reshape(len(x), math.prod(x.shape[1:]))
+    return np.asarray(product).reshape(len(product), *x.shape[1:])
