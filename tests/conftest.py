@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.cli import main, output
@@ -18,6 +19,10 @@ from hotlever.materials import published
 from hotlever.probe import Probe
 
 ROOT = Path(__file__).parents[1]
+
+# how long an example takes says how busy the machine is
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session", autouse=True)
