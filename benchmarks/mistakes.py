@@ -1,11 +1,11 @@
 """Mistakes of users: whether they are found, and what is said of them.
 
-Forty mistakes are made with twins of `twins.py`, levers of a richer model that differ from their
+Forty mistakes are made with levers of `twins.py`, of a richer model, that differ from their
 drawing, and each file is calibrated by the command line. A mistake counts as named when what is
 said of it (notes and the closing line on standard error) has the likeliest cause in it. Then follow
-things that are no mistakes, and GOOD twins as they are: none of these may alarm.
+things that are no mistakes, and GOOD levers as they are: none of these may alarm.
 
-Run: python benchmarks/mistakes.py [GOOD] [FIRST]      (FIRST twin of the mistakes)
+Run: python benchmarks/mistakes.py [GOOD] [FIRST]      (FIRST lever of the mistakes)
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from hotlever.calibration.procedure import calibrate
 from hotlever.errors import HotleverError
 from hotlever.estimation import Measurement
 from hotlever.probe import Probe
-from hotlever.studies.twins import ALL, drawn, measured
+from hotlever.studies.simulation_based_calibration import ALL, draw, measure
 from hotlever.types import Array
 from problems import processor_time, table
 
@@ -57,10 +57,10 @@ class Bench:
     number: int = 0
 
     @classmethod
-    def of_twin(cls, number: int, medium: str = "vacuum", what: str = "iv") -> Bench:
+    def of_lever(cls, number: int, medium: str = "vacuum", what: str = "iv") -> Bench:
         rng = np.random.default_rng(number)
-        true, nominal = drawn(rng, number, medium)
-        data, _, _ = measured(true, rng, what, DEPARTED)
+        true, nominal = draw(rng, number, medium)
+        data, _, _ = measure(true, rng, what, DEPARTED)
         return cls(columns_of(data), nominal, true, rng, number=number)
 
     @property
@@ -89,7 +89,7 @@ class Bench:
         data, probe = folder / "data.csv", folder / "probe.toml"
         data.write_text("\n".join(lines) + "\n")
         if self.fit_of is not None:
-            other = Bench.of_twin(self.fit_of)
+            other = Bench.of_lever(self.fit_of)
             os.mkdir(folder / "other")
             own, _, at = other.files(folder / "other")
             fitted = folder / "fit.json"
@@ -153,7 +153,7 @@ def other_terminal(bench: Bench) -> None:
 
 def remeasured(bench: Bench, true: Probe) -> Array:
     """Return the current of another lever at the same bias, or at the last that it can take."""
-    data = measured(true, bench.rng, "iv", DEPARTED, float(bench.bias.max()))[0]
+    data = measure(true, bench.rng, "iv", DEPARTED, float(bench.bias.max()))[0]
     return np.interp(bench.bias, data.bias_V, data.current_mA)
 
 
@@ -167,7 +167,7 @@ def contact(bench: Bench) -> None:
 
 
 def half_of_another(bench: Bench) -> None:
-    other = remeasured(bench, drawn(bench.rng, bench.number + 2, "vacuum")[0])
+    other = remeasured(bench, draw(bench.rng, bench.number + 2, "vacuum")[0])
     half = bench.bias.size // 2
     bench.set(I_h=np.concatenate([bench.current[:half], other[half:]]))
 
@@ -308,9 +308,9 @@ class Outcome(NamedTuple):
 
 
 def run(number: int, first: int = 0) -> Outcome:
-    """Make a mistake, each with another twin, and calibrate by the command line."""
+    """Make a mistake, each with another lever, and calibrate by the command line."""
     mistake = [*MISTAKES, *HARMLESS][number]
-    bench = Bench.of_twin(first + number, mistake.medium, mistake.what)
+    bench = Bench.of_lever(first + number, mistake.medium, mistake.what)
     mistake.make(bench)
     with tempfile.TemporaryDirectory() as folder:
         os.environ[CACHE_VARIABLE] = str(Path(folder, "cache"))
@@ -322,8 +322,8 @@ def run(number: int, first: int = 0) -> Outcome:
 
 
 def good(number: int) -> tuple[int, str, float]:
-    """Calibrate a good twin; return what is said against it."""
-    bench = Bench.of_twin(number, "air" if number % 4 == 3 else "vacuum")
+    """Calibrate a good lever; return what is said against it."""
+    bench = Bench.of_lever(number, "air" if number % 4 == 3 else "vacuum")
     began = time.process_time()
     data = Measurement(*bench.columns.values(), *np.full((3, bench.bias.size), np.nan))
     try:
@@ -357,8 +357,8 @@ def main(count: int = 40, first: int = 0) -> None:
         report(HARMLESS, outcomes[len(MISTAKES) :])
         alarms = [one for one in pool.map(good, range(1000, 1000 + count)) if one[1]]
     for number, said, seconds in alarms:
-        print(f"false alarm: twin {number}, {seconds:.1f} s: {said}")
-    print(f"good twins: {count}, false alarms: {len(alarms)}")
+        print(f"false alarm: lever {number}, {seconds:.1f} s: {said}")
+    print(f"good levers: {count}, false alarms: {len(alarms)}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Fits of levers, judged twins, and files with a fault, made up for tests."""
+"""Fits of levers, judged calibrations, and files with a fault, made up for tests."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hotlever.datasets import labelled
 from hotlever.estimation import FittedParameter
 from hotlever.estimation.levers import compare_levers
 from hotlever.materials import PARAMETERS
-from hotlever.studies.twins import WAYS, together
+from hotlever.studies.simulation_based_calibration import WAYS, concatenated
 
 #: Not there, which is something else than null.
 GONE = object()
@@ -65,8 +65,8 @@ def levers(count: int, held: tuple[str, ...] = ()) -> xr.Dataset:
     return compare_levers(fits)
 
 
-def twins(other_law: bool = False) -> xr.Dataset:
-    """Return twins with errors of 0.5, 1.5 and 3 stated ones throughout, and one refused."""
+def judged_levers(other_law: bool = False) -> xr.Dataset:
+    """Return levers with errors of 0.5, 1.5 and 3 stated ones throughout, and one refused."""
     shape, rows = (len(WAYS), 101), np.arange(101)
     judged = []
     for number, sigma in enumerate((0.5, 1.5, 3.0, np.nan)):
@@ -80,6 +80,6 @@ def twins(other_law: bool = False) -> xr.Dataset:
             "refused": "" if np.isfinite(sigma) else "no lever like this",
             "doubted": "",
         }
-        coordinates = {"way": list(WAYS), "twin": number, "other_law": other_law}
+        coordinates = {"way": list(WAYS), "lever": number, "other_law": other_law}
         judged.append(labelled(columns, (), coordinates))
-    return together(judged)
+    return concatenated(judged)

@@ -129,10 +129,10 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "at_power_K": ("K", "largest change of the tip temperature at the same power"),
     "fitted_knee_K": ("K", "knee of a tipless lever fitted to the one with the tip"),
     "missed_K": ("K", "how far the knee lies above that of the fitted tipless lever"),
-    # twins
+    # simulation-based calibration
     "off_K": ("K", "tip temperature as calibrated less the true one"),
     "largest_K": ("K", "largest error of the tip temperature"),
-    "held": ("1", "share of twins whose error is within the band"),
+    "coverage": ("1", "share of levers whose error is within the band"),
     "seconds": ("s", "processor time of the calibration"),
     # Raman spectra
     "center_per_cm": ("cm-1", "place of the silicon line"),

@@ -23,7 +23,7 @@ from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
-from hotlever.studies.wild import wild_twin
+from little_known_levers import little_known_lever
 
 NOISE = 5e-4
 FOLDER = Path(hotlever.__file__).parent / "examples"
@@ -152,5 +152,5 @@ def test_levers_that_cannot_be_drawn_bound_a_search():
 @pytest.mark.slow
 def test_a_fold_that_moves_past_a_row_is_no_obstacle():
     """Values are not smooth there, and no step gains what the derivatives promise."""
-    twin = wild_twin(38)
-    assert calibrate(twin.measurement, probe=twin.nominal).describes_data
+    unknown = little_known_lever(38)
+    assert calibrate(unknown.measurement, probe=unknown.nominal).describes_data

@@ -41,12 +41,14 @@ def made(coarse):
             ["c_kappa", "p"], np.array([[1, -0.9], [-0.9, 1]])
         ),
         "band": figures.tip_band(sweep.assign(tip_stderr_K=0.01 * sweep.tip_K), data),
-        "twins": figures.twins(xr.concat([made_up.twins(), made_up.twins(True)], "twin")),
+        "judged": figures.judged_calibrations(
+            xr.concat([made_up.judged_levers(), made_up.judged_levers(True)], "lever")
+        ),
     }
 
 
 NAMES = ["probe", "u_shape", "overview", "iv", "temperature_power", "resistances"]
-NAMES += ["doping", "profiles", "maps", "fit", "correlation", "band", "twins"]
+NAMES += ["doping", "profiles", "maps", "fit", "correlation", "band", "judged"]
 
 
 def texts(figure):

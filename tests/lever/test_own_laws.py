@@ -13,7 +13,7 @@ from hotlever.lever.transient import pulse, simulate
 from hotlever.materials.kinds import HighDopedSilicon
 from hotlever.probe import Probe
 from hotlever.probe.parameters import usual_parameters
-from hotlever.studies.twins import MinimosLever
+from hotlever.studies.simulation_based_calibration import MinimosLever
 
 REFUSED = "follows laws of its own, those of the Python class .*, which no file holds"
 

@@ -10,9 +10,9 @@ from hotlever.estimation import Measurement, fit
 from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.estimation.uncertainty import examine
 from hotlever.report.fit_pages import fit_page
-from hotlever.report.reproduce import LONG_SECTIONS, SECTIONS, TWINS, twins
+from hotlever.report.reproduce import LONG_SECTIONS, NEVER_SEEN, SECTIONS, simulated
 from hotlever.report.reproduce.findings import Findings
-from hotlever.studies.twins import WAYS
+from hotlever.studies.simulation_based_calibration import WAYS
 
 
 @pytest.fixture(scope="module")
@@ -35,20 +35,20 @@ def test_a_fit_s_page_tells_what_was_found_and_how_sure_it_is(result):
 
 @pytest.fixture
 def judged(monkeypatch):
-    """Twins that need not be solved: each of the page's is one of those made up."""
+    """Levers that need not be solved: each of the page's is one of those made up."""
     asked = []
 
     def judge(number, departures):
         other = "mobility" in departures
         asked.append((number, other))
-        return made_up.twins(other).isel(twin=number % 3).assign_coords(twin=number)
+        return made_up.judged_levers(other).isel(lever=number % 3).assign_coords(lever=number)
 
-    monkeypatch.setattr(twins, "judge", judge)
+    monkeypatch.setattr(simulated, "judge", judge)
     return asked
 
 
 @pytest.mark.parametrize(
-    ("section", "count"), [(twins.twins_section, 12), (twins.few_twins_section, 2)]
+    ("section", "count"), [(simulated.many_levers_section, 12), (simulated.few_levers_section, 2)]
 )
 def test_levers_never_seen_are_made_with_both_laws_and_counted(coarse, judged, section, count):
     told = []
@@ -67,12 +67,12 @@ def test_levers_never_seen_are_made_with_both_laws_and_counted(coarse, judged, s
 
 def test_the_page_says_when_the_stated_errors_do_not_hold(coarse, judged):
     page = Findings(coarse)
-    twins.twins_section(page)
-    # a third of the made-up twins is off by three stated errors
+    simulated.many_levers_section(page)
+    # a third of the made-up levers is off by three stated errors
     assert "do not cover this departure" in page.blocks[1]["text"]
     assert "67% in its 95 % band" in page.blocks[1]["text"]
 
 
 def test_the_quick_page_has_the_headings_of_the_long_one_in_the_same_order():
     assert list(SECTIONS | LONG_SECTIONS)[: len(SECTIONS)] == list(SECTIONS)
-    assert SECTIONS[TWINS] is not LONG_SECTIONS[TWINS]
+    assert SECTIONS[NEVER_SEEN] is not LONG_SECTIONS[NEVER_SEEN]

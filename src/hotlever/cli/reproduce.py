@@ -19,7 +19,7 @@ def reproduce_command(
     quick: bool = Option(
         False,
         "--quick",
-        help="Leave out what takes longest: k by geometry, the tip, the mesh; fewer twins.",
+        help="Leave out what takes longest: k by geometry, the tip, the mesh; fewer levers.",
     ),
 ) -> None:
     """Compute the paper's tables and figures and put them on one page."""

@@ -6,7 +6,7 @@ writes one as PNG, SVG or PDF.
 # ruff: noqa: F401 (what is imported here is what the shelf offers)
 
 from hotlever.figures.air import air_loss, disc_between_planes, scale_factor, temperature_slices
-from hotlever.figures.calibration import calibration_curves, design_sweep, twins
+from hotlever.figures.calibration import calibration_curves, design_sweep, judged_calibrations
 from hotlever.figures.drawing import outlines_drawing
 from hotlever.figures.fit import (
     correlation_matrix,

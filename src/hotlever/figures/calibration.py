@@ -26,7 +26,7 @@ from hotlever.figures.style import (
     from_zero,
 )
 from hotlever.studies.design import label_of
-from hotlever.studies.twins import ESTIMATE, LEVELS, WAYS
+from hotlever.studies.simulation_based_calibration import ESTIMATE, LEVELS, WAYS
 from hotlever.text import BAND
 
 if TYPE_CHECKING:
@@ -91,16 +91,16 @@ def calibration_curves(calibration: Calibration) -> Figure:
     return made
 
 
-def twins(found: xr.Dataset) -> Figure:
+def judged_calibrations(judged: xr.Dataset) -> Figure:
     """Draw how wrong each way of calibrating is, and whether the stated errors hold.
 
     Parameters
     ----------
-    found : xarray.Dataset
-        From `hotlever.studies.twins.together`.
+    judged : xarray.Dataset
+        From `hotlever.studies.simulation_based_calibration.concatenated`.
     """
-    largest, other = abs(found.off_K).max("row"), found.other_law.values
-    ratio = (found.off_K.sel(way=ESTIMATE) / found.stated_K).transpose("twin", "row")
+    largest, other = abs(judged.off_K).max("row"), judged.other_law.values
+    ratio = (judged.off_K.sel(way=ESTIMATE) / judged.stated_K).transpose("lever", "row")
     laws = [law for law in (False, True) if law in other]
     with figure(8.0, 3.8, 1, 2, letters=True) as (made, (by_way, by_bias)):
         beside: Any = {"transform": by_way.get_yaxis_transform(), "va": "center", "fontsize": 8}

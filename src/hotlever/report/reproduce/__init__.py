@@ -8,12 +8,12 @@ from hotlever.lever import Lever
 from hotlever.materials import published
 from hotlever.probe import Probe
 from hotlever.report.page import Page
-from hotlever.report.reproduce import air, fits, thermometer, twins, vacuum
+from hotlever.report.reproduce import air, fits, simulated, thermometer, vacuum
 from hotlever.report.reproduce.findings import Findings
 from hotlever.steps import each
 from hotlever.types import Progress
 
-TWINS = "A lever never seen: how wrong is its calibration?"
+NEVER_SEEN = "A lever never seen: how wrong is its calibration?"
 #: Headings and sections, in the order of the page.
 SECTIONS: dict[str, Callable[[Findings], None]] = {
     "The reference probe": vacuum.probe_section,
@@ -29,7 +29,7 @@ SECTIONS: dict[str, Callable[[Findings], None]] = {
     "Characteristics in air (Figs. 9 and 10)": air.characteristics_section,
     "Is air one factor of the power? (Fig. 10b)": air.scale_section,
     "Where the heat goes": air.map_section,
-    TWINS: twins.few_twins_section,
+    NEVER_SEEN: simulated.few_levers_section,
     "Balances": vacuum.balance_section,
 }
 #: Left out of the quick form, or shorter there.
@@ -37,7 +37,7 @@ LONG_SECTIONS: dict[str, Callable[[Findings], None]] = {
     "k by size, gap and pressure": air.geometry_section,
     "The missing tip": air.tip_section,
     "Mesh": vacuum.mesh_section,
-    TWINS: twins.twins_section,
+    NEVER_SEEN: simulated.many_levers_section,
 }
 
 

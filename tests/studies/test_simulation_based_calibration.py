@@ -1,4 +1,4 @@
-"""Twins depart from the model in what they are said to, and are judged by their own truth."""
+"""Simulated levers depart from the model as is said, and are judged by their own truth."""
 
 from __future__ import annotations
 
@@ -12,42 +12,44 @@ from hotlever.lever.lever import COARSE
 from hotlever.materials import LOW_DOPED
 from hotlever.materials.kinds import NSilicon
 from hotlever.probe import Probe
-from hotlever.studies import twins
-from hotlever.studies.twins import (
+from hotlever.studies import simulation_based_calibration as study
+from hotlever.studies.simulation_based_calibration import (
     ALL,
     ESTIMATE,
     WAYS,
     MinimosLever,
     MinimosSilicon,
-    drawn,
+    draw,
     judge,
-    measured,
+    measure,
 )
 
 
 @pytest.fixture(autouse=True)
 def coarse_levers(monkeypatch):
     """What is tested here does not depend on the mesh."""
-    monkeypatch.setattr(twins, "_FINER", COARSE)
+    monkeypatch.setattr(study, "_FINER", COARSE)
 
 
 @pytest.fixture
 def solved_once(monkeypatch):
-    """A lever that is not solved for every twin anew."""
-    sweep = Lever(Probe.reference(), COARSE).sweep(np.linspace(0.275, 11.0, twins.POINTS))
+    """A lever that is not solved for every number anew."""
+    sweep = Lever(Probe.reference(), COARSE).sweep(np.linspace(0.275, 11.0, study.POINTS))
     monkeypatch.setattr(Lever, "sweep", lambda *_: sweep)
     return sweep
 
 
 def data_of(number, departures, what="iv", probe=None):
     rng = np.random.default_rng(number)
-    return measured(probe or Probe.reference(), rng, what, departures)[0]
+    return measure(probe or Probe.reference(), rng, what, departures)[0]
 
 
 def test_a_departure_that_is_left_out_changes_nothing_else():
-    everything, nominal = drawn(np.random.default_rng(0), 0, "vacuum")
+    everything, nominal = draw(np.random.default_rng(0), 0, "vacuum")
     probes = {
-        name: drawn(np.random.default_rng(0), 0, "vacuum", [one for one in ALL if one != name])[0]
+        name: draw(
+            np.random.default_rng(0), 0, "vacuum", [other for other in ALL if other != name]
+        )[0]
         for name in ("tip", "drawing")
     }
     assert all(one.material == everything.material != nominal.material for one in probes.values())
@@ -58,19 +60,19 @@ def test_a_departure_that_is_left_out_changes_nothing_else():
     assert probes["drawing"].tip == everything.tip
 
 
-def test_the_jump_is_of_twins_in_air_alone():
+def test_the_jump_is_of_levers_in_air_alone():
     rng = np.random.default_rng
-    assert drawn(rng(1), 1, "air")[0].surroundings.accommodation == 0.9
-    without = drawn(rng(1), 1, "air", ["drawing"])[0]
+    assert draw(rng(1), 1, "air")[0].surroundings.accommodation == 0.9
+    without = draw(rng(1), 1, "air", ["drawing"])[0]
     assert without.surroundings.accommodation == Probe.reference().surroundings.accommodation
-    assert drawn(rng(1), 1, "vacuum")[0].surroundings.accommodation != 0.9
+    assert draw(rng(1), 1, "vacuum")[0].surroundings.accommodation != 0.9
 
 
-def test_outliers_are_far_off_few_and_in_a_third_of_the_twins(solved_once):
+def test_outliers_are_far_off_few_and_in_a_third_of_the_levers(solved_once):
     some = 0
     for number in range(300):
         with_, without = (data_of(number, more).current_mA for more in (["outliers"], []))
-        off = np.abs(with_ / without - 1.0) / twins.NOISE
+        off = np.abs(with_ / without - 1.0) / study.NOISE
         moved = off[off > 1e-9]
         assert moved.size <= 2
         assert np.all((moved > 9.9) & (moved < 50.1))
@@ -85,7 +87,7 @@ def test_drift_grows_over_the_ramp(solved_once):
     ]
     spread = np.std(off, axis=0)
     assert spread[0] == pytest.approx(0.0, abs=1e-12)
-    assert spread[-1] == pytest.approx(twins.DRIFT, rel=0.25)
+    assert spread[-1] == pytest.approx(study.DRIFT, rel=0.25)
 
 
 def test_another_mobility_changes_the_lever_and_nobody_else_s():
@@ -103,7 +105,7 @@ def test_another_mobility_changes_the_lever_and_nobody_else_s():
 def test_raman_temperatures_have_the_errors_that_they_state(solved_once):
     data, tip = data_of(0, [], "raman"), solved_once.tip_K.values
     known = np.isfinite(data.tip_K)
-    assert known.sum() == twins.RAMAN_POINTS
+    assert known.sum() == study.RAMAN_POINTS
     assert np.all(np.abs(data.tip_K - tip)[known] < 4 * data.tip_error_K[known])
     assert tip[known].min() > 390
 
@@ -113,10 +115,10 @@ def test_a_reader_is_measured_where_there_is_one():
     assert np.isnan(data_of(0, ["mesh"], "reader", Probe.u_shape()).reader_V).all()
 
 
-def test_a_twin_like_the_model_is_calibrated_within_the_stated_error():
+def test_a_lever_like_the_model_is_calibrated_within_the_stated_error():
     found = judge(0, departures=["mesh"])
     assert found.refused == ""
-    hot = found.tip_K.values > twins.HOT
+    hot = found.tip_K.values > study.HOT
     estimate = found.off_K.sel(way=ESTIMATE).values
     assert np.array_equal(np.isfinite(estimate), hot)
     assert np.nanmax(np.abs(estimate / found.stated_K.values)) < 3.0
@@ -125,23 +127,23 @@ def test_a_twin_like_the_model_is_calibrated_within_the_stated_error():
     assert not found.other_law
 
 
-def test_a_twin_without_an_answer_is_kept_with_the_reason(monkeypatch):
+def test_a_lever_without_an_answer_is_kept_with_the_reason(monkeypatch):
     def refuse(*_, **__):
-        raise twins.HotleverError("no lever like this")
+        raise study.HotleverError("no lever like this")
 
-    monkeypatch.setattr(twins, "calibrate", refuse)
+    monkeypatch.setattr(study, "calibrate", refuse)
     found = judge(0, departures=["mesh"])
     assert found.refused == "no lever like this"
     assert found.off_K.isnull().all()
 
 
 def test_a_summary_counts_what_the_bands_hold():
-    """Errors of 0.5, 1.5 and 3 stated ones throughout; the last twin was refused."""
-    total = twins.summary(made_up.twins())
+    """Errors of 0.5, 1.5 and 3 stated ones throughout; the last lever was refused."""
+    total = study.summary(made_up.judged_levers())
     assert total.answered == 3
     assert total.largest_K.sel(way=ESTIMATE).values == pytest.approx([15.0, 27.0, 30.0])
     assert total.largest_K.sel(way=WAYS[1], percentile=100) == pytest.approx(60.0)
-    assert total.held.sel(level=0.68).values == pytest.approx(np.full(10, 1 / 3))
-    assert total.held.sel(level=0.95).values == pytest.approx(np.full(10, 2 / 3))
+    assert total.coverage.sel(level=0.68).values == pytest.approx(np.full(10, 1 / 3))
+    assert total.coverage.sel(level=0.95).values == pytest.approx(np.full(10, 2 / 3))
     assert total.everywhere == pytest.approx(2 / 3)
     assert total.rms == pytest.approx(np.sqrt((0.5**2 + 1.5**2 + 3**2) / 3))

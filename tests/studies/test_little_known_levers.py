@@ -1,4 +1,4 @@
-"""Wild twins are drawn from what their owners say, measured as said, and judged by their truth."""
+"""Levers are drawn from what their owners say, measured as said, and judged by their truth."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import little_known_levers
 from hotlever.errors import ComputationError
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -15,8 +16,14 @@ from hotlever.lever.meshing import chosen_space
 from hotlever.measurement import read_measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import default_priors
-from hotlever.studies import wild
-from hotlever.studies.wild import DOPING, FAILED, PRIORS, SHAPES, judge_wild, wild_twin
+from little_known_levers import (
+    DOPING,
+    FAILED,
+    PRIORS,
+    SHAPES,
+    judge_little_known,
+    little_known_lever,
+)
 
 NUMBERS = range(12)
 
@@ -24,19 +31,23 @@ NUMBERS = range(12)
 @pytest.fixture(autouse=True)
 def coarse_levers(monkeypatch):
     """What is tested here does not depend on the mesh."""
-    monkeypatch.setattr(wild, "_finer", lambda true: Lever(true, COARSE))
+    monkeypatch.setattr(little_known_levers, "_finer", lambda true: Lever(true, COARSE))
 
 
 @pytest.fixture(scope="module")
 def some():
-    """A dozen twins in vacuum."""
+    """A dozen levers in vacuum."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(wild, "_finer", lambda true: Lever(true, COARSE))
-        return [wild_twin(number, "vacuum") for number in NUMBERS]
+        patch.setattr(little_known_levers, "_finer", lambda true: Lever(true, COARSE))
+        return [little_known_lever(number, "vacuum") for number in NUMBERS]
 
 
-def test_a_twin_is_the_same_each_time_and_in_the_medium_that_is_asked_for():
-    once, again, in_air = wild_twin(4, "vacuum"), wild_twin(4, "vacuum"), wild_twin(4, "air")
+def test_a_lever_is_the_same_each_time_and_in_the_medium_that_is_asked_for():
+    once, again, in_air = (
+        little_known_lever(4, "vacuum"),
+        little_known_lever(4, "vacuum"),
+        little_known_lever(4, "air"),
+    )
     assert (once.true, once.nominal) == (again.true, again.nominal)
     np.testing.assert_array_equal(once.measurement.current_mA, again.measurement.current_mA)
     assert in_air.true.surroundings.medium == in_air.nominal.surroundings.medium == "air"
@@ -44,20 +55,20 @@ def test_a_twin_is_the_same_each_time_and_in_the_medium_that_is_asked_for():
 
 
 def test_every_shape_has_its_turn_and_nominal_levers_differ(some):
-    assert [twin.nominal.shape.shape for twin in some] == [*SHAPES] * 4
-    doping = np.array([twin.nominal.material.n_d for twin in some])
+    assert [lever.nominal.shape.shape for lever in some] == [*SHAPES] * 4
+    doping = np.array([lever.nominal.material.n_d for lever in some])
     assert np.all((doping >= 3e16) & (doping <= 1e18))
     assert doping.max() > 5 * doping.min()
-    for twin in some:
-        reference = Probe.u_shape() if twin.nominal.shape.shape == "u-shape" else Probe.reference()
-        for name, size in twin.nominal.shape.dimensions().items():
+    for lever in some:
+        reference = Probe.u_shape() if lever.nominal.shape.shape == "u-shape" else Probe.reference()
+        for name, size in lever.nominal.shape.dimensions().items():
             usual = reference.shape.dimensions().get(name)
             assert not usual or 0.5 <= size / usual <= 2.0
 
 
 def test_levers_scatter_about_what_their_owners_know_as_the_priors_say():
     rng, away = np.random.default_rng(1), []
-    nominal = wild._nominal(rng, "u-shape")
+    nominal = little_known_levers._nominal(rng, "u-shape")
     known = default_priors(nominal)
     assert known["delta"].spread == 0.35
     assert known["thickness_um"].spread == 0.20
@@ -65,8 +76,8 @@ def test_levers_scatter_about_what_their_owners_know_as_the_priors_say():
     assert known["n_d"].spread in (0.6, pytest.approx(np.log(2.5)))
     while len(away) < 200:
         try:
-            true = wild._drawn(rng, nominal)
-        except wild.HotleverError:
+            true = little_known_levers._drawn(rng, nominal)
+        except little_known_levers.HotleverError:
             continue
         assert true.prior is None
         values = true.values(list(known)).tolist()
@@ -77,55 +88,55 @@ def test_levers_scatter_about_what_their_owners_know_as_the_priors_say():
 
 
 def test_owners_state_priors_as_probe_files_do(some, tmp_path):
-    for twin in some:
-        stated = dict(twin.nominal.stated_priors)
+    for lever in some:
+        stated = dict(lever.nominal.stated_priors)
         assert stated.pop("n_d") in DOPING
-        outline = twin.nominal.shape.outline_moves
+        outline = lever.nominal.shape.outline_moves
         assert stated == {name: PRIORS[name] for name in PRIORS if outline or name != "dimensions"}
-    twin = some[2]
-    twin.nominal.to_file(tmp_path / "probe.toml")
-    (tmp_path / "iv.csv").write_text(twin.measurement_csv())
+    lever = some[2]
+    lever.nominal.to_file(tmp_path / "probe.toml")
+    (tmp_path / "iv.csv").write_text(lever.measurement_csv())
     again = Probe.from_file(tmp_path / "probe.toml")
-    assert again.stated_priors == twin.nominal.stated_priors
-    np.testing.assert_allclose(again.shape.thickness_um, twin.nominal.shape.thickness_um)
+    assert again.stated_priors == lever.nominal.stated_priors
+    np.testing.assert_allclose(again.shape.thickness_um, lever.nominal.shape.thickness_um)
     data = read_measurement(tmp_path / "iv.csv")
-    np.testing.assert_allclose(data.current_mA, twin.measurement.current_mA, rtol=1e-6)
-    np.testing.assert_allclose(data.bias_V, twin.measurement.bias_V, rtol=1e-6)
+    np.testing.assert_allclose(data.current_mA, lever.measurement.current_mA, rtol=1e-6)
+    np.testing.assert_allclose(data.bias_V, lever.measurement.bias_V, rtol=1e-6)
 
 
 def test_data_end_anywhere_from_350_K_to_melting_half_of_them_below_the_knee(some):
-    ends = [float(twin.branch.read(twin.true.circuit, np.array([0.0])).last_K) for twin in some]
+    ends = [float(lever.branch.read(lever.true.circuit, np.array([0.0])).last_K) for lever in some]
     assert max(ends) > 1000.0
-    below = sum(twin.below_knee for twin in some)
+    below = sum(lever.below_knee for lever in some)
     assert 3 <= below <= 9
-    for twin in some:
-        tip = twin.tip_K(twin.measurement.bias_V)
+    for lever in some:
+        tip = lever.tip_K(lever.measurement.bias_V)
         assert 18 <= tip.size <= 55
         assert np.nanmax(tip) > 345.0
-        assert np.nanmax(tip) < twin.branch.hottest_K
-        assert twin.branch.melts
-        assert np.all(np.diff(twin.measurement.bias_V) >= 0)
+        assert np.nanmax(tip) < lever.branch.hottest_K
+        assert lever.branch.melts
+        assert np.all(np.diff(lever.measurement.bias_V) >= 0)
 
 
 def test_noise_is_half_a_per_cent_and_a_picture_is_read_by_a_share_of_its_full_scale(some):
-    assert {twin.digitised for twin in some} == {False, True}
-    for twin in some:
-        if twin.jumps:
+    assert {lever.digitised for lever in some} == {False, True}
+    for lever in some:
+        if lever.jumps:
             continue
-        data, tip = twin.measurement, twin.tip_K(twin.measurement.bias_V)
+        data, tip = lever.measurement, lever.tip_K(lever.measurement.bias_V)
         here = np.isfinite(tip)
-        current = twin.branch.shown(twin.branch.u_at(tip[here]))["current_mA"]
+        current = lever.branch.shown(lever.branch.u_at(tip[here]))["current_mA"]
         off = data.current_mA[here] - current
-        if twin.digitised:
+        if lever.digitised:
             assert 3e-4 < np.std(off) / data.current_mA.max() < 9e-3
         else:
-            assert np.std(off / current) == pytest.approx(wild._NOISE, rel=0.5)
+            assert np.std(off / current) == pytest.approx(little_known_levers._NOISE, rel=0.5)
 
 
 def test_the_truth_is_solved_on_a_finer_mesh_than_the_default(monkeypatch):
     monkeypatch.undo()
     probe = Probe.u_shape()
-    usual, finer = chosen_space(probe), wild._finer(probe)
+    usual, finer = chosen_space(probe), little_known_levers._finer(probe)
     assert finer.space.mesh.elements.nelements > 1.2 * usual.mesh.elements.nelements
     assert finer.panels.refinement > Lever(probe).panels.refinement
 
@@ -138,20 +149,20 @@ def test_a_lever_that_has_no_state_is_drawn_anew_and_counted(monkeypatch):
             raise ComputationError("no state")
         return Lever(true, COARSE)
 
-    monkeypatch.setattr(wild, "_finer", solved)
-    assert wild_twin(1, "vacuum").repeated >= 2
-    monkeypatch.setattr(wild, "_MOST_DRAWN", 2)
+    monkeypatch.setattr(little_known_levers, "_finer", solved)
+    assert little_known_lever(1, "vacuum").repeated >= 2
+    monkeypatch.setattr(little_known_levers, "_MOST_DRAWN", 2)
     failures = iter([True, True])
     with pytest.raises(ComputationError, match="no state"):
-        wild_twin(1, "vacuum")
+        little_known_lever(1, "vacuum")
 
 
 @pytest.fixture
 def answered(some, monkeypatch):
     """A calibration that is 10 K too hot, known to 5 K on the cold side and 20 K on the hot."""
-    twin = some[0]
-    bias = np.append(0.0, twin.measurement.bias_V)
-    tip = twin.tip_K(bias) + 10.0
+    lever = some[0]
+    bias = np.append(0.0, lever.measurement.bias_V)
+    tip = lever.tip_K(bias) + 10.0
 
     class Answer:
         table = xr.Dataset(
@@ -170,33 +181,33 @@ def answered(some, monkeypatch):
         asked.update(data=data, probe=probe)
         return Answer
 
-    monkeypatch.setattr(wild, "calibrate", calibrated)
-    monkeypatch.setattr(wild, "wild_twin", lambda *_: twin)
-    return Answer, asked, twin
+    monkeypatch.setattr(little_known_levers, "calibrate", calibrated)
+    monkeypatch.setattr(little_known_levers, "little_known_lever", lambda *_: lever)
+    return Answer, asked, lever
 
 
 def test_an_answer_is_compared_with_the_truth_by_the_error_of_that_side(answered):
-    answer, asked, twin = answered
-    record = judge_wild(0, "vacuum")
-    assert asked == {"data": twin.measurement, "probe": twin.nominal}
+    answer, asked, lever = answered
+    record = judge_little_known(0, "vacuum")
+    assert asked == {"data": lever.measurement, "probe": lever.nominal}
     assert record["outcome"] == "described"
-    count = np.isfinite(twin.tip_K(twin.measurement.bias_V)).sum()
+    count = np.isfinite(lever.tip_K(lever.measurement.bias_V)).sum()
     assert record["off_K"] == pytest.approx([10.0] * count)
     assert record["stated_K"] == pytest.approx([5.0] * count)
     assert json.loads(json.dumps(record)) == record
     answer.describes_data, answer.reason = False, "no such lever"
-    assert judge_wild(0)["outcome"] == "not described"
-    assert judge_wild(0)["reason"] == "no such lever"
+    assert judge_little_known(0)["outcome"] == "not described"
+    assert judge_little_known(0)["reason"] == "no such lever"
     answer.describes_data = None
-    assert judge_wild(0)["outcome"] == "not converged"
+    assert judge_little_known(0)["outcome"] == "not converged"
 
 
 def test_an_error_of_any_type_is_a_result(answered, monkeypatch):
     def broken(*_, **__):
         raise ValueError("x must be strictly increasing")
 
-    monkeypatch.setattr(wild, "calibrate", broken)
-    record = judge_wild(0)
+    monkeypatch.setattr(little_known_levers, "calibrate", broken)
+    record = judge_little_known(0)
     assert (record["outcome"], record["exception"]) == (FAILED, "ValueError")
     assert record["reason"] == "x must be strictly increasing"
     assert "off_K" not in record

@@ -1,9 +1,12 @@
-"""Levers never seen: how wrong their calibrations are, and whether the stated errors hold.
+"""Simulation-based calibration: how wrong calibrations are, and whether the stated errors hold.
 
-A twin is a lever that is solved with more physics than the model that calibrates it has, so that
-its tip temperature is known. It differs from that model by `DEPARTURES`, in its material, and in
-what its data suffer on the way. The calibration knows the drawing, the nominal doping, the usual
-priors (`hotlever.probe.priors`), and the measured data. Beside it stand the paper's ways.
+A lever is drawn from the priors and solved with more physics than the model that calibrates it has,
+so that its tip temperature is known. It differs from that model by `DEPARTURES`, in its material,
+and in what its data suffer on the way. The calibration knows the drawing, the nominal doping, the
+usual priors (`hotlever.probe.priors`), and the measured data. Beside it stand the paper's ways.
+
+Over many levers the share of true temperatures inside a stated band, its coverage, is to be the
+band's level of confidence (Talts et al., arXiv:1804.06788).
 """
 
 from __future__ import annotations
@@ -39,7 +42,7 @@ from hotlever.probe.tip import Tip
 from hotlever.text import BAND
 from hotlever.types import Array
 
-#: What a twin has and the model that calibrates it has not; each can be left out.
+#: What a simulated lever has and the model that calibrates it has not; each can be left out.
 DEPARTURES = {
     "mesh": "elements 1.3 times finer",
     "tip": "a cone on the heater",
@@ -47,7 +50,7 @@ DEPARTURES = {
     "jump": "in air, a temperature jump at the surface (accommodation 0.9)",
     "mobility": "carriers as in MINIMOS, scattered less by impurities when hot, instead of Eq. 8",
     "drift": "a gain that drifts by 0.05 % over the ramp",
-    "outliers": "in a third of the twins, one or two currents off by 10 to 50 times the noise",
+    "outliers": "in a third of the levers, one or two currents off by 10 to 50 times the noise",
     "thermometer": "Raman temperatures off together, by 2 % of the rise",
 }
 ALL = tuple(DEPARTURES)
@@ -56,7 +59,7 @@ KINDS = ("iv", "reader", "raman")
 ESTIMATE = "estimate with priors"
 WAYS = (ESTIMATE, "model of the drawing at k", "Eq. 12 at k", "knee at T_i")
 POINTS, NOISE, DRIFT = 40, 2e-3, 5e-4
-#: Share of the twins that have outliers, and how far these are off, in standard deviations.
+#: Share of the levers that have outliers, and how far these are off, in standard deviations.
 _SOME, _FAR = 1 / 3, (10.0, 50.0)
 #: Errors of Raman temperatures, as shares of the rise: of each, and common to all.
 RAMAN, RAMAN_POINTS = (0.01, 0.02), 5
@@ -88,12 +91,12 @@ class MinimosLever(Lever):
         self.equations = LeverEquations(self.space, kinds, self.circuit)
 
 
-def drawn(
+def draw(
     rng: np.random.Generator, number: int, medium: str, departures: Collection[str] = ALL
 ) -> tuple[Probe, Probe]:
-    """Draw a twin from the priors; return its probe, and the one that is known beforehand.
+    """Draw a lever from the priors; return its probe, and the one that is known beforehand.
 
-    Twins of even `number` have three legs, the others are U-shaped.
+    Levers of even `number` have three legs, the others are U-shaped.
     """
     nominal = (Probe.reference() if number % 2 == 0 else Probe.u_shape()).in_medium(medium)
     values = {
@@ -114,30 +117,29 @@ def drawn(
     return true, nominal
 
 
-def measured(
+def measure(
     true: Probe,
     rng: np.random.Generator,
     what: str,
     departures: Collection[str] = ALL,
     highest: float | None = None,
 ) -> tuple[Measurement, Array, Lever]:
-    """Measure a twin up to a bias (V), or as far as it goes; return its true temperatures (K) too.
+    """Measure a lever up to a bias (V), or as far as it goes; return its true temperatures (K) too.
 
     Of ``KINDS``, the current is measured alone, with the reader, or with five Raman temperatures.
 
     Raises
     ------
     ComputationError
-        If a state of the twin was not found.
+        If a state of the lever was not found.
     """
     kind = MinimosLever if "mobility" in departures else Lever
     lever = kind(true, _FINER if "mesh" in departures else None)
-    highest = highest or HIGHEST_V[true.surroundings.medium]
+    even = np.linspace(1.0 / POINTS, 1.0, POINTS)
     try:
-        sweep = lever.sweep(np.linspace(highest / POINTS, highest, POINTS))
+        sweep = lever.sweep((highest or HIGHEST_V[true.surroundings.medium]) * even)
     except BranchEndError as error:
-        highest = 0.97 * error.bias_reached
-        sweep = lever.sweep(np.linspace(highest / POINTS, highest, POINTS))
+        sweep = lever.sweep(0.97 * error.bias_reached * even)
     tip, drifting = sweep.tip_K.values, DRIFT * ("drift" in departures)
 
     def noisy(values: Array) -> Array:
@@ -151,16 +153,15 @@ def measured(
         at = np.linspace(HOT, 0.98 * tip.max(), RAMAN_POINTS)
         some = np.searchsorted(tip, at).clip(0, POINTS - 1)
         (alone, common), base = RAMAN, true.circuit.base_temperature_K
-        together_off = rng.standard_normal() * ("thermometer" in departures)
-        scale = 1.0 + common * together_off
+        scale = 1.0 + common * rng.standard_normal() * ("thermometer" in departures)
         rise = (tip - base)[some] * scale * (1.0 + alone * rng.standard_normal(some.size))
         stated = np.hypot(alone, common) if "thermometer" in departures else alone
         tips[some], errors[some] = base + rise, stated * (tip[some] - base)
     current = noisy(sweep.current_mA.values)
     if "outliers" in departures and rng.random() < _SOME:
-        places = rng.choice(POINTS, rng.integers(1, 3), replace=False)
-        off = rng.choice((-1.0, 1.0), places.size) * rng.uniform(*_FAR, places.size)
-        current[places] *= 1.0 + NOISE * off
+        outliers = rng.choice(POINTS, rng.integers(1, 3), replace=False)
+        off = rng.choice((-1.0, 1.0), outliers.size) * rng.uniform(*_FAR, outliers.size)
+        current[outliers] *= 1.0 + NOISE * off
     return Measurement(sweep.bias.values, current, reader, tips, errors), tip, lever
 
 
@@ -191,7 +192,7 @@ def _in_vacuum(nominal: Probe) -> Branch:
 def judge(
     number: int, medium: str = "vacuum", what: str = "iv", departures: Collection[str] = ALL
 ) -> xr.Dataset:
-    """Make the twin of a number, calibrate it, and compare with its true temperature.
+    """Simulate the lever of a number, calibrate it, and compare with its true temperature.
 
     Returns
     -------
@@ -200,33 +201,33 @@ def judge(
         below, and throughout for a way that gave no answer; ``tip_K``, the truth, and
         ``stated_K``, the error that the estimate states on that side; ``seconds`` of processor; as
         texts ``refused``, why there is no estimate, and ``doubted``, why it says that the data are
-        not described; as coordinates ``twin``, the number, and ``other_law``, whether the mobility
+        not described; as coordinates ``lever``, the number, and ``other_law``, whether the mobility
         is not Eq. 8's.
 
     Raises
     ------
     ComputationError
-        If the twin could not be solved.
+        If the lever could not be solved.
     """
     rng = np.random.default_rng(number)
-    true, nominal = drawn(rng, number, medium, departures)
-    data, _, lever = measured(true, rng, what, departures)
+    true, nominal = draw(rng, number, medium, departures)
+    data, _, lever = measure(true, rng, what, departures)
     off, refused, doubted = np.full((len(WAYS), _ROWS), np.nan), "", ""
     tip, stated = off[0], off[0]
     began = time.process_time()
     try:
-        found = calibrate(data, probe=nominal)
+        calibration = calibrate(data, probe=nominal)
     except HotleverError as error:
         refused = str(error)
     seconds = time.process_time() - began
     if not refused:
-        rows, doubted = found.table, found.reason
-        tip = lever.sweep(rows.bias_V.values).tip_K.values
-        off[0] = rows.tip_K.values - tip
-        stated = stated_on_that_side(rows, off[0])
+        table, doubted = calibration.table, calibration.reason
+        tip = lever.sweep(table.bias_V.values).tip_K.values
+        off[0] = table.tip_K.values - tip
+        stated = stated_on_that_side(table, off[0])
         with suppress(HotleverError):
-            for place, way in enumerate(paper_ways(data, nominal), start=1):
-                off[place] = way(rows.power_mW.values) - tip
+            ways = paper_ways(data, nominal)
+            off[1:] = [tip_at(table.power_mW.values) - tip for tip_at in ways]
     columns = {
         "off_K": (("way", "row"), np.where(tip > HOT, off, np.nan)),
         "tip_K": ("row", tip),
@@ -235,7 +236,7 @@ def judge(
         "refused": refused,
         "doubted": doubted,
     }
-    coordinates = {"way": list(WAYS), "twin": number, "other_law": "mobility" in departures}
+    coordinates = {"way": list(WAYS), "lever": number, "other_law": "mobility" in departures}
     return labelled(columns, (), coordinates)
 
 
@@ -245,52 +246,55 @@ def stated_on_that_side(table: xr.Dataset, off_K: Array) -> Array:
     return np.asarray(np.abs(limit - table.tip_K.values) / BAND)
 
 
-def held_by_decile(ratios: Sequence[Array]) -> Array:
+def coverage_by_decile(ratios: Sequence[Array]) -> Array:
     """Return the share of rows within the band, by level of confidence and decile of the bias.
 
     Parameters
     ----------
     ratios : sequence of ndarray
-        Error over stated error of each twin, (rows,), rising in bias; every twin counts alike.
+        Error over stated error of each lever, (rows,), rising in bias; all levers count alike.
 
     Returns
     -------
     ndarray, shape (levels, 10)
     """
-    parts = [np.array_split(one, _DECILES) for one in ratios]
-    held = [[[np.mean(part < limit) for part in one] for one in parts] for limit in LEVELS.values()]
-    return np.mean(held, axis=1)
+    levers = [np.array_split(ratio, _DECILES) for ratio in ratios]
+    within = [
+        [[np.mean(decile < limit) for decile in lever] for lever in levers]
+        for limit in LEVELS.values()
+    ]
+    return np.mean(within, axis=1)
 
 
-def together(judged: Sequence[xr.Dataset]) -> xr.Dataset:
-    """Return judged twins as one dataset, on the dimension ``twin``."""
-    return xr.concat(judged, "twin", coords="all", combine_attrs="override")
+def concatenated(judged: Sequence[xr.Dataset]) -> xr.Dataset:
+    """Return judged calibrations as one dataset, on the dimension ``lever``."""
+    return xr.concat(judged, "lever", coords="all", combine_attrs="override")
 
 
-def summary(found: xr.Dataset) -> xr.Dataset:
-    """Sum judged twins up; those without an answer are left out.
+def summary(judged: xr.Dataset) -> xr.Dataset:
+    """Sum judged calibrations up; levers without an answer are left out.
 
     Returns
     -------
     xarray.Dataset
-        ``largest_K`` by ``way`` and ``percentile``; ``held``, the share within the stated band, by
-        ``level`` and ``decile`` of the bias above 400 K; as attributes ``rms``, the pooled one of
-        error over stated error, ``everywhere``, the share of twins within two stated errors at
+        ``largest_K`` by ``way`` and ``percentile``; ``coverage``, the share within the stated band,
+        by ``level`` and ``decile`` of the bias above 400 K; as attributes ``rms``, the pooled one
+        of error over stated error, ``everywhere``, the share of levers within two stated errors at
         every bias, and how many were ``answered``.
     """
-    answered = found.isel(twin=(found.refused == "").values)
+    answered = judged.isel(lever=(judged.refused == "").values)
     ratio = abs(answered.off_K.sel(way=ESTIMATE) / answered.stated_K).values
     # of data that are not described no error is stated
     ratio = ratio[np.isfinite(ratio).any(axis=1)]
-    largest = abs(answered.off_K).max("row").transpose("way", "twin").values
-    held = held_by_decile([one[np.isfinite(one)] for one in ratio])
+    largest = abs(answered.off_K).max("row").transpose("way", "lever").values
+    coverage = coverage_by_decile([row[np.isfinite(row)] for row in ratio])
     return labelled(
         {
             "largest_K": (("way", "percentile"), np.nanpercentile(largest, PERCENTILES, axis=1).T),
-            "held": (("level", "decile"), held),
+            "coverage": (("level", "decile"), coverage),
         },
         coordinates={"way": list(WAYS), "percentile": list(PERCENTILES), "level": list(LEVELS)},
         rms=float(np.sqrt(np.nanmean(ratio**2))),
         everywhere=float(np.mean(np.nanmax(ratio, axis=1) < 2.0)),
-        answered=int(answered.sizes["twin"]),
+        answered=int(answered.sizes["lever"]),
     )

@@ -1,9 +1,11 @@
-"""Wild twins: levers of which the owner knows little, and says so.
+"""Levers of which the owner knows little, and says so: simulated, measured, calibrated.
 
-A twin of `hotlever.studies.twins` departs from the model and is known well. A wild one is a lever
-of the model itself, solved on a finer mesh, whose owner states its doping, dimensions and thickness
-with wide priors. What is tried is the search: whether it gets to such a lever from so far away,
-and whether the errors that it states are those it makes.
+The levers of `hotlever.studies.simulation_based_calibration` depart from the model and are known
+well. These are levers of the model itself, solved on a finer mesh, whose owner states doping,
+dimensions and thickness with wide priors. What is tried is the search: whether it gets to such a
+lever from so far away, and whether the errors that it states are those it makes.
+
+`twins.py --wild` runs and reports them.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.parts import PriorTexts
 from hotlever.probe.priors import default_priors
-from hotlever.studies.twins import stated_on_that_side
+from hotlever.studies.simulation_based_calibration import stated_on_that_side
 from hotlever.types import Array
 
 SHAPES = ("three-leg", "u-shape", "drawing")
@@ -46,9 +48,9 @@ _NOISE, _READING = 5e-3, (1e-3, 3e-3)
 #: Share of the error estimate whose triangles are split once more than by default; panels of the
 #: air, as much smaller.
 _SPLIT, _PANELS = 0.8, 1.3
-#: Most levers drawn for one twin.
+#: Most levers drawn for one number.
 _MOST_DRAWN = 200
-#: What becomes of a twin: of the last two there is no band to be judged.
+#: What becomes of a lever: of the last two there is no band to be judged.
 DESCRIBED, CONTRADICTED, NOT_CONVERGED, FAILED = (
     "described",
     "not described",
@@ -59,7 +61,7 @@ _OUTCOMES = {True: DESCRIBED, False: CONTRADICTED, None: NOT_CONVERGED}
 
 
 @dataclass(frozen=True)
-class WildTwin:
+class LittleKnownLever:
     """A lever that is measured, and what its owner knows of it.
 
     Attributes
@@ -104,8 +106,8 @@ class WildTwin:
         return "\n".join(lines) + "\n"
 
 
-def wild_twin(number: int, medium: str | None = None) -> WildTwin:
-    """Draw and measure the twin of a number, the same each time.
+def little_known_lever(number: int, medium: str | None = None) -> LittleKnownLever:
+    """Draw and measure the lever of a number, the same each time.
 
     Parameters
     ----------
@@ -131,7 +133,9 @@ def wild_twin(number: int, medium: str | None = None) -> WildTwin:
         except HotleverError as error:
             reason = error
             continue
-        return WildTwin(number, true, nominal, branch, measurement, digitised, jumps, repeated)
+        return LittleKnownLever(
+            number, true, nominal, branch, measurement, digitised, jumps, repeated
+        )
     raise reason
 
 
@@ -199,7 +203,7 @@ def _drawing(rng: Generator, common: float) -> Probe:
         },
         "terminals": {"supply": right[-2:], "ground": left[:2]},
     }
-    return Probe.from_sections(sections, "drawn twin")
+    return Probe.from_sections(sections, "drawn lever")
 
 
 def _drawn(rng: Generator, nominal: Probe) -> Probe:
@@ -270,13 +274,13 @@ def _measured(rng: Generator, true: Probe, branch: Branch) -> tuple[Measurement,
     return measurement, digitised, jumps
 
 
-def judge_wild(number: int, medium: str | None = None) -> dict[str, Any]:
-    """Make the twin of a number, calibrate it, and compare with its true temperature.
+def judge_little_known(number: int, medium: str | None = None) -> dict[str, Any]:
+    """Make the lever of a number, calibrate it, and compare with its true temperature.
 
     Returns
     -------
     dict
-        What can be written as JSON: what the twin is; ``outcome``, with ``reason`` and, for an
+        What can be written as JSON: what the lever is; ``outcome``, with ``reason`` and, for an
         exception, its type as ``exception``; ``seconds`` of processor; and if there is an answer
         ``tip_K``, the truth, ``off_K``, the error, and ``stated_K``, the one that is stated on
         that side, by row of the calibration's table, where it has a bias and the lever a state.
@@ -284,21 +288,21 @@ def judge_wild(number: int, medium: str | None = None) -> dict[str, Any]:
     Raises
     ------
     HotleverError
-        If there is no twin of that number.
+        If there is no lever of that number.
     """
-    twin = wild_twin(number, medium)
-    probe, data = twin.nominal, twin.measurement
+    lever = little_known_lever(number, medium)
+    probe, data = lever.nominal, lever.measurement
     record: dict[str, Any] = {
-        "twin": number,
+        "lever": number,
         "shape": probe.shape.shape,
         "medium": probe.surroundings.medium,
         "n_d": probe.material.n_d,
         "rows": data.bias_V.size,
-        "digitised": twin.digitised,
-        "jumps": twin.jumps,
-        "below_knee": twin.below_knee,
-        "end_K": round(float(np.nanmax(twin.tip_K(data.bias_V))), 1),
-        "repeated": twin.repeated,
+        "digitised": lever.digitised,
+        "jumps": lever.jumps,
+        "below_knee": lever.below_knee,
+        "end_K": round(float(np.nanmax(lever.tip_K(data.bias_V))), 1),
+        "repeated": lever.repeated,
         "exception": "",
         "reason": "",
     }
@@ -310,7 +314,7 @@ def judge_wild(number: int, medium: str | None = None) -> dict[str, Any]:
         return record | {"seconds": time.process_time() - began}
     record["seconds"] = time.process_time() - began
     table = calibration.table.isel(bias=calibration.table.bias_V.values > 0)
-    tip = twin.tip_K(table.bias_V.values)
+    tip = lever.tip_K(table.bias_V.values)
     there = np.isfinite(tip)
     table, tip = table.isel(bias=there), tip[there]
     off = table.tip_K.values - tip
