@@ -105,19 +105,19 @@ def _to_one_width(
     """
     full = np.array([row for row in rows if row is not None and row.size == width])
     width = int(np.flatnonzero(~np.isnan(full).all(axis=0)).max()) + 1
-    for place, row in enumerate(rows):
+    for index, row in enumerate(rows):
         if row is not None:
             fits = row.size >= width and bool(np.isnan(row[width:]).all())
-            rows[place] = row[:width] if fits else None
-    inside = [place for place, row in enumerate(rows) if row is not None]
+            rows[index] = row[:width] if fits else None
+    inside = [index for index, row in enumerate(rows) if row is not None]
     odd = ""
     count = 0
-    for place in range(inside[0], inside[-1]):
-        if rows[place] is None:
-            cells = dialect.cells(lines[place]) or []
+    for index in range(inside[0], inside[-1]):
+        if rows[index] is None:
+            cells = dialect.cells(lines[index]) or []
             numbers = [dialect.number(cell) for cell in cells] if len(cells) == width else [None]
             if numbers[0] is not None and not np.isnan(numbers[0]):
-                rows[place] = np.array(numbers, dtype=float)
+                rows[index] = np.array(numbers, dtype=float)
                 odd, count = odd or cells[numbers.index(None)], count + 1
     if count > max(_FEWEST_ROWS, _MOST_GAPS * len(inside)):
         raise InputError(
@@ -135,7 +135,7 @@ def _blocks(
         list(run) for fits, run in groupby(range(len(rows)), lambda i: rows[i] is not None) if fits
     ]
     fewest = min(_FEWEST_ROWS, max(map(len, runs)))
-    found: list[tuple[list[int], list[str], dict[str, str]]] = []
+    blocks: list[tuple[list[int], list[str], dict[str, str]]] = []
     end = 0
     for run in runs:
         above = lines[end : run[0]]
@@ -143,15 +143,15 @@ def _blocks(
         header = [key_and_value(line) for line in above[: len(above) - used]]
         metadata = {key: value for key, value in reversed(header) if value}
         end = run[-1] + 1
-        if found and not (any(names) or metadata):
-            found[-1][0].extend(run)
+        if blocks and not (any(names) or metadata):
+            blocks[-1][0].extend(run)
         else:
-            found.append((run, names, metadata))
-    first = found[0]
-    for run, names, metadata in found:
+            blocks.append((run, names, metadata))
+    first = blocks[0]
+    for run, names, metadata in blocks:
         if len(run) < fewest:
             continue
-        values = np.array([rows[place] for place in run])
+        values = np.array([rows[index] for index in run])
         names = names if any(names) else first[1]
         full = ~np.all(np.isnan(values), axis=0)
         yield Block(

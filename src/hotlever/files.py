@@ -8,9 +8,9 @@ from __future__ import annotations
 import json
 import math
 import os
+import secrets
 import select
 import stat
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from contextvars import ContextVar
@@ -140,6 +140,7 @@ class Outputs:
 
     Examples
     --------
+    >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     outputs = Outputs()
     ...     outputs.file(f"{folder}/a.csv", ".csv", ".nc")
@@ -180,10 +181,10 @@ class Outputs:
         if path is None:
             return
         folder = Path(os.path.realpath(path))
-        there = next(one for one in (folder, *folder.parents) if os.path.lexists(one))
-        if not there.is_dir():
-            raise InputError(f"{path}: cannot be made a folder ({there} is a file)")
-        if not os.access(there, os.W_OK | os.X_OK):
+        above = next(path for path in (folder, *folder.parents) if os.path.lexists(path))
+        if not above.is_dir():
+            raise InputError(f"{path}: cannot be made a folder ({above} is a file)")
+        if not os.access(above, os.W_OK | os.X_OK):
             raise InputError(f"{path}: cannot be written (Permission denied)")
         self._ask(path, folder)
 
@@ -206,7 +207,7 @@ class Outputs:
                 kind = _kind(target)
                 if kind != "file":
                     raise InputError(f"{path}: is a {kind}, expected a file name to write to")
-                if any(one.exists() and one.samefile(target) for one in self._inputs):
+                if any(file.exists() and file.samefile(target) for file in self._inputs):
                     raise InputError(f"{path}: is an input of this command, expected another name")
             elif not target.parent.is_dir():
                 raise InputError(f"{path}: the folder {Path(path).parent} does not exist")
@@ -262,6 +263,7 @@ def kept_before_writing(keep: Callable[[Path], None]) -> Iterator[None]:
 
     Examples
     --------
+    >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder, kept_before_writing(
     ...     lambda path: print(path.name, path.exists())
     ... ):
@@ -294,12 +296,12 @@ def whole_file(path: Name) -> Iterator[Path]:
     running = _outputs.get()
     with nullcontext(running) if running else Outputs().together() as outputs:
         target = outputs.target(path)
+        temporary = target.with_name(f".hotlever-{secrets.token_hex(6)}{target.suffix}")
         try:
-            handle, name = tempfile.mkstemp(target.suffix, ".hotlever-", target.parent)
-            os.close(handle)
+            # with the permissions that any new file would have here
+            os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
         except OSError as error:
             raise InputError(f"{path}: cannot be written ({error.strerror})") from error
-        temporary = Path(name)
         try:
             yield temporary
             # what the same block wrote there before is replaced
@@ -321,8 +323,8 @@ def _disk_error(error: BaseException, temporary: Path) -> str | None:
             # NetCDF and PDF say a full disk in words of their own
             with temporary.open("ab") as file:
                 file.write(bytes(100_000))
-    except OSError as found:
-        return found.strerror or str(found)
+    except OSError as disk_error:
+        return disk_error.strerror or str(disk_error)
     return None
 
 
@@ -345,7 +347,7 @@ def output_folder(path: Name) -> Path:
     """
     folder, outputs = Path(path), _outputs.get()
     try:
-        missing = [one for one in (folder, *folder.parents) if not one.exists()]
+        missing = [path for path in (folder, *folder.parents) if not path.exists()]
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from error
@@ -355,18 +357,13 @@ def output_folder(path: Name) -> Path:
 
 
 def _put_in_place(temporary: Path, target: Path) -> None:
-    """Rename a file; it gets the permissions of the one it replaces, or that any new one would."""
+    """Rename a file; it gets the permissions of the one it replaces."""
     keep = _keep.get()
     try:
         if keep is not None:
             keep(target)
         if target.exists():
-            mode = target.stat().st_mode & 0o7777
-        else:
-            umask = os.umask(0)
-            os.umask(umask)
-            mode = 0o666 & ~umask
-        temporary.chmod(mode)
+            temporary.chmod(target.stat().st_mode & 0o7777)
         temporary.replace(target)
     except OSError as error:
         raise HotleverError(f"{target}: cannot be written ({error.strerror})") from error

@@ -61,8 +61,8 @@ class Table:
         """Name file and line of a row (-1: the header row), to begin an error with."""
         return f"{self.path}: line {self.lines[row - len(self.rows)]}"
 
-    def place(self, heading: str) -> int:
-        """Return the place of a column by its heading, with or without unit, or by its number.
+    def index(self, heading: str) -> int:
+        """Return the index of a column by its heading, with or without unit, or by its number.
 
         Raises
         ------
@@ -71,14 +71,14 @@ class Table:
         """
         width = f"its number (1 to {len(self.rows[0])})"
         for names in (self.names, [name_and_unit(name)[0] for name in self.names]):
-            places = [at for at, name in enumerate(names) if name.casefold() == heading.casefold()]
-            if len(places) > 1:
+            indices = [i for i, name in enumerate(names) if name.casefold() == heading.casefold()]
+            if len(indices) > 1:
                 raise InputError(
-                    f"{self.where(-1)}: column {quoted(heading)} stands {len(places)} times, "
+                    f"{self.where(-1)}: column {quoted(heading)} stands {len(indices)} times, "
                     f"expected {width}"
                 )
-            if places:
-                return places[0]
+            if indices:
+                return indices[0]
         if not heading.isdecimal() and self.names:
             names = [shown(name) for name in self.names[:9]]
             raise unknown_name("column", heading, names, self.where(-1))
@@ -110,10 +110,10 @@ class Table:
                 and all(_GROUPED.fullmatch(cells[row]) for row in commas)
                 and any(map(_SMALL.fullmatch, cells))
             ):
-                found = cells[commas[0]]
+                cell = cells[commas[0]]
                 raise InputError(
-                    f"{self.where(commas[0])}: {name}: '{found}' may be {found.replace(',', '.')} "
-                    f"or {found.replace(',', '')}, expected numbers without marks of thousands"
+                    f"{self.where(commas[0])}: {name}: '{cell}' may be {cell.replace(',', '.')} "
+                    f"or {cell.replace(',', '')}, expected numbers without marks of thousands"
                 )
         return np.array(values, dtype=float)
 
@@ -145,7 +145,7 @@ def read_table(
     path: str | os.PathLike[str],
     expected: str,
     header: bool = True,
-    known: Callable[[str], bool] | None = None,
+    is_heading: Callable[[str], bool] | None = None,
 ) -> Table:
     """Read a table of cells separated by tabs, semicolons, commas or, some, by blanks.
 
@@ -160,7 +160,7 @@ def read_table(
     header : bool
         Whether there must be a header row. Else a first row with a number is none, and blanks
         may separate cells.
-    known : callable, optional
+    is_heading : callable, optional
         Whether a heading is one of those looked for. The header row is then the first with two of
         them, a comment if numbers follow; without such a row, the one above the first row of
         numbers. Lines above it are comments; units may stand in a row below it, and the header
@@ -173,20 +173,20 @@ def read_table(
     """
     raw = read_bytes(path)
     numbered = enumerate(text_lines(raw, str(path)), start=1)
-    lines = [(place, line) for place, line in numbered if line.strip(' \t,;"\u00a0')]
+    lines = [(number, line) for number, line in numbered if line.strip(' \t,;"\u00a0')]
     first = next((at for at, (_, line) in enumerate(lines) if not _is_comment(line)), None)
     if first is None:
         raise InputError(f"{path}: no header row and no rows, expected {expected}")
-    at = first if known is None else _header_row(lines, known)
+    at = first if is_heading is None else _header_row(lines, is_heading)
     start = first if at is None else at
-    reader = _Reader(str(path), lines[start:], at is not None, header, known is not None)
+    reader = _Reader(str(path), lines[start:], at is not None, header, is_heading is not None)
     comments = lines[:start]
-    for place, line in lines[start if at is None else start + 1 :]:
-        if _is_comment(line) or not reader.takes(place, line):
-            comments.append((place, line))
-    names, rows, places = reader.names, reader.rows, [lines[start][0], *reader.places]
+    for number, line in lines[start if at is None else start + 1 :]:
+        if _is_comment(line) or not reader.takes(number, line):
+            comments.append((number, line))
+    names, rows, numbers = reader.names, reader.rows, [lines[start][0], *reader.lines]
     if not header and (not rows or any(map(NUMBER.fullmatch, names))):
-        names, rows, places = [], [names, *rows], [places[0], *places]
+        names, rows, numbers = [], [names, *rows], [numbers[0], *numbers]
     if reader.skipping or not rows:
         where = f"line {reader.skipping}: another table" if reader.skipping else "no data rows"
         raise InputError(f"{path}: {where} after the header")
@@ -196,9 +196,9 @@ def read_table(
         path=str(path),
         sha256=hashlib.sha256(raw).hexdigest(),
         comments=comments,
-        names=[] if at is None else reader.with_units(comments) if known else names,
+        names=[] if at is None else reader.with_units(comments) if is_heading else names,
         rows=rows,
-        lines=places,
+        lines=numbers,
         dialect=Dialect(reader.separator, comma),
         remarks=reader.remarks,
     )
@@ -216,11 +216,11 @@ class _Reader:
         self._path, self._loose = path, loose
         self._first = "header" if header else "first row"
         self.rows: list[list[str]] = []
-        self.places: list[int] = []
+        self.lines: list[int] = []
         self.remarks: list[tuple[int, str]] = []
         self.skipping = 0  # the line since which the next header row is waited for
         self._units: list[str] = []
-        place, line = lines[0]
+        number, line = lines[0]
         separator = next((mark for mark in "\t;," if mark in line), None)
         if not named or _is_comment(line):
             # the heading may be separated in another way than the rows
@@ -233,27 +233,27 @@ class _Reader:
             separator = None if len(self.names) > 1 else ","
         else:
             separator = separator or ("," if header else None)
-            self.names = self._cells(place, line, separator)
+            self.names = self._cells(number, line, separator)
         self.separator = separator
         while named and len(self.names) > 1 and not self.names[-1]:
             self.names.pop()
         if named and loose:
             self.names[0] = self.names[0].lstrip(_MARKS)
 
-    def _cells(self, place: int, line: str, separator: str | None) -> list[str]:
+    def _cells(self, number: int, line: str, separator: str | None) -> list[str]:
         cells = Dialect(separator).cells(line)
         if cells is None:
             raise InputError(
-                f"{self._path}: line {place}: found '{shown(line)}', expected quotes in pairs "
+                f"{self._path}: line {number}: found '{shown(line)}', expected quotes in pairs "
                 "around a cell"
             )
         return cells
 
-    def takes(self, place: int, line: str) -> bool:
+    def takes(self, number: int, line: str) -> bool:
         """Take a line as a row if it is one; return whether it has been used."""
         if self.skipping and self.separator is not None and self.names[-1] not in line:
             return False
-        cells = self._cells(place, line, self.separator)
+        cells = self._cells(number, line, self.separator)
         width = len(self.names)
         while len(cells) > width and not cells[-1]:
             cells.pop()
@@ -262,37 +262,37 @@ class _Reader:
                 self.skipping = 0  # a further sweep
                 return True
             if self.skipping or cells[0].lower() in _BETWEEN:
-                self.skipping = self.skipping or place
+                self.skipping = self.skipping or number
                 return False
             if len(cells) < width and self.names[-1].lower() == "comment":
                 cells += [""] * (width - len(cells))  # LabVIEW's column for remarks
             if not self.rows and len(cells) <= width and not any(map(_begins_number, cells)):
-                self._remark(place, line, cells)
+                self._remark(number, line, cells)
                 return True
         if len(cells) != width:
             halves = self.separator == "," and len(cells) == 2 * width
             hint = "; with decimal commas, tabs or semicolons must separate the cells" * halves
             raise InputError(
-                f"{self._path}: line {place}: {len(cells)} cells, expected {width} as in the "
+                f"{self._path}: line {number}: {len(cells)} cells, expected {width} as in the "
                 f"{self._first}{hint}"
             )
-        self.places.append(place)
+        self.lines.append(number)
         self.rows.append(cells)
         return True
 
-    def _remark(self, place: int, line: str, cells: list[str]) -> None:
+    def _remark(self, number: int, line: str, cells: list[str]) -> None:
         units = [cell.strip("()[]{}<> ") for cell in cells]
         if not self._units and any(map(is_unit, units)):
             self._units = units
         else:
-            self.remarks.append((place, line))
+            self.remarks.append((number, line))
 
     def with_units(self, comments: list[tuple[int, str]]) -> list[str]:
         """Return the headings with the units that stand in a row of their own."""
         rows = [self._units]
-        for place, line in comments:
+        for number, line in comments:
             if line[:20].strip(_MARKS).lower().startswith(tuple(_UNIT_ROWS)):
-                rows.append(self._cells(place, line, self.separator))
+                rows.append(self._cells(number, line, self.separator))
         units = next((row for row in rows if any(map(is_unit, row))), [])
         units += [""] * (len(self.names) - len(units))
         return [
@@ -339,13 +339,13 @@ def _headings(line: str) -> list[str]:
     return names or [""]
 
 
-def _header_row(lines: list[tuple[int, str]], known: Callable[[str], bool]) -> int | None:
-    """Return the place of the header row, None if there are numbers only (see `read_table`)."""
+def _header_row(lines: list[tuple[int, str]], is_heading: Callable[[str], bool]) -> int | None:
+    """Return the index of the header row, None if there are numbers only (see `read_table`)."""
 
     def width(at: int) -> int:
         names = _headings(lines[at][1])
         asked = [name for name in names if len(name) <= _LONGEST_HEADING]
-        return len(names) if sum(map(known, asked)) >= 2 else 0
+        return len(names) if sum(map(is_heading, asked)) >= 2 else 0
 
     plain = [at for at, (_, line) in enumerate(lines) if not _is_comment(line)]
     named: list[int] = []

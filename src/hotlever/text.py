@@ -125,5 +125,5 @@ def as_toml(value: object) -> str:
     text = json.dumps(value, ensure_ascii=False)
     if len(text) <= _LONG or not isinstance(value, list | tuple):
         return text
-    inner = ",\n".join(as_toml(one) for one in value)
+    inner = ",\n".join(as_toml(entry) for entry in value)
     return f"[\n{inner},\n]"

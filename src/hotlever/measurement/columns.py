@@ -41,10 +41,10 @@ _LARGEST = 100_000
 
 @dataclass(frozen=True)
 class Column:
-    """Place of a quantity in a table, its unit, and what this is in the unit inside."""
+    """Index of a quantity in a table, its unit, and what this is in the unit inside."""
 
     symbol: str
-    place: int
+    index: int
     heading: str
     unit: str
     factor: float
@@ -53,13 +53,13 @@ class Column:
     @property
     def origin(self) -> str:
         """Its heading or number, with the unit where that stands elsewhere."""
-        heading = f"'{shown(self.heading)}'" if self.heading else f"column {self.place + 1}"
+        heading = f"'{shown(self.heading)}'" if self.heading else f"column {self.index + 1}"
         written = name_and_unit(self.heading)[1] == self.unit
         return heading if written else f"{heading} in {self.unit}"
 
     def values(self, table: Table) -> Array:
         """Return the data in the unit used inside; raises InputError (see `Table.numbers`)."""
-        return self.factor * table.numbers(self.place, self.symbol) + self.offset
+        return self.factor * table.numbers(self.index, self.symbol) + self.offset
 
 
 def symbol_of(name: str) -> str | None:
@@ -157,25 +157,25 @@ def find_columns(
     for quantity, heading in told.items():
         symbol, unit = _quantity(quantity, told=True)
         assert symbol is not None
-        place = table.place(heading)
+        index = table.index(heading)
         for other, column in columns.items():
-            if column.place == place:
+            if column.index == index:
                 raise InputError(
                     f"{where}: --column says that {shown(heading)} is {other} and {symbol}, "
                     "expected one of them"
                 )
-        columns[symbol] = _column(table, symbol, place, unit)
+        columns[symbol] = _column(table, symbol, index, unit)
     in_time = driven or TIME in columns
-    taken = {column.place for column in columns.values()}
-    places = defaultdict[str, list[int]](list)
-    for place, heading in enumerate(table.names):
+    taken = {column.index for column in columns.values()}
+    candidates = defaultdict[str, list[int]](list)
+    for index, heading in enumerate(table.names):
         named, _ = _quantity(heading)
-        if named is not None and named not in columns and place not in taken:
-            places[named].append(place)
-    for symbol, alike in places.items():
+        if named is not None and named not in columns and index not in taken:
+            candidates[named].append(index)
+    for symbol, indices in candidates.items():
         # its own symbol names a quantity before any other name
-        own = [p for p in alike if name_and_unit(table.names[p])[0].lower() == symbol.lower()]
-        first, *others = own or alike
+        own = [i for i in indices if name_and_unit(table.names[i])[0].lower() == symbol.lower()]
+        first, *others = own or indices
         if others and symbol != TIME:
             raise InputError(
                 f"{where}: column '{symbol}' stands twice; {_told(symbol)} says which it is"
@@ -187,10 +187,10 @@ def find_columns(
     return columns
 
 
-def _column(table: Table, symbol: str, place: int, told: str | None) -> Column:
+def _column(table: Table, symbol: str, index: int, told: str | None) -> Column:
     """Return a column with its unit, which the file or the user gives."""
-    heading, inside = table.names[place] if table.names else "", COLUMNS[symbol].unit
-    where = f"{table.where(-1)}: column '{shown(heading or str(place + 1))}'"
+    heading, inside = table.names[index] if table.names else "", COLUMNS[symbol].unit
+    where = f"{table.where(-1)}: column '{shown(heading or str(index + 1))}'"
     written = name_and_unit(heading)[1]
     if table.names[:1] == [_IN_SI]:
         written = written or inside[-1]
@@ -198,7 +198,7 @@ def _column(table: Table, symbol: str, place: int, told: str | None) -> Column:
     if unit is None:
         raise InputError(
             f"{where} has no unit, expected '{symbol} ({inside})' or another unit in parentheses; "
-            f"{_told(symbol, heading or str(place + 1))} gives one"
+            f"{_told(symbol, heading or str(index + 1))} gives one"
         )
     difference = symbol.startswith("d")
     scale = conversion(unit, inside, difference)
@@ -206,7 +206,7 @@ def _column(table: Table, symbol: str, place: int, told: str | None) -> Column:
         raise unknown_unit(unit, inside, f"{table.where(-1)}: {shown(heading)}")
     if told and written and _contradicts(written, inside, difference, scale):
         raise InputError(f"{where}: its unit is {written}, expected {told} as --column says")
-    return Column(symbol, place, heading, unit, *scale)
+    return Column(symbol, index, heading, unit, *scale)
 
 
 def _contradicts(written: str, inside: str, difference: bool, scale: tuple[float, float]) -> bool:
@@ -222,7 +222,7 @@ def _told(symbol: str, heading: str = "HEADING") -> str:
 
 def _are_brief(table: Table, column: Column) -> bool:
     """Whether times are numbers, and close enough to each other for what is measured in time."""
-    if table.dialect.number(table.rows[0][column.place]) is None:
+    if table.dialect.number(table.rows[0][column.index]) is None:
         return False  # clocks show no numbers
     times = column.values(table)
     return bool(0.0 < np.nanmax(times, initial=-np.inf) - np.nanmin(times, initial=np.inf) <= BRIEF)
@@ -256,10 +256,10 @@ def _require(table: Table, columns: Mapping[str, Column], driven: bool) -> None:
 def unused_columns(table: Table, columns: Mapping[str, Column]) -> list[str]:
     """Return a note on each column that is no quantity, with the one that it may be."""
     notes = []
-    used = {column.place for column in columns.values()}
+    used = {column.index for column in columns.values()}
     missing = [column for column in MEASURED if column.symbol not in columns]
-    for place, heading in enumerate(table.names):
-        if place not in used and heading != _IN_SI and heading.strip():
+    for index, heading in enumerate(table.names):
+        if index not in used and heading != _IN_SI and heading.strip():
             unit = name_and_unit(heading)[1] or ""
             likely = next(
                 (column.symbol for column in missing if conversion(unit, column.unit)), None

@@ -54,13 +54,13 @@ class Contents:
         for symbol, column in self.columns.items():
             self.values[symbol] = column.values(self.table)
             if symbol not in ("V_b", LEVER, TIME):
-                filled = np.array([bool(row[column.place]) for row in self.table.rows])
+                filled = np.array([bool(row[column.index]) for row in self.table.rows])
                 missing = np.isnan(self.values[symbol]) & filled
                 self.note_rows(missing, f"{symbol} is written as missing")
 
     def cell(self, symbol: str, row: int) -> str:
         """Return a cell as it stands in the file, to quote it."""
-        return shown(self.table.rows[row][self.columns[symbol].place])
+        return shown(self.table.rows[row][self.columns[symbol].index])
 
     def refuse(self, rows: NDArray[np.bool_], expected: str, *symbols: str) -> None:
         """Refuse the first of some rows, (n,) of bool, for what its cells of `symbols` hold.

@@ -69,8 +69,8 @@ def read_measurement(
         no lever can have, or whose unit must be wrong.
     """
     told = parse_columns(f"{name}={heading}" for name, heading in (columns or {}).items())
-    known = partial(is_heading, told=told)
-    table = read_table(path, "one like 'V_b (V),I_h (mA),V_r (mV)'", known=known)
+    expected = "one like 'V_b (V),I_h (mA),V_r (mV)'"
+    table = read_table(path, expected, is_heading=partial(is_heading, told=told))
     settings = Settings.of(table)
     quantities = find_columns(table, told, driven=waveform is not None)
     remarks = (

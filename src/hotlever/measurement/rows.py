@@ -125,8 +125,8 @@ def _difference(along: Array, values: Array, first: slice, other: slice, largest
 def _rising(x: Array, y: Array) -> tuple[Array, Array]:
     """Sort by bias; rows at the same bias count as their mean."""
     finite = np.isfinite(y)
-    bias, place, count = np.unique(x[finite], return_inverse=True, return_counts=True)
-    return bias, np.bincount(place, weights=y[finite], minlength=bias.size) / count
+    bias, level, count = np.unique(x[finite], return_inverse=True, return_counts=True)
+    return bias, np.bincount(level, weights=y[finite], minlength=bias.size) / count
 
 
 # --- many rows averaged to some -----------------------------------------------------------------

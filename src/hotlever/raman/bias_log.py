@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hotlever.errors import InputError, shown
-from hotlever.raman.spectrum import file_and_label
+from hotlever.raman.spectrum import aliases, file_and_label
 from hotlever.tables import Table, read_table
 from hotlever.units import name_and_unit
 
@@ -73,12 +73,12 @@ def join(log: Table, spectra: xr.Dataset) -> str:
     writer = csv.writer(out, delimiter=log.dialect.separator or ",", lineterminator="\n")
     writer.writerow([log.names[j] for j in keep] + [TEMPERATURE, ERROR])
     temperature, error = spectra.temperature_K.values, spectra.temperature_error_K.values
-    for cells, found in zip(log.rows, matched, strict=True):
+    for cells, spectrum in zip(log.rows, matched, strict=True):
         numbers = ["", ""]
-        if found is not None and np.isfinite(temperature[found]):
+        if spectrum is not None and np.isfinite(temperature[spectrum]):
             # an error is never written as 0
-            digits = ".1f" if error[found] >= 0.1 else ".2g"
-            numbers = [f"{temperature[found]:.1f}", f"{error[found]:{digits}}"]
+            digits = ".1f" if error[spectrum] >= 0.1 else ".2g"
+            numbers = [f"{temperature[spectrum]:.1f}", f"{error[spectrum]:{digits}}"]
             if log.dialect.decimal_comma:
                 numbers = [number.replace(".", ",") for number in numbers]
         writer.writerow([cells[j] for j in keep] + numbers)
@@ -86,21 +86,23 @@ def join(log: Table, spectra: xr.Dataset) -> str:
 
 
 def _column(log: Table, pattern: re.Pattern[str]) -> int | None:
-    """Place of the first column whose heading begins so."""
+    """Index of the first column whose heading begins so."""
     return next((j for j, name in enumerate(log.names) if pattern.match(name)), None)
 
 
 def _bias(log: Table) -> np.ndarray | None:
     """Bias of each row in volts, NaN where blank; None without such a column."""
-    at = _column(log, _BIAS)
-    return None if at is None else log.values(at, "V", name_and_unit(log.names[at])[0], unit="V")
+    column = _column(log, _BIAS)
+    if column is None:
+        return None
+    return log.values(column, "V", name_and_unit(log.names[column])[0], unit="V")
 
 
 def _match(log: Table, names: list[str]) -> list[int | None]:
-    """For each row of the log the place of its spectrum."""
-    at = _column(log, _FILE)
-    if at is not None:
-        return _by_name(log, at, names)
+    """For each row of the log the index of its spectrum."""
+    column = _column(log, _FILE)
+    if column is not None:
+        return _by_name(log, column, names)
     bias = _bias(log)
     stated = [_bias_in_name(name) for name in names]
     if bias is not None and None not in stated:
@@ -116,26 +118,23 @@ def _match(log: Table, names: list[str]) -> list[int | None]:
 def _bias_in_name(name: str) -> float | None:
     """Bias (V) that a spectrum's own name in its file states, else the file's name."""
     file, label = file_and_label(Path(name).name)
-    found = _IN_NAME.search(label) or _IN_NAME.search(Path(file).stem)
-    return float(found[1].replace(",", ".").replace("p", ".")) if found else None
+    match = _IN_NAME.search(label) or _IN_NAME.search(Path(file).stem)
+    return float(match[1].replace(",", ".").replace("p", ".")) if match else None
 
 
-def _by_name(log: Table, at: int, names: list[str]) -> list[int | None]:
-    stems, files = defaultdict[str, list[int]](list), defaultdict[str, list[int]](list)
-    for place, path in enumerate(map(Path, names)):
-        file, label = file_and_label(path.name)
-        stems[Path(file).stem + (f"[{label}]" if label else "")].append(place)
-        files[path.name].append(place)
-        if label:
-            files[file].append(place)
+def _by_name(log: Table, column: int, names: list[str]) -> list[int | None]:
+    called = defaultdict[str, list[int]](list)
+    for spectrum, name in enumerate(names):
+        for alias in aliases(name):
+            called[alias].append(spectrum)
     matched: list[int | None] = []
     for row, cells in enumerate(log.rows):
-        name = Path(cells[at]).name
-        found = files.get(name) or stems.get(name, [])
-        if name and len(found) != 1:
-            problem = f"names {len(found)} of them" if found else "is not among those given"
-            raise InputError(f"{log.where(row)}: spectrum '{shown(cells[at])}' {problem}")
-        matched.append(found[0] if found else None)
+        name = Path(cells[column]).name
+        spectra = called.get(name, [])
+        if name and len(spectra) != 1:
+            problem = f"names {len(spectra)} of them" if spectra else "is not among those given"
+            raise InputError(f"{log.where(row)}: spectrum '{shown(cells[column])}' {problem}")
+        matched.append(spectra[0] if spectra else None)
     return matched
 
 
@@ -143,7 +142,7 @@ def _by_bias(
     log: Table, bias: np.ndarray, stated: list[float], names: list[str]
 ) -> list[int | None]:
     matched: list[int | None] = [None] * bias.size
-    for place, (value, name) in enumerate(zip(stated, names, strict=True)):
+    for spectrum, (value, name) in enumerate(zip(stated, names, strict=True)):
         distance = np.abs(np.where(np.isnan(bias), np.inf, bias) - value)
         nearest = int(np.argmin(distance))
         # a name is rounded: 5.25V for 5.2500 V
@@ -157,5 +156,5 @@ def _by_bias(
             raise InputError(
                 f"{log.path}: two spectra at {bias[nearest]:g} V: {names[other]} and {name}"
             )
-        matched[nearest] = place
+        matched[nearest] = spectrum
     return matched

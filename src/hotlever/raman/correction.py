@@ -14,7 +14,7 @@ import numpy as np
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.raman.peak import PeakOptions
 from hotlever.raman.spectrum import Spectrum
-from hotlever.tables import Table, read_table
+from hotlever.tables import read_table
 
 #: Header of a table of corrections.
 COLUMNS = ("file", "start_cm-1", "from_cm-1", "to_cm-1", "use")
@@ -44,6 +44,10 @@ class Correction:
         return replace(options, start=start, window=window).validate()
 
 
+#: What is said of most spectra.
+NOTHING = Correction()
+
+
 def corrections_text(corrections: Mapping[str, Correction]) -> str:
     """Return the table that `read_corrections` reads.
 
@@ -56,9 +60,9 @@ def corrections_text(corrections: Mapping[str, Correction]) -> str:
     written = io.StringIO()
     table = csv.writer(written, lineterminator="\n")
     table.writerow(COLUMNS)
-    for name, one in corrections.items():
-        numbers = ("" if at is None else f"{at:.10g}" for at in (one.start, one.low, one.high))
-        table.writerow((name, *numbers, "yes" if one.use else "no"))
+    for name, said in corrections.items():
+        numbers = ("" if at is None else f"{at:.10g}" for at in (said.start, said.low, said.high))
+        table.writerow((name, *numbers, "yes" if said.use else "no"))
     return written.getvalue()
 
 
@@ -96,35 +100,33 @@ def read_corrections(path: str | os.PathLike[str]) -> dict[str, Correction]:
             f"{table.where(-1)}: found {shown(', '.join(table.names))}, expected the column file "
             f"and any of {', '.join(COLUMNS[1:])}, each once"
         )
-    found: dict[str, Correction] = {}
-    numbers = {name: _numbers(table, heads, name) for name in COLUMNS[1:4]}
+    corrections: dict[str, Correction] = {}
+    nothing = np.full(len(table.rows), np.nan)
+    numbers = [
+        table.numbers(heads.index(name), name) if name in heads else nothing
+        for name in COLUMNS[1:4]
+    ]
     for row, cells in enumerate(table.rows):
         name = Path(cells[heads.index("file")]).as_posix()
-        if name in found:
+        if name in corrections:
             raise InputError(f"{table.where(row)}: '{shown(name)}' has a row above")
-        start, low, high = (None if np.isnan(one[row]) else one[row] for one in numbers.values())
+        at_row = (float(column[row]) for column in numbers)
+        start, low, high = (None if np.isnan(value) else value for value in at_row)
         use = cells[heads.index("use")].strip().lower() if "use" in heads else ""
         if use not in _USE:
             raise InputError(f"{table.where(row)}: use: found '{shown(use)}', expected yes or no")
-        found[name] = Correction(start, low, high, _USE[use])
+        corrections[name] = Correction(start, low, high, _USE[use])
         try:
-            found[name].of(PeakOptions())
+            corrections[name].of(PeakOptions())
         except InputError as error:
             raise InputError(f"{table.where(row)}: {error}") from None
-    return found
+    return corrections
 
 
-def _numbers(table: Table, heads: list[str], name: str) -> list[float]:
-    if name not in heads:
-        return [np.nan] * len(table.rows)
-    return [float(value) for value in table.numbers(heads.index(name), name)]
-
-
-def of_spectrum(spectrum: Spectrum, corrections: Mapping[str, Correction]) -> Correction | None:
+def of_spectrum(spectrum: Spectrum, corrections: Mapping[str, Correction]) -> Correction:
     """Return what is said of a spectrum, the row with the most folders before its name first."""
-    if not corrections:
-        return None
-    return next((corrections[one] for one in _names(spectrum) if one in corrections), None)
+    names = _names(spectrum) if corrections else []
+    return next((corrections[name] for name in names if name in corrections), NOTHING)
 
 
 def check_corrections(
@@ -150,14 +152,14 @@ def check_corrections(
     InputError
         If there is none; the text names the nearest one.
     """
-    known: dict[str, None] = {}
-    for spectrum in spectra if corrections else ():
-        known |= dict.fromkeys(_names(spectrum))
-    folders = {Path(one).parent for one in known}
+    if not corrections:
+        return []
+    spectra_named = dict.fromkeys(name for spectrum in spectra for name in _names(spectrum))
+    folders = {Path(name).parent for name in spectra_named}
     elsewhere = [name for name in corrections if Path(name).parent not in folders]
     for name in corrections:
-        if name not in known and name not in elsewhere:
-            beside = [one for one in known if Path(one).parent == Path(name).parent]
+        if name not in spectra_named and name not in elsewhere:
+            beside = [other for other in spectra_named if Path(other).parent == Path(name).parent]
             raise unknown_name("spectrum", name, beside, where)
     return elsewhere
 
@@ -165,4 +167,4 @@ def check_corrections(
 def _names(spectrum: Spectrum) -> list[str]:
     """By what a spectrum may be called: its name, with more or fewer folders before it."""
     folders = Path(spectrum.folder).parts
-    return [Path(*folders[place:], spectrum.name).as_posix() for place in range(len(folders) + 1)]
+    return [Path(*folders[depth:], spectrum.name).as_posix() for depth in range(len(folders) + 1)]

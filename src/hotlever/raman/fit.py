@@ -119,8 +119,8 @@ def _spiky(peak: Peak, step: float) -> bool:
 
 def _beside_cosmic_ray(x: Array, y: Array, options: PeakOptions, spike: Peak | None) -> Peak | None:
     """The line without what looks like one: on a coarse axis a cosmic ray does."""
-    place = spike.centre if spike else x[np.argmax(np.where(_in_range(x), y, -np.inf))]
-    hit = np.abs(x - place) <= 1.1 * _step(x)
+    ray = spike.centre if spike else x[np.argmax(np.where(_in_range(x), y, -np.inf))]
+    hit = np.abs(x - ray) <= 1.1 * _step(x)
     peak = _fit(x[~hit], y[~hit], options) if np.count_nonzero(~hit) >= MIN_SAMPLES else None
     if peak is None or _spiky(peak, _step(x)):
         return None
@@ -147,10 +147,10 @@ def _fit(x: Array, y: Array, options: PeakOptions) -> Peak | None:
 
 def _likely_spikes(x: Array, y: Array, base: float, start: float | None) -> Mask:
     """Cosmic rays by sight; none where a line is said or, on a coarse axis, can be."""
-    found = noise.likely_spikes(y, base)
+    spikes = noise.likely_spikes(y, base)
     if start is not None:
-        return np.asarray(found & ~_near(x, start))
-    return found & ~_in_range(x) if _step(x) > _SPIKE_MAX_STEP else found
+        return np.asarray(spikes & ~_near(x, start))
+    return spikes & ~_in_range(x) if _step(x) > _SPIKE_MAX_STEP else spikes
 
 
 def _start(x: Array, y: Array, options: PeakOptions) -> tuple[Problem, Array] | None:
@@ -299,7 +299,7 @@ def _peak(solution: Solution) -> Peak | None:
     problem, p, x = solution.problem, solution.p, solution.problem.x
     if np.isnan(p).any():
         return None
-    centre, log_fwhm, height, level, slope, fano, log_sigma, *found = p.tolist()
+    centre, log_fwhm, height, level, slope, fano, log_sigma, *low_band = p.tolist()
     fwhm, resolution = width_of(log_fwhm), width_of(log_sigma) / lineshape.SIGMA_PER_FWHM
     width, step = observed_width(fwhm, resolution), _step(x)
     covariance = solution.covariance
@@ -324,7 +324,7 @@ def _peak(solution: Solution) -> Peak | None:
         return None
     band, band_gap = None, math.nan
     if At.BAND_HEIGHT in problem.free:
-        band = Band(found[1], width_of(found[2]), found[0])
+        band = Band(low_band[1], width_of(low_band[2]), low_band[0])
         band_gap = centre - band.centre - (0.5 * band.fwhm + width)
     spikes, misfit = x[problem.shown & ~solution.use].tolist(), solution.misfit
     flags = {

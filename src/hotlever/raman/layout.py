@@ -62,8 +62,8 @@ def _in_rows(table: Block) -> list[Spectrum]:
     columns = {names[j]: rows[:, j] for j in np.flatnonzero(~axis) if names[j]}
     labels = positions(columns, len(rows))
     return [
-        _labelled(first[axis], row[axis], columns, place, labels[place])
-        for place, row in enumerate(rows)
+        _labelled(first[axis], row[axis], columns, number, labels[number])
+        for number, row in enumerate(rows)
     ]
 
 
@@ -107,8 +107,8 @@ def _in_columns(table: Block, where: str) -> list[Spectrum]:
     headings = {column: names[column] if len(chosen) > 1 else "" for column in chosen}
     labels = positions(columns, len(groups))
     return [
-        _labelled(x[rows], values[rows, column], columns, place, labels[place], heading)
-        for place, rows in enumerate(groups)
+        _labelled(x[rows], values[rows, column], columns, number, labels[number], heading)
+        for number, rows in enumerate(groups)
         for column, heading in headings.items()
     ]
 
@@ -117,12 +117,12 @@ def _labelled(
     x: Array,
     y: Array,
     columns: dict[str, Array],
-    place: int,
+    number: int,
     label: str = "",
     heading: str = "",
 ) -> Spectrum:
     """A spectrum with its position and its column's heading as label, and the temperature there."""
-    position = {name: f"{values[place]:g}" for name, values in columns.items()}
+    position = {name: f"{values[number]:g}" for name, values in columns.items()}
     temperature = temperature_in_name(heading) or temperature_in_metadata(position)
     return Spectrum(x, y, f"{label} {heading}".strip(), temperature=temperature)
 
@@ -319,23 +319,23 @@ def intensities(table: Block, others: list[int], where: str) -> list[int]:
             f"{where}: the columns beside the axis are {_listed(names, useful)}; expected "
             "intensities alone, or all of them named so"
         )
-    found = [j for j in spectra if kinds[j] == best or best >= _PLAIN] or useful
-    for first, second in combinations(found[:_MOST_COMPARED], 2):
+    chosen = [j for j in spectra if kinds[j] == best or best >= _PLAIN] or useful
+    for first, second in combinations(chosen[:_MOST_COMPARED], 2):
         if _computed_from(values[:, first], values[:, second]):
             raise InputError(
                 f"{where}: columns {first + 1} and {second + 1} rise and fall as one, as counts "
                 "and their error do; expected spectra alone"
             )
-    return found
+    return chosen
 
 
 def _kind(name: str) -> int:
     """Place in `_WANTED` of what a column is named as, `_UNNAMED` if in none, or `_OTHER`."""
     if _UNWANTED.search(name) and not _WANTED[0].search(name):
         return _OTHER
-    found = next((i for i, wanted in enumerate(_WANTED) if wanted.search(name)), _UNNAMED)
+    kind = next((i for i, wanted in enumerate(_WANTED) if wanted.search(name)), _UNNAMED)
     quantity = _OTHER_QUANTITY.search(name) and temperature_in_name(name) is None
-    return _OTHER if found == _UNNAMED and quantity else found
+    return _OTHER if kind == _UNNAMED and quantity else kind
 
 
 def _listed(names: list[str], which: list[int]) -> str:

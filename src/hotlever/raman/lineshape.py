@@ -154,7 +154,7 @@ class Problem:
                 unit, slopes = band(self.x, centre, width_of(log_fwhm))
                 value += height * unit
                 columns += [unit, *(height * slopes)]
-            return value, np.array([columns[place] for place in self.free]).T, part
+            return value, np.array([columns[parameter] for parameter in self.free]).T, part
 
     def weighted(self, p: Array, variance: Array, use: Mask) -> tuple[Array, Array]:
         """Residuals over their standard deviations, priors last, and the Jacobian of both."""
@@ -162,9 +162,9 @@ class Problem:
         weight = 1.0 / np.sqrt(variance[use])
         residual, jacobian = (value - self.y)[use] * weight, jacobian[use] * weight[:, None]
         if self.priors:
-            places, mean, spread = np.array(self.priors).T
-            residual = np.append(residual, (p[places.astype(int)] - mean) / spread)
-            jacobian = np.append(jacobian, (places[:, None] == self.free) / spread[:, None], 0)
+            parameters, mean, spread = np.array(self.priors).T
+            residual = np.append(residual, (p[parameters.astype(int)] - mean) / spread)
+            jacobian = np.append(jacobian, (parameters[:, None] == self.free) / spread[:, None], 0)
         if not np.isfinite(residual).all():
             residual, jacobian = np.full_like(residual, 1e30), np.nan_to_num(jacobian)
         return residual, jacobian
@@ -187,7 +187,7 @@ class Problem:
         # least_squares adds takes longer than the fit of a few hundred samples
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
-            found = leastsq(
+            solution = leastsq(
                 lambda some: at(some.tobytes())[0],
                 start[free],
                 Dfun=lambda some: at(some.tobytes())[1],
@@ -196,7 +196,7 @@ class Problem:
                 xtol=1e-8,
                 maxfev=200,
             )[0]
-        return all_of(found)
+        return all_of(solution)
 
 
 @dataclass(frozen=True)

@@ -112,8 +112,8 @@ def _spc(raw: bytes, spc_io: Any) -> list[Spectrum]:
     if data.xtype not in _SPC_SHIFT:
         unit = "the axis is a wavelength" if data.xtype in _SPC_NM else f"an axis in {data.xtype}"
         raise ValueError(f"{unit}, expected a Raman shift in cm⁻¹")
-    places = {name: np.array([getattr(part, name) for part in data], float) for name in "wz"}
-    labels = positions({k: v for k, v in places.items() if np.isfinite(v).all()}, len(data))
+    coordinates = {name: np.array([getattr(part, name) for part in data], float) for name in "wz"}
+    labels = positions({k: v for k, v in coordinates.items() if np.isfinite(v).all()}, len(data))
     pairs = [(np.array(part.xarray, float), np.array(part.yarray, float)) for part in data]
     return [Spectrum(x, y, label) for (x, y), label in zip(pairs, labels, strict=True)]
 
@@ -204,27 +204,27 @@ def read_wdf(raw: bytes) -> list[Spectrum]:
         with np.errstate(divide="ignore"):
             x = laser - 1e7 / x
     y = _floats(data, samples * measured).reshape(measured, samples)
-    places, temperatures = _origins(blocks.get(b"ORGN", b""), room, measured)
-    labels = positions(places, measured)
+    coordinates, temperatures = _origins(blocks.get(b"ORGN", b""), room, measured)
+    labels = positions(coordinates, measured)
     return [Spectrum(x, y[i], labels[i], temperature=temperatures[i]) for i in range(measured)]
 
 
 def _blocks(raw: bytes) -> dict[bytes, bytes]:
     """Content by name, of the first block of each; ValueError if blocks do not fill the file."""
     blocks: dict[bytes, bytes] = {}
-    place = count = 0
-    while place < len(raw):
+    start = count = 0
+    while start < len(raw):
         count += 1
         name, size = b"", 0
-        if place + _BLOCK.size <= len(raw):
-            name, size = _BLOCK.unpack_from(raw, place)
-        if count > _MOST_BLOCKS or not _BLOCK.size <= size <= len(raw) - place:
+        if start + _BLOCK.size <= len(raw):
+            name, size = _BLOCK.unpack_from(raw, start)
+        if count > _MOST_BLOCKS or not _BLOCK.size <= size <= len(raw) - start:
             raise ValueError(
-                f"cut short or damaged: its blocks do not follow each other at byte {place} of "
+                f"cut short or damaged: its blocks do not follow each other at byte {start} of "
                 f"{len(raw)}"
             )
-        blocks.setdefault(name, raw[place + _BLOCK.size : place + size])
-        place += size
+        blocks.setdefault(name, raw[start + _BLOCK.size : start + size])
+        start += size
     return blocks
 
 
@@ -239,7 +239,7 @@ def _origins(
     content: bytes, room: int, measured: int
 ) -> tuple[dict[str, Array], list[float | None]]:
     """Where and at which temperature (K) spectra were measured, as far as the file says."""
-    places: dict[str, Array] = {}
+    coordinates: dict[str, Array] = {}
     temperatures: list[float | None] = [None] * measured
     size = _ORIGIN.size + 8 * room
     for at in range(4, len(content) - size + 1, size)[:_MOST_ORIGINS]:
@@ -252,8 +252,8 @@ def _origins(
             values = values + _TO_KELVIN[unit]
             temperatures = [sample_temperature(kelvin) for kelvin in values.tolist()]
         if name == "T" or kind & _PRIMARY:
-            places[name] = values
-    return places, temperatures
+            coordinates[name] = values
+    return coordinates, temperatures
 
 
 #: By suffix.

@@ -79,11 +79,11 @@ def read_file(path: str | os.PathLike[str]) -> list[Spectrum]:
         raise InputError(f"{file}: holds no spectrum")
     names = names_in_file(file.name, [spectrum.name for spectrum in spectra])
     of_file = temperature_in_name(inside.stem)
-    for place, (name, spectrum) in enumerate(zip(names, spectra, strict=True)):
+    for index, (name, spectrum) in enumerate(zip(names, spectra, strict=True)):
         x, y = _checked(spectrum.x, spectrum.y, str(file.with_name(name)))
         stated = (spectrum.temperature, temperature_in_metadata(spectrum.metadata), of_file)
         temperature = next((kelvin for kelvin in stated if kelvin is not None), None)
-        spectra[place] = Spectrum(x, y, name, spectrum.metadata, temperature, str(file.parent))
+        spectra[index] = Spectrum(x, y, name, spectrum.metadata, temperature, str(file.parent))
     return spectra
 
 
@@ -186,7 +186,7 @@ def spectrum_files(paths: Iterable[str | os.PathLike[str]]) -> list[tuple[Path, 
 def _natural_key(path: Path) -> list[str | int]:
     """Sort key that puts ``tip_2`` before ``tip_10``."""
     parts = re.split(r"([0-9]+)", path.name.lower())
-    return [int(part) if place % 2 else part for place, part in enumerate(parts)]
+    return [int(part) if index % 2 else part for index, part in enumerate(parts)]
 
 
 def read_spectra(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +15,10 @@ import numpy as np
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.raman.calibration import Point, RamanCalibration, calibrate_raman
-from hotlever.raman.correction import Correction, of_spectrum
+from hotlever.raman.correction import NOTHING, Correction, of_spectrum
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
-from hotlever.raman.spectrum import Spectrum, file_and_label, sample_temperature
+from hotlever.raman.spectrum import Spectrum, aliases, sample_temperature
 from hotlever.raman.thermometer import Thermometer
 from hotlever.steps import each
 from hotlever.tables import read_table
@@ -45,17 +46,17 @@ class Line:
 
     spectrum: Spectrum
     peak: Peak | None
-    correction: Correction | None = None  #: by hand
+    correction: Correction = NOTHING  #: by hand
 
     @property
     def used(self) -> bool:
         """Whether it is measured, and not left out."""
-        return self.correction is None or self.correction.use
+        return self.correction.use
 
     @property
     def window(self) -> tuple[float, float]:
         """The part that is fitted, cm⁻¹."""
-        return (self.correction or Correction()).of(PeakOptions()).window
+        return self.correction.of(PeakOptions()).window
 
     @property
     def flags(self) -> list[str]:
@@ -63,7 +64,7 @@ class Line:
         if not self.used:
             return ["left-out"]
         flags = ["no-line"] if self.peak is None else list(self.peak.flags)
-        return flags if self.correction in (None, Correction()) else [*flags, "by-hand"]
+        return flags if self.correction == NOTHING else [*flags, "by-hand"]
 
 
 def measure(
@@ -95,16 +96,12 @@ def measure(
     options = options or PeakOptions()
     lines = []
     for spectrum in each(spectra, progress):
-        correction = of_spectrum(spectrum, corrections or {})
-        line = Line(spectrum, None, correction)
-        if line.used:
-            own = options if correction is None else correction.of(options)
-            try:
+        correction, peak = of_spectrum(spectrum, corrections or {}), None
+        if correction.use:
+            with suppress(NoSiliconLine):
+                own = correction.of(options)
                 peak = fit_peak(spectrum.x, spectrum.y, own, spectrum.name)
-                line = replace(line, peak=peak)
-            except NoSiliconLine:
-                pass
-        lines.append(line)
+        lines.append(Line(spectrum, peak, correction))
     return lines
 
 
@@ -123,16 +120,16 @@ def read_lines(lines: Sequence[Line], thermometer: Thermometer | None) -> xr.Dat
         names = [str(Path(line.spectrum.folder) / line.spectrum.name) for line in lines]
     numbers = np.full((len(DIGITS), len(lines)), np.nan)
     flags = [line.flags for line in lines]
-    for place, peak in enumerate(line.peak for line in lines):
+    for column, peak in zip(numbers.T, (line.peak for line in lines), strict=True):
         if peak is not None:
-            numbers[:3, place] = peak.centre, peak.centre_stderr, peak.fwhm
+            column[:3] = peak.centre, peak.centre_stderr, peak.fwhm
     if thermometer is not None:
         reading = thermometer.read(numbers[0], numbers[1])
         numbers[3:] = reading.shift, reading.temperature, reading.error
         missing = np.isnan(reading.temperature) & ~np.isnan(numbers[0])
         for flag, where in (("no-temperature", missing), ("extrapolated", reading.outside)):
-            for place in where.nonzero()[0].tolist():
-                flags[place].append(flag)
+            for spectrum in where.nonzero()[0].tolist():
+                flags[spectrum].append(flag)
     joined = np.array([";".join(each) for each in flags], dtype=str)
     columns = {
         "file": ("spectrum", np.array(names, dtype=str), {"long_name": "file"}),
@@ -181,18 +178,18 @@ def calibrate_from(
         If a spectrum has no temperature, no silicon line, or a clipped one.
     """
     options = options or PeakOptions()
-    known = corrections or {}
-    kept = [one for one in spectra if (said := of_spectrum(one, known)) is None or said.use]
+    corrections = corrections or {}
+    kept = [spectrum for spectrum in spectra if of_spectrum(spectrum, corrections).use]
     if not kept:
         raise InputError(f"{source}: every spectrum is left out, expected some to calibrate with")
     stated = [_temperature(spectrum, temperatures or {}) for spectrum in kept]
-    lines = measure(kept, options, progress, known)
+    lines = measure(kept, options, progress, corrections)
     points = []
     for line, temperature in zip(lines, stated, strict=True):
         name, peak = line.spectrum.name, line.peak
         if peak is None or "saturated" in peak.flags:
-            found = "no silicon line" if peak is None else "a saturated line"
-            raise InputError(f"{name}: {found}, expected a spectrum to calibrate with")
+            fault = "no silicon line" if peak is None else "a saturated line"
+            raise InputError(f"{name}: {fault}, expected a spectrum to calibrate with")
         points.append(
             Point(
                 file=name,
@@ -206,19 +203,17 @@ def calibrate_from(
 
 def _temperature(spectrum: Spectrum, table: dict[str, float]) -> float:
     name = spectrum.name
-    if not table and spectrum.temperature is None:
-        raise InputError(
-            f"{name}: no temperature in its header or name; expected e.g. "
-            "'#Temperature (K)=\t295', a name like si_450K.txt, or a table of temperatures"
-        )
-    file, label = file_and_label(name)
-    named = [f"{one}[{label}]" if label else one for one in (file, Path(file).stem)]
-    # a table may name a file whose spectra were all taken at one temperature
-    found = next((table[one] for one in (*named, file, Path(file).stem) if one in table), None)
-    found = found if table else spectrum.temperature
-    if found is None:
+    if not table:
+        if spectrum.temperature is None:
+            raise InputError(
+                f"{name}: no temperature in its header or name; expected e.g. "
+                "'#Temperature (K)=\t295', a name like si_450K.txt, or a table of temperatures"
+            )
+        return spectrum.temperature
+    called = next((alias for alias in aliases(name) if alias in table), None)
+    if called is None:
         raise unknown_name("spectrum in the temperature table", name, table)
-    return found
+    return table[called]
 
 
 def read_temperatures(path: str | os.PathLike[str]) -> dict[str, float]:
@@ -241,12 +236,12 @@ def read_temperatures(path: str | os.PathLike[str]) -> dict[str, float]:
     # a heading such as T_C has its unit without brackets
     celsius = table.names and re.search(r"[\W_](C|celsius)\W*$", table.names[1], re.I)
     kelvin = table.values(1, "K", "temperature", unit="C" if celsius else "K")
-    found: dict[str, float] = {}
+    temperatures: dict[str, float] = {}
     for row, (cells, value) in enumerate(zip(table.rows, kelvin, strict=True)):
         temperature = sample_temperature(float(value))
         if temperature is None:
             raise InputError(f"{table.where(row)}: '{shown(cells[1])}' is no sample temperature")
         name = Path(cells[0]).name
-        if found.setdefault(name, temperature) != temperature:
+        if temperatures.setdefault(name, temperature) != temperature:
             raise InputError(f"{table.where(row)}: '{shown(name)}' has another temperature above")
-    return found
+    return temperatures

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -41,9 +42,11 @@ def names_in_file(file: str, labels: list[str]) -> list[str]:
     if len(labels) == 1:
         return [file]
     # a name is a cell of a CSV, and the last part of a path
-    plain = [" ".join(re.sub(r"[\[\]\\/,;|\"']", " ", one).split())[:_LONGEST] for one in labels]
-    told = all(plain) and len(set(plain)) == len(plain)
-    return [f"{file}[{one}]" for one in (plain if told else range(len(plain)))]
+    plain = [
+        " ".join(re.sub(r"[\[\]\\/,;|\"']", " ", label).split())[:_LONGEST] for label in labels
+    ]
+    distinct = all(plain) and len(set(plain)) == len(plain)
+    return [f"{file}[{label}]" for label in (plain if distinct else range(len(plain)))]
 
 
 def file_and_label(name: str) -> tuple[str, str]:
@@ -54,8 +57,23 @@ def file_and_label(name: str) -> tuple[str, str]:
     >>> file_and_label("iv.txt[5.25 V]"), file_and_label("si.txt")
     (('iv.txt', '5.25 V'), ('si.txt', ''))
     """
-    found = re.fullmatch(r"(.+?)\[([^\[\]]+)\]", name)
-    return (found[1], found[2]) if found else (name, "")
+    match = re.fullmatch(r"(.+?)\[([^\[\]]+)\]", name)
+    return (match[1], match[2]) if match else (name, "")
+
+
+def aliases(name: str) -> list[str]:
+    """Return what tables may call a spectrum, the most exact first.
+
+    Its file goes with or without suffix, and may stand for all the spectra in it.
+
+    Examples
+    --------
+    >>> aliases("tip/iv.txt[5.25 V]")
+    ['iv.txt[5.25 V]', 'iv[5.25 V]', 'iv.txt', 'iv']
+    """
+    file, label = file_and_label(Path(name).name)
+    files = list(dict.fromkeys((file, Path(file).stem)))
+    return [f"{name}[{label}]" for name in files if label] + files
 
 
 def positions(columns: Mapping[str, Array], count: int) -> list[str]:
@@ -119,11 +137,10 @@ def temperature_in_metadata(metadata: dict[str, str]) -> float | None:
             continue
         number, unit = quantity(value)
         unit = unit.strip() or match[2] or ""
-        if (found := _kelvin(number, unit)) is None:
-            continue
-        whose, in_kelvin = match[1], unit[0] in "kK"
-        if whose or in_kelvin or found > COLDEST_UNNAMED:
-            return found
+        kelvin = _kelvin(number, unit)
+        # a sample's by name or unit, else it may be a detector's
+        if kelvin is not None and (match[1] or unit[0] in "kK" or kelvin > COLDEST_UNNAMED):
+            return kelvin
     return None
 
 

@@ -71,17 +71,17 @@ class Thermometer:
             The temperature (K) is the room temperature of the calibration where None.
         """
         room = self.calibration.room_temperature_K
-        found = [
+        lines = [
             (peak.centre, peak.centre_stderr**-2, room if temperature is None else temperature)
             for peak, temperature in peaks
         ]
-        if not found:
+        if not lines:
             raise InputError("reference: no spectrum with a silicon line")
-        centres, weights, temperatures = np.array(found).T
-        places = centres - self.calibration.anharmonic.shift(temperatures, room)[0]
+        centres, weights, temperatures = np.array(lines).T
+        references = centres - self.calibration.anharmonic.shift(temperatures, room)[0]
         return replace(
             self,
-            reference=float(np.average(places, weights=weights)),
+            reference=float(np.average(references, weights=weights)),
             reference_stderr=float(np.sum(weights) ** -0.5),
         )
 
