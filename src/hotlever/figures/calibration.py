@@ -10,18 +10,14 @@ from matplotlib.figure import Figure
 
 from hotlever.calibration.calibration import Calibration
 from hotlever.calibration.pulses import PulseCalibration
+from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from hotlever.estimation.lack_of_fit import USUAL_SCATTER
 from hotlever.figures.style import (
-    BLACK,
-    BLUE,
     COLOURS,
-    GREEN,
     MEASURED,
     NOT_DESCRIBED,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
+    axis_label,
+    curve,
     figure,
     from_zero,
 )
@@ -44,24 +40,19 @@ def calibration_curves(calibration: Calibration) -> Figure:
     if calibrated, stands beside the static curve.
     """
     table, knee, described = calibration.table, calibration.knee, calibration.describes_data
-    power, tip = table.power_mW, table.tip_K
+    power = table.power_mW
     measured = calibration.measurement.dataset(calibration.probe.circuit)
     with figure(8.0, 6.0, 2, 2, letters=True) as (made, grid):
         by_power, by_bias, iv, budget = grid.ravel()
         if not described:
             made.suptitle(NOT_DESCRIBED, color=VERMILION)
-        for axes, along, label in (
-            (by_power, "power_mW", "power P$_l$ (mW)"),
-            (by_bias, "bias_V", "bias V$_b$ (V)"),
-        ):
+        name = "calibration and 95 % band" if described else "the nearest lever"
+        for axes, along in ((by_power, "power_mW"), (by_bias, "bias_V")):
             if described:
                 low, high = table.tip_low_K, table.tip_high_K
                 axes.fill_between(table[along], low, high, color=SKY, alpha=0.6, lw=0)
-            text = "calibration and 95 % band" if described else "the nearest lever"
-            axes.plot(table[along], tip, color=BLUE, label=text)
-            axes.set(xlabel=label, ylabel="tip temperature (K)")
-            if measured.tip_K.notnull().any():
-                axes.plot(measured[along], measured.tip_K, **MEASURED)
+            curve(axes, table, along, "tip_K", color=BLUE, label=name)
+            curve(axes, measured, along, "tip_K", **MEASURED)
         if calibration.power_law is not None and np.isfinite(calibration.k):
             law = calibration.power_law.scaled(calibration.k)
             expected = law.tip_temperature(power, calibration.base_temperature_K)
@@ -73,15 +64,14 @@ def calibration_curves(calibration: Calibration) -> Figure:
         by_power.legend(loc="upper left")
         if calibration.pulse is not None:
             _pulse(by_bias, calibration.pulse)
-        iv.plot(measured.lever_V, measured.current_mA, **MEASURED)
-        text = "calibrated lever" if described else "the nearest lever"
-        iv.plot(table.lever_V, table.current_mA, color=BLUE, label=text)
+        curve(iv, measured, "lever_V", "current_mA", **MEASURED)
+        name = "calibrated lever" if described else "the nearest lever"
+        curve(iv, table, "lever_V", "current_mA", color=BLUE, label=name)
         if calibration.knee_measured:
             across, up = BAND * knee.lever_V_stderr, BAND * knee.current_mA_stderr
             label = "knee, 95 %" if described else "its knee"
             style: Any = {"fmt": "s", "color": VERMILION, "label": label}
             iv.errorbar(knee.lever_V, knee.current_mA, xerr=across, yerr=up, **style)
-        iv.set(xlabel="lever voltage V$_l$ (V)", ylabel="heater current I$_h$ (mA)")
         iv.set(xlim=from_zero(table.lever_V), ylim=from_zero(table.current_mA))
         iv.legend(loc="upper left")
         if described:
@@ -151,22 +141,21 @@ def _budget(axes: Axes, table: xr.Dataset) -> None:
     for source, colour in zip(table.source.values, COLOURS, strict=False):
         axes.plot(table.tip_K, table.budget_K.sel(source=source), color=colour, label=source)
     axes.plot(table.tip_K, table.tip_stderr_K, color=BLACK, lw=2.0, label="together")
-    axes.set(xlabel="tip temperature (K)", ylabel="standard error (K)", ylim=(0, None))
+    axes.set(xlabel=axis_label("tip_K"), ylabel="standard error (K)", ylim=(0, None))
     axes.legend(loc="upper left")
 
 
 def _difference(axes: Axes, calibration: Calibration, measured: xr.Dataset) -> None:
     """Draw data minus the nearest lever, and mark the rows that are off."""
-    table, known = calibration.table, measured.dropna("bias", subset=["current_mA"])
-    largest = float(np.abs(known.current_mA).max())
-    shown = np.interp(known.bias_V, table.bias_V, table.current_mA)
-    share = (known.current_mA - shown) / largest
-    usual = USUAL_SCATTER
+    table, data = calibration.table, measured.dropna("bias", subset=["current_mA"])
+    expected = np.interp(data.bias_V, table.bias_V, table.current_mA)
+    share = 100 * (data.current_mA - expected) / float(np.abs(data.current_mA).max())
+    usual = 100 * USUAL_SCATTER
     off = np.abs(share) > usual
-    axes.axhspan(-100 * usual, 100 * usual, color="0.9", lw=0, label="as usual")
-    axes.plot(known.bias_V, 100 * share, "o", color=BLACK, ms=3.0, label="measured")
-    axes.plot(known.bias_V[off], 100 * share[off], "o", color=VERMILION, ms=5.0, label="off")
-    axes.set(xlabel="bias V$_b$ (V)", ylabel="I$_h$: data − lever (% of the largest)")
+    axes.axhspan(-usual, usual, color="0.9", lw=0, label="as usual")
+    axes.plot(data.bias_V, share, "o", color=BLACK, ms=3.0, label="measured")
+    axes.plot(data.bias_V[off], share[off], "o", color=VERMILION, ms=5.0, label="off")
+    axes.set(xlabel=axis_label("bias_V"), ylabel="I$_h$: data − lever (% of the largest)")
     axes.legend(loc="best")
 
 

@@ -1,20 +1,109 @@
-"""Figures of drawings: what a file holds, and where it is at fault."""
+"""Drawings: a probe from above, and what a file holds, with where it is at fault."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from textwrap import fill
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
+from matplotlib.tri import Triangulation
 
-from hotlever.figures.style import BLACK, COLOURS, VERMILION, figure
+from hotlever.colours import BLACK, BLUE, ORANGE, SKY, VERMILION
+from hotlever.figures.style import COLOURS, figure
+from hotlever.materials import HIGH_DOPED
+from hotlever.probe import Layout, ProbeMesh, Region
+from hotlever.types import Array
 
 Ring = Sequence[tuple[float, float]]
-#: Beyond this share of the drawing's extent a place is marked outside of it.
-_MARGIN = 0.06
+#: Characters of a title that have room above a drawing.
+_TITLE = 90
+#: Room around a drawing as a share of its extent, and a terminal's name over its height.
+_MARGIN, _NAME = 0.04, 0.33
+
+
+def probe_drawing(layout: Layout, title: str = "", *, mesh: ProbeMesh | None = None) -> Figure:
+    """Draw a probe from above, with heater, reader, terminals and tip marked, or its mesh too."""
+    with figure(7.0, 3.4) as (made, axes):
+        handles: dict[str, Patch | Line2D] = {}
+        for region in layout.regions:
+            colour, label = _shown_as(region)
+            axes.add_patch(_patch(region, facecolor=colour, edgecolor="0.55", lw=0.6))
+            handles.setdefault(label, Patch(facecolor=colour, edgecolor="0.55", label=label))
+        if mesh is not None:
+            x, y = mesh.elements.p
+            axes.triplot(Triangulation(x, y, mesh.elements.t.T), color="0.25", lw=0.25)
+        low, high = layout.box
+        margin = _MARGIN * max(high - low)
+        # beside a lever that is as wide as long names take more of its size
+        name_um = max(5 * margin, _NAME * (high - low)[1]), 5 * margin
+        room = np.full((2, 2), margin)  # before and behind, in x and y
+        for name, edges in groupby(layout.terminals, lambda terminal: terminal.name):
+            ends = np.array([(edge.start, edge.end) for edge in edges])
+            axes.plot(*ends.T, color=BLUE, lw=4, solid_capstyle="butt")
+            at, middle = ends.mean(axis=(0, 1)), (low + high) / 2
+            # away from the middle of the lever, along the nearer axis
+            along = int(np.argmax(np.abs(at - middle) / (high - low)))
+            side = int(at[along] >= middle[along])
+            room[side, along] = name_um[along]
+            shift = np.zeros(2)
+            shift[along] = (-8, 8)[side]
+            beside: Any = {"ha": ("right", "left")[side], "va": "center"}
+            if along == 1:
+                beside = {"ha": "center", "va": ("top", "bottom")[side]}
+            axes.annotate(name, at, xytext=shift, textcoords="offset points", color=BLUE, **beside)
+        handles["terminal"] = Line2D([], [], color=BLUE, lw=4, label="terminal (base temperature)")
+        (handles["tip"],) = axes.plot(*layout.tip, "^", color=BLACK, label="tip")
+        _plane(axes, low - room[0], high + room[1])
+        if title:
+            made.suptitle(fill(title, _TITLE), x=0.01, ha="left", fontsize=9, parse_math=False)
+        made.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
+    return made
+
+
+def _shown_as(region: Region) -> tuple[str, str]:
+    """Return colour and label of a region in a drawing of its probe."""
+    heats = region.part == "heater"
+    if region.insulates:
+        return "0.93", f"{region.stack[-1].material} (insulates)"
+    if region.films:
+        top = region.films[-1].material
+        return (VERMILION, f"heater ({top})") if heats else (ORANGE, top)
+    if region.taper is not None:
+        name = "heater" if heats else "reader"
+        return VERMILION if heats else SKY, f"{name} (low-doped)"
+    material = region.stack[0].material
+    label = "high-doped silicon" if material == HIGH_DOPED else material
+    return (VERMILION, f"heater ({label})") if heats else ("0.82", label)
+
+
+def _patch(region: Region, **style: Any) -> PathPatch:
+    """Return a region as it is drawn, its holes left out."""
+    rings = [Path([*ring, ring[0]], closed=True) for ring in region.rings]
+    return PathPatch(Path.make_compound_path(*rings), **style)
+
+
+def outlines(axes: Axes, layout: Layout) -> None:
+    """Draw the regions and the tip of a lever over a map of it."""
+    for region in layout.regions:
+        axes.add_patch(_patch(region, fill=False, edgecolor="0.45", lw=0.4))
+    axes.plot(*layout.tip, marker="^", mfc="white", mec="black", ms=4)
+    _plane(axes)
+    axes.grid(False)
+
+
+def _plane(axes: Axes, low: Array | None = None, high: Array | None = None) -> None:
+    """Show the plane of a lever, from one corner to another if these are given."""
+    axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)")
+    if low is not None and high is not None:
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
 def outlines_drawing(
@@ -41,7 +130,7 @@ def outlines_drawing(
     rings = {name: [np.array(ring) for ring in group] for name, group in outlines.items() if group}
     extents = {name: np.ptp(np.concatenate(group), axis=0).prod() for name, group in rings.items()}
     with figure(7.0, 4.2) as (made, axes):
-        for number, name in enumerate(sorted(rings, key=lambda one: -extents[one])):
+        for number, name in enumerate(sorted(rings, key=lambda name: -extents[name])):
             colour = "0.6" if number == 0 else COLOURS[(number - 1) % len(COLOURS)]
             areas = [ring for ring in rings[name] if len(ring) > 2]
             lines = [ring for ring in rings[name] if len(ring) == 2]
@@ -58,9 +147,8 @@ def outlines_drawing(
             axes.plot(*place, marker="o", label="at fault", **ring)
             axes.plot(*place, marker="+", color=VERMILION, ms=8, mew=1.5)
         low, high = points.min(axis=0), points.max(axis=0)
-        margin = _MARGIN * max(high - low)
-        axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
-        axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)")
-        axes.set_title(fill(fault, 90) if fault else title, color=VERMILION if fault else BLACK)
+        margin = 1.5 * _MARGIN * max(high - low)
+        _plane(axes, low - margin, high + margin)
+        axes.set_title(fill(fault, _TITLE) if fault else title, color=VERMILION if fault else BLACK)
         made.legend(loc="outside lower center", ncols=4)
     return made

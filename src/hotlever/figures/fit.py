@@ -14,19 +14,19 @@ from matplotlib.ticker import MaxNLocator
 from scipy.ndimage import gaussian_filter
 from scipy.special import chdtri, ndtri
 
+from hotlever.colours import BLACK, BLUE, ORANGE, SKY, VERMILION
+from hotlever.datasets import OBSERVABLES
 from hotlever.estimation.lack_of_fit import USUAL_SCATTER
 from hotlever.figures.style import (
-    BLACK,
-    BLUE,
     MEASURED,
     NOT_DESCRIBED,
-    ORANGE,
-    SKY,
-    VERMILION,
     axis_label,
+    curve,
     figure,
     from_zero,
     panel_letters,
+    parameter_label,
+    settled,
 )
 from hotlever.materials.parameters import parameter_named
 from hotlever.text import BAND, value_with_error
@@ -43,118 +43,103 @@ _QUANTILES = (0.025, 0.16, 0.5, 0.84, 0.975)
 #: More levers than this are numbered instead of named along an axis.
 _MOST_NAMES = 24
 
-#: Observable, label, column, and the unit of differences, in parts of the column's.
-_PANELS = (
-    ("current", "heater current I$_h$ (mA)", "current_mA", "µA", 1000.0),
-    ("reader", "reader voltage V$_r$ (V)", "reader_V", "mV", 1000.0),
-    ("tip", "tip temperature (K)", "tip_K", "K", 1.0),
-)
+#: Unit of differences of each observable, and what it is of the observable's own.
+_DIFFERENCES = {"current": ("µA", 1000.0), "reader": ("mV", 1000.0), "tip": ("K", 1.0)}
 
 
-def data_and_model(measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str]) -> Figure:
+def data_and_model(
+    measured: xr.Dataset,
+    model: xr.Dataset,
+    fitted: Sequence[str],
+    band: xr.Dataset | None = None,
+) -> Figure:
     """Draw measured and modelled observables, and their difference (paper's Figs. 3 and 4).
 
     Parameters
     ----------
     measured : xarray.Dataset
-        From `Measurement.dataset`.
+        From `Measurement.dataset`, along the bias or in time.
     model : xarray.Dataset
-        The sweep of the fitted lever at the measured biases, in the same order.
+        The fitted lever at the measured biases or times, in the same order.
     fitted : sequence of str
         The observables that entered the fit.
+    band : xarray.Dataset, optional
+        `Fit.band`: of the tip, which is then drawn with it, and whether it was measured or not.
     """
-    usual = USUAL_SCATTER
-    # a lever without a reader shows no voltage of it
-    panels = [panel for panel in _PANELS if model[panel[2]].notnull().any()]
-    bias, shape = measured.bias.values, (2, len(panels))
-    with figure(2.8 * len(panels), 4.6, *shape, sharex=True, height_ratios=(1.8, 1.0)) as (
-        made,
-        grid,
-    ):
-        for (upper, lower), (name, label, column, unit, factor) in zip(grid.T, panels, strict=True):
-            data, values = measured[column].values, model[column].values
-            upper.plot(bias, values, "-", color=BLUE, label="model")
-            upper.plot(bias, data, **MEASURED)
-            lower.axhline(0, color="0.4", lw=0.8)
-            if name == "tip":
-                error = measured.tip_error_K
-                lower.fill_between(bias, -error, error, color="0.9", label="± dT")
-            lower.plot(bias, (data - values) * factor, "o-", color=VERMILION, lw=0.8, ms=3.5)
-            off = np.abs(data - values) > usual * np.nanmax(np.abs(data), initial=0.0)
-            if name != "tip" and off.any():
-                style: Any = {"color": BLACK, "label": f"off by more than {usual:.1%}"}
-                lower.plot(
-                    bias[off], (data - values)[off] * factor, "o", ms=5.5, mfc="none", **style
-                )
-                lower.legend(loc="best")
-            upper.set(ylabel=label)
-            if name not in fitted:
-                _not_fitted(upper)
-            lower.set(xlabel="bias V$_b$ (V)", ylabel=f"data − model ({unit})")
-        panel_letters(grid[0])
-        grid[0, 0].legend(loc="upper left")
-    return made
-
-
-def fitted_history(
-    measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str], band: xr.Dataset
-) -> Figure:
-    """Draw what was measured in time with its model, their difference, and the tip's band.
-
-    Parameters
-    ----------
-    measured : xarray.Dataset
-        From `Measurement.dataset`.
-    model : xarray.Dataset
-        The history of the fitted lever at the measured times.
-    fitted : sequence of str
-        The observables that entered the fit.
-    band : xarray.Dataset
-        `Fit.band`.
-    """
-    # the tip is always drawn, others where they were measured
-    panels = [one for one in _PANELS if one[0] == "tip" or measured[one[2]].notnull().any()]
-    settles = float(measured.bias_V.max()) == float(measured.bias_V.min())
-    time, width = measured.time.values, BAND * band.tip_stderr_K
-    stated = bool(width.notnull().any())
-    with figure(3.4 * len(panels), 4.6, 2, len(panels), sharex=True, height_ratios=(1.8, 1.0)) as (
-        made,
-        grid,
-    ):
-        if not stated:
-            made.suptitle(NOT_DESCRIBED, color=VERMILION)
-        for (upper, lower), (name, label, column, unit, factor) in zip(grid.T, panels, strict=True):
-            data, values = measured[column].values, model[column].values
-            if np.isfinite(data).any():
-                upper.plot(time, data, **{**MEASURED, "ms": 2.5})
-            if name == "tip":
-                if stated:
-                    low, high = band.tip_K - width, band.tip_K + width
-                    upper.fill_between(band.time, low, high, color=SKY, label="95 %")
-                upper.plot(band.time, band.tip_K, "-", color=BLUE, label="model")
-                upper.legend()
+    (along,) = map(str, measured.sizes)
+    in_time = along == "time"
+    # in time what was measured and the tip; else what the lever has, such as a reader
+    data = measured if in_time else model
+    panels = {
+        name: column.name
+        for name, column in OBSERVABLES.items()
+        if data[column.name].notnull().any() or (in_time and name == "tip")
+    }
+    size, heights = (3.4 if in_time else 2.8) * len(panels), (1.8, 1.0)
+    with figure(size, 4.6, 2, len(panels), sharex=True, height_ratios=heights) as (made, grid):
+        for (upper, lower), (name, column) in zip(grid.T, panels.items(), strict=True):
+            seen = measured[column].notnull().any()
+            if band is not None and name == "tip":
+                _tip_in_time(upper, band)
             else:
-                upper.plot(time, values, "-", color=BLUE, label="model")
-            upper.set(ylabel=label)
-            if np.isfinite(data).any():
-                lower.axhline(0, color="0.4", lw=0.8)
-                lower.plot(time, (data - values) * factor, "o", color=VERMILION, ms=2)
-                lower.set(ylabel=f"data − model ({unit})")
-                if name not in fitted:
-                    _not_fitted(upper)
-            elif stated:
-                lower.plot(band.time, band.tip_stderr_K, color=VERMILION)
+                curve(upper, model, along, column, color=BLUE, label="model")
+            if seen:
+                points = {**MEASURED, "ms": 2.5, "zorder": 1} if in_time else MEASURED
+                curve(upper, measured, along, column, **points)
+                _differences(lower, measured, model, name)
+            elif band is not None and _stated(band):
+                curve(lower, band, along, "tip_stderr_K", color=VERMILION)
                 lower.set(ylabel="standard error (K)", ylim=(0, None))
-            lower.set(xlabel="time (µs)")
-        if settles:
+            if name not in fitted:
+                where: Any = {"xycoords": "axes fraction", "ha": "right", "color": "0.4"}
+                upper.annotate("not fitted", (0.96, 0.05), **where)
+            lower.set(xlabel=axis_label(along))
+        if in_time and settled(measured):
             grid[0, 0].set_xscale("log")
+        if band is not None and not _stated(band):
+            made.suptitle(NOT_DESCRIBED, color=VERMILION)
         panel_letters(grid[0])
-        grid[0, 0].legend(loc="best")
+        # the tip, which is the last, has a band of its own
+        for axes in {grid[0, 0], grid[0, 0 if band is None else -1]}:
+            axes.legend(loc="best")
     return made
 
 
-def _not_fitted(axes: Axes) -> None:
-    axes.annotate("not fitted", (0.96, 0.05), None, "axes fraction", ha="right", color="0.4")
+def _tip_in_time(axes: Axes, band: xr.Dataset) -> None:
+    """Draw the tip temperature that a fit predicts, with its band."""
+    if _stated(band):
+        width = BAND * band.tip_stderr_K
+        axes.fill_between(
+            band.time, band.tip_K - width, band.tip_K + width, color=SKY, label="95 %"
+        )
+    curve(axes, band, "time", "tip_K", color=BLUE, label="model")
+
+
+def _differences(axes: Axes, measured: xr.Dataset, model: xr.Dataset, name: str) -> None:
+    """Draw data minus model of an observable, and mark what is off by more than is usual."""
+    (along,), column, (unit, factor) = measured.sizes, OBSERVABLES[name].name, _DIFFERENCES[name]
+    x, data = measured[along].values, measured[column].values
+    difference = data - model[column].values
+    axes.axhline(0, color="0.4", lw=0.8)
+    axes.set(ylabel=f"data − model ({unit})")
+    if along == "time":
+        axes.plot(x, difference * factor, "o", color=VERMILION, ms=2)
+        return
+    axes.plot(x, difference * factor, "o-", color=VERMILION, lw=0.8, ms=3.5)
+    if name == "tip":
+        error = measured.tip_error_K
+        axes.fill_between(x, -error, error, color="0.9", label="± dT")
+        return
+    off = np.abs(difference) > USUAL_SCATTER * np.nanmax(np.abs(data), initial=0.0)
+    if off.any():
+        style: Any = {"mfc": "none", "label": f"off by more than {USUAL_SCATTER:.1%}"}
+        axes.plot(x[off], difference[off] * factor, "o", ms=5.5, color=BLACK, **style)
+        axes.legend(loc="best")
+
+
+def _stated(band: xr.Dataset) -> bool:
+    """Whether a band has errors: there are none of a lever that does not show its data."""
+    return bool(band.tip_stderr_K.notnull().any())
 
 
 def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
@@ -192,7 +177,7 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
     if "quantile" in band.coords:
         by_bias, by_power, middle_name = band.tip_K.values, band.tip_at_power_K.values, "median"
     else:
-        stated = bool(band.tip_stderr_K.notnull().any())
+        stated = _stated(band)
         away = ndtri(_QUANTILES)[:, None] * band.tip_stderr_K.fillna(0.0).values
         by_bias = by_power = band.tip_K.values + away
         middle_name = "prediction" if stated else "the nearest lever"
@@ -258,7 +243,7 @@ def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
 
 
 def _profile(axes: Axes, profile: xr.Dataset) -> None:
-    label, unit = axis_label(profile.attrs["quantity"])
+    label, unit = parameter_label(profile.attrs["quantity"])
     value, optimum = profile.value.values / unit, profile.attrs["optimum"] / unit
     fine = np.linspace(value.min(), value.max(), 200)
     away = np.abs(value - optimum).argmax()
@@ -290,7 +275,7 @@ def posterior_corner(posterior: xr.Dataset, optimum: Mapping[str, float] | None 
         Value of each quantity to mark.
     """
     names = posterior.quantity.values.tolist()
-    shown = {name: axis_label(name) for name in names}
+    shown = {name: parameter_label(name) for name in names}
     values = {name: posterior[name].values.ravel() / shown[name][1] for name in names}
     marks = {name: value / shown[name][1] for name, value in (optimum or {}).items()}
     size = 1.3 * len(names) + 0.8
@@ -373,7 +358,7 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
         column = grid[:, 0]
         for name, axes in zip(free, column, strict=True):
             one = levers.sel(quantity=name)
-            label, scale = axis_label(name)
+            label, scale = parameter_label(name)
             mean, scatter = one["mean"].item() / scale, one.scatter.item() / scale
             if np.isfinite(scatter):
                 low, high = mean - scatter, mean + scatter

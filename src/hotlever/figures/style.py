@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -16,16 +16,33 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
+from hotlever.datasets import QUANTITIES
 from hotlever.errors import InputError
 from hotlever.files import FIGURE_TYPES, whole_file
 from hotlever.materials.parameters import INVERSION, parameter_named
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+#: Lines that can be told apart, more of them than there are colours.
+LINES = [(line, colour) for line in ("-", "--") for colour in COLOURS]
 #: How measured points look.
 MEASURED: Any = {"ls": "none", "marker": "o", "mfc": "none", "color": BLACK, "label": "measured"}
 
 #: Title of what is drawn of a lever that does not show its data.
 NOT_DESCRIBED = "the data are not described: the nearest lever, without errors"
+
+#: Points of a curve that are marked at most.
+_MARKED = 40
+#: What quantities are called that the paper has a symbol for.
+_SYMBOLS = {
+    **dict.fromkeys(("bias", "bias_V"), "bias V$_b$"),
+    "current_mA": "heater current I$_h$",
+    "lever_V": "lever voltage V$_l$",
+    "reader_V": "reader voltage V$_r$",
+    "power_mW": "power P$_l$",
+}
 
 _STYLE: Any = {
     "font.size": 9,
@@ -92,6 +109,34 @@ def save_figure(made: Figure, path: str | os.PathLike[str]) -> None:
         made.savefig(temporary, metadata=metadata.get(suffix))
 
 
+def curve(axes: Axes, data: xr.Dataset, along: str, name: str, *line: str, **style: Any) -> None:
+    """Draw a column of a dataset against another, and label the axes with what they are.
+
+    One without values, as the reader's of a lever that has none, is left out.
+    """
+    if data[name].notnull().any():
+        axes.plot(data[along], data[name], *line, **style)
+    axes.set(ylabel=axis_label(name))
+    # of axes above each other the lowest has the label
+    if axes.xaxis.get_tick_params().get("labelbottom", True):
+        axes.set(xlabel=axis_label(along))
+
+
+def marker(data: xr.Dataset, along: str, mark: str = "o") -> str:
+    """Mark the points of a curve, unless they are so many that they hide the line."""
+    return mark if data.sizes[along] <= _MARKED else ""
+
+
+def settled(history: xr.Dataset) -> bool:
+    """Whether the bias stays what it is: time is then drawn logarithmic."""
+    return float(history.bias_V.max()) == float(history.bias_V.min())
+
+
+def beside(axes: Axes) -> None:
+    """Put the legend to the right of axes, where it hides nothing."""
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
 def from_zero(values: Any) -> tuple[float | None, None]:
     """Return limits of an axis that begins at zero, unless some values are below it."""
     return (None if np.nanmin(values, initial=0.0) < 0.0 else 0.0), None
@@ -103,14 +148,26 @@ def panel_letters(panels: Iterable[Axes]) -> None:
         axes.set_title(f"({letter})", loc="left", fontweight="bold")
 
 
-def axis_label(name: str) -> tuple[str, float]:
-    """Return a quantity's axis label and the unit (of its own) that it is drawn in."""
+def axis_label(name: str) -> str:
+    """Return the label of an axis with a quantity of datasets.
+
+    Examples
+    --------
+    >>> axis_label("bias_V"), axis_label("doping")
+    ('bias V$_b$ (V)', 'doping concentration (cm⁻³)')
+    """
+    unit, meaning = QUANTITIES[name]
+    return f"{_SYMBOLS.get(name, meaning)} ({unit})"
+
+
+def parameter_label(name: str) -> tuple[str, float]:
+    """Return a parameter's axis label and the unit (of its own) that it is drawn in."""
     if name == INVERSION:
         return "T$_i$ (K)", 1.0
-    known = parameter_named(name)
-    unit = "" if known.unit == "1" else known.unit
-    if known.scale != 1.0:
-        unit = f"10$^{{{math.log10(known.scale):.0f}}}$ {unit}"
-    symbol, _, index = known.symbol.partition("_")
+    parameter = parameter_named(name)
+    unit = "" if parameter.unit == "1" else parameter.unit
+    if parameter.scale != 1.0:
+        unit = f"10$^{{{math.log10(parameter.scale):.0f}}}$ {unit}"
+    symbol, _, index = parameter.symbol.partition("_")
     symbol += f"$_{{{index}}}$" if index else ""
-    return f"{symbol} ({unit})" if unit else symbol, known.scale
+    return f"{symbol} ({unit})" if unit else symbol, parameter.scale

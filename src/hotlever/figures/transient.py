@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hotlever.figures.style import BLUE, GREEN, ORANGE, PURPLE, VERMILION, figure
+from hotlever.colours import BLUE, GREEN, ORANGE, PURPLE, VERMILION
+from hotlever.figures.style import axis_label, curve, figure, marker, settled
 
 if TYPE_CHECKING:
     import xarray as xr
-
-#: Rows that are marked; more would hide the lines.
-_MARKED = 40
 
 
 def history_overview(history: xr.Dataset) -> Figure:
@@ -20,35 +19,29 @@ def history_overview(history: xr.Dataset) -> Figure:
 
     Where the bias stays what it is, time is logarithmic.
     """
-    settles = float(history.bias_V.max()) == float(history.bias_V.min())
-    data = history.isel(time=history.time > 0) if settles else history
-    style: Any = {"marker": "o" if data.sizes["time"] <= _MARKED else "", "ms": 3}
+    data = history.isel(time=history.time > 0) if settled(history) else history
+    style: Any = {"marker": marker(data, "time"), "ms": 3}
+    energies = {"supplied_nJ": ("supplied", PURPLE), "stored_nJ": ("stored", VERMILION)}
+    if data.air_stored_nJ.any():
+        energies["air_stored_nJ"] = "in the air", BLUE
+    energies["lost_nJ"] = "lost", ORANGE
     with figure(7.4, 5.2, 2, 2, letters=True, sharex=True) as (made, grid):
         voltage, current, tip, heat = grid.ravel()
-        voltage.plot(data.time, data.bias_V, color=PURPLE, label="bias V$_b$", **style)
-        voltage.plot(data.time, data.lever_V, color=BLUE, label="lever V$_l$", **style)
-        if data.reader_V.notnull().any():
-            voltage.plot(data.time, data.reader_V, color=GREEN, label="reader V$_r$", **style)
-        voltage.set(ylabel="voltage (V)")
-        current.plot(data.time, data.current_mA, color=BLUE, **style)
-        current.set(ylabel="heater current I$_h$ (mA)")
-        tip.plot(data.time, data.tip_K, color=VERMILION, **style)
-        tip.set(ylabel="tip temperature (K)")
         for name, label, colour in (
-            ("supplied_nJ", "supplied", PURPLE),
-            ("stored_nJ", "stored", VERMILION),
-            ("air_stored_nJ", "in the air", BLUE),
-            ("lost_nJ", "lost", ORANGE),
+            ("bias_V", "bias V$_b$", PURPLE),
+            ("lever_V", "lever V$_l$", BLUE),
+            ("reader_V", "reader V$_r$", GREEN),
         ):
-            if name == "air_stored_nJ" and not data[name].any():
-                continue  # in vacuum
-            heat.plot(data.time, data[name], color=colour, label=label, **style)
+            curve(voltage, data, "time", name, color=colour, label=label, **style)
+        voltage.set(ylabel="voltage (V)")
+        curve(current, data, "time", "current_mA", color=BLUE, **style)
+        curve(tip, data, "time", "tip_K", color=VERMILION, **style)
+        for name, (label, colour) in energies.items():
+            curve(heat, data, "time", name, color=colour, label=label, **style)
         heat.set(ylabel="energy (nJ)")
         for axes in (voltage, heat):
             axes.legend()
-        for axes in (tip, heat):
-            axes.set(xlabel="time (µs)")
-        if settles:
+        if settled(history):
             tip.set_xscale("log")
     return made
 
@@ -63,21 +56,22 @@ def small_signals(spectrum: xr.Dataset) -> Figure:
         nyquist.axhline(0, color="0.4", lw=0.8)
         bode.plot(spectrum.frequency, real, color=BLUE, label="Re Z")
         bode.plot(spectrum.frequency, imaginary, "--", color=BLUE, label="Im Z")
-        bode.set(xlabel="frequency (Hz)", ylabel="impedance (kΩ)")
-        for name, label, colour in (
-            ("tip_per_power", "by power (K/mW)", VERMILION),
-            ("tip_per_bias", "by bias (K/V)", PURPLE),
-        ):
-            unit = "K_per_mW" if name == "tip_per_power" else "K_per_V"
-            size.plot(spectrum.frequency, spectrum[f"{name}_{unit}"], color=colour, label=label)
-            angle = spectrum[f"{name}_deg"]
-            phase.plot(spectrum.frequency, angle, color=colour, label=label.partition(" (")[0])
-        size.set(xlabel="frequency (Hz)", ylabel="change of T$_{tip}$ (K/mW, K/V)", yscale="log")
-        phase.set(xlabel="frequency (Hz)", ylabel="phase (°)")
-        for axes in (bode, size, phase):
-            axes.set_xscale("log")
-            axes.legend()
+        bode.set(ylabel="impedance (kΩ)")
+        for per, unit, colour in (("power", "K/mW", VERMILION), ("bias", "K/V", PURPLE)):
+            name, label = f"tip_per_{per}", f"by {per}"
+            change = spectrum[f"{name}_{unit.replace('/', '_per_')}"]
+            size.plot(spectrum.frequency, change, color=colour, label=f"{label} ({unit})")
+            phase.plot(spectrum.frequency, spectrum[f"{name}_deg"], color=colour, label=label)
+        size.set(ylabel="change of T$_{tip}$ (K/mW, K/V)", yscale="log")
+        phase.set(ylabel="phase (°)")
+        _along_frequency(bode, size, phase)
     return made
+
+
+def _along_frequency(*panels: Axes) -> None:
+    for axes in panels:
+        axes.set(xlabel=axis_label("frequency"), xscale="log")
+        axes.legend()
 
 
 def harmonics(data: xr.Dataset) -> Figure:
@@ -91,9 +85,7 @@ def harmonics(data: xr.Dataset) -> Figure:
             size.plot(data.frequency, volts, color=colour, label=f"{name} harmonic")
             angle = data[f"{name}_harmonic_deg"]
             phase.plot(data.frequency, angle, color=colour, label=f"{name} harmonic")
-        size.set(xlabel="frequency (Hz)", ylabel="amplitude of V$_l$ (V)", yscale="log")
-        phase.set(xlabel="frequency (Hz)", ylabel="phase (°)")
-        for axes in (size, phase):
-            axes.set_xscale("log")
-            axes.legend()
+        size.set(ylabel="amplitude of V$_l$ (V)", yscale="log")
+        phase.set(ylabel="phase (°)")
+        _along_frequency(size, phase)
     return made

@@ -109,7 +109,7 @@ def _add_fit_in_time(page: Page, fit: Fit) -> None:
     measured = fit.measurement.dataset(fit.probe.circuit)
     page.figure(
         "fit_in_time",
-        figures.fitted_history(measured, fit.model(), fit.observables, fit.band),
+        figures.data_and_model(measured, fit.model(), fit.observables, fit.band),
         "Measured and modelled observables against time, and their difference; and the tip "
         + (
             "temperature that the fit predicts, with the 95 % band that follows from the "
