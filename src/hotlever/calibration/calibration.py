@@ -177,8 +177,8 @@ class Calibration(Outcome):
     @property
     def heating(self) -> xr.Dataset:
         """The rows of the table that have a tip temperature, from the coldest on."""
-        known = self.table.isel(bias=np.isfinite(self.table.tip_K.values))
-        return known.isel(bias=slice(int(np.argmin(known.tip_K.values)), None))
+        rows = self.table.isel(bias=np.isfinite(self.table.tip_K.values))
+        return rows.isel(bias=slice(int(np.argmin(rows.tip_K.values)), None))
 
     @property
     def columns(self) -> list[str]:

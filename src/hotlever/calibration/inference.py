@@ -73,10 +73,10 @@ def estimate_lever(
     ComputationError
         If no lever near the probe has states at all measured biases.
     """
-    known, medium = known_beforehand(probe, priors), probe.surroundings.medium
+    stated, medium = known_beforehand(probe, priors), probe.surroundings.medium
     if fit is None:
-        options = FitOptions(priors=known, medium=medium)
-        return estimate(measured, probe, options, progress=progress), known
+        options = FitOptions(priors=stated, medium=medium)
+        return estimate(measured, probe, options, progress=progress), stated
     before_fit = _before(fit, priors)
     fixed = dict.fromkeys(fit.options.fixed)
     options = FitOptions(
@@ -97,7 +97,7 @@ def estimate_lever(
     left = PriorDensity.of_estimate(own, values, covariance[np.ix_(numbers, numbers)], relative)
     probe = probe.replace(dict(zip(own, values.tolist(), strict=True)))
     theirs = {
-        name: prior for name, prior in known.items() if name in {*OF_THE_MEASUREMENT, *SCALES}
+        name: prior for name, prior in stated.items() if name in {*OF_THE_MEASUREMENT, *SCALES}
     }
     free = tuple(name for name in own if name not in usual_parameters(probe))
     again = FitOptions(fixed=fixed, priors=theirs, free=free, medium=medium)
@@ -120,8 +120,8 @@ def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Pri
     if priors is not None and not priors:
         return {}
     asked = priors_of({**fit.options.priors, **(priors or {})}, fit.probe, "priors")
-    known = default_priors(fit.probe, published_material()) | asked
-    return {name: prior for name, prior in known.items() if name not in fit.options.fixed}
+    before = default_priors(fit.probe, published_material()) | asked
+    return {name: prior for name, prior in before.items() if name not in fit.options.fixed}
 
 
 def _same_data(first: Measurement, second: Measurement) -> bool:
@@ -135,7 +135,7 @@ def _same_data(first: Measurement, second: Measurement) -> bool:
 def calibrated_by_estimate(
     measured: Measurement,
     estimate: Estimate,
-    known: Mapping[str, Prior],
+    stated: Mapping[str, Prior],
     route: str,
     samples: int = 0,
     progress: Progress | None = None,
@@ -144,7 +144,7 @@ def calibrated_by_estimate(
 
     See `hotlever.calibration.procedure.calibrate`.
     """
-    probe, priors = estimate.probe, estimate.priors(known)
+    probe, priors = estimate.probe, estimate.priors(stated)
     circuit, medium = probe.circuit, probe.surroundings.medium
     tip = tip_by_bias(estimate, samples, progress)
     converged, reason = _verdict(estimate, priors)

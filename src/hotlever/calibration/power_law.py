@@ -171,8 +171,8 @@ def read_power_law(path: str | os.PathLike[str]) -> PowerLaw:
         )
     if not isinstance(section, dict):
         raise InputError(f"{path}: found no power law, expected an object with its coefficients")
-    known = {name: value for name, value in section.items() if name != "threshold_K"}
-    law = PowerLaw.from_values(known, str(path))
+    coefficients = {name: value for name, value in section.items() if name != "threshold_K"}
+    law = PowerLaw.from_values(coefficients, str(path))
     for name, value in law:
         if not 0 < value <= _LARGEST:
             expected = "a positive number" if not value > 0 else f"at most {_LARGEST:g}"

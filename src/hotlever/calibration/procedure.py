@@ -107,8 +107,8 @@ def calibrate(
                 "medium of the data"
             )
         # a power law holds for vacuum, whatever the lever is in
-        known = measured if law is None else replace(measured, medium=None)
-        probe, notes = with_measured_circuit(origin, known, "vacuum")
+        anywhere = measured if law is None else replace(measured, medium=None)
+        probe, notes = with_measured_circuit(origin, anywhere, "vacuum")
         probe.circuit.need_cold_start("a power law")
         result = calibrated_by_knee(measured, probe, law, route)
         return replace(result, notes=[*notes, *more, *result.notes])
@@ -121,8 +121,8 @@ def calibrate(
         causes = Diagnosis(measured, probe, priors)
         check_plausible(measured, probe, causes, known_beforehand(probe, priors))
         try:
-            estimate, known = estimate_lever(measured, probe, fit, priors, progress)
-            result = calibrated_by_estimate(measured, estimate, known, route, samples, progress)
+            estimate, stated = estimate_lever(measured, probe, fit, priors, progress)
+            result = calibrated_by_estimate(measured, estimate, stated, route, samples, progress)
         except ComputationError as error:
             raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
         if result.reason and result.converged:

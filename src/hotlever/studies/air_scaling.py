@@ -73,12 +73,12 @@ def surroundings_study(probe: Probe) -> xr.Dataset:
     for pressure in (100.0, 10.0):
         thin = probe.with_(accommodation=0.9, pressure_mbar=pressure)
         cases[f"{pressure:g} mbar, accommodation 0.9"] = thin
-    found = []
+    factors = []
     for changed in cases.values():
-        lever = Lever(changed.in_medium("vacuum"))
-        found.append(find_scale_factor(lever.branch(), Lever(changed.in_medium("air")).branch()))
-    data = xr.concat(found, "case", combine_attrs="override").assign_coords(case=list(cases))
-    return data.assign(unevenness=("case", [unevenness(one) for one in found]))
+        vacuum, air = (Lever(changed.in_medium(medium)).branch() for medium in ("vacuum", "air"))
+        factors.append(find_scale_factor(vacuum, air))
+    data = xr.concat(factors, "case", combine_attrs="override").assign_coords(case=list(cases))
+    return data.assign(unevenness=("case", [unevenness(factor) for factor in factors]))
 
 
 def _resized(probe: Probe, factor: float) -> Probe:

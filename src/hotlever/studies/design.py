@@ -68,24 +68,25 @@ class Design:
         InputError
             If there is none; the text gives the nearest one.
         """
-        known = self.numbers
-        if name not in known:
-            raise unknown_name("name", name, known)
-        return known[name]
+        numbers = self.numbers
+        if name not in numbers:
+            raise unknown_name("name", name, numbers)
+        return numbers[name]
 
     @property
     def numbers(self) -> dict[str, float]:
         """All that can be varied, by name: the numbers of the probe file, and the annealing."""
-        fixed, found = (*self.probe.shape.read_with, "tolerance_um"), dict[str, float]()
+        fixed, numbers = (*self.probe.shape.read_with, "tolerance_um"), dict[str, float]()
         for section, entries in self.probe.sections().items():
             for key, entry in entries.items():
                 if isinstance(entry, Mapping):
                     # a material's name is enough, a layer or a contact has its section before it
                     start = key if section == "materials" else f"{section}.{key}"
-                    found |= {f"{start}.{own}": one for own, one in entry.items() if _number(one)}
+                    own = {f"{start}.{name}": value for name, value in entry.items()}
+                    numbers |= {name: value for name, value in own.items() if _number(value)}
                 elif _number(entry) and key not in fixed:
-                    found[key] = float(entry)
-        return found | {name: getattr(self, name) for name in ANNEALING if self._is_annealed}
+                    numbers[key] = float(entry)
+        return numbers | {name: getattr(self, name) for name in ANNEALING if self._is_annealed}
 
     @property
     def usual(self) -> tuple[str, ...]:
@@ -100,8 +101,10 @@ class Design:
     @property
     def _is_annealed(self) -> bool:
         """Whether dopant of the silicon of ``[material]`` diffuses anywhere."""
-        regions = self.probe.layout().regions
-        return any(one.taper is not None and one.stack[0].material == LOW_DOPED for one in regions)
+        return any(
+            region.taper is not None and region.stack[0].material == LOW_DOPED
+            for region in self.probe.layout().regions
+        )
 
     def changed(self, name: str, value: float) -> Probe:
         """Return the probe with one value changed.
@@ -115,7 +118,8 @@ class Design:
         annealing: Any = {name: value}
         other = replace(self, **annealing)
         before, after = (
-            diffusion_length(one.annealing_K, 60.0 * one.annealing_min) for one in (self, other)
+            diffusion_length(design.annealing_K, 60.0 * design.annealing_min)
+            for design in (self, other)
         )
         return self.probe.with_(delta=self.probe.material.delta * float(after / before))
 
@@ -141,20 +145,20 @@ def quantities(probe: Probe, power_mW: float, air: bool = True) -> dict[str, flo
         vacuum = lever.branch()
     silicon, knee = probe.heater_silicon, vacuum.knee
     cold = vacuum.point(_COLD_U)
-    found = dict.fromkeys(QUANTITIES, float("nan"))
+    values = dict.fromkeys(QUANTITIES, float("nan"))
     if silicon is not None:
-        found["inversion_K"] = float(silicon.inversion_temperature())
-    found["tip_K"] = float(vacuum.tip_temperature(power_mW))
-    found["cold_ohm"] = 1000.0 * cold.lever_V / cold.current_mA
+        values["inversion_K"] = float(silicon.inversion_temperature())
+    values["tip_K"] = float(vacuum.tip_temperature(power_mW))
+    values["cold_ohm"] = 1000.0 * cold.lever_V / cold.current_mA
     if knee is None:
-        return found
-    found |= {"knee_K": knee.tip_K, "knee_mW": knee.power_mW}
-    found |= {"knee_V": knee.lever_V, "knee_mA": knee.current_mA}
-    found["knee_bias_V"] = probe.circuit.bias(knee.lever_V, knee.current_mA)
+        return values
+    values |= {"knee_K": knee.tip_K, "knee_mW": knee.power_mW}
+    values |= {"knee_V": knee.lever_V, "knee_mA": knee.current_mA}
+    values["knee_bias_V"] = probe.circuit.bias(knee.lever_V, knee.current_mA)
     in_air = lever.in_medium("air").branch_past_knee().knee if air else None
     if in_air is not None:
-        found["k"] = in_air.power_mW / knee.power_mW
-    return found
+        values["k"] = in_air.power_mW / knee.power_mW
+    return values
 
 
 def vary(
@@ -280,5 +284,5 @@ def label_of(name: str) -> str:
     """Return the label of an axis along which a number of a design runs."""
     if name in ANNEALING:
         return f"{ANNEALING[name]} ({name.rpartition('_')[2]})"
-    known = parameter_named(name)
-    return known.symbol if known.unit == "1" else f"{known.symbol} ({known.unit})"
+    varied = parameter_named(name)
+    return varied.symbol if varied.unit == "1" else f"{varied.symbol} ({varied.unit})"

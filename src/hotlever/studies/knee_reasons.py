@@ -48,11 +48,11 @@ def reasons_of_the_knee(lever: Lever) -> xr.Dataset:
     levers = {"as it is": {}, "no leg resistance": ideal_legs, "uniform doping": uniform}
     levers["neither"] = ideal_legs | uniform
     # none of these materials is possible, so none is checked
-    found = [
+    maxima = [
         _highest(lever.with_material(material.model_copy(update=changes)).branch(), name)
         for name, changes in levers.items()
     ]
-    knee, resistance = zip(*found, strict=True)
+    knee, resistance = zip(*maxima, strict=True)
     return labelled(
         {"knee_K": list(knee), "resistance_K": list(resistance)},
         "lever",
