@@ -18,7 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hotlever.calibration.knee import IVCurve, find_knee
-from hotlever.calibration.knee_scaling import curve_of_law, curve_of_model, knee_of
+from hotlever.calibration.knee_scaling import (
+    TemperatureCurve,
+    curve_of_law,
+    curve_of_model,
+    knee_of,
+)
 from hotlever.calibration.power_law import EQ12
 from hotlever.errors import HotleverError
 from hotlever.estimation import Measurement, fit
@@ -126,8 +131,10 @@ def routes(
         if fit_medium == "air" and medium == "vacuum":
             continue
         # the fitted lever's knee is above or below its model's by as much in either medium
+        # the knee that was measured takes the place of the model's, which is less sure of it
         above = fit_knee / knee_of(models[fit_medium]).power_mW
-        fitted_curve = curve_of_model(models[medium], above * knee_of(models[medium]).power_mW)
+        fitted = models[medium]
+        fitted_curve = TemperatureCurve(fitted.tip_temperature, above * knee_of(fitted).power_mW)
         found[f"fit in {fit_medium}"] = lambda power, of=fitted_curve: of.at(power, knee)
     return found
 

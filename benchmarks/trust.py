@@ -16,6 +16,7 @@ from hotlever.estimation.experiment_at_rest import ExperimentAtRest, experiment_
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
+from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from problems import BIAS, EXAMPLE, table
@@ -87,7 +88,8 @@ def coverage(probe, twins, proportional):
 
 def coarse(probe, bias):
     """Return the model of a geometry never reduced, whose fits start at the probe's material."""
-    return ExperimentAtRest(Lever(probe, COARSE), Lever(probe), probe.circuit, bias)
+    coarse, full = (SimilarLevers(Lever(probe, mesh)) for mesh in (COARSE, None))
+    return ExperimentAtRest(coarse, full, bias)
 
 
 def starts(count, model, name):

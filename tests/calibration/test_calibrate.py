@@ -235,14 +235,6 @@ def test_a_scaled_model_is_the_paper_s_rule(reference):
     np.testing.assert_allclose(law.at(1.29 * power, 1.29 * 2.95), EQ12.tip_temperature(power))
 
 
-def test_a_measured_knee_takes_the_place_of_the_model_s(reference):
-    """A model whose knee is 6 % off leaves the temperature of its own lever as it is."""
-    measured = 1.06 * reference.knee.power_mW
-    curve = curve_of_model(reference, measured)
-    power = np.linspace(0.5, 4.0, 8)
-    np.testing.assert_allclose(curve.at(power, measured), reference.tip_temperature(power))
-
-
 def test_a_calibration_file_is_read_back_whole(calibrated, tmp_path):
     path = tmp_path / "cal.json"
     calibrated.write(path)

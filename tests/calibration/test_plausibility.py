@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hotlever.calibration.knee import IVCurve
+from hotlever.calibration.plausibility import what_data_lack
 from hotlever.calibration.procedure import calibrate
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement
@@ -122,7 +123,13 @@ def test_temperatures_in_degrees_celsius_are_refused(curve):
         (slice(None, 12), 0.0, "measured only up to a tip of 3"),
     ],
 )
-def test_what_the_data_lack_is_remarked(curve, rows, step, remark):
+def test_what_the_data_lack_is_remarked(curve, reference, rows, step, remark):
     current = np.round(curve.current_mA / step) * step if step else curve.current_mA
-    notes = calibrate(shown(curve, rows, current_mA=current)).notes
-    assert [text for text in notes if remark in text]
+    data = shown(curve, rows, current_mA=current)
+    remarks = what_data_lack(data, reference.tip_temperature(curve.power_mW[rows]))
+    assert [text for text in remarks if remark in text]
+
+
+def test_a_calibration_notes_what_its_data_lack(curve):
+    notes = calibrate(shown(curve, slice(20, 24))).notes
+    assert [text for text in notes if "4 rows say little of a lever" in text]

@@ -75,13 +75,15 @@ def curve_of_law(law: PowerLaw, base_temperature_K: float) -> TemperatureCurve:
     )
 
 
-def curve_of_model(model: Branch, knee_mW: float | None = None) -> TemperatureCurve:
+def curve_of_model(model: Branch) -> TemperatureCurve:
     """Return the model of a lever, in the medium it is to be calibrated in, as reference.
 
-    A knee that was measured (its power) on the lever which the model was fitted to takes the place
-    of the model's, since models are less sure of the knee than of the temperature at a power.
+    Raises
+    ------
+    ComputationError
+        If it has no knee.
     """
-    return TemperatureCurve(model.tip_temperature, knee_mW or knee_of(model).power_mW)
+    return TemperatureCurve(model.tip_temperature, knee_of(model).power_mW)
 
 
 def knee_of(model: Branch) -> OperatingPoint:
