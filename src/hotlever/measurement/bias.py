@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import make_lsq_spline
 
 from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError
@@ -218,6 +217,8 @@ def find_waveform(contents: Contents) -> Waveform:
             f"{table.path}: V_b has more than {_MOST_LINES} straight parts, expected fewer, or the "
             "wave form beside the file, such as --pulse 10V,5us"
         )
+    from scipy.interpolate import make_lsq_spline  # takes half a second
+
     at = times[corners]
     volts = make_lsq_spline(times, bias, np.concatenate((at[:1], at, at[-1:])), k=1).c
     if begins_on:

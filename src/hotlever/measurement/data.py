@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from hotlever.datasets import COLUMNS, OBSERVABLES, labelled
@@ -17,6 +16,9 @@ from hotlever.lever.transient.waveform import Waveform
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.surroundings import Medium
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: The time, in files of what was measured in time.
 TIME = "t"

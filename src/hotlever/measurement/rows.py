@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median
 
 from hotlever.datasets import OBSERVABLES
 from hotlever.measurement.data import MEASURED, Measurement
@@ -198,6 +197,8 @@ def _far_off(values: Array, step: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return which data are far off the others of their step."""
     finite = np.isfinite(values)
     data, (steps, group) = values[finite], np.unique(step[finite], return_inverse=True)
+    from scipy.ndimage import median  # not needed for most measurements
+
     numbers = np.arange(steps.size)
     away = np.abs(data - median(data, group, numbers)[group])
     scatter = 1.4826 * median(away, group, numbers)[group]
