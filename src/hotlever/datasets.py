@@ -146,12 +146,16 @@ QUANTITIES: dict[str, tuple[str, str]] = {
 }
 
 
-class Column(NamedTuple):
-    """A quantity that instruments measure."""
+class Measurand(NamedTuple):
+    """A quantity that instruments measure, or its standard error."""
 
     symbol: str  #: heads its column in measurement files
     name: str  #: in datasets, and of the attribute of a `Measurement`
     unit: str  #: in datasets
+    #: Other headings of its column, in small letters without blanks and marks.
+    headings: tuple[str, ...] = ()
+    #: Where the largest value of a column can lie; else its unit is wrong.
+    plausible: tuple[float, float] = (0.0, math.inf)
 
     @property
     def heading(self) -> str:
@@ -164,32 +168,37 @@ class Column(NamedTuple):
         return QUANTITIES[self.name][1]
 
 
+_BIAS = ("vb", "ub", "vbias", "ubias", "bias", "biasvoltage")
+_LEVER = ("vl", "ul", "vlever", "ulever", "lever", "levervoltage")
+_CURRENT = ("ih", "i", "current", "heatercurrent", "levercurrent")
+_READER = ("vr", "ur", "vreader", "ureader", "reader", "readervoltage")
+_TIP = ("ttip", "tip", "tiptemperature")
 #: Everything that a measurement may hold, by symbol; ``d`` begins that of a standard error.
-COLUMNS = {
-    column.symbol: column
-    for column in (
-        Column("t", "time_us", "us"),
-        Column("V_l", "lever_V", "V"),
-        Column("V_b", "bias_V", "V"),
-        Column("I_h", "current_mA", "mA"),
-        Column("V_r", "reader_V", "V"),
-        Column("T_tip", "tip_K", "K"),
-        Column("dT_tip", "tip_error_K", "K"),
-        Column("dI_h", "current_error_mA", "mA"),
-        Column("dV_r", "reader_error_V", "V"),
+MEASURANDS = {
+    measurand.symbol: measurand
+    for measurand in (
+        Measurand("t", "time_us", "us"),
+        Measurand("V_l", "lever_V", "V", _LEVER),
+        Measurand("V_b", "bias_V", "V", _BIAS, (1e-3, 1e3)),
+        Measurand("I_h", "current_mA", "mA", _CURRENT, (1e-9, 1e3)),
+        Measurand("V_r", "reader_V", "V", _READER, (1e-9, 1e3)),
+        Measurand("T_tip", "tip_K", "K", _TIP, (0.0, 5e3)),
+        Measurand("dT_tip", "tip_error_K", "K", ("dttip", "δttip")),
+        Measurand("dI_h", "current_error_mA", "mA", ("dih", "δih")),
+        Measurand("dV_r", "reader_error_V", "V", ("dvr", "δvr")),
     )
 }
 #: What a fit compares, by the name that users give it.
 OBSERVABLES = {
-    "current": COLUMNS["I_h"],
-    "reader": COLUMNS["V_r"],
-    "tip": COLUMNS["T_tip"],
+    "current": MEASURANDS["I_h"],
+    "reader": MEASURANDS["V_r"],
+    "tip": MEASURANDS["T_tip"],
 }
 
 
 def observables_of(data: xr.Dataset) -> Array:
     """Return current (mA), reader voltage (V) and tip temperature (K) of a dataset, (3, n)."""
-    return np.stack([data[column.name].values for column in OBSERVABLES.values()])
+    return np.stack([data[measurand.name].values for measurand in OBSERVABLES.values()])
 
 
 def labelled(

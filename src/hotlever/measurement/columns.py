@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.cells import text_lines
-from hotlever.datasets import COLUMNS, OBSERVABLES
+from hotlever.datasets import MEASURANDS, OBSERVABLES
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_bytes
 from hotlever.measurement.data import LEVER, MEASURED, TIME
@@ -19,16 +19,8 @@ from hotlever.tables import Table
 from hotlever.types import Array
 from hotlever.units import TIMES, conversion, name_and_unit, unknown_unit
 
-#: Other names of columns, in small letters without blanks and marks.
-_NAMES = {
-    **dict.fromkeys(("vb", "ub", "vbias", "ubias", "bias", "biasvoltage"), "V_b"),
-    **dict.fromkeys(("vl", "ul", "vlever", "ulever", "lever", "levervoltage"), LEVER),
-    **dict.fromkeys(("ih", "i", "current", "heatercurrent", "levercurrent"), "I_h"),
-    **dict.fromkeys(("vr", "ur", "vreader", "ureader", "reader", "readervoltage"), "V_r"),
-    **dict.fromkeys(("ttip", "tip", "tiptemperature"), "T_tip"),
-    **dict.fromkeys(("dttip", "δttip"), "dT_tip"),
-    **dict.fromkeys(("dih", "δih"), "dI_h"),
-    **dict.fromkeys(("dvr", "δvr"), "dV_r"),
+_SYMBOLS = {
+    heading: measurand.symbol for measurand in MEASURANDS.values() for heading in measurand.headings
 }
 #: µs that a table in time lasts at most, unless one says that it is one: longer ones are slow
 #: sweeps with the time of each row.
@@ -70,7 +62,7 @@ def symbol_of(name: str) -> str | None:
     >>> symbol_of("Vb"), symbol_of("I_h"), symbol_of("Voltage")
     ('V_b', 'I_h', None)
     """
-    return _NAMES.get(re.sub(r"[\W_]+", "", name[:40]).lower())
+    return _SYMBOLS.get(re.sub(r"[\W_]+", "", name[:40]).lower())
 
 
 def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
@@ -97,9 +89,9 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
             )
         symbol, unit = _quantity(quantity, told=True)
         if symbol is None:
-            raise unknown_name("quantity", name_and_unit(quantity)[0], COLUMNS, where)
-        if unit is not None and conversion(unit, COLUMNS[symbol].unit) is None:
-            raise unknown_unit(unit, COLUMNS[symbol].unit, f"{where}: {symbol}")
+            raise unknown_name("quantity", name_and_unit(quantity)[0], MEASURANDS, where)
+        if unit is not None and conversion(unit, MEASURANDS[symbol].unit) is None:
+            raise unknown_unit(unit, MEASURANDS[symbol].unit, f"{where}: {symbol}")
         if symbol in headings:
             raise InputError(f"{where}: {symbol} is given twice, expected once")
         headings[symbol] = quantity, heading
@@ -122,7 +114,7 @@ def _quantity(heading: str, told: bool = False) -> tuple[str | None, str | None]
     The name alone is no time, unless it is told: settings of instruments are called so too.
     """
     name, unit = name_and_unit(heading)
-    is_time = name.casefold() in TIMES and (told or conversion(unit or "", COLUMNS[TIME].unit))
+    is_time = name.casefold() in TIMES and (told or conversion(unit or "", MEASURANDS[TIME].unit))
     return TIME if is_time else symbol_of(name), unit
 
 
@@ -189,7 +181,7 @@ def find_columns(
 
 def _column(table: Table, symbol: str, index: int, told: str | None) -> Column:
     """Return a column with its unit, which the file or the user gives."""
-    heading, inside = table.names[index] if table.names else "", COLUMNS[symbol].unit
+    heading, inside = table.names[index] if table.names else "", MEASURANDS[symbol].unit
     where = f"{table.where(-1)}: column '{shown(heading or str(index + 1))}'"
     written = name_and_unit(heading)[1]
     if table.names[:1] == [_IN_SI]:
@@ -197,7 +189,7 @@ def _column(table: Table, symbol: str, index: int, told: str | None) -> Column:
     unit = told or written
     if unit is None:
         raise InputError(
-            f"{where} has no unit, expected '{symbol} ({inside})' or another unit in parentheses; "
+            f"{where} has no unit, expected '{MEASURANDS[symbol].heading}' or another unit in parentheses; "
             f"{_told(symbol, heading or str(index + 1))} gives one"
         )
     difference = symbol.startswith("d")
@@ -213,11 +205,13 @@ def _contradicts(written: str, inside: str, difference: bool, scale: tuple[float
     """Whether the unit of a heading, of any quantity, is not the one that is told."""
     if (own := conversion(written, inside, difference)) is not None:
         return own != scale
-    return any(conversion(written, unit) for unit in {column.unit for column in COLUMNS.values()})
+    return any(
+        conversion(written, unit) for unit in {measurand.unit for measurand in MEASURANDS.values()}
+    )
 
 
 def _told(symbol: str, heading: str = "HEADING") -> str:
-    return f"--column '{symbol} ({COLUMNS[symbol].unit})={shown(heading)}'"
+    return f"--column '{MEASURANDS[symbol].heading}={shown(heading)}'"
 
 
 def _are_brief(table: Table, column: Column) -> bool:
@@ -257,7 +251,7 @@ def unused_columns(table: Table, columns: Mapping[str, Column]) -> list[str]:
     """Return a note on each column that is no quantity, with the one that it may be."""
     notes = []
     used = {column.index for column in columns.values()}
-    missing = [column for column in MEASURED if column.symbol not in columns]
+    missing = [measurand for measurand in MEASURED if measurand.symbol not in columns]
     for index, heading in enumerate(table.names):
         if index not in used and heading != _IN_SI and heading.strip():
             unit = name_and_unit(heading)[1] or ""

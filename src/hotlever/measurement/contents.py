@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from hotlever.datasets import COLUMNS
+from hotlever.datasets import MEASURANDS
 from hotlever.errors import InputError, shown
 from hotlever.measurement.columns import Column
 from hotlever.measurement.data import LEVER, MEASURED, TIME
@@ -50,7 +50,7 @@ class Contents:
 
     def __post_init__(self) -> None:
         self.origin = {symbol: column.origin for symbol, column in self.columns.items()}
-        self.values = dict.fromkeys(COLUMNS, np.full(len(self.table.rows), np.nan))
+        self.values = dict.fromkeys(MEASURANDS, np.full(len(self.table.rows), np.nan))
         for symbol, column in self.columns.items():
             self.values[symbol] = column.values(self.table)
             if symbol not in ("V_b", LEVER, TIME):
@@ -86,8 +86,6 @@ class Contents:
             self.notes.append(f"{self.table.where(int(np.argmax(rows)))}: {text}{others}")
 
 
-#: Where the largest value of a column can lie, in the unit inside; else its unit is wrong.
-_PLAUSIBLE = {"V_b": (1e-3, 1e3), "I_h": (1e-9, 1e3), "V_r": (1e-9, 1e3), "T_tip": (0.0, 5e3)}
 #: A standard error this much smaller than the largest value is none.
 _LEAST_ERROR = 1e-9
 #: Part of the largest value by which noise and drift may push a current or voltage below 0.
@@ -118,9 +116,9 @@ def check(contents: Contents, *, signed: bool = False) -> None:
         If a value cannot be, or the largest of a quantity shows that its unit is wrong.
     """
     values, settings = contents.values, contents.settings.values
-    for symbol in (column.symbol for column in MEASURED if column.symbol in contents.columns):
+    for symbol in (each.symbol for each in MEASURED if each.symbol in contents.columns):
         of, data = symbol.removeprefix("d"), values[symbol]
-        unit, (low, high) = COLUMNS[of].unit, _PLAUSIBLE[of]
+        unit, (low, high) = MEASURANDS[of].unit, MEASURANDS[of].plausible
         size = np.nanmax(np.abs(values[of]), initial=0.0)
         if symbol != of:
             expected = f"a standard error above 0 and up to {high:g} {unit}, or an empty cell"

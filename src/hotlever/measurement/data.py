@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hotlever.datasets import COLUMNS, OBSERVABLES, labelled
+from hotlever.datasets import MEASURANDS, OBSERVABLES, labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.lever.dataset import circuit_of
 from hotlever.lever.transient.history import checked_times
@@ -25,7 +25,7 @@ TIME = "t"
 #: The voltage over the lever, from which the bias follows.
 LEVER = "V_l"
 #: The columns that a measurement keeps: the bias, observables and standard errors.
-MEASURED = [column for symbol, column in COLUMNS.items() if symbol not in (TIME, LEVER)]
+MEASURED = [measurand for symbol, measurand in MEASURANDS.items() if symbol not in (TIME, LEVER)]
 #: mbar; between these the pressure is no matter to a lever without a temperature jump.
 _DENSE_MBAR = 700.0, 1200.0
 
@@ -155,7 +155,7 @@ class Measurement:
         ('current', 'reader', 'tip')
         """
         circuit, symbols = circuit_of(sweep), ("V_b", "I_h", "V_r", "T_tip")
-        shown = [COLUMNS[symbol].name for symbol in symbols]
+        shown = [MEASURANDS[symbol].name for symbol in symbols]
         columns: dict[str, Any] = {name: sweep[name].values for name in shown}
         return cls(
             **columns,
@@ -194,7 +194,7 @@ class Measurement:
     def error(self, name: str) -> Array:
         """Return the standard errors of an observable's data, NaN where there are none."""
         self.observable(name)
-        values = getattr(self, COLUMNS["d" + OBSERVABLES[name].symbol].name)
+        values = getattr(self, MEASURANDS["d" + OBSERVABLES[name].symbol].name)
         return np.full(self.bias_V.shape, np.nan) if values is None else values
 
     def part(self, rows: NDArray[np.bool_]) -> Measurement:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.datasets import COLUMNS, OBSERVABLES
+from hotlever.datasets import MEASURANDS, OBSERVABLES
 from hotlever.errors import InputError, shown
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.measurement.bias import check_times, find_bias, find_waveform, leave_out_jumps, mirror
@@ -141,7 +141,7 @@ def _understood(contents: Contents, order: str) -> tuple[tuple[str, ...], ...]:
     separator = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", None: "blanks"}
     cells = separator[dialect.separator] + ", decimal comma" * dialect.decimal_comma
     rows = [(table.path, cells, order)]
-    for symbol, column in COLUMNS.items():
+    for symbol, column in MEASURANDS.items():
         values = contents.values[symbol]
         count = int(np.isfinite(values).sum())
         if count > 0:
