@@ -189,8 +189,8 @@ def _column(table: Table, symbol: str, index: int, told: str | None) -> Column:
     unit = told or written
     if unit is None:
         raise InputError(
-            f"{where} has no unit, expected '{MEASURANDS[symbol].heading}' or another unit in parentheses; "
-            f"{_told(symbol, heading or str(index + 1))} gives one"
+            f"{where} has no unit, expected '{MEASURANDS[symbol].heading}' or another unit in "
+            f"parentheses; {_told(symbol, heading or str(index + 1))} gives one"
         )
     difference = symbol.startswith("d")
     scale = conversion(unit, inside, difference)
@@ -205,9 +205,7 @@ def _contradicts(written: str, inside: str, difference: bool, scale: tuple[float
     """Whether the unit of a heading, of any quantity, is not the one that is told."""
     if (own := conversion(written, inside, difference)) is not None:
         return own != scale
-    return any(
-        conversion(written, unit) for unit in {measurand.unit for measurand in MEASURANDS.values()}
-    )
+    return any(conversion(written, measurand.unit) for measurand in MEASURANDS.values())
 
 
 def _told(symbol: str, heading: str = "HEADING") -> str:
