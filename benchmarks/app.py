@@ -22,7 +22,7 @@ import psutil
 from app_in_browser import EXAMPLES, answer, browsing, go, running
 from bad_files import bad_files
 from problems import table
-from random_clicks import ROOMS, RandomUser, act
+from random_clicks import PAGES, RandomUser, act
 
 MATERIAL = "phonon scattering exponent"
 #: Seconds after which the app has forgotten a page, and given back its memory.
@@ -147,23 +147,23 @@ def speed(count):
 
 
 def files(count):
-    """Drop bad files in every room; say of which no line was said that names them."""
+    """Drop bad files in every page; say of which no line was said that names them."""
     rows, silent = [], []
     with (
         tempfile.TemporaryDirectory() as name,
         running(Path(name)) as app,
         browsing(app) as (page, seen),
     ):
-        for room in ROOMS:
-            go(page, app, room)
+        for address in PAGES:
+            go(page, app, address)
             for zone in range(page.locator("input[type=file]").count()):
-                found = [_dropped(page, app, room, zone, *file) for file in bad_files()][:count]
-                where = f"{room or 'start'}{f', {zone + 1}' if zone else ''}"
+                found = [_dropped(page, app, address, zone, *file) for file in bad_files()][:count]
+                where = f"{address or 'start'}{f', {zone + 1}' if zone else ''}"
                 kinds = ("said", "moved on", "silent")
                 dead = sum(not one[2] for one in found)
                 rows.append((where, len(found), *(_count(found, kind) for kind in kinds), dead))
                 silent += [f"{where}: {one[0]}" for one in found if one[1] != "said"]
-        table(("room", "files", "a line", "moved on", "no line", "dead pages"), rows)
+        table(("page", "files", "a line", "moved on", "no line", "dead pages"), rows)
         print(f"errors in the browser: {len(seen.errors)}")
         for line in (*silent, *app.lines[1:], *seen.errors[:5]):
             print(line)
@@ -173,14 +173,14 @@ def _count(found, kind):
     return sum(one[1] == kind for one in found)
 
 
-def _dropped(page, app, room, zone, name, content):
+def _dropped(page, app, address, zone, name, content):
     """Drop a file; return its name, what became of it, and whether the page is alive."""
-    said = answer(page, app, room, zone, name, content)
+    said = answer(page, app, address, zone, name, content)
     return name, said, page.get_by_role("button", name="Simulate", exact=True).first.is_enabled()
 
 
 def memory(count, minutes):
-    """Click at random in all rooms; say how the memory of the app grows.
+    """Click at random in all pages; say how the memory of the app grows.
 
     Before each number all work is cancelled, and pages that were closed have been forgotten. After
     a tenth of the actions each kind of work has been done once, and caches are full.

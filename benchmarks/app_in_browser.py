@@ -23,7 +23,7 @@ EXAMPLES = Path(__file__).parents[1] / "src" / "hotlever" / "examples"
 _START_S, _END_S = 60, 15
 #: Seconds in which a line must be said of a file.
 _SAID_S = 8.0
-#: Milliseconds in which a room that is there comes to rest.
+#: Milliseconds in which a page that is there comes to rest.
 _IDLE_MS = 10_000
 #: There is no input while another file is on its way.
 _DROP = """async ([zone, name, content]) => {
@@ -110,15 +110,15 @@ def give(page: Page, zone: int, name: str, content: bytes) -> None:
     page.evaluate(_DROP, [zone, name, b64encode(content).decode("ascii")])
 
 
-def answer(page: Page, app: App, room: str, zone: int, name: str, content: bytes) -> str:
-    """Drop a file in a room, and wait for the answer.
+def answer(page: Page, app: App, address: str, zone: int, name: str, content: bytes) -> str:
+    """Drop a file in a page, and wait for the answer.
 
-    Afterwards the page shows the room again.
+    Afterwards the page shows the page again.
 
     Returns
     -------
     str
-        "said" if a line names the file, "moved on" if the page went to another room, or "silent".
+        "said" if a line names the file, "moved on" if the page went to another page, or "silent".
     """
     give(page, zone, name, content)
     # it may be kept with a number
@@ -129,20 +129,20 @@ def answer(page: Page, app: App, room: str, zone: int, name: str, content: bytes
         try:
             lines = page.locator("[role=alert]").all_inner_texts()
         except Error:
-            lines = []  # it is going to another room
-        if urlsplit(page.url).path.strip("/") != room:
-            go(page, app, room)
+            lines = []  # it is going to another page
+        if urlsplit(page.url).path.strip("/") != address:
+            go(page, app, address)
             return "moved on"
         if any(kept in line for line in lines):
             return "said"
     return "silent"
 
 
-def go(page: Page, app: App, room: str) -> None:
-    """Open a room, and wait until it is there."""
-    page.goto(f"{app.base}/{room}")
+def go(page: Page, app: App, address: str) -> None:
+    """Open a page, and wait until it is there."""
+    page.goto(f"{app.base}/{address}")
     page.wait_for_function("window.did_handshake === true")
-    # an upload that the last room broke off may count as under way for ever
+    # an upload that the last page broke off may count as under way for ever
     with suppress(Error):
         page.wait_for_load_state("networkidle", timeout=_IDLE_MS)
 

@@ -1,4 +1,4 @@
-"""A user who clicks at random: sliders, buttons, boxes, menus and rooms, files now and then."""
+"""A user who clicks at random: sliders, buttons, boxes, menus and pages, files now and then."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from playwright.sync_api import Error
 from app_in_browser import EXAMPLES, give
 from bad_files import bad_files
 
-ROOMS = ("", "lever", "simulate", "raman", "fit", "calibrate", "levers")
-#: What can be clicked, and what is moved by a key. Buttons of the sliders' room come first often.
+PAGES = ("", "lever", "simulate", "raman", "fit", "calibrate", "levers")
+#: What can be clicked, and what is moved by a key. Buttons of the sliders' page come first often.
 _CLICKED = "button, [role=checkbox], [role=option], [role=radio], label.q-field, .q-expansion-item"
 _MOVED = ".q-slider__focus-ring, .q-slider [tabindex], input[type=number]"
 #: Focuses or clicks one of what is seen and enabled; returns how many there are.
@@ -86,20 +86,20 @@ class RandomUser:
                     print(f"after {self.done} actions, {self._page.url}: {error}")
         self.open("simulate")
 
-    def open(self, room):
-        """Open a room anew."""
+    def open(self, address):
+        """Open a page anew."""
         try:
-            self._page.goto(f"{self._base}/{room}")
+            self._page.goto(f"{self._base}/{address}")
         except Error:
             # a click before has led elsewhere meanwhile
             self._page.wait_for_timeout(1000)
-            self._page.goto(f"{self._base}/{room}")
+            self._page.goto(f"{self._base}/{address}")
         self._page.wait_for_load_state("networkidle")
 
     def rest(self):
-        """Cancel what runs in any room."""
-        for room in ROOMS:
-            self.open(room)
+        """Cancel what runs in any page."""
+        for address in PAGES:
+            self.open(address)
             cancel = self._page.get_by_role("button", name="Cancel")
             if cancel.count() and cancel.first.is_visible():
                 cancel.first.click()

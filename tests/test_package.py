@@ -36,6 +36,7 @@ LAYERS = (
     ("figures",),
     ("report",),
     ("tasks",),
+    ("app",),
     ("cli",),
 )
 

@@ -1,10 +1,11 @@
-"""The rooms, with NiceGUI's simulated user: bad files, peaks by hand, and where to begin."""
+"""The pages, with NiceGUI's simulated user: bad files, peaks by hand, and where to begin."""
 
 from __future__ import annotations
 
 import asyncio
 import csv
 import re
+import shlex
 import shutil
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,12 @@ from typing import Any
 import pytest
 from nicegui import ui
 from nicegui.testing import User
-from test_rooms import Here, Run, drop, shown, until, visit
+from test_pages import Here, Run, drop, shown, until, visit
 
 from bad_files import bad_files
+from hotlever.app.jobs import Task
+from hotlever.app.pages.start import QUESTIONS
 from hotlever.app.project import DRAWINGS, EXAMPLES, safe_name
-from hotlever.app.rooms.gallery import QUESTIONS
 from hotlever.app.session import Session
 from hotlever.probe import Probe
 
@@ -24,19 +26,19 @@ from hotlever.probe import Probe
 POOR = ("one-row.csv", "negative.csv")
 
 
-def _imported(name: str) -> list[str]:
+def _imported(name: str) -> Task:
     stem = Path(name).stem
-    return ["probe", "import", name, "-o", f"{stem}.toml", "--plot", f"{stem}.svg"]
+    return Task("probe import", (name,), {"output": f"{stem}.toml", "plot": f"{stem}.svg"})
 
 
 @pytest.mark.parametrize("address", ["/fit", "/", "/lever", "/raman", "/levers"])
-def test_bad_files_are_a_line_each_and_the_room_goes_on(tmp_path: Path, address: str) -> None:
-    # what a command will refuse, and is no mistake of the room
+def test_bad_files_are_a_line_each_and_the_page_goes_on(tmp_path: Path, address: str) -> None:
+    # what a command will refuse, and is no mistake of the page
     taken = {"/": (*POOR, *DRAWINGS), "/fit": POOR, "/levers": POOR, "/lever": DRAWINGS}
 
     async def story(user: User, session: Session) -> None:
-        asked: list[list[str]] = []
-        session.jobs.start = lambda room, arguments, then=None: asked.append(arguments)  # type: ignore
+        asked: list[Task] = []
+        session.jobs.start = lambda page, task: asked.append(task)  # type: ignore
         await user.open(address)
         for name, content in bad_files():
             client = user.client
@@ -81,8 +83,8 @@ def test_a_line_is_corrected_by_hand_as_by_the_command(
         def said() -> str:
             return shown(user, "data-spectrum=1")
 
-        asked: list[list[str]] = []
-        session.jobs.start = lambda room, arguments, then=None: asked.append(arguments)  # type: ignore
+        asked: list[Task] = []
+        session.jobs.start = lambda page, task: asked.append(task)  # type: ignore
         session.chosen["raman"] = {"spectrum": "tip/tip_04.txt"}
         await user.open("/raman")
         await until(lambda: "551.11 ± 2.52 K" in said())
@@ -90,14 +92,14 @@ def test_a_line_is_corrected_by_hand_as_by_the_command(
         await until(lambda: "by-hand" in said())
         user.find(kind=ui.plotly).trigger("plotly_selected", {"range": {"x": [545.0, 490.0]}})
         await until(lambda: said().endswith("(by-hand)"))
-        _, out, _ = run(*asked[-1][: asked[-1].index("-o")])
+        _, out, _ = run(*shlex.split(asked[-1].line.partition(" -o ")[0])[1:])
         told.extend((said(), out))
         user.find("Leave out").click()
         await until(lambda: said() == "left-out")
         user.find("As found").click()
         await until(lambda: "551.11 ± 2.52 K" in said())
-        assert "--corrections" in asked[0]
-        assert "--corrections" not in asked[-1]
+        assert "--corrections" in asked[0].line
+        assert "--corrections" not in asked[-1].line
 
     visit(tmp_path, story)
     row = next(one for one in csv.DictReader(told[1].splitlines()) if one["file"] == "tip_04.txt")
@@ -106,7 +108,7 @@ def test_a_line_is_corrected_by_hand_as_by_the_command(
     assert told[0] == line.format(**row)
 
 
-def test_questions_of_the_gallery_open_rooms_or_scripts(tmp_path: Path) -> None:
+def test_questions_of_the_gallery_open_pages_or_scripts(tmp_path: Path) -> None:
     page = (Path(__file__).parents[2] / "docs" / "gallery.md").read_text(encoding="utf-8")
     assert list(QUESTIONS) == re.findall(r"gallery/(\w+)\.png", page)
     files = {"how_sure": "lever-a.csv", "metal_film": "palladium-on-nitride.toml"}
@@ -115,7 +117,7 @@ def test_questions_of_the_gallery_open_rooms_or_scripts(tmp_path: Path) -> None:
         for name, opened in QUESTIONS.items():
             if opened is not None:
                 opened.set_up(session)
-                assert opened.room.strip("/") in session.chosen
+                assert opened.page in session.chosen
                 assert not opened.key or (tmp_path / files.get(name, "lever-a.csv")).is_file()
         await user.open("/fit")
         await user.should_see("hotlever fit lever-a.csv -o lever-a.fit.json", retries=50)
@@ -137,7 +139,7 @@ def test_a_page_that_waits_for_a_busy_process_is_shown(tmp_path: Path) -> None:
             return await super().call(function, *arguments, heard=heard)
 
     async def story(user: User, session: Session) -> None:
-        session._desks["full"] = Busy()  # type: ignore[assignment]
+        session.workers["full"] = Busy()  # type: ignore[assignment]
         (tmp_path / "lever-a.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
         await user.open("/fit")
         await user.should_see("Measurement")

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_rooms_at_work import done
+from test_pages_at_work import done
 
 from hotlever.app import changes as changes_module
 from hotlever.app.changes import Changes
+from hotlever.app.jobs import Task
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.errors import InputError
 from hotlever.files import write_text
@@ -52,10 +53,10 @@ def test_what_a_command_of_the_app_replaces_is_kept(
     for name, content in before.items():
         project.path(name).write_bytes(content)
     drawing = project.take_example("reference-probe.gds")
-    words = ["probe", "import", drawing, "-o", "own.toml", "--plot", "own.svg"]
-    assert done(words, project.folder)[0].standing == "done"
+    task = Task("probe import", (drawing,), {"output": "own.toml", "plot": "own.svg"})
+    assert done(task, project.folder)[0].standing == "done"
     change, _ = project.changes.latest()
-    assert change.what == f"hotlever {' '.join(words)}"
+    assert change.what == f"hotlever probe import {drawing} -o own.toml --plot own.svg"
     assert set(change.before) == set(before)
     assert b"hotlever probe file" in project.path("own.toml").read_bytes()
     project.changes.undo(change)

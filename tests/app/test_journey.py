@@ -84,7 +84,7 @@ def picture(page: Page, name: str) -> None:
 
 
 def button(page: Page, name: str) -> Any:
-    """Return a button of the room, not the one of the same name that leads to it."""
+    """Return a button of the page, not the one of the same name that leads to it."""
     return page.get_by_role("button", name=name, exact=True).last
 
 
@@ -270,7 +270,7 @@ def test_many_levers_fill_a_table(app: App, page: Page) -> None:
     expect(page.get_by_text("fits/lever-b.json")).to_be_visible(timeout=_WORK)
 
 
-def test_bad_files_in_every_room_are_a_line(app: App, page: Page) -> None:
+def test_bad_files_in_every_page_are_a_line(app: App, page: Page) -> None:
     # others are tried without a browser, and by benchmarks/app.py; negative currents are a
     # measurement, which is refused when it is fitted
     files = [
@@ -278,10 +278,10 @@ def test_bad_files_in_every_room_are_a_line(app: App, page: Page) -> None:
         for number, file in enumerate(bad_files())
         if (number % 6 == 0 and file[0] != "negative.csv") or "a" * 99 in file[0]
     ]
-    for room in ("", "lever", "raman", "fit", "calibrate", "levers"):
-        go(page, app, room)
+    for address in ("", "lever", "raman", "fit", "calibrate", "levers"):
+        go(page, app, address)
         for file in files:
-            assert answer(page, app, room, 0, *file) != "silent", (room, file[0])
+            assert answer(page, app, address, 0, *file) != "silent", (address, file[0])
         assert "internal error" not in page.inner_text("body")
     go(page, app, "fit")
     drop(page, EXAMPLES / "lever-a.csv")
@@ -303,10 +303,10 @@ def test_files_dropped_one_after_another_all_arrive(app: App, page: Page, folder
 
 def test_the_pages_fit_on_a_tablet(app: App, page: Page) -> None:
     page.set_viewport_size({"width": 820, "height": 1180})
-    for room in ("", "simulate", "fit"):
-        go(page, app, room)
+    for address in ("", "simulate", "fit"):
+        go(page, app, address)
         page.wait_for_timeout(1500)
         wide = page.evaluate("document.documentElement.scrollWidth")
-        picture(page, f"tablet-{room or 'start'}")
-        assert wide <= 830, room
+        picture(page, f"tablet-{address or 'start'}")
+        assert wide <= 830, address
     page.set_viewport_size({"width": 1280, "height": 800})

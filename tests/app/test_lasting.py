@@ -14,14 +14,14 @@ import pytest
 from nicegui import ui
 from nicegui.testing import User
 from nicegui.testing.user_interaction import UserInteraction
-from test_rooms import drop, shown, until, visit
-from test_rooms_at_work import done
+from test_pages import drop, shown, until, visit
+from test_pages_at_work import done
 
 from hotlever.app import live, showing
-from hotlever.app.choices import CHOICES, SCHEMA, read_choices
+from hotlever.app.jobs import Task
+from hotlever.app.pages.page import MEDIA
 from hotlever.app.project import EXAMPLES, Project
-from hotlever.app.rooms.room import MEDIA
-from hotlever.app.session import Session
+from hotlever.app.session import CHOICES, SCHEMA, Session
 from hotlever.probe import Probe
 
 DROPPED = "dropped own.gds"
@@ -31,8 +31,8 @@ OWN = (EXAMPLES / "reference-probe.gds").read_bytes()
 def at_once(session: Session) -> None:
     """Have commands run in this process, before they are said to have been started."""
 
-    def start(room: str, arguments: list[str], then: Any = None) -> Any:
-        job = session.jobs.by_room[room] = done(arguments, session.project.folder)[0]
+    def start(page: str, task: Task) -> Any:
+        job = session.jobs.by_page[page] = done(task, session.project.folder)[0]
         return job
 
     session.jobs.start = start  # type: ignore[method-assign]
@@ -103,7 +103,7 @@ def test_a_drawing_that_comes_again_leaves_an_edited_probe_file_alone(
 
 
 def press(user: User, text: str) -> None:
-    """Press the last button that says something: that of the room, not the one that leads to it."""
+    """Press the last button that says something: that of the page, not the one that leads to it."""
     buttons = [one for one in user.client.elements.values() if isinstance(one, ui.button)]
     named = [one for one in buttons if text in (one.text, one.props.get("aria-label"))]
     UserInteraction(user, {named[-1]}, None).click()
@@ -239,11 +239,14 @@ def test_what_nobody_typed_is_drawn_once(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("medium", MEDIA)
-@pytest.mark.parametrize("room", ["fit", "calibrate"])
-def test_every_medium_of_the_rooms_is_kept(tmp_path: Path, room: str, medium: str) -> None:
-    chosen = {room: {"medium": medium}}
-    (tmp_path / CHOICES).write_text(json.dumps({"schema": SCHEMA, "chosen": chosen}))
-    assert read_choices(tmp_path) == (chosen, "")
+@pytest.mark.parametrize("page", ["fit", "calibrate"])
+def test_every_medium_of_the_pages_is_kept(tmp_path: Path, page: str, medium: str) -> None:
+    chosen = {page: {"medium": medium}}
+    hidden = tmp_path / ".hotlever"
+    hidden.mkdir()
+    (hidden / CHOICES).write_text(json.dumps({"schema": SCHEMA, "chosen": chosen}))
+    session = Session(Project(tmp_path))
+    assert (session.chosen, session.remark) == (chosen, "")
 
 
 CHOSEN: dict[str, Any] = {
@@ -411,7 +414,7 @@ def test_columns_belong_to_the_file_that_they_were_typed_for(tmp_path: Path) -> 
         of(user, ui.select, "Measurement").set_value("odd.csv")
         await user.should_see(f"hotlever fit {words} -o odd.fit.json", retries=50)
         assert of(user, ui.textarea).value == "V_b (V)=a\nI_h (mA)=b"
-        # the same file has the same columns in the next room
+        # the same file has the same columns in the next page
         session.chosen["calibrate"] = {"data": "odd.csv"}
         await user.open("/calibrate")
         await user.should_see(f"hotlever calibrate {words}", retries=50)

@@ -24,7 +24,7 @@ expect.set_options(timeout=60_000)
 
 
 def probe_text(page: Page) -> str:
-    """Return the probe file that the room Lever shows."""
+    """Return the probe file that the page Lever shows."""
     return page.get_by_label("Probe file", exact=True).input_value()
 
 

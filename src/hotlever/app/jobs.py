@@ -1,12 +1,12 @@
-"""Commands that run for the app, one process each: their progress, notes, end, and cancelling."""
+"""What pages have done: tasks, one at a time for each page, each in a process of its own."""
 
 from __future__ import annotations
 
 import asyncio
 import shlex
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,39 +15,88 @@ from hotlever.errors import HotleverError
 
 Standing = Literal["running", "done", "failed", "cancelled"]
 
-#: Lines kept of what a command says.
-_MOST_LINES = 200
+#: Notes kept of a task.
+_MOST_NOTES = 200
 #: Share of the work from which on it tells how long the rest takes: it may begin slowly.
 _TELLING = 0.03
-_NOTE, _FAILURE = "note: ", "hotlever: "
+#: Options that name what is written.
+_FILES = ("output", "plot", "fields")
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is done, as one would type it: a command, its files, and its options.
+
+    Attributes
+    ----------
+    command : str
+        Such as ``fit``; see `hotlever.app.work`.
+    files : tuple of str
+    options : dict
+        By their names, in the order in which they are typed; empty ones are none.
+
+    Examples
+    --------
+    >>> task = Task("fit", ("my data.csv",), {"fix": ["p"], "robust": True, "output": "a.json"})
+    >>> print(task.line)
+    hotlever fit 'my data.csv' --fix p --robust -o a.json
+    """
+
+    command: str
+    files: tuple[str, ...] = ()
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def line(self) -> str:
+        """The command line that does the same."""
+        words = [*self.command.split(), *map(_plain, self.files)]
+        for name, value in self.options.items():
+            option = "-o" if name == "output" else f"--{name.replace('_', '-')}"
+            if value is True:
+                words.append(option)
+            elif value not in (None, "", False):
+                values = value if isinstance(value, list) else [value]
+                words += [word for one in values for word in (option, _plain(str(one)))]
+        return shlex.join(["hotlever", *words])
+
+    def writing(self, files: Mapping[str, str]) -> Task:
+        """Return the same that writes other files."""
+        options = {name: value for name, value in self.options.items() if name not in _FILES}
+        return replace(self, options={**options, **files})
+
+    @property
+    def written(self) -> str:
+        """The file or folder that shows whether it has written what was asked for."""
+        return str([value for value in self.options.values() if value][-1])
+
+
+def _plain(name: str) -> str:
+    """Return a file's name as an argument that is no option."""
+    return f"./{name}" if name.startswith("-") else name
 
 
 @dataclass
 class Job:
-    """A command and how far it is.
+    """A task and how far it is.
 
     Attributes
     ----------
-    arguments : list of str
-        Of the command line, without the word ``hotlever``.
-    result : str
-        What it wrote to standard output.
+    task : Task
     message : str
         In one line, why it failed.
     notes : list of str
     label, done, total
         Of the last progress told.
     shown : dict
-        What it showed last, by what it is: the ``curve`` of a fit, a ``table``.
+        What it told last, by what it is: the ``result``, the ``curve`` of a fit, a ``table``.
     began : float
         When, as files are stamped.
     version : int
         Counts the changes, for pages to see that there is something new.
     """
 
-    arguments: list[str]
+    task: Task
     standing: Standing = "running"
-    result: str = ""
     message: str = ""
     notes: list[str] = field(default_factory=list)
     label: str = ""
@@ -55,14 +104,7 @@ class Job:
     total: int = 0
     shown: dict[str, Any] = field(default_factory=dict)
     version: int = 0
-    started: float = field(default_factory=time.monotonic)
     began: float = field(default_factory=time.time)
-    seconds: float = 0.0
-
-    @property
-    def command(self) -> str:
-        """The command line that does the same."""
-        return command_line(self.arguments)
 
     @property
     def share(self) -> float | None:
@@ -75,112 +117,83 @@ class Job:
         share = self.share
         if share is None or share < _TELLING or self.standing != "running":
             return None
-        return (time.monotonic() - self.started) * (1.0 - share) / share
+        return (time.time() - self.began) * (1.0 - share) / share
 
-    def hear(self, message: tuple[Any, ...]) -> None:
-        """Take in what the command says."""
-        kind, *content = message
+    def hear(self, kind: str, content: Any) -> None:
+        """Take in what the task tells."""
         if kind == "progress":
             self.label, self.done, self.total = content
-        elif kind == "shown":
-            self.shown[content[0]] = content[1]
-        elif content[0].startswith(_NOTE):
-            self.notes = [*self.notes, content[0].removeprefix(_NOTE)][-_MOST_LINES:]
-        elif content[0].startswith(_FAILURE):
-            self.message = content[0].removeprefix(_FAILURE)
+        elif kind == "note":
+            self.notes = [*self.notes, content][-_MOST_NOTES:]
+        elif kind == "failure":
+            self.message = content
+        else:
+            self.shown[kind] = content
         self.version += 1
 
     def end(self, standing: Standing, message: str = "") -> None:
         """Note how it ended, for good."""
-        if self.standing != "running":
-            return
-        self.standing, self.message = standing, message or self.message
-        self.seconds = time.monotonic() - self.started
-        self.version += 1
-
-
-def command_line(arguments: list[str]) -> str:
-    """Return a command as it is typed in a shell."""
-    return shlex.join(["hotlever", *arguments])
-
-
-def named(name: str) -> str:
-    """Return a file's name as an argument that is no option."""
-    return f"./{name}" if name.startswith("-") else name
+        if self.standing == "running":
+            self.standing, self.message = standing, message or self.message
+            self.version += 1
 
 
 class Jobs:
-    """The commands of a project: one at a time in each room, each in a process of its own.
-
-    A process is kept ready for the next.
-    """
+    """The jobs of a project by the names of their pages; a process is kept ready for the next."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._spare: Worker | None = None
         self._workers: dict[str, Worker] = {}
-        self._tasks: set[asyncio.Task[None]] = set()
-        self.by_room: dict[str, Job] = {}
+        self._running: set[asyncio.Task[None]] = set()
+        self.by_page: dict[str, Job] = {}
 
     def prepare(self) -> None:
         """Have a process ready."""
         if self._spare is None or self._spare.lost:
             self._spare = Worker()
 
-    def running(self, room: str) -> bool:
-        """Return whether a room has work."""
-        return room in self.by_room and self.by_room[room].standing == "running"
+    def running(self, page: str) -> bool:
+        """Return whether a page has work."""
+        return page in self.by_page and self.by_page[page].standing == "running"
 
-    def start(
-        self, room: str, arguments: list[str], then: Callable[[Job], None] | None = None
-    ) -> Job:
-        """Run a command for a room.
+    def start(self, page: str, task: Task) -> Job:
+        """Have a task done for a page.
 
         Raises
         ------
         HotleverError
-            If the room has work already.
+            If the page has work already.
         """
-        if self.running(room):
+        if self.running(page):
             raise HotleverError("this is being worked on already; cancel it first")
-        job = self.by_room[room] = Job(arguments)
+        job = self.by_page[page] = Job(task)
         self.prepare()
         assert self._spare is not None
-        worker, self._spare = self._spare, None
-        self._workers[room] = worker
-        task = asyncio.create_task(self._run(room, job, worker, then))
+        self._workers[page], self._spare = self._spare, None
+        running = asyncio.create_task(self._run(page, job, self._workers[page]))
         # a task that nobody holds may be collected
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        self._running.add(running)
+        running.add_done_callback(self._running.discard)
         return job
 
-    async def _run(
-        self, room: str, job: Job, worker: Worker, then: Callable[[Job], None] | None
-    ) -> None:
-        call = f"{_COMMANDS}:run_command"
+    async def _run(self, page: str, job: Job, worker: Worker) -> None:
         try:
-            status, job.result = await worker.call(
-                call, job.arguments, self._folder, heard=job.hear
-            )
-            # 1: what was reached is written, and the message says where it stopped
-            job.end("done" if status == 0 else "failed")
+            await worker.call("hotlever.app.work:run", self._folder, job.task, heard=job.hear)
+            job.end("failed" if job.message else "done")
         except HotleverError as error:
+            # what was reached may be written; the message says where it stopped
             job.end("failed", str(error))
         if worker.lost or job.standing == "cancelled" or self._spare is not None:
             worker.kill()
         else:
             self._spare = worker
-        if self._workers.get(room) is worker:
-            del self._workers[room]
+        if self._workers.get(page) is worker:
+            del self._workers[page]
         self.prepare()
-        if then is not None and job.standing != "cancelled":
-            then(job)
 
-    async def cancel(self, room: str) -> None:
-        """End what a room works on."""
-        if self.running(room):
-            self.by_room[room].end("cancelled")
-            await self._workers[room].end()
-
-
-_COMMANDS = "hotlever.app.commands"
+    async def cancel(self, page: str) -> None:
+        """End what a page works on."""
+        if self.running(page):
+            self.by_page[page].end("cancelled")
+            await self._workers[page].end()

@@ -18,12 +18,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.path import Path as Outline
 from PIL import Image
+from shapely import Polygon, contains_xy
 
-from hotlever.app.child import Report
+from hotlever.app.project import file_stamp
+from hotlever.app.workers import Report
 from hotlever.colours import HEAT
-from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.errors import ComputationError, HotleverError
 from hotlever.lever import Branch, Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.full_space import FullSpace
@@ -34,6 +35,7 @@ from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, kn
 from hotlever.probe import Circuit, Layout, Probe
 from hotlever.probe.parameters import of_materials
 from hotlever.probe.shapes import EDGE_BIAS
+from hotlever.tasks.probes import make_lever
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -70,12 +72,6 @@ class _Map:
         self.along = line[:, 0]
         self._line = probes(line.T) if len(line) else None
 
-    def cells(self, T: Array) -> Array:
-        """Return the temperature (K) of the cells, (y, x), NaN beside the lever."""
-        values = np.full(self._inside.shape, np.nan)
-        values[self._inside] = self._cells @ T
-        return values.reshape(self.y.size, self.x.size)
-
     def picture(self, T: Array, low: float, high: float) -> bytes:
         """Return the map as PNG, coloured from `low` to `high` (K), transparent beside the lever.
 
@@ -96,12 +92,11 @@ class _Map:
 
 def _inside(layout: Layout, points: Array) -> Any:
     """Return which points lie inside a layout, and not on its edges."""
-    found = np.zeros(len(points), dtype=bool)
+    inside = np.zeros(len(points), dtype=bool)
     for region in layout.regions:
-        rings = [Outline([*ring, ring[0]], closed=True) for ring in region.rings]
-        outer, *holes = (ring.contains_points(points) for ring in rings)
-        found |= outer & ~np.any(holes, axis=0) if holes else outer
-    return found
+        outer, *holes = region.rings
+        inside |= contains_xy(Polygon(outer, holes), points)
+    return inside
 
 
 @dataclass
@@ -167,13 +162,13 @@ _maps: dict[int, tuple[object, _Map]] = {}
 
 
 def _map_of(space: FullSpace) -> _Map:
-    known = _maps.get(id(space.mesh))
-    if known is None:
+    number = id(space.mesh)
+    if number not in _maps:
         if len(_maps) >= _KEPT:
             _maps.clear()
         # the mesh is kept, so that no other gets its number
-        known = _maps[id(space.mesh)] = space.mesh, _Map(space)
-    return known[1]
+        _maps[number] = space.mesh, _Map(space)
+    return _maps[number][1]
 
 
 # --- called from the app -------------------------------------------------------------------------
@@ -203,7 +198,7 @@ def answer(
         If the lever has no state at this bias; a reduced lever that ends below leaves the answer to
         a coarse one.
     """
-    probe = _probe(folder, name, _stamp(folder, name), tuple(sorted(changes.items())))
+    probe = _probe(folder, name, changes)
     most = max(ask["most"], ask["bias"])
     live = _quick(probe, most, ask["reduced"]) if ask["quick"] else _full(report, probe, most)
     if live.model == REDUCED and not live.reaches(ask["bias"]):
@@ -223,39 +218,38 @@ def prepare(report: Report, folder: Path, name: str | None, changes: dict[str, A
     """Make the reduced lever of a probe, if it can have one; return whether it has."""
     with suppress(OSError, AttributeError):
         os.nice(_NICE)  # sliders come first
-    probe = _probe(folder, name, _stamp(folder, name), tuple(sorted(changes.items())))
+    probe = _probe(folder, name, changes)
     if not _can_be_reduced(probe):
         return False
-    lever = Lever(probe, progress=report.progress("air"))
-    cached_reduction(lever, report.progress("live sliders"))
+    with report.progress_bars("air", "live sliders") as (meshing, training):
+        cached_reduction(Lever(probe, progress=meshing), training)
     return True
 
 
 def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
-    """Return what sliders need of a probe: its values, their bounds, units and meanings."""
-    probe = Probe.reference() if name is None else Probe.from_file(folder / name)
-    sliders = []
-    known = of_materials(probe)
-    for one, value in zip(known, probe.values(list(known)).tolist(), strict=True):
-        parameter = known[one]
+    """Return what sliders need of a probe: by group names, values, bounds, units and meanings."""
+    probe = _probe(folder, name, {})
+    sliders: dict[str, list[Any]] = {"material": [], "dimensions": [], "circuit": []}
+    parameters = of_materials(probe)
+    values = probe.values(list(parameters)).tolist()
+    for (key, parameter), value in zip(parameters.items(), values, strict=True):
         low, high = max(parameter.lower, value / 2), min(parameter.upper, value * 2)
         if value == 0.0:
             low, high = -0.2 * parameter.scale, 0.2 * parameter.scale
-        meaning, unit = parameter.meaning, parameter.unit
-        sliders.append(("material", one, value, min(low, value), max(high, value), unit, meaning))
+        ends = min(low, value), max(high, value)
+        sliders["material"].append((key, value, *ends, parameter.unit, parameter.meaning))
     meanings = probe.shape.description()
-    for one, value in probe.shape.dimensions().items():
-        if one not in probe.shape.tied():
-            unit, meaning = "µm", meanings.get(one, "")
-            low, high = (0.8 * value, 1.2 * value) if one != EDGE_BIAS else (-0.2, 0.2)
+    for key, value in probe.shape.dimensions().items():
+        if key not in probe.shape.tied():
+            low, high = (0.8 * value, 1.2 * value) if key != EDGE_BIAS else (-0.2, 0.2)
             ends = min(low, value), max(high, value)
-            sliders.append(("dimensions", one, value, *ends, unit, meaning))
+            sliders["dimensions"].append((key, value, *ends, "µm", meanings.get(key, "")))
     circuit = probe.circuit
     resistance, base = circuit.series_resistance_ohm, circuit.base_temperature_K
     top = max(2 * resistance, 1000.0)
-    sliders += [
-        ("circuit", "series_resistance_ohm", resistance, 0.0, top, "Ω", "series resistance"),
-        ("circuit", "base_temperature_K", base, 250.0, 400.0, "K", "temperature of the leg ends"),
+    sliders["circuit"] = [
+        ("series_resistance_ohm", resistance, 0.0, top, "Ω", "series resistance"),
+        ("base_temperature_K", base, 250.0, 400.0, "K", "temperature of the leg ends"),
     ]
     return {
         "sliders": sliders,
@@ -265,24 +259,21 @@ def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
     }
 
 
-def _stamp(folder: Path, name: str | None) -> float:
-    try:
-        return 0.0 if name is None else (folder / name).stat().st_mtime
-    except OSError:
-        raise InputError(f"{name}: no such file") from None
+def _probe(folder: Path, name: str | None, changes: dict[str, Any]) -> Probe:
+    path = None if name is None else folder / name
+    stamp = 0.0 if path is None else file_stamp(path)
+    return _read_probe(path, stamp, tuple(sorted(changes.items())))
 
 
 @lru_cache(maxsize=64)
-def _probe(
-    folder: Path, name: str | None, stamp: float, changes: tuple[tuple[str, Any], ...]
-) -> Probe:
-    probe = Probe.reference() if name is None else Probe.from_file(folder / name)
+def _read_probe(path: Path | None, stamp: float, changes: tuple[tuple[str, Any], ...]) -> Probe:
+    probe = Probe.reference() if path is None else Probe.from_file(path)
     return probe.with_(**dict(changes)) if changes else probe
 
 
 @lru_cache(maxsize=_KEPT)
 def _full(report: Report, probe: Probe, most: float) -> LiveLever:
-    lever = Lever(probe, progress=report.progress("air"))
+    lever = make_lever(report, probe)
     return LiveLever(FULL, lever.space, lever.circuit, _branch(lever, most), lambda x: x)
 
 
@@ -319,8 +310,8 @@ def _geometry(probe: Probe) -> Probe:
 def _reduced(probe: Probe) -> tuple[Lever, ReducedLever] | None:
     """Return the full and the reduced lever of a geometry."""
     lever = Lever(probe)
-    found = known_reduction(lever)
-    return None if found is None else (lever, found)
+    reduced = known_reduction(lever)
+    return None if reduced is None else (lever, reduced)
 
 
 def _branch(lever: Lever, most: float) -> Branch:

@@ -49,6 +49,20 @@ def safe_name(name: str) -> str:
     return kept or "file"
 
 
+def file_stamp(path: Path) -> float:
+    """Return when a file was written, which tells whether it is as it was.
+
+    Raises
+    ------
+    InputError
+        If it does not exist.
+    """
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        raise InputError(f"{path.name}: no such file") from None
+
+
 class Project:
     """A folder with probes, drawings, measurements, fits, calibrations and spectra.
 
@@ -152,15 +166,12 @@ class Project:
 
     def spectra(self, folder: str) -> list[str]:
         """Return the spectra in a folder of the project, which may not exist yet."""
-        path = self.path(folder)
-        return sorted(one.name for one in path.iterdir() if one.is_file()) if path.is_dir() else []
+        return sorted(path.name for path in self.path(folder).glob("*") if path.is_file())
 
     def stamp(self, name: str) -> float:
         """Return when a file was written; 0 if it does not exist."""
-        try:
-            return self.path(name).stat().st_mtime
-        except OSError:
-            return 0.0
+        path = self.path(name)
+        return file_stamp(path) if path.exists() else 0.0
 
     def probe_of_drawing(self, drawing: str) -> tuple[str, bool]:
         """Return the name of the probe file of a drawing, and whether it is there already.

@@ -10,18 +10,17 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any
 
-from fastapi.dependencies import models
 from nicegui import app, background_tasks, ui
 
-from hotlever.app.guard import Guard
+from hotlever.app.access import Access
+from hotlever.app.pages.calibrate import CalibratePage
+from hotlever.app.pages.fit import FitPage
+from hotlever.app.pages.lever import LeverPage
+from hotlever.app.pages.levers import LeversPage
+from hotlever.app.pages.raman import RamanPage
+from hotlever.app.pages.simulate import SimulatePage
+from hotlever.app.pages.start import StartPage, serve_pictures
 from hotlever.app.project import LARGEST_FILE, Project
-from hotlever.app.rooms import gallery, start
-from hotlever.app.rooms.calibrate import CalibrateRoom
-from hotlever.app.rooms.fit import FitRoom
-from hotlever.app.rooms.lever import LeverRoom
-from hotlever.app.rooms.levers import LeversRoom
-from hotlever.app.rooms.raman import RamanRoom
-from hotlever.app.rooms.simulate import SimulateRoom
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 from hotlever.memory import give_back
@@ -36,11 +35,7 @@ _MESSAGES = 100
 #: Seconds after which a page is shown with what it has by then.
 _SOON_S = 1.0
 LOCAL = ("127.0.0.1", "localhost", "::1")
-_ROOMS = (LeverRoom, SimulateRoom, RamanRoom, FitRoom, CalibrateRoom, LeversRoom)
-_PAGES: dict[str, Callable[[Session], Awaitable[None]]] = {
-    "/": start.fill,
-    **{f"/{room.name}": room.fill for room in _ROOMS},
-}
+_PAGES = (StartPage, LeverPage, SimulatePage, RamanPage, FitPage, CalibratePage, LeversPage)
 
 
 @dataclass(frozen=True)
@@ -90,7 +85,7 @@ def serve(
     session = Session(project)
     app.on_startup(session.start)
     app.on_startup(lambda: say(address))
-    app.on_startup(lambda: app.timer(_GIVE_BACK_S, forget_pages))
+    app.on_startup(lambda: app.timer(_GIVE_BACK_S, give_back))
     app.on_startup(lambda: app.timer(_KEEP_S, session.keep))
     app.on_shutdown(session.keep)
     # told in one line, and kept in a file, as by any command
@@ -98,7 +93,7 @@ def serve(
     app.on_exception(failed)
     add_pages(session)
     limits: Any = {"password": served.password, "largest": LARGEST_FILE}
-    app.add_middleware(Guard, token=token, hosts=hosts, **limits)
+    app.add_middleware(Access, token=token, hosts=hosts, **limits)
     ui.run(
         host=served.host,
         port=port,
@@ -113,23 +108,11 @@ def serve(
     )
 
 
-def forget_pages() -> None:
-    """Give back the memory of pages that were closed.
-
-    FastAPI remembers what kind of function each route had, 4096 of them. A drop zone is a route,
-    whose function holds the page.
-    """
-    for kept in vars(models).values():
-        if hasattr(kept, "cache_clear"):
-            kept.cache_clear()
-    give_back()
-
-
 def add_pages(session: Session) -> None:
-    """Make the pages of all rooms."""
-    gallery.serve_pictures()
-    for address, fill in _PAGES.items():
-        ui.page(address)(_page(session, fill))
+    """Make all pages."""
+    serve_pictures()
+    for kind in _PAGES:
+        ui.page(f"/{kind.name}")(_page(session, kind.fill))
 
 
 def _page(session: Session, fill: Callable[[Session], Awaitable[None]]) -> Any:
@@ -169,6 +152,6 @@ def _free(served: Served) -> int:
 
 def _addresses(name: str) -> set[str]:
     try:
-        return {str(found[4][0]) for found in socket.getaddrinfo(name, None)}
+        return {str(address[0]) for *_, address in socket.getaddrinfo(name, None)}
     except OSError:
         return set()

@@ -18,7 +18,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hotlever import figures
-from hotlever.app.child import Report
+from hotlever.app.project import file_stamp
+from hotlever.app.workers import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.summary import calibration_text
 from hotlever.calibration.table import STATED, TABLE_COLUMNS
@@ -92,8 +93,7 @@ def drawn(report: Report, folder: Path, kind: str, name: str, figure: str, suffi
 
 def doubted(report: Report, folder: Path, name: str) -> str:
     """Return why a calibration does not say what to set; empty if it does."""
-    path = folder / name
-    return _calibration(path, _stamp(path)).doubt
+    return _calibration(folder / name, file_stamp(folder / name)).doubt
 
 
 def settings(
@@ -108,8 +108,7 @@ def settings(
     InputError
         If the data of the calibration are not described.
     """
-    path = folder / name
-    calibration = _calibration(path, _stamp(path))
+    calibration = _calibration(folder / name, file_stamp(folder / name))
     calibration.need_described("what to set")
     table = calibration.table
     if along == "tip_K":
@@ -123,11 +122,6 @@ def settings(
         return None
     row = {column: float(np.interp(bias, table.bias_V, table[column])) for column in TABLE_COLUMNS}
     return {**row, "bias_V": bias, **({along: value} if along != "bias_V" else {})}
-
-
-def probe_page(report: Report, folder: Path, name: str) -> dict[str, Any]:
-    """Return the drawing of a probe file, and what there is to know of it."""
-    return _described(_probe(folder, name), name, False)
 
 
 def probe_of_text(
@@ -146,7 +140,12 @@ def probe_of_text(
 
 
 def probe_of_values(
-    report: Report, shape: str, changes: dict[str, Any], title: str, mesh: bool = False
+    report: Report,
+    folder: Path,
+    shape: str,
+    changes: dict[str, Any],
+    title: str,
+    mesh: bool = False,
 ) -> dict[str, Any]:
     """Return the drawing, and the file, of a parametric probe with some values changed."""
     start = Probe.u_shape() if shape == "u-shape" else Probe.reference()
@@ -162,14 +161,6 @@ def probe_file(report: Report, folder: Path, name: str, suffix: str, mesh: bool 
     probe = _probe(folder, name)
     triangles = chosen_space(probe).mesh if mesh else None
     return _file(figures.probe_drawing(probe.layout(), name, mesh=triangles), suffix)
-
-
-def is_spectrum(report: Report, folder: Path, name: str) -> bool:
-    """Return whether a file holds Raman spectra."""
-    try:
-        return bool(read_spectra([folder / name]))
-    except InputError:
-        return False
 
 
 def refused(report: Report, folder: Path, names: list[str], spectra: bool) -> list[str]:
@@ -191,17 +182,17 @@ def levers(report: Report, folder: Path, names: list[str]) -> dict[str, Any]:
     rows, head = [], ["lever"]
     for name in names:
         try:
-            fit = _fit(folder / name, _stamp(folder / name))
+            fit = _fit(folder / name, file_stamp(folder / name))
         except InputError:
             continue  # being written, or another kind of file
         cells = parameter_rows(fit)
-        head = ["lever", *(f"{one} ({unit})" if unit else one for one, _, unit, _ in cells)]
+        head = ["lever", *(f"{label} ({unit})" if unit else label for label, _, unit, _ in cells)]
         lever = Path(name).name.split(".")[0]
         rows.append([lever, *(value for _, value, _, _ in cells), fit.doubt])
     return {"head": [*head, "remark"], "rows": rows}
 
 
-def packed(report: Report, paths: list[Path]) -> bytes:
+def packed(report: Report, folder: Path, paths: list[Path]) -> bytes:
     """Return files as the content of one."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -267,7 +258,7 @@ def _impossible(values: Mapping[str, Any], said: str) -> Figure:
     if not np.abs([region.rings[0] for region in regions]).max() < _DRAWABLE_UM:
         raise ValueError(said)
     parts = {word.partition("_")[0] for word in words}
-    wrong = next((one for one in regions if one.name.partition(" ")[0] in parts), None)
+    wrong = next((region for region in regions if region.name.partition(" ")[0] in parts), None)
     place = None if wrong is None else np.mean(wrong.rings[0], axis=0).tolist()
     outlines = {region.name: region.rings for region in regions}
     return figures.outlines_drawing(outlines, fault=said, place=place)
@@ -277,20 +268,13 @@ def _probe(folder: Path, name: str | None) -> Probe:
     return Probe.reference() if name is None else Probe.from_file(folder / name)
 
 
-def _stamp(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except OSError:
-        raise InputError(f"{path.name}: no such file") from None
-
-
 #: Pages of results, whose figures may be asked for as files; the latest last.
 _pages: dict[tuple[str, Path, float], Page] = {}
 
 
 def _page(kind: str, path: Path, added: Callable[[Block], None] | None = None) -> Page:
     """Return the page of a result, telling of its blocks as soon as they are there."""
-    key = kind, path, _stamp(path)
+    key = kind, path, file_stamp(path)
     if key in _pages:
         if added is not None:
             for block in _pages[key].blocks:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hotlever.app.child import Report
+from hotlever.app.workers import Report
 from hotlever.errors import HotleverError, InputError
 from hotlever.raman import measure, read_lines
 from hotlever.raman.peak import WINDOW, in_window
@@ -25,21 +26,17 @@ _POINTS = 800
 
 def names(report: Report, folder: Path, folders: Sequence[str]) -> list[str]:
     """Return the names of the spectra in some folders of a project, each with its folder."""
-    found: list[str] = []
-    for one in folders:
-        try:
-            files = spectrum_files([folder / one])
-        except InputError:
-            continue  # there is none yet
-        for file, _ in files:
-            try:
-                found += (f"{one}/{name}" for name in _names(file, file.stat().st_mtime))
-            except (InputError, OSError):
-                continue  # no spectrum: the command says so
-    return found
+    spectra: list[str] = []
+    for name in folders:
+        # there may be none yet, and other files among them, of which the command says so
+        with suppress(InputError):
+            for file, _ in spectrum_files([folder / name]):
+                with suppress(InputError, OSError):
+                    spectra += (f"{name}/{one}" for one in _names(file, file.stat().st_mtime))
+    return spectra
 
 
-def one(report: Report, folder: Path, name: str, asked: dict[str, Any]) -> dict[str, Any]:
+def measured(report: Report, folder: Path, name: str, asked: dict[str, Any]) -> dict[str, Any]:
     """Return the counts of a spectrum, its fit, and what is read from it, in words.
 
     Parameters
@@ -50,7 +47,7 @@ def one(report: Report, folder: Path, name: str, asked: dict[str, Any]) -> dict[
         As `names` has it.
     asked : dict
         Of the thermometer: ``calibration``, ``calibrate_from`` and ``corrections`` are names in the
-        folder, or None, and ``law`` is one.
+        folder, or empty, and ``law`` is one.
     """
     spectrum = _spectrum(folder, name)
     setup, doubt = _setup(folder, asked)
@@ -74,7 +71,7 @@ def one(report: Report, folder: Path, name: str, asked: dict[str, Any]) -> dict[
         "ends": WINDOW,
         "window": line.window,
         "centre": None if line.peak is None else line.peak.centre,
-        "said": "; ".join(filter(None, (_words(line, table), doubt))),
+        "text": "; ".join(filter(None, (_summary(line, table), doubt))),
     }
 
 
@@ -85,33 +82,33 @@ def _with_room(values: Array) -> list[float]:
     return [low - room, high + room]
 
 
-def _words(line: Line, table: Any) -> str:
+def _summary(line: Line, table: Any) -> str:
     """Say what was read from a line, with the digits of the command's table."""
     flags = ", ".join(line.flags)
     if line.peak is None:
         return flags
     peak, T = line.peak, float(table.temperature_K.values[0])
     error = float(table.temperature_error_K.values[0])
-    said = f"{peak.centre:.4f} ± {peak.centre_stderr:.4f} cm⁻¹, width {peak.fwhm:.3f} cm⁻¹"
+    text = f"{peak.centre:.4f} ± {peak.centre_stderr:.4f} cm⁻¹, width {peak.fwhm:.3f} cm⁻¹"
     if np.isfinite(T):
-        said += f", {T:.2f} ± {error:.2f} K"
-    return f"{said} ({flags})" if flags else said
+        text += f", {T:.2f} ± {error:.2f} K"
+    return f"{text} ({flags})" if flags else text
 
 
 def _setup(folder: Path, asked: dict[str, Any]) -> tuple[Thermometry, str]:
     """Return the thermometer; one without temperatures, and why, if that cannot be made."""
-    calibration, corrections, plate = (
-        asked[key] and folder / asked[key]
-        for key in ("calibration", "corrections", "calibrate_from")
-    )
-    law, paths = asked["law"], [plate] if plate else None
+    by_hand = folder / asked["corrections"] if asked["corrections"] else None
+    options: dict[str, Any] = {"law": asked["law"], "corrections": by_hand}
+    calibrated: dict[str, Any] = {}
+    if asked["calibration"]:
+        calibrated = {"calibration": str(folder / asked["calibration"])}
+    elif asked["calibrate_from"]:
+        calibrated = {"calibrate_from": [folder / asked["calibrate_from"]]}
     try:
-        return set_up(
-            calibration=calibration, calibrate_from=paths, corrections=corrections, law=law
-        ), ""
+        return set_up(**calibrated, **options), ""
     except HotleverError as error:
         doubt = f"no temperature: {str(error).replace(f'{folder}/', '')}"
-    return set_up(corrections=corrections, law=law), doubt
+    return set_up(**options), doubt
 
 
 def _spectrum(folder: Path, name: str) -> Spectrum:

@@ -1,27 +1,51 @@
-"""Processes that work for the app: started by spawn, told by messages, ended at any time."""
+"""Processes that work for the app: started by spawn, told by messages, ended at any time.
+
+`Worker` is the app's side of one. `serve` runs in the process, where it calls functions of this
+package one after the other; each is given a `Report` first, by which it tells of its progress.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import atexit
+import gc
+import importlib
+import io
 import multiprocessing
 import os
+import queue
 import signal
+import sys
 import threading
 import weakref
-from collections.abc import Callable
-from contextlib import suppress
-from typing import Any
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext, suppress
+from functools import partial
+from multiprocessing.connection import Connection
+from typing import Any, NoReturn
 
-from hotlever.app import child
 from hotlever.errors import HotleverError
+from hotlever.memory import give_back
+from hotlever.types import Progress
+from hotlever.unforeseen import unforeseen_error
 
 #: Number of what a process says of no call.
 _ANY = 0
 #: Seconds that a process has to end by itself, tidying up, before it is killed.
 _TIDY_S = 0.6
-#: Events while a call runs: ("said", line), ("progress", label, done, total), ("shown", what, it).
-Heard = Callable[[tuple[Any, ...]], None]
+#: Seconds without a call after which a process gives back the memory that its last calls freed.
+_REST_S = 1.0
+#: Modules that a process imports before it is asked for anything, so that it then answers at once.
+_READY = (
+    *("hotlever.app.work", "hotlever.estimation", "hotlever.calibration"),
+    *("hotlever.figures", "hotlever.lever", "hotlever.report.fit_pages", "hotlever.raman"),
+)
+_LOST = (
+    "the process that worked on this died (too little memory?); what was written before is there, "
+    "please try again"
+)
+#: Hears what a call tells: of which kind it is, and what.
+Heard = Callable[[str, Any], None]
 
 _alive: weakref.WeakSet[Worker] = weakref.WeakSet()
 
@@ -31,27 +55,25 @@ class WorkerLostError(HotleverError):
 
 
 class Worker:
-    """A process that answers calls one after the other."""
+    """A process that answers calls one after the other; one that died is replaced at the next."""
 
     def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=child.serve, args=(theirs,), name="hotlever")
-        self._process.start()
-        theirs.close()
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._turn = asyncio.Lock()
         self._answer: asyncio.Future[Any] | None = None
         self._heard: Heard | None = None
-        self._number = 0
-        self._turn = asyncio.Lock()
-        self.lost = False
+        self._number = _ANY
         _alive.add(self)
-        threading.Thread(target=self._read, daemon=True).start()
+        self._start()
 
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-        return int(self._process.pid or 0)
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=serve, args=(theirs,), name="hotlever")
+        self._process.start()
+        theirs.close()
+        self.lost = False
+        self._loop: asyncio.AbstractEventLoop | None = None
+        threading.Thread(target=self._read, args=(self._connection,), daemon=True).start()
 
     async def call(self, function: str, *arguments: Any, heard: Heard | None = None) -> Any:
         """Call ``module:function`` of the process, and wait for its turn and answer.
@@ -64,12 +86,12 @@ class Worker:
             If the process died.
         """
         async with self._turn:
+            if self.lost:
+                self._start()
             self._loop = asyncio.get_running_loop()
             self._answer, self._heard = self._loop.create_future(), heard
             self._number += 1
             try:
-                if self.lost:
-                    raise OSError
                 self._connection.send((self._number, function, arguments))
                 return await self._answer
             except OSError:
@@ -77,35 +99,30 @@ class Worker:
             finally:
                 self._answer = self._heard = None
 
-    def _read(self) -> None:
+    def _read(self, connection: Connection) -> None:
         """Hand messages of the process to the loop that waits for them."""
-        while True:
+        lost = False
+        while not lost:
             try:
-                message = self._connection.recv()
+                message = connection.recv()
             except (EOFError, OSError):
-                self.lost = True
-                message = (_ANY, "lost")
+                lost = self.lost = True
+                message = (_ANY, "lost", _LOST)
             if self._loop is not None:
                 with suppress(RuntimeError):  # the loop is closed
-                    self._loop.call_soon_threadsafe(self._take, message)
-            if self.lost:
-                return
+                    self._loop.call_soon_threadsafe(self._take, *message)
 
-    def _take(self, message: tuple[Any, ...]) -> None:
-        answer = self._answer
-        if answer is None or answer.done():
-            return
-        number, kind, *content = message
-        if number not in (_ANY, self._number):
+    def _take(self, number: int, kind: str, content: Any) -> None:
+        if self._answer is None or self._answer.done() or number not in (_ANY, self._number):
             return  # of a call that nobody waits for any more
         if kind == "done":
-            answer.set_result(content[0])
+            self._answer.set_result(content)
         elif kind == "failed":
-            answer.set_exception(HotleverError(content[0]))
+            self._answer.set_exception(HotleverError(content))
         elif kind == "lost":
-            answer.set_exception(WorkerLostError(_LOST))
+            self._answer.set_exception(WorkerLostError(content))
         elif self._heard is not None:
-            self._heard((kind, *content))
+            self._heard(kind, content)
 
     async def end(self) -> None:
         """End the process and all that it started."""
@@ -121,30 +138,11 @@ class Worker:
         self._signal(getattr(signal, "SIGKILL", signal.SIGTERM))
 
     def _signal(self, number: int) -> None:
-        with suppress(OSError):
-            if hasattr(os, "killpg"):
-                os.killpg(self.pid, number)
-        with suppress(OSError, AttributeError, ValueError):
-            os.kill(self.pid, number)
-
-
-_LOST = (
-    "the process that worked on this died (too little memory?); what was written before is there, "
-    "please try again"
-)
-
-
-class Desk:
-    """A worker that is always there: one that died is replaced at the next call."""
-
-    def __init__(self) -> None:
-        self._worker = Worker()
-
-    async def call(self, function: str, *arguments: Any, heard: Heard | None = None) -> Any:
-        """Call a function; see `Worker.call`."""
-        if self._worker.lost:
-            self._worker = Worker()
-        return await self._worker.call(function, *arguments, heard=heard)
+        pid = int(self._process.pid or 0)
+        with suppress(OSError, AttributeError):
+            os.killpg(pid, number)
+        with suppress(OSError, ValueError):
+            os.kill(pid, number)
 
 
 @atexit.register
@@ -152,3 +150,125 @@ def _end_all() -> None:
     # registered after multiprocessing's own, which would wait for them, and so called before it
     for worker in list(_alive):
         worker.kill()
+
+
+# --- in the process -------------------------------------------------------------------------------
+
+
+class Report:
+    """Tells the app of a call: a `hotlever.tasks.reporter.Reporter`.
+
+    Attributes
+    ----------
+    number : int
+        Of the call. Who asked may be gone, and somebody else wait for the next answer.
+    """
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection, self.number = connection, _ANY
+
+    def send(self, kind: str, content: Any) -> None:
+        """Send something of what is worked on, or the answer."""
+        self._connection.send((self.number, kind, content))
+
+    def give(self, result: str) -> None:
+        """Send the result as text."""
+        self.send("result", result)
+
+    def tell(self, text: str) -> None:
+        """Leave out what is said on the way: the page shows how far the work is."""
+
+    def note(self, *texts: str) -> None:
+        """Send what should be known beside the result."""
+        for text in texts:
+            self.send("note", text)
+
+    def fail(self, message: str) -> None:
+        """Send what went wrong with a part of the work."""
+        self.send("failure", message)
+
+    def tell_table(self, rows: Sequence[Sequence[str]]) -> None:
+        """Send rows of cells."""
+        self.send("table", [list(row) for row in rows])
+
+    def show(self, what: str, content: Any) -> None:
+        """Send what can be drawn."""
+        self.send(what, content)
+
+    def progress(self, label: str) -> AbstractContextManager[Progress]:
+        """Give what sends how far a part of the work is."""
+        return nullcontext(partial(self._progressed, label))
+
+    def progress_bars(self, *labels: str) -> AbstractContextManager[tuple[Progress, ...]]:
+        """Give the same for several parts."""
+        return nullcontext(tuple(partial(self._progressed, label) for label in labels))
+
+    def _progressed(self, label: str, done: int, total: int) -> None:
+        self.send("progress", (label, int(done), int(total)))
+
+
+#: A call: its number, the function, and its arguments.
+_Call = tuple[int, str, tuple[Any, ...]]
+
+
+def serve(connection: Connection) -> None:
+    """Answer calls until the app is gone, or says that this ends."""
+    _quiet()
+    calls: queue.Queue[_Call] = queue.Queue()
+    threading.Thread(target=_listen, args=(connection, calls), daemon=True).start()
+    with suppress(KeyboardInterrupt):
+        for name in _READY:
+            importlib.import_module(name)
+        report = Report(connection)
+        while True:
+            _answer(report, *_next(calls))
+
+
+def _answer(report: Report, number: int, name: str, arguments: tuple[Any, ...]) -> None:
+    report.number = number
+    module, _, function = name.partition(":")
+    try:
+        report.send("done", getattr(importlib.import_module(module), function)(report, *arguments))
+    except HotleverError as error:
+        report.send("failed", str(error))
+    except MemoryError:
+        report.send("failed", "there is too little memory for this")
+    except Exception as error:
+        report.send("failed", unforeseen_error(error, ["app", name]))
+
+
+def _next(calls: queue.Queue[_Call]) -> _Call:
+    """Wait for a call; give memory back while there is none."""
+    with suppress(queue.Empty):
+        return calls.get(timeout=_REST_S)
+    gc.collect()
+    give_back()
+    return calls.get()
+
+
+def _quiet() -> None:
+    """Print nothing, stop when the app says so, and lead a group that can be stopped together."""
+    with suppress(OSError, AttributeError):
+        os.setsid()
+    # Ctrl-C is for the app, which ends its workers; what is being written is tidied up then
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _stop)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for number in (0, 1):
+        os.dup2(nowhere, number)
+    sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), errors="backslashreplace")
+
+
+def _stop(*_: Any) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _listen(connection: Connection, calls: queue.Queue[_Call]) -> None:
+    try:
+        while True:
+            calls.put(connection.recv())
+    except (EOFError, OSError):
+        # the app is gone
+        with suppress(OSError, AttributeError):
+            os.killpg(os.getpgid(0), signal.SIGTERM)
+        os._exit(0)

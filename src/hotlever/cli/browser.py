@@ -12,8 +12,8 @@ from typer import Argument, Option
 from hotlever.cli.commands import app
 from hotlever.cli.options import check_number
 from hotlever.cli.output import fail, tell
-from hotlever.cli.running import unforeseen_error
 from hotlever.errors import InputError
+from hotlever.unforeseen import unforeseen_error
 
 #: Where a password may stand, that would be seen by others on the command line.
 _PASSWORD = "HOTLEVER_APP_PASSWORD"

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args
 
 from typer import Argument, Option
 
-from hotlever.cli.output import note, progress
+from hotlever.cli import output as terminal
 from hotlever.errors import InputError, quoted, shown
 from hotlever.files import FIGURE_TYPES, Outputs
-from hotlever.tasks.texts import parse_number, parse_settings
+from hotlever.tasks.texts import parse_number
 from hotlever.units import LEAST_BIAS, MOST_BIAS, setting
 
 if TYPE_CHECKING:
@@ -172,20 +172,16 @@ def load_probe(path: Path | None, settings: list[str] | None = None) -> Probe:
 
     What should be known of its shape is told.
     """
-    from hotlever.probe import Probe
+    from hotlever.tasks.probes import read_probe
 
-    probe = Probe.reference() if path is None else Probe.from_file(path)
-    probe = probe.with_(**parse_settings(settings, probe)) if settings else probe
-    note(*probe.shape.notes())
-    return probe
+    return read_probe(terminal, path, settings)
 
 
 def make_lever(probe: Probe) -> Lever:
     """Mesh a probe, and make the air around it."""
-    from hotlever.lever import Lever
+    from hotlever.tasks import probes
 
-    with progress("air") as update:
-        return Lever(probe, progress=update)
+    return probes.make_lever(terminal, probe)
 
 
 # --- checks ---------------------------------------------------------------------------------------

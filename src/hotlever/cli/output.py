@@ -9,9 +9,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from contextvars import ContextVar
-from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from hotlever.errors import HotleverError
 
@@ -22,32 +20,6 @@ if TYPE_CHECKING:
 FIRST_LINE_S, NEXT_LINE_S = 2.0, 10.0
 #: Characters of a line that says what went wrong.
 _LONGEST = 1200
-
-
-class Listener(Protocol):
-    """Who hears what a command says beside its result, in place of standard error."""
-
-    def told(self, line: str) -> None:
-        """Hear a line."""
-
-    def progressed(self, label: str, done: int, total: int) -> None:
-        """Hear how many steps of some work are done."""
-
-    def shown(self, what: str, content: Any) -> None:
-        """Hear what can be drawn: a curve on its way to the data, a table."""
-
-
-_listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
-
-
-@contextmanager
-def heard_by(listener: Listener) -> Iterator[None]:
-    """Let somebody hear what commands say inside the block."""
-    before = _listener.set(listener)
-    try:
-        yield
-    finally:
-        _listener.reset(before)
 
 
 def give(result: str = "") -> None:
@@ -97,31 +69,16 @@ def tell_table(rows: Sequence[Sequence[str]]) -> None:
     """Show rows of cells on standard error."""
     from hotlever.text import aligned
 
-    cells = [[_printable(cell) for cell in row] for row in rows]
-    if _shown("table", cells):
-        return
-    for line in aligned(cells):
+    for line in aligned([[_printable(cell) for cell in row] for row in rows]):
         _say(line)
 
 
 def show(what: str, content: Any) -> None:
-    """Show what a terminal cannot draw to who listens."""
-    _shown(what, content)
-
-
-def _shown(what: str, content: Any) -> bool:
-    listener = _listener.get()
-    if listener is not None:
-        listener.shown(what, content)
-    return listener is not None
+    """Leave out what a terminal cannot draw."""
 
 
 def _say(line: str) -> None:
-    listener = _listener.get()
-    if listener is None:
-        print(line, file=cast(Any, _stderr), flush=True)
-    else:
-        listener.told(line)
+    print(line, file=cast(Any, _stderr), flush=True)
 
 
 def _printable(text: str) -> str:
@@ -172,10 +129,6 @@ def progress(label: str) -> Iterator[Progress]:
 @contextmanager
 def progress_bars(*labels: str) -> Iterator[tuple[Progress, ...]]:
     """Show several progress bars, each from its first call on; lines where there is no terminal."""
-    listener = _listener.get()
-    if listener is not None:
-        yield tuple(partial(listener.progressed, label) for label in labels)
-        return
     if sys.stderr is None or not sys.stderr.isatty():
         yield tuple(_lines(label) for label in labels)
         return

@@ -7,19 +7,16 @@ from __future__ import annotations
 
 import io
 import os
-import platform
 import signal
 import sys
-import tempfile
-import traceback
 import warnings
 from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
-from hotlever import __version__
 from hotlever.cli.output import fail, give
 from hotlever.errors import HotleverError
+from hotlever.unforeseen import unforeseen_error
 
 #: Signals that end a command, and those that have come: a compiled module that is stopped while
 #: it is imported says something else.
@@ -105,30 +102,3 @@ def _ended(error: BaseException, arguments: list[str]) -> tuple[int, str]:
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else 1, ""
     return 1, unforeseen_error(error, arguments)
-
-
-def unforeseen_error(error: BaseException, arguments: list[str]) -> str:
-    """Return the line for an error that nobody foresaw, with where its traceback is kept."""
-    what = "out of memory" if isinstance(error, MemoryError) else f"{type(error).__name__}: {error}"
-    return f"internal error: {what} ({_logged(error, arguments)})"
-
-
-def _logged(error: BaseException, arguments: list[str]) -> str:
-    """Keep the traceback in a file, and say where."""
-    import platformdirs
-
-    lines = [
-        f"hotlever {__version__}, Python {platform.python_version()}, {platform.platform()}\n",
-        f"{['hotlever', *arguments]}\n",
-        *traceback.format_exception(error),
-    ]
-    for folder in (platformdirs.user_log_dir("hotlever"), tempfile.gettempdir()):
-        try:
-            os.makedirs(folder, exist_ok=True)
-            handle, path = tempfile.mkstemp(".log", "hotlever-", folder, text=True)
-            with open(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
-                file.writelines(lines)
-        except OSError:
-            continue
-        return f"please report it with {path}"
-    return "no log could be written"

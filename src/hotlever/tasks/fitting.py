@@ -36,10 +36,10 @@ class Destination(NamedTuple):
 
 def fit_options(
     probe: Probe,
-    observables: str | None,
-    fix: Sequence[str] | None,
-    free: str | None,
-    prior: Sequence[str] | None,
+    observables: str | None = None,
+    fix: Sequence[str] | None = None,
+    free: str | None = None,
+    prior: Sequence[str] | None = None,
     **others: Any,
 ) -> FitOptions:
     """Return what a fit is asked, of what was typed."""

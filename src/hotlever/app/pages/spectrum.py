@@ -1,27 +1,44 @@
-"""One spectrum of the room Raman: its counts and the fitted line, and what is corrected by hand."""
+"""One spectrum of the page Raman: its counts and the fitted line, and what is corrected by hand."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from nicegui import ui
 
-from hotlever.app.page import Complaint
-from hotlever.app.rooms.plots import INK, axes, plotted, short
+from hotlever.app.pages.frame import ErrorBanner, caption, flat_button
+from hotlever.app.pages.plots import INK, axes, plotted, short
 from hotlever.app.session import Session
 from hotlever.colours import BLUE, GREEN, VERMILION
 from hotlever.errors import HotleverError
 from hotlever.raman import Correction, read_corrections
 from hotlever.raman.correction import corrections_text
 
-_SPECTRA = "hotlever.app.spectra"
 #: The table of corrections, in the folder of the project.
 CORRECTIONS = "raman.corrections.csv"
 _ALT = "Counts of the spectrum, and the fitted line"
 _HELP = "Click where the line is, or type it. Drag across the part that is to be fitted."
 _FIELDS = {"start": "Line near", "low": "Fit from", "high": "Fit to"}
+_LINE = {"type": "scatter", "mode": "lines", "hoverinfo": "skip"}
+_DOTS = {"type": "scatter", "mode": "markers"}
+#: Counts, fitted line, background, and cosmic rays.
+_TRACES = [
+    {**_DOTS, "marker": {"color": INK, "size": 4}},
+    {**_LINE, "line": {"color": BLUE, "width": 2}},
+    {**_LINE, "line": {"color": GREEN, "width": 1, "dash": "dot"}},
+    {
+        **_DOTS,
+        "marker": {"color": VERMILION, "size": 8, "symbol": "x-thin-open"},
+        "hoverinfo": "skip",
+    },
+]
+#: Over the whole height: what is not fitted, and the place of the line.
+_HIGH = {"yref": "paper", "y0": 0, "y1": 1}
+_SHADE = {"type": "rect", **_HIGH, "line": {"width": 0}, "fillcolor": "rgba(128,128,128,.25)"}
+_PLACE = {"type": "line", **_HIGH, "line": {"color": VERMILION, "width": 1, "dash": "dash"}}
 
 
 class OneSpectrum:
@@ -30,64 +47,47 @@ class OneSpectrum:
     Parameters
     ----------
     session : Session
-    complaint : Complaint
+    banner : ErrorBanner
     chosen : dict
-        What was chosen last in the room; ``spectrum`` is the name.
+        What was chosen last on the page; ``spectrum`` is the name.
     thermometer : callable
-        Returns the options of the thermometer; see `hotlever.app.spectra.one`.
-    changed : callable
+        Returns the options of the thermometer; see `hotlever.app.spectra.measured`.
+    corrected : callable
         Called when something has been corrected.
     """
 
     def __init__(
         self,
         session: Session,
-        complaint: Complaint,
+        banner: ErrorBanner,
         chosen: dict[str, Any],
-        thermometer: Callable[[], dict[str, Any]],
-        changed: Callable[[], None],
+        thermometer: Callable[[], dict[str, str]],
+        corrected: Callable[[], None],
     ) -> None:
-        self._session, self._complaint, self._chosen = session, complaint, chosen
-        self._thermometer, self._changed = thermometer, changed
-        self._asked, self._quiet = 0, False
+        self._session, self._banner, self._chosen = session, banner, chosen
+        self._thermometer, self._corrected = thermometer, corrected
+        self._turn, self._quiet = 0, False
         with ui.card().classes("w-full gap-1").props("flat bordered") as self._all:
             with ui.row().classes("w-full items-center no-wrap"):
-                self._select = ui.select([], label="Spectrum", on_change=self._pick)
-                self._select.props("dense outlined").classes("col")
-                for icon, step, label in (
-                    ("chevron_left", -1, "Spectrum before"),
-                    ("chevron_right", 1, "Next spectrum"),
-                ):
-                    button = ui.button(icon=icon, on_click=lambda _, s=step: self._move(s))
-                    button.props(f'flat dense aria-label="{label}"')
+                self._select = ui.select([], label="Spectrum", on_change=self._pick).classes("col")
+                before, after = partial(self._move, -1), partial(self._move, 1)
+                flat_button("", before, icon="chevron_left", label="Spectrum before")
+                flat_button("", after, icon="chevron_right", label="Next spectrum")
             layout = axes("Raman shift (cm⁻¹)", "counts", 300, normal="xy")
             layout |= {"hovermode": "x", "dragmode": "select", "selectdirection": "h"}
-            line = {"type": "scatter", "mode": "lines", "hoverinfo": "skip"}
-            hit = {"color": VERMILION, "size": 8, "symbol": "x-thin-open"}
-            self._plot = plotted(
-                [
-                    {"type": "scatter", "mode": "markers", "marker": {"color": INK, "size": 4}},
-                    {**line, "line": {"color": BLUE, "width": 2}},
-                    {**line, "line": {"color": GREEN, "width": 1, "dash": "dot"}},
-                    {"type": "scatter", "mode": "markers", "marker": hit, "hoverinfo": "skip"},
-                ],
-                layout,
-                _ALT,
-            )
+            self._plot = plotted(_TRACES, layout, _ALT)
             self._plot.on("plotly_click", self._click, ["points"])
             self._plot.on("plotly_selected", self._drag, ["range"])
-            self._said = ui.label().classes("remark").props("aria-live=polite data-spectrum=1")
+            self._text = ui.label().classes("remark").props("aria-live=polite data-spectrum=1")
             with ui.row().classes("w-full items-center"):
                 self._numbers = {}
                 for key, label in _FIELDS.items():
                     number = ui.number(label, on_change=self._type, format="%.6g")
-                    number.props("dense outlined clearable suffix=cm⁻¹ debounce=600")
+                    number.props("clearable suffix=cm⁻¹ debounce=600")
                     self._numbers[key] = number.classes("w-36")
-                self._out = ui.checkbox("Leave out", on_change=self._type).props("dense")
-                ui.button("As found", icon="restart_alt", on_click=self._reset).props(
-                    "flat dense no-caps"
-                )
-            ui.label(_HELP).classes("text-xs opacity-70")
+                self._out = ui.checkbox("Leave out", on_change=self._type)
+                flat_button("As found", self._reset, icon="restart_alt")
+            caption(_HELP)
         # the frame's head covers the top of what is scrolled to
         self._all.style("scroll-margin-top: 4rem").set_visibility(False)
 
@@ -101,16 +101,15 @@ class OneSpectrum:
 
     async def look(self, folders: list[str]) -> None:
         """Offer the spectra of some folders, and show the one that was chosen last."""
-        call, folder = f"{_SPECTRA}:names", self._session.project.folder
-        names = await self._session.full.call(call, folder, folders)
+        names = await self._session.ask("full", "spectra:names", folders)
         if self._all.is_deleted:
             return
         self._all.set_visibility(bool(names))
-        chosen = self._chosen.get("spectrum")
+        chosen = self._chosen["spectrum"]
         self._quiet = True
         self._select.set_options(names, value=chosen if chosen in names else (names or [None])[0])
         self._quiet = False
-        await self._show()
+        await self.show_chosen()
 
     async def show(self, name: str) -> None:
         """Show a spectrum, if there is one of this name, and go there."""
@@ -118,14 +117,10 @@ class OneSpectrum:
             self._select.set_value(name)
             ui.run_javascript(f"getHtmlElement({self._all.id}).scrollIntoView()")
 
-    async def refresh(self) -> None:
-        """Show it by what is asked of the thermometer now."""
-        await self._show()
-
     async def _pick(self) -> None:
         if not self._quiet:
             self._chosen["spectrum"] = self._name
-            await self._show()
+            await self.show_chosen()
 
     def _move(self, step: int) -> None:
         names = list(self._select.options)
@@ -155,65 +150,63 @@ class OneSpectrum:
 
     async def _correct(self, **what: Any) -> None:
         """Keep a correction in the table, and have everything follow."""
-        with self._complaint.caught():
-            known = self._corrections()
-            before = known.pop(self._name, Correction())
+        with self._banner.caught():
+            corrections = self._corrections()
+            before = corrections.pop(self._name, Correction())
             after = replace(before, **what)
             if after == before:
                 return
             if after != Correction():
-                known[self._name] = after
+                corrections[self._name] = after
             project = self._session.project
-            if known:
-                project.write(CORRECTIONS, corrections_text(known), f"corrected {self._name}")
+            if corrections:
+                text = corrections_text(corrections)
+                project.write(CORRECTIONS, text, f"corrected {self._name}")
             else:
                 project.changes.remove(project.path(CORRECTIONS))
-            await self._show()
-            self._changed()
+            await self.show_chosen()
+            self._corrected()
 
     # --- what is shown ----------------------------------------------------------------------------
 
-    async def _show(self) -> None:
-        self._asked += 1
-        this, name = self._asked, self._name
+    async def show_chosen(self) -> None:
+        """Show the spectrum that is chosen, by what is asked of the thermometer now."""
+        self._turn += 1
+        turn, name = self._turn, self._name
         if not name:
             return
-        call, folder = f"{_SPECTRA}:one", self._session.project.folder
         try:
             correction = self._corrections().get(name, Correction())
-            found = await self._session.full.call(call, folder, name, self._thermometer())
+            asked = name, self._thermometer()
+            spectrum = await self._session.ask("full", "spectra:measured", *asked)
         except HotleverError as error:
             if not self._all.is_deleted:
-                self._said.set_text(str(error).replace(f"{folder}/", ""))
+                self._text.set_text(str(error).replace(f"{self._session.project.folder}/", ""))
             return
-        if this != self._asked or self._all.is_deleted:  # another one has been chosen meanwhile
+        if turn != self._turn or self._all.is_deleted:  # another one has been chosen meanwhile
             return
         self._quiet = True
         for key, number in self._numbers.items():
             number.set_value(getattr(correction, key))
         self._out.set_value(not correction.use)
         self._quiet = False
-        self._said.set_text(found["said"])
-        self._draw(found)
+        self._text.set_text(spectrum["text"])
+        self._draw(spectrum)
 
-    def _draw(self, found: dict[str, Any]) -> None:
-        figure = self._plot.figure
-        for trace, (x, y) in zip(figure["data"], found["curves"], strict=True):
+    def _draw(self, spectrum: dict[str, Any]) -> None:
+        figure: Any = self._plot.figure
+        for trace, (x, y) in zip(figure["data"], spectrum["curves"], strict=True):
             trace |= {"x": short(x), "y": short(y)}
-        low, high = found["ends"]
-        shade = {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "line": {"width": 0}}
-        shade |= {"fillcolor": "rgba(128,128,128,.25)", "layer": "below"}
-        shapes = [
-            {**shade, "x0": x0, "x1": x1}
-            for x0, x1 in ((low, found["window"][0]), (found["window"][1], high))
+        low, high = spectrum["ends"]
+        first, last = spectrum["window"]
+        shapes: list[dict[str, Any]] = [
+            {**_SHADE, "layer": "below", "x0": x0, "x1": x1}
+            for x0, x1 in ((low, first), (last, high))
             if x1 > x0
         ]
-        line = {"type": "line", "yref": "paper", "y0": 0, "y1": 1}
-        if found["centre"] is not None:
-            at = found["centre"]
-            dash = {"color": VERMILION, "width": 1, "dash": "dash"}
-            shapes.append({**line, "x0": at, "x1": at, "line": dash})
+        if spectrum["centre"] is not None:
+            shapes.append({**_PLACE, "x0": spectrum["centre"], "x1": spectrum["centre"]})
         figure["layout"] |= {"shapes": shapes, "selections": []}
         figure["layout"]["xaxis"]["range"] = [low, high]
-        figure["layout"]["yaxis"] |= {"range": found["heights"], "autorange": False}
+        figure["layout"]["yaxis"] |= {"range": spectrum["heights"], "autorange": False}
         self._plot.update()

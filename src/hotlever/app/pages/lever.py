@@ -3,55 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 
-from hotlever.app.jobs import Job, named
-from hotlever.app.page import Complaint, Work, drop_zone, hand_over, two_columns
+from hotlever.app.jobs import Job, Task
+from hotlever.app.pages.frame import (
+    FIGURE_FILES,
+    ErrorBanner,
+    drop_zone,
+    flat_button,
+    hand_over,
+    two_columns,
+)
+from hotlever.app.pages.page import Page, Work
+from hotlever.app.pages.probe_files import Dimensions, Drawings, Picture, ProbeFile
 from hotlever.app.project import DRAWINGS
-from hotlever.app.rooms.drawn import Fields, Picture
-from hotlever.app.rooms.imported import Imports
-from hotlever.app.rooms.probe_file import ProbeFile
-from hotlever.app.rooms.results import FIGURE_FILES, SHOWING
-from hotlever.app.rooms.room import Room
-from hotlever.app.session import Session
+from hotlever.app.session import Lever, Session, Simulate
 from hotlever.errors import HotleverError, InputError
 
 _SHAPES = {"three-leg": "three legs", "u-shape": "two legs (U)"}
 _FILE = "a probe file or a drawing"
-_NEW = "my-lever.toml"
+_NEW = Lever().name
 _DROP = "Drop a drawing here (GDSII, OASIS, DXF), or a probe file"
 
 
-class LeverRoom(Room):
-    """One tab of the room."""
+class LeverPage(Page):
+    """One tab of the page."""
 
     name = "lever"
 
-    def __init__(self, session: Session, complaint: Complaint) -> None:
-        super().__init__(session, complaint)
-        start: dict[str, Any] = {"shape": "three-leg", "changes": {}, "text": None}
-        self.chosen |= start | {"name": _NEW, "saved": ""} | self.chosen
+    def __init__(self, session: Session, banner: ErrorBanner) -> None:
+        super().__init__(session, banner)
         self._file = ProbeFile(session, self.chosen)
         self._shown_text, self._fault = "", ""
         with two_columns() as (left, right):
             with left:
-                drop_zone(session, complaint, _DROP, self._dropped)
+                drop_zone(session, banner, _DROP, self._dropped)
                 self._pick = ui.select(self._files, label="Open")
                 self._pick.on_value_change(lambda event: self._open(event.value))
-                self._pick.classes("w-full").props("dense outlined clearable")
-                self._shape = ui.toggle(
-                    _SHAPES, value=self.chosen["shape"], on_change=self._take_shape
-                ).props("no-caps dense unelevated")
-                self._fields = Fields(self._change)
+                self._pick.classes("w-full").props("clearable")
+                shape = self.chosen["shape"]
+                self._shape = ui.toggle(_SHAPES, value=shape, on_change=self._take_shape)
+                self._dimensions = Dimensions(self._change)
             with right:
                 self._work = Work(session, self.name, self._ended)
-                self._imports = Imports(session, self.chosen, self.run, self._begin, self._show)
+                shown = self.run, self._begin, self._show
+                self._drawings = Drawings(session, self.chosen, *shown)
                 self._picture = Picture(session, self.chosen, self._draw)
-                self._save()
-                with ui.expansion("The probe file").classes("w-full").props("dense"):
+                with ui.row().classes("items-center w-full"):
+                    self._name = ui.input("Save as", value=self.chosen["name"])
+                    ui.button("Save", icon="save", on_click=self._write)
+                    go = ui.button("Simulate", icon="tune", on_click=self._simulate)
+                    go.props("outline")
+                    for suffix in FIGURE_FILES:
+                        flat_button(suffix[1:].upper(), partial(self._give, suffix))
+                with ui.expansion("The probe file"):
                     self._text = ui.textarea(on_change=self._edited).classes("w-full")
                     self._text.props('outlined autogrow debounce=400 aria-label="Probe file"')
                     self._text.props("input-class=font-mono input-style=font-size:.8rem")
@@ -62,24 +71,13 @@ class LeverRoom(Room):
         project = self.session.project
         return [*project.probes, *project.drawings]
 
-    def _save(self) -> None:
-        with ui.row().classes("items-center w-full"):
-            self._name = ui.input("Save as", value=self.chosen["name"])
-            self._name.props("dense outlined")
-            ui.button("Save", icon="save", on_click=self._write).props("no-caps")
-            ui.button("Simulate", icon="tune", on_click=self._simulate).props("no-caps outline")
-            for suffix in FIGURE_FILES:
-                ui.button(suffix[1:].upper(), on_click=lambda _, s=suffix: self._give(s)).props(
-                    "flat dense no-caps"
-                )
-
     async def open(self) -> None:
         """Show what was open last; a drawing that was just dropped is opened."""
-        with self.complaint.caught():
+        with self.banner.caught():
             self._file.take_up()
         self._quietly(self.chosen["text"] or "")
-        await self._draw(fields=True)
-        await self._open(self.chosen.get("drawing"))
+        await self._draw(anew=True)
+        await self._open(self.chosen["drawing"])
 
     # --- parametric -------------------------------------------------------------------------------
 
@@ -91,18 +89,18 @@ class LeverRoom(Room):
         self.chosen |= {"shape": event.value, "changes": {}}
         self._begin(name, None)
         self._pick.set_value(None)
-        await self._draw(fields=True)
+        await self._draw(anew=True)
 
     async def _change(self, name: str, value: float | None) -> None:
         if value is None:
-            self.complaint.say(f"{name}: expected a number")
+            self.banner.say(f"{name}: expected a number")
             return
         self.chosen["changes"] = {**self.chosen["changes"], name: value}
         self.chosen["text"] = None
         await self._draw()
 
-    async def _draw(self, fields: bool = False) -> None:
-        """Draw what is chosen."""
+    async def _draw(self, anew: bool = False) -> None:
+        """Draw what is chosen; dimensions that are shown `anew` are those of another shape."""
         chosen, title = self.chosen, self._name.value
         text = chosen["text"]
         if text == "":  # nothing is open
@@ -110,8 +108,7 @@ class LeverRoom(Room):
             return
         try:
             if text is not None:
-                folder = self.session.project.folder
-                drawn = await self._picture.of("probe_of_text", folder, text, title)
+                drawn = await self._picture.of("probe_of_text", text, title)
             else:
                 values = chosen["shape"], chosen["changes"]
                 drawn = await self._picture.of("probe_of_values", *values, title)
@@ -122,10 +119,10 @@ class LeverRoom(Room):
             drawn, self._fault = {}, str(error)
         if text is None and not self._fault:
             self._quietly(drawn["text"])
-            if fields:
-                self._fields.show(drawn["values"])
-        self._fields.mark(self._fault)
-        self.complaint.say(self._fault)
+            if anew:
+                self._dimensions.show(drawn["values"])
+        self._dimensions.mark(self._fault)
+        self.banner.say(self._fault)
         self.show_command()
 
     # --- a file -----------------------------------------------------------------------------------
@@ -133,8 +130,8 @@ class LeverRoom(Room):
     async def _dropped(self, names: list[str]) -> None:
         self._pick.set_options(self._files)
         if names[-1] not in self._files:
-            self.complaint.say(f"{names[-1]}: unknown type of file, expected {_FILE}")
-        elif self._pick.value == names[-1]:  # dropped again
+            raise InputError(f"{names[-1]}: unknown type of file, expected {_FILE}")
+        if self._pick.value == names[-1]:  # dropped again
             await self._open(names[-1])
         else:
             self._pick.set_value(names[-1])
@@ -144,13 +141,13 @@ class LeverRoom(Room):
         if name is None:
             return
         if not await self._file.may_go():
-            self._imports.clear()
+            self._drawings.clear()
             self._pick.set_value(None)
             return
-        self.complaint.clear()
+        self.banner.clear()
         self._work.hide()
         if name.lower().endswith(DRAWINGS):
-            await self._imports.open(name, self.session.jobs.by_room.get(self.name))
+            await self._drawings.open(name, self.session.jobs.by_page.get(self.name))
         else:
             await self._show(name)
 
@@ -159,16 +156,16 @@ class LeverRoom(Room):
         self._fault = ""
         self.chosen |= {"name": name, "text": text, "saved": ""}
         self._name.set_value(name)
-        self._fields.clear()
+        self._dimensions.clear()
         self._picture.clear()
-        self._imports.clear()
+        self._drawings.clear()
         self._quietly("")
         self.show_command()
 
     async def _show(self, name: str, listing: str = "", plot: str = "") -> None:
         """Show a probe file, and what the drawing holds that it was proposed for."""
         self._begin(name)
-        with self.complaint.caught():
+        with self.banner.caught():
             self._quietly(self._file.open(name))
             await self._draw()
             if plot:
@@ -177,14 +174,14 @@ class LeverRoom(Room):
 
     async def _ended(self, job: Job) -> None:
         self._pick.set_options(self._files)
-        await self._imports.done(job)
+        await self._drawings.done(job)
 
     def _edited(self, event: Any) -> Awaitable[None] | None:
         """Take what was typed, at once: later the text may be another one, which nobody typed."""
         if event.value == self._shown_text:
             return None
         self.chosen["text"] = self._shown_text = event.value
-        self._fields.clear()
+        self._dimensions.clear()
         self._shape.set_value(None)
         return self._draw()
 
@@ -197,15 +194,15 @@ class LeverRoom(Room):
 
     # --- what is shown and written ----------------------------------------------------------------
 
-    def arguments(self) -> list[str]:
+    def task(self) -> Task:
         """Return the command that draws the probe."""
         name = self._name.value or "lever"
-        mesh = ["--mesh"] if self.chosen["mesh"] else []
-        return ["probe", "show", named(name), "--plot", f"{Path(name).stem}.svg", *mesh]
+        options = {"plot": f"{Path(name).stem}.svg", "mesh": self.chosen["mesh"]}
+        return Task("probe show", (name,), options)
 
     async def _write(self) -> bool:
         """Write the probe file; return whether it is there now."""
-        with self.complaint.caught():
+        with self.banner.caught():
             if self._fault and self.chosen["text"] is None:
                 raise InputError(self._fault)
             name = await self._file.save(self._name.value or "", self._shown_text)
@@ -219,13 +216,12 @@ class LeverRoom(Room):
 
     async def _simulate(self) -> None:
         if await self._write():
-            self.session.chosen["simulate"] = {"probe": self._name.value}
+            self.session.chosen["simulate"] = Simulate(probe=self._name.value).model_dump()
             ui.navigate.to("/simulate")
 
     async def _give(self, suffix: str) -> None:
         if await self._write():
-            with self.complaint.caught():
-                name, folder = self._name.value, self.session.project.folder
-                asked = folder, name, suffix, self.chosen["mesh"]
-                made = self.session.quick.call(f"{SHOWING}:probe_file", *asked)
-                await hand_over(made, f"{Path(name).stem}{suffix}")
+            with self.banner.caught():
+                name, mesh = self._name.value, self.chosen["mesh"]
+                drawn = self.session.ask("quick", "showing:probe_file", name, suffix, mesh)
+                await hand_over(drawn, f"{Path(name).stem}{suffix}")

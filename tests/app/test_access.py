@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from hotlever.app import guard
-from hotlever.app.guard import Guard
+from hotlever.app import access
+from hotlever.app.access import Access
 
 TOKEN, LARGEST = "t0ken", 1000
 
@@ -18,13 +18,13 @@ def ask(
     query: str = "",
     *,
     password: str | None = None,
-    gate: Guard | None = None,
+    gate: Access | None = None,
     body: bytes = b"",
     method: str = "GET",
     kind: str = "http",
     **headers: str,
 ) -> tuple[int, dict[str, str], bytes]:
-    """Send a request through a guard to an app that answers 200 with what it was sent."""
+    """Send a request to an app behind `Access` that answers 200 with what it was sent."""
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
         got = b""
@@ -46,7 +46,7 @@ def ask(
     async def send(message: Any) -> None:
         sent.append(message)
 
-    gate = gate or Guard(app, TOKEN, {"127.0.0.1"}, password, LARGEST)
+    gate = gate or Access(app, TOKEN, {"127.0.0.1"}, password, LARGEST)
     gate._app = app
     given = {"host": "127.0.0.1:80", **headers}
     scope = {
@@ -63,8 +63,8 @@ def ask(
     return sent[0]["status"], head, sent[1]["body"]
 
 
-def gate(password: str | None = None) -> Guard:
-    return Guard(None, TOKEN, {"127.0.0.1"}, password, LARGEST)
+def gate(password: str | None = None) -> Access:
+    return Access(None, TOKEN, {"127.0.0.1"}, password, LARGEST)
 
 
 def test_without_the_token_nothing_is_answered() -> None:
@@ -108,7 +108,7 @@ def test_a_request_that_says_it_is_too_large_is_refused(length: str) -> None:
 
 
 def test_a_request_that_grows_too_large_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guard, "_FORM", 0)
+    monkeypatch.setattr(access, "_FORM", 0)
     same = gate()
     cookie = ask("/", f"token={TOKEN}", gate=same)[1]["set-cookie"].split(";")[0]
     assert ask(gate=same, cookie=cookie, body=bytes(LARGEST))[0] == 200
@@ -116,7 +116,7 @@ def test_a_request_that_grows_too_large_is_cut_off(monkeypatch: pytest.MonkeyPat
 
 
 def test_others_need_the_password(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guard, "_WRONG_S", 0.0)
+    monkeypatch.setattr(access, "_WRONG_S", 0.0)
     same = gate("long enough")
     status, _, page = ask("/", f"token={TOKEN}", gate=same)
     assert status == 401

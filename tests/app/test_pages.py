@@ -1,4 +1,4 @@
-"""The rooms, with NiceGUI's simulated user: what is shown, dropped, and computed."""
+"""The pages, with NiceGUI's simulated user: what is shown, dropped, and computed."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ from nicegui.testing import User, user_simulation
 from PIL import Image
 
 from hotlever.app import live, showing, spectra
-from hotlever.app.jobs import Jobs, command_line
+from hotlever.app.jobs import Jobs, Task
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.server import add_pages
 from hotlever.app.session import Session
+from hotlever.app.workers import Report
 from hotlever.errors import BranchEndError, HotleverError
 from hotlever.lever import Lever
 from hotlever.lever.reduced.lever import ReducedLever
@@ -30,26 +31,23 @@ from hotlever.probe import Probe
 Run = Callable[..., tuple[int, str, str]]
 
 
-class Here:
-    """Answers calls in this process, where a `Desk` has a process of its own."""
+class Here(Report):
+    """Answers calls in this process, where a `Worker` has a process of its own."""
 
     def __init__(self) -> None:
         self.sent: list[tuple[str, Any]] = []
 
-    def told(self, line: str) -> None: ...
-
     def send(self, kind: str, content: Any) -> None:
         self.sent.append((kind, content))
-
-    def progress(self, label: str) -> None: ...
 
     async def call(self, function: str, *arguments: Any, heard: Any = None) -> Any:
         modules = {"live": live, "showing": showing, "spectra": spectra}
         module = modules[function.split(":")[0].split(".")[-1]]
         self.sent = []
         result = getattr(module, function.split(":")[1])(self, *arguments)
-        for message in self.sent:
-            heard(message)
+        for kind, content in self.sent:
+            if heard is not None:
+                heard(kind, content)
         return result
 
 
@@ -59,7 +57,7 @@ def visit(folder: Path, story: Callable[[User, Session], Awaitable[None]]) -> No
     async def told() -> None:
         async with user_simulation() as user:
             session = Session(Project(folder))
-            session._desks = dict.fromkeys(("quick", "full", "making"), Here())  # type: ignore[arg-type]
+            session.workers = dict.fromkeys(("quick", "full", "making"), Here())  # type: ignore[arg-type]
             add_pages(session)
             await story(user, session)
 
@@ -70,7 +68,7 @@ def visit(folder: Path, story: Callable[[User, Session], Awaitable[None]]) -> No
 
 
 async def drop(user: User, name: str, content: bytes, zone: int = 0) -> None:
-    """Drop a file in a room."""
+    """Drop a file in a page."""
     zones = [one for one in user.client.elements.values() if isinstance(one, ui.upload)]
     upload = sorted(zones, key=lambda one: one.id)[zone]
     await upload.handle_uploads([ui.upload.SmallFileUpload(name, "", content)])
@@ -98,7 +96,7 @@ async def until(true: Callable[[], bool]) -> None:
     raise AssertionError("it did not become true")
 
 
-def test_every_room_opens_in_an_empty_folder(tmp_path: Path) -> None:
+def test_every_page_opens_in_an_empty_folder(tmp_path: Path) -> None:
     async def story(user: User, session: Session) -> None:
         for address, words in {
             "/": "Try it",
@@ -132,9 +130,9 @@ def test_simulate_shows_the_numbers_of_the_sweep(tmp_path: Path, run: Run) -> No
         await until(lambda: "full lever" in shown(user, "aria-live=polite"))
         for key, form in (("tip_K", "{:.1f} K"), ("current_mA", "{:.4f} mA")):
             assert shown(user, f"data-number={key}") == form.format(float(row[key]))
-        answer = await session.full.call(
+        answer = await session.ask(
+            "full",
             "live:answer",
-            session.project.folder,
             None,
             {"n_d": 5e17},
             {"bias": 8.0, "most": 12.0, "quick": False},
@@ -235,17 +233,17 @@ def test_a_shape_is_drawn_while_its_fields_change(tmp_path: Path) -> None:
     async def story(user: User, session: Session) -> None:
         await user.open("/lever")
         await until(lambda: any(one.tag == "img" for one in user.client.elements.values()))
-        room_text = next(
+        page_text = next(
             one for one in user.client.elements.values() if isinstance(one, ui.textarea)
         )
-        assert "length_um = 54.4" in room_text.value
+        assert "length_um = 54.4" in page_text.value
         field = next(
             one
             for one in user.client.elements.values()
             if isinstance(one, ui.number) and one.props["label"] == "length_um"
         )
         field.set_value(60.0)
-        await until(lambda: "length_um = 60" in room_text.value)
+        await until(lambda: "length_um = 60" in page_text.value)
         before = drawn(user)
         field.set_value(1.0)
         await until(lambda: "length_um" in shown(user, "role=alert"))
@@ -271,20 +269,22 @@ def test_commands_run_in_processes_that_can_be_ended(tmp_path: Path) -> None:
 
     async def story() -> None:
         jobs = Jobs(tmp_path)
-        job = jobs.start("fit", ["fit", "nothing.csv"])
+        job = jobs.start("fit", Task("fit", ("nothing.csv",)))
         with pytest.raises(HotleverError, match="cancel it first"):
-            jobs.start("fit", ["fit", "nothing.csv"])
+            jobs.start("fit", Task("fit", ("nothing.csv",)))
         while jobs.running("fit"):
             await asyncio.sleep(0.02)
         assert (job.standing, job.message) == ("failed", "nothing.csv: no such file")
-        job = jobs.start("fit", ["fit", "lever-a.csv", "--posterior", "-o", "fit.json"])
+        job = jobs.start(
+            "fit", Task("fit", ("lever-a.csv",), {"posterior": True, "output": "fit.json"})
+        )
         while not job.done:
             await asyncio.sleep(0.02)
         # a posterior takes minutes
         await asyncio.wait_for(jobs.cancel("fit"), 15)
         assert job.standing == "cancelled"
         assert [path.name for path in tmp_path.iterdir()] == ["lever-a.csv"]
-        job = jobs.start("fit", ["sweep", "--bias", "0:12:4000"])
+        job = jobs.start("fit", Task("sweep", (), {"bias": "0:12:4000"}))
         jobs._workers["fit"].kill()
         while jobs.running("fit"):
             await asyncio.sleep(0.02)
@@ -302,4 +302,4 @@ def test_commands_run_in_processes_that_can_be_ended(tmp_path: Path) -> None:
 
 
 def test_a_command_is_shown_as_a_shell_takes_it() -> None:
-    assert command_line(["fit", "my data.csv"]) == "hotlever fit 'my data.csv'"
+    assert Task("fit", ("my data.csv",)).line == "hotlever fit 'my data.csv'"

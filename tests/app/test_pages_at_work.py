@@ -1,4 +1,4 @@
-"""What rooms show of commands: fits on their way, pulses, and the files that leave."""
+"""What pages show of tasks: fits on their way, pulses, and the files that leave."""
 
 from __future__ import annotations
 
@@ -14,46 +14,43 @@ import numpy as np
 import pytest
 from nicegui import ui
 from nicegui.testing import User
-from test_rooms import Here, shown, until, visit
+from test_pages import Here, shown, until, visit
 
 from hotlever.app import showing
-from hotlever.app.commands import run_command
-from hotlever.app.jobs import Job
-from hotlever.app.page import Complaint
+from hotlever.app.jobs import Job, Task
+from hotlever.app.pages.frame import ErrorBanner
+from hotlever.app.pages.pulses import Pulses
 from hotlever.app.project import CALIBRATION, EXAMPLES
-from hotlever.app.rooms.pulses import Pulses
-from hotlever.app.rooms.sliders import FIRST
-from hotlever.app.session import Session
+from hotlever.app.session import Session, Simulate
+from hotlever.app.work import run
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.procedure import calibrate
+from hotlever.errors import HotleverError
 
 
 class Hearing(Here):
-    """Hears a command in this process, for its job."""
+    """Hears a task in this process, for its job."""
 
     def __init__(self, job: Job) -> None:
         super().__init__()
         self._job = job
 
-    def told(self, line: str) -> None:
-        self._job.hear(("said", line))
-
-    def progressed(self, *content: Any) -> None:
-        self._job.hear(("progress", *content))
-
-    def shown(self, what: str, content: Any) -> None:
-        self._job.hear(("shown", what, content))
-        self.sent.append((what, content))
+    def send(self, kind: str, content: Any) -> None:
+        super().send(kind, content)
+        self._job.hear(kind, content)
 
 
-def done(arguments: list[str], folder: Path) -> tuple[Job, list[Any]]:
-    """Run a command as a worker does; return the job, and the curves that it has shown."""
-    job = Job(arguments)
-    here: Any = Hearing(job)
-    status, job.result = run_command(here, arguments, folder)
-    job.end("done" if status == 0 else "failed")
-    return job, [content for what, content in here.sent if what == "curve"]
+def done(task: Task, folder: Path) -> tuple[Job, list[Any]]:
+    """Do a task as a worker does; return the job, and the curves that it has shown."""
+    job = Job(task)
+    here = Hearing(job)
+    try:
+        run(here, folder, task)
+        job.end("failed" if job.message else "done")
+    except HotleverError as error:
+        job.end("failed", str(error))
+    return job, [content for kind, content in here.sent if kind == "curve"]
 
 
 def understood(folder: Path) -> dict[str, Any]:
@@ -68,7 +65,7 @@ def test_the_lever_that_is_fitted_is_drawn_beside_the_data(
     # where the geometry has been reduced before, a fit begins near its end
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
     (tmp_path / "mine.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
-    job, curves = done(["fit", "mine.csv", "-o", "mine.fit.json"], tmp_path)
+    job, curves = done(Task("fit", ("mine.csv",), {"output": "mine.fit.json"}), tmp_path)
     assert job.standing == "done"
     data = understood(tmp_path)["data"]
 
@@ -82,7 +79,7 @@ def test_the_lever_that_is_fitted_is_drawn_beside_the_data(
     assert off(curves[-1]) < 0.005
 
     async def story(user: User, session: Session) -> None:
-        session.jobs.by_room["fit"] = job
+        session.jobs.by_page["fit"] = job
         await user.open("/fit")
         await user.should_see("Line: the lever as the fit has it", retries=50)
         plots = [one for one in user.client.elements.values() if isinstance(one, ui.plotly)]
@@ -94,7 +91,7 @@ def test_the_lever_that_is_fitted_is_drawn_beside_the_data(
 
 
 @pytest.mark.slow
-def test_pulses_in_the_room_are_those_of_the_command_and_of_python(tmp_path: Path) -> None:
+def test_pulses_in_the_page_are_those_of_the_command_and_of_python(tmp_path: Path) -> None:
     chosen = {"kind": "train", "height": 6.0, "length": 1.0, "period": 2.5, "count": 2}
     lever = {"changes": {"c_kappa": 0.7}, "view": "time"}
 
@@ -105,7 +102,10 @@ def test_pulses_in_the_room_are_those_of_the_command_and_of_python(tmp_path: Pat
         words = "pulse --set c_kappa=0.7 --pulse 6V,1us --period 2.5us --count 2 --until 4us"
         words += " -o reference.pulse.csv --plot reference.pulse.svg"
         await user.should_see(f"hotlever {words}", retries=50)
-        job = session.jobs.by_room["pulse"] = done(words.split(), tmp_path)[0]
+        with user:
+            task = Pulses(session, ErrorBanner(""), session.chosen["simulate"]).task()
+        assert task.line == f"hotlever {words}"
+        job = session.jobs.by_page["pulse"] = done(task, tmp_path)[0]
         await user.open("/simulate")
         labels = [one.text for one in user.client.elements.values() if isinstance(one, ui.label)]
         lines = next(text for text in labels if "simulate(lever, " in text)
@@ -129,13 +129,13 @@ def test_pulses_in_the_room_are_those_of_the_command_and_of_python(tmp_path: Pat
 def test_fields_leave_as_one_file(tmp_path: Path) -> None:
     async def story(user: User, session: Session) -> None:
         await user.open("/simulate")
-        job = Job(["pulse", "--fields", "a.fields"])
+        job = Job(Task("pulse", (), {"fields": "a.fields"}))
         (tmp_path / "a.fields").mkdir()
         for name in ("1.vtu", "2.vtu", "3.vtu"):
             (tmp_path / "a.fields" / name).write_text(name)
         os.utime(tmp_path / "a.fields" / "1.vtu", (0, 0))  # of another command
         with user:
-            await Pulses(session, Complaint(""), dict(FIRST)).give(job)
+            await Pulses(session, ErrorBanner(""), Simulate().model_dump()).give(job)
             await until(lambda: bool(user.download.http_responses))
         packed = zipfile.ZipFile(io.BytesIO(user.download.http_responses[-1].content))
         assert packed.namelist() == ["2.vtu", "3.vtu"]

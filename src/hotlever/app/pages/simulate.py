@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
 from typing import Any
 
 from nicegui import ui
 
-from hotlever.app.page import Complaint, Work, two_columns
-from hotlever.app.rooms.following import Following
-from hotlever.app.rooms.pulses import Pulses
-from hotlever.app.rooms.sliders import FIRST, Sliders, in_python, options, stem
-from hotlever.app.rooms.written import WritingRoom, outputs
+from hotlever.app.jobs import Task
+from hotlever.app.pages.frame import ErrorBanner, two_columns
+from hotlever.app.pages.page import Page, Work, outputs
+from hotlever.app.pages.pulses import Pulses, in_python, settings, stem
+from hotlever.app.pages.sliders import LiveLever, Sliders
 from hotlever.app.session import Session
 
 #: Biases of a sweep that is written.
@@ -18,30 +19,29 @@ _BIASES = 49
 _VIEWS = {"rest": "at a bias", "time": "in time"}
 
 
-class SimulateRoom(WritingRoom):
-    """One tab of the room."""
+class SimulatePage(Page):
+    """One tab of the page."""
 
     name = "simulate"
 
-    def __init__(self, session: Session, complaint: Complaint) -> None:
-        super().__init__(session, complaint)
-        self.chosen |= FIRST | self.chosen
+    def __init__(self, session: Session, banner: ErrorBanner) -> None:
+        super().__init__(session, banner)
         with two_columns() as (left, right):
             with left:
-                self._sliders = Sliders(session, complaint, self.chosen, self._moved)
+                self.probe_choice()
+                self._sliders = Sliders(session, banner, self.chosen, self._moved)
             with right:
-                view = ui.toggle(_VIEWS, value=self.chosen.get("view", "rest"))
-                view.props('no-caps dense unelevated aria-label="What is shown"')
-                view.on_value_change(self._view)
+                view = ui.toggle(_VIEWS, value=self.chosen["view"])
+                view.props('aria-label="What is shown"').on_value_change(self._view)
                 with ui.column().classes("w-full gap-3") as rest:
-                    self._following = Following(session, complaint, self.chosen)
+                    self._lever = LiveLever(session, banner, self.chosen)
                     with ui.card().classes("w-full").props("flat bordered"):
                         ui.label("Take it with you").classes("text-bold")
-                        self.buttons(self.ask)
+                        self.kind_buttons(lambda kind: self.run(self._sweep(kind)))
                         Work(session, self.name, self.give)
                         self.command()
                 with ui.column().classes("w-full gap-3") as time:
-                    self._pulses = Pulses(session, complaint, self.chosen)
+                    self._pulses = Pulses(session, banner, self.chosen)
                 for name, shown in (
                     ("rest", rest),
                     ("rest", self._sliders.of_bias),
@@ -53,24 +53,33 @@ class SimulateRoom(WritingRoom):
         """Ask for the sliders of the probe, and so for the first state."""
         await self._sliders.open()
 
+    def changed(self) -> Awaitable[None]:
+        """Show another probe, as it stands in its file."""
+        self.chosen["changes"] = {}
+        return self.open()
+
     def _view(self, event: Any) -> None:
         self.chosen["view"] = event.value
         # what was hidden had no size that figures could be drawn for
         ui.run_javascript("setTimeout(() => window.dispatchEvent(new Event('resize')))")
 
     def _moved(self) -> None:
-        self._following.follow(self._sliders)
+        self._lever.follow(self._sliders.free)
         self.show_command()
         self._pulses.show_command()
 
-    def writing(self, kind: str) -> list[str]:
-        """Return the command that writes a sweep, or the fields at the bias that is shown."""
+    def task(self) -> Task:
+        """Return the task that writes the table of a sweep."""
+        return self._sweep("CSV")
+
+    def _sweep(self, kind: str) -> Task:
+        """Return the task that writes a sweep, or the fields at the bias that is shown."""
         chosen = self.chosen
         bias = f"{chosen['bias']:g}:{chosen['bias']:g}:1"
         bias = bias if kind == "VTU" else f"0:{chosen['most']:g}:{_BIASES}"
-        probe, *settings = options(chosen) if chosen["probe"] else ["", *options(chosen)]
-        words = ["sweep", *filter(None, [probe]), "--bias", bias, *settings]
-        return [*words, *outputs(f"{stem(chosen)}.sweep", kind)]
+        files = outputs(f"{stem(chosen)}.sweep", kind)
+        probe = (chosen["probe"],) if chosen["probe"] else ()
+        return Task("sweep", probe, {"bias": bias, **settings(chosen), **files})
 
     def python(self) -> str:
         """Return the lines of Python that make the sweep."""

@@ -1,0 +1,311 @@
+"""What every page has: the frame with the way to the others, its error banner, places for files."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from contextlib import contextmanager
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from nicegui import events, ui
+
+from hotlever.app.changes import Change
+from hotlever.app.project import LARGEST_FILE, safe_name
+from hotlever.app.session import Session
+from hotlever.errors import HotleverError
+
+#: Pages by their names: title and icon.
+PAGES = {
+    "": ("Start", "home"),
+    "lever": ("Lever", "architecture"),
+    "simulate": ("Simulate", "tune"),
+    "raman": ("Raman", "thermostat"),
+    "fit": ("Fit", "query_stats"),
+    "calibrate": ("Calibrate", "straighten"),
+    "levers": ("Levers", "table_rows"),
+}
+#: Types of files that figures leave as.
+FIGURE_FILES = (".svg", ".png", ".pdf")
+#: Changes that are listed, and files of each that are named; refused files that are named.
+_LISTED, _NAMED, _REFUSED = 30, 4, 5
+_STYLE = Path(__file__).with_name("style.css")
+
+
+def look_alike() -> None:
+    """Have all elements of a kind look alike."""
+    ui.button.default_props("no-caps")
+    for field in (ui.input, ui.number, ui.select):
+        field.default_props("dense outlined")
+    ui.expansion.default_props("dense").default_classes("w-full")
+    ui.toggle.default_props("no-caps dense unelevated")
+    for box in (ui.checkbox, ui.switch):
+        box.default_props("dense")
+
+
+@contextmanager
+def framed(session: Session, page: str) -> Iterator[ErrorBanner]:
+    """Give a page, with the way to the others above it, and its error banner."""
+    title, _ = PAGES[page]
+    look_alike()
+    ui.page_title(f"{title} · hotlever")
+    ui.add_css(_STYLE)
+    ui.colors(primary="#0072B2", negative="#D55E00", positive="#009E73", warning="#E69F00")
+    dark = ui.dark_mode(session.chosen.get("dark", False))
+
+    def switch() -> None:
+        dark.value = session.chosen["dark"] = not dark.value
+
+    with ui.header().classes("items-center q-py-xs no-wrap").props("role=banner"):
+        ui.label("hotlever").classes("text-bold text-lg q-mr-md")
+        with ui.element("nav").classes("row no-wrap").props('aria-label="Pages"'):
+            for other, (name, icon) in PAGES.items():
+                here = other == page
+                link = ui.button(name, icon=icon, on_click=partial(ui.navigate.to, f"/{other}"))
+                link.props(f"flat dense color=white {'aria-current=page' if here else ''}")
+                link.classes("q-px-sm" + (" bg-white/25" if here else ""))
+        ui.space()
+        ui.label(str(session.project.folder)).classes("text-xs ellipsis gt-sm")
+        undo = flat_button("", partial(_list_changes, session), icon="undo", label="Undo")
+        undo.props("color=white").tooltip("Undo what the app wrote")
+        flat_button("", switch, icon="contrast", label="Light or dark").props("color=white")
+    if session.remark:
+        remark = session.remark.replace(f"{session.project.folder}/", "")
+        ui.label(remark).classes("text-sm remark w-full").props("role=status")
+        session.remark = ""
+    yield ErrorBanner(str(session.project.folder))
+
+
+class ErrorBanner:
+    """The line in which a page says what is wrong; empty and hidden while nothing is.
+
+    Files of the project's folder are named without it.
+    """
+
+    def __init__(self, folder: str) -> None:
+        self._folder = folder
+        self._label = ui.label().classes("banner w-full").props("role=alert")
+        self.clear()
+
+    def clear(self) -> None:
+        """Say nothing."""
+        self.say("")
+
+    def say(self, text: str) -> None:
+        """Say what is wrong."""
+        self._label.set_text(text.replace(f"{self._folder}/", ""))
+        self._label.set_visibility(bool(text))
+
+    @contextmanager
+    def caught(self) -> Iterator[None]:
+        """Say what goes wrong in the block."""
+        self.clear()
+        try:
+            yield
+        except HotleverError as error:
+            self.say(str(error))
+
+
+@contextmanager
+def two_columns() -> Iterator[tuple[ui.column, ui.column]]:
+    """Give a narrow column for what is set and a wide one for what comes out."""
+    with ui.row().classes("w-full items-start"):
+        left = ui.column().classes("controls gap-3")
+        right = ui.column().classes("results gap-3")
+        yield left, right
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+def drop_zone(
+    session: Session,
+    banner: ErrorBanner,
+    label: str,
+    then: Callable[[list[str]], Awaitable[None]],
+    folder: str = "",
+) -> ui.upload:
+    """Show where files are dropped; they are kept in the project, then handed on by name."""
+
+    async def take(event: events.MultiUploadEventArguments) -> None:
+        with banner.caught():
+            names = []
+            more = f" and {len(event.files) - 1} more" if len(event.files) > 1 else ""
+            first = f"{safe_name(event.files[0].name)}{more}" if event.files else ""
+            with session.project.changes.recorded(f"dropped {first}"):
+                for file in event.files:
+                    names.append(session.project.take(file.name, await file.read(), folder))
+            await then(names)
+
+    # the web server remembers its last 4096 routes, of which a drop zone is one: what it holds of
+    # a page goes when the page is closed
+    takers = [take]
+    ui.context.client.on_delete(takers.clear)
+
+    async def taken(event: events.MultiUploadEventArguments) -> None:
+        for taker in takers:
+            await taker(event)
+
+    zone = ui.upload(
+        multiple=True,
+        auto_upload=True,
+        label=label,
+        max_file_size=LARGEST_FILE,
+        on_multi_upload=taken,
+        on_rejected=lambda: banner.say(
+            f"a file may have {LARGEST_FILE // 2**20} MB at most: this one was not taken"
+        ),
+    ).props(f'flat bordered aria-label="{label}"')
+    # others may be on their way
+    zone.on("uploaded", lambda: zone.run_method("removeUploadedFiles"), args=[])
+    return zone
+
+
+async def say_refused(
+    session: Session, banner: ErrorBanner, names: list[str], *, spectra: bool
+) -> None:
+    """Say which of some files are no measurements, or no spectra; they stay in the folder."""
+    lines = await session.ask("full", "showing:refused", names, spectra)
+    more = f"\nand {len(lines) - _REFUSED} more such files" if len(lines) > _REFUSED else ""
+    banner.say("\n".join(lines[:_REFUSED]) + more)
+
+
+async def hand_over(made: Awaitable[bytes], name: str) -> None:
+    """Give a file when it is made, be the button that asked for it gone by then."""
+    client = ui.context.client
+    content = await made
+    with client:
+        ui.download.content(content, name)
+
+
+def download_button(session: Session, name: str, label: str) -> None:
+    """Offer a file of the project, if it is there."""
+    if session.project.stamp(name):
+        path = session.project.path(name)
+        small_button(label, lambda: ui.download.file(path), icon="download")
+
+
+# --- elements -------------------------------------------------------------------------------------
+
+
+def small_button(text: str, click: Any, icon: str | None = None, label: str = "") -> ui.button:
+    """Show a small button with a frame; `label` is what it says to who cannot see it."""
+    button = ui.button(text, icon=icon, on_click=click).props("outline dense").classes("q-px-sm")
+    return button.props(f'aria-label="{_attribute(label)}"') if label else button
+
+
+def flat_button(text: str, click: Any, icon: str | None = None, label: str = "") -> ui.button:
+    """Show a small button without a frame."""
+    button = ui.button(text, icon=icon, on_click=click).props("flat dense")
+    return button.props(f'aria-label="{_attribute(label)}"') if label else button
+
+
+def _attribute(text: str) -> str:
+    """Return a text that may stand in a property."""
+    return text.replace("\\", "/").replace('"', "'")
+
+
+def caption(text: str) -> ui.label:
+    """Show a line in small print."""
+    return ui.label(text).classes("text-xs opacity-70")
+
+
+def lines_shown(lines: str, kind: str, what: str) -> None:
+    """Show a command line, or lines of Python, to be copied; with what they do."""
+    with ui.row().classes("w-full items-start no-wrap gap-1"):
+        with ui.element("pre").classes("command col"):
+            ui.label(lines)
+        copy = partial(ui.clipboard.write, lines)
+        flat_button("", copy, icon="content_copy", label=f"Copy the {kind}")
+    caption(what)
+
+
+def number_shown(key: str, title: str, value: str = "…") -> ui.label:
+    """Show a number with its title; return the label of the number."""
+    with ui.column().classes("gap-0"):
+        caption(title)
+        return ui.label(value).classes("number").props(f'data-number="{key}"')
+
+
+def figure(content: str, alt: str, *, wide: bool = False) -> None:
+    """Show an SVG figure: as an image it may hold texts from files, but no script of them runs."""
+    source = f"data:image/svg+xml;base64,{b64encode(content.encode()).decode('ascii')}"
+    with ui.element("div").classes("paper wide w-full" if wide else "paper"):
+        image = ui.element("img")
+        image.props["src"], image.props["alt"] = source, alt
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], **options: Any) -> ui.table:
+    """Show rows of texts; cells are escaped by the browser's own table."""
+    names = [str(number) for number in range(len(columns))]
+    head = [
+        {"name": name, "label": label, "field": name, "align": "left"}
+        for name, label in zip(names, columns, strict=True)
+    ]
+    body = [{"id": number, **dict(zip(names, row, strict=True))} for number, row in enumerate(rows)]
+    shown = ui.table(columns=head, rows=body, row_key="id", **options)
+    return shown.classes("w-full").props("dense flat bordered")
+
+
+# --- dialogs --------------------------------------------------------------------------------------
+
+
+async def asked(question: str, yes: str, no: str) -> bool:
+    """Ask something, and wait for the answer; whoever closes the question says no."""
+    with ui.dialog() as dialog, ui.card():
+        ui.label(question).classes("remark")
+        with ui.row().classes("w-full justify-end"):
+            ui.button(no, on_click=lambda: dialog.submit(False)).props("autofocus")
+            ui.button(yes, on_click=lambda: dialog.submit(True)).props("outline")
+    answer = bool(await dialog)
+    dialog.delete()
+    return answer
+
+
+@contextmanager
+def opened_dialog(title: str, width: str) -> Iterator[ui.row]:
+    """Open a dialog with a title and a way out of it; give the row of its title."""
+    with ui.dialog(value=True) as dialog, ui.card().classes("w-full").style(f"max-width: {width}"):
+        with ui.row().classes("w-full items-center no-wrap"):
+            ui.label(title).classes("text-lg text-bold col")
+            buttons = ui.row()
+            flat_button("", dialog.close, icon="close", label="Close")
+        yield buttons
+    dialog.on("hide", dialog.delete)
+
+
+def _list_changes(session: Session) -> None:
+    """Show what the app wrote into the project, each change with the way back."""
+    changes = session.project.changes.latest(_LISTED)
+    with opened_dialog("What the app wrote", "46rem"):
+        if changes:
+            words = "Undo makes these files what they were before, and can be undone too."
+            ui.label(words).classes("text-sm opacity-70")
+        else:
+            ui.label("Nothing yet in this folder.")
+        for change in changes:
+            with ui.row().classes("w-full items-center no-wrap"):
+                with ui.column().classes("col gap-0"):
+                    ui.label(change.what).classes("text-sm remark")
+                    caption(_time_and_files(change)).classes("remark")
+                small_button("Undo", partial(_undo, session, change), label=f"Undo: {change.what}")
+
+
+def _time_and_files(change: Change) -> str:
+    """Say when a change was made, and of which files."""
+    when = datetime.fromtimestamp(change.time_s).strftime("%Y-%m-%d %H:%M")
+    names = [name if kept else f"{name} (new)" for name, kept in change.before.items()]
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"{when}: {', '.join(names[:_NAMED])}{more}"
+
+
+def _undo(session: Session, change: Change) -> None:
+    try:
+        session.project.changes.undo(change)
+    except HotleverError as error:
+        ui.notify(str(error), type="negative")
+        return
+    # all pages show what is in the files
+    ui.navigate.reload()

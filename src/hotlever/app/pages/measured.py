@@ -1,0 +1,267 @@
+"""What the pages Fit and Calibrate have in common: a measurement, and a result.
+
+A measurement is dropped or chosen; a file is made of it, whose page is shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from hotlever.app.jobs import Job
+from hotlever.app.pages.frame import (
+    FIGURE_FILES,
+    ErrorBanner,
+    caption,
+    drop_zone,
+    figure,
+    flat_button,
+    hand_over,
+    small_button,
+    table,
+    two_columns,
+)
+from hotlever.app.pages.page import Page, Work
+from hotlever.app.pages.plots import MeasuredPlots
+from hotlever.app.project import DATA
+from hotlever.app.session import Session
+from hotlever.errors import HotleverError, InputError
+
+_DROP = "Drop a measurement here (bias, current and what else there is), or press +"
+
+
+class MeasuredPage(Page):
+    """A page that begins with a measurement, makes a file of it, and shows that."""
+
+    #: What is made: its kind, and what its name ends with.
+    kind, ending = "", ""
+    #: Of the button that makes it.
+    button, icon = "", ""
+    #: What its task takes of what can be told of a file, see `Session.told_of`.
+    tellable: tuple[str, ...] = ("columns",)
+
+    def __init__(self, session: Session, banner: ErrorBanner) -> None:
+        super().__init__(session, banner)
+        #: Observables that the measurement has.
+        self.observables: list[str] = []
+        self._reads = self._shows = 0
+        self._read_of: tuple[str | None, str | None] | None = None
+        with two_columns() as (left, right):
+            with left:
+                self._data_controls()
+                self.options()
+                self._button = ui.button(self.button, icon=self.icon, on_click=self.start)
+                # until there is something understood
+                self._button.classes("w-full").disable()
+            with right:
+                Work(session, self.name, self._ended, during=self._follow, notes=False)
+                self._result = ui.column().classes("w-full gap-2")
+                opened = ui.expansion("What was understood", value=True)
+                self._understood = opened.props("header-class=text-bold")
+                with self._understood, ui.column().classes("w-full gap-2"):
+                    self._plots = MeasuredPlots()
+                    self._rows = ui.column().classes("w-full gap-2")
+                self._understood.set_visibility(False)
+                self.command()
+
+    async def open(self) -> None:
+        """Read the measurement that was chosen last."""
+        await self.read()
+
+    # --- for the page to say ----------------------------------------------------------------------
+
+    def options(self) -> None:
+        """Show what else can be chosen."""
+
+    def understood(self) -> None:
+        """Follow what was understood of a measurement."""
+
+    def results(self) -> list[str]:
+        """Return the files that show what was made of this measurement, the first best."""
+        return [self.output]
+
+    async def show(self, name: str) -> None:
+        """Show a result above its page."""
+
+    @property
+    def stem(self) -> str:
+        """What names of files begin with."""
+        return Path(self.chosen["data"]).stem
+
+    @property
+    def output(self) -> str:
+        """The file that is made."""
+        return f"{self.stem}{self.ending}"
+
+    # --- the measurement --------------------------------------------------------------------------
+
+    def _data_controls(self) -> None:
+        """Show where a measurement is dropped or chosen, and what is told of it."""
+        drop_zone(self.session, self.banner, _DROP, self._dropped)
+        names = self.session.project.data
+        if self.chosen["data"] not in names:
+            self.chosen["data"] = names[0] if names else None
+        self._select = self.choice("data", "Measurement", names, None)
+        if not names:
+            small_button("Try the example", self._example, icon="science")
+        with ui.expansion("Columns with other names"):
+            self._columns = ui.textarea(
+                value="\n".join(self.told["columns"]),
+                placeholder="I_h (uA)=Current",
+                on_change=lambda event: self.tell("columns", _lines(event.value)),
+            )
+            label = "Which column is which, one on a line"
+            self._columns.props(f'dense outlined autogrow aria-label="{label}"')
+            caption("One on a line: QUANTITY (UNIT)=NAME of the column, or its number.")
+
+    async def _dropped(self, names: list[str]) -> None:
+        self._select.set_options(self.session.project.data)
+        if names[-1] not in self._select.options:
+            raise InputError(f"{names[-1]}: no measurement by its name, expected {', '.join(DATA)}")
+        if self.chosen["data"] == names[-1]:
+            await self.read()
+        self._select.set_value(names[-1])
+
+    async def _example(self) -> None:
+        with self.banner.caught():
+            await self._dropped([self.session.project.take_example("lever-a.csv")])
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """What was told of this measurement, on whatever page; see `Session.told_of`."""
+        return self.session.told_of(self.chosen["data"])
+
+    def tell(self, key: str, value: Any) -> Awaitable[None] | None:
+        """Keep what was typed of a measurement, unless it is what is shown for another one."""
+        if value == self.told[key]:
+            return None
+        self.told[key] = value
+        return self.read()
+
+    def show_told(self) -> None:
+        """Show what was told of the measurement that is chosen."""
+        self._columns.set_value("\n".join(self.told["columns"]))
+
+    def changed(self) -> Awaitable[None] | None:
+        """Read the measurement anew if another one, or another probe, was chosen."""
+        if (self.chosen["data"], self.chosen.get("probe")) == self._read_of:
+            self.show_command()
+            return None
+        self.show_told()
+        return self.read()
+
+    async def read(self) -> None:
+        """Read the measurement, and show what was understood, and what was made of it before."""
+        self._reads += 1
+        turn, understood, name = self._reads, None, self.chosen["data"]
+        self._read_of = name, self.chosen.get("probe")
+        self.banner.clear()
+        if name is not None:
+            told = {key: self.told[key] for key in self.tellable}
+            told["probe"] = self.chosen.get("probe")
+            try:
+                understood = await self.session.ask("full", "showing:understood", name, told)
+            except HotleverError as error:
+                if turn == self._reads:
+                    self.banner.say(str(error))
+        if turn != self._reads:  # something else has been chosen meanwhile
+            return
+        self._show_understood(understood)
+        if job := self.session.jobs.by_page.get(self.name):
+            self._follow(job)
+        self._button.set_enabled(understood is not None)
+        self.understood()
+        self.show_command()
+        await self._show_result()
+
+    def _show_understood(self, understood: dict[str, Any] | None) -> None:
+        self.observables = understood["observables"] if understood else []
+        self._understood.set_visibility(understood is not None)
+        self._rows.clear()
+        if understood is None:
+            return
+        self._plots.measured(understood["data"], self.observables)
+        with self._rows:
+            head, *rows = understood["rows"]
+            table(head, rows)
+            for note in understood["notes"]:
+                ui.label(f"• {note}").classes("text-sm remark")
+
+    # --- what is made of it -----------------------------------------------------------------------
+
+    def start(self) -> bool:
+        """Have the task done; what it replaces is not shown any more."""
+        started = super().start()
+        if started:
+            self._result.clear()
+        return started
+
+    def _follow(self, job: Job) -> None:
+        """Draw how near to the data the lever is that is being fitted, or was."""
+        curve = job.shown.get("curve")
+        if curve and self.observables and job.task.files == (self.chosen["data"],):
+            self._plots.approach(curve)
+
+    async def _ended(self, job: Job) -> None:
+        await self._show_result()
+
+    async def _show_result(self) -> None:
+        self._shows += 1
+        turn, project = self._shows, self.session.project
+        self._result.clear()
+        if not self.chosen["data"] or self.session.jobs.running(self.name):
+            return
+        name = next((name for name in self.results() if project.stamp(name)), None)
+        if name is None:
+            return
+        with self._result:
+            await self.show(name)
+            if turn == self._shows:
+                await self._show_blocks(name)
+
+    async def _show_blocks(self, name: str) -> None:
+        """Show the page of a result in the element that is open, as it is drawn."""
+        shown = ui.row().classes("w-full gap-3 items-start")
+        waiting = ui.spinner(size="lg")
+
+        def hear(kind: str, block: dict[str, Any]) -> None:
+            if kind == "block" and not shown.is_deleted:
+                with shown:
+                    self._show_block(name, block)
+
+        with self.banner.caught():
+            await self.session.ask("full", "showing:page", self.kind, name, heard=hear)
+        if not waiting.is_deleted:
+            waiting.delete()
+
+    def _show_block(self, name: str, block: dict[str, Any]) -> None:
+        if block["kind"] == "heading":
+            ui.label(block["text"]).classes("w-full text-lg text-bold")
+        elif block["kind"] == "text":
+            style = "lines" if "\n" in block["text"] else "remark"
+            ui.label(block["text"]).classes(f"w-full {style}")
+        elif block["kind"] == "table":
+            table(block["columns"], block["rows"])
+            caption(block["caption"]).classes("w-full")
+        else:
+            with ui.column().classes("gap-0"):
+                figure(block["figure"], block["caption"])
+                with ui.row().classes("items-center w-full no-wrap"):
+                    caption(block["caption"]).classes("remark caption col")
+                    for suffix in FIGURE_FILES:
+                        give = partial(self._give_figure, name, block["name"], suffix)
+                        label = f"{block['name']} as {suffix[1:].upper()}"
+                        flat_button(suffix[1:].upper(), give, label=label).props("size=sm")
+
+    async def _give_figure(self, name: str, shown: str, suffix: str) -> None:
+        with self.banner.caught():
+            drawn = self.session.ask("full", "showing:drawn", self.kind, name, shown, suffix)
+            await hand_over(drawn, f"{Path(name).name.split('.')[0]}-{shown}{suffix}")
+
+
+def _lines(text: str | None) -> list[str]:
+    return [line.strip() for line in (text or "").splitlines() if line.strip()]

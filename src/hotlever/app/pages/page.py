@@ -1,0 +1,304 @@
+"""What pages have in common: what is chosen, the task that follows from it, and its work."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from typing import Any
+
+from nicegui import ui
+
+from hotlever.app.jobs import Job, Task
+from hotlever.app.pages.frame import (
+    ErrorBanner,
+    framed,
+    hand_over,
+    lines_shown,
+    small_button,
+)
+from hotlever.app.session import Session
+from hotlever.errors import InputError
+
+REFERENCE = "reference probe"
+MEDIA = {
+    "": "as the files say",
+    "vacuum": "vacuum",
+    "air": "air",
+    "unknown": "not known: either is tried",
+}
+#: What a task that writes tables, figures and fields may be asked for.
+KINDS = {
+    "CSV": "the table",
+    "NetCDF": "the table with units and all that is known",
+    "SVG": "the figure",
+    "PNG": "the figure",
+    "PDF": "the figure",
+    "VTU": "the fields, for ParaView",
+}
+_TABLES = {"CSV": "csv", "NetCDF": "nc"}
+#: Seconds between two looks at the work that runs.
+_LOOK_S = 0.1
+
+
+class Page:
+    """One tab of a page, or of a part of one.
+
+    Attributes
+    ----------
+    name : str
+        Its address, under which also its work runs, and what was chosen is kept.
+    chosen : dict
+        What was chosen last, in whatever tab; see `hotlever.app.session.Choices`.
+    """
+
+    name = ""
+
+    @classmethod
+    async def fill(cls, session: Session) -> None:
+        """Fill the page."""
+        with framed(session, cls.name) as banner:
+            page = cls(session, banner)
+        await page.open()
+
+    def __init__(self, session: Session, banner: ErrorBanner) -> None:
+        self.session, self.banner = session, banner
+        self.chosen: dict[str, Any] = session.choices(self.name) if self.name else {}
+        self._command: ui.column | None = None
+        self._shown = ""
+
+    async def open(self) -> None:
+        """Show what takes a moment, once the page is there."""
+
+    # --- what is asked ----------------------------------------------------------------------------
+
+    def changed(self) -> Awaitable[None] | None:
+        """Follow what was chosen."""
+        self.show_command()
+        return None
+
+    def _keep(self, key: str, without: Any = None) -> Callable[[Any], Awaitable[None] | None]:
+        def keep(event: Any) -> Awaitable[None] | None:
+            self.chosen[key] = without if event.value in (None, "") else event.value
+            return self.changed()
+
+        return keep
+
+    def choice(self, key: str, label: str, options: Any, without: Any = "") -> ui.select:
+        """Ask for one of some options; where a name is empty `without` is chosen."""
+        return choice(label, options, self.chosen[key], self._keep(key, without))
+
+    def probe_choice(self) -> ui.select:
+        """Ask for a probe, the reference probe or one of the project."""
+        probes = {"": REFERENCE} | {name: name for name in self.session.project.probes}
+        return self.choice("probe", "Probe", probes, None)
+
+    def text(self, key: str, label: str) -> ui.input:
+        """Ask for a line of text."""
+        shown = ui.input(label, value=self.chosen[key], on_change=self._keep(key, ""))
+        return shown.classes("w-full")
+
+    def checkbox(self, key: str, label: str, meaning: str) -> ui.checkbox:
+        """Ask whether something is wanted."""
+        box = ui.checkbox(label, value=self.chosen[key], on_change=self._keep(key, False))
+        return box.tooltip(meaning)
+
+    # --- what is done -----------------------------------------------------------------------------
+
+    def task(self) -> Task | None:
+        """Return the task that does what is chosen.
+
+        Raises
+        ------
+        InputError
+            If something is missing.
+        """
+        return None
+
+    def python(self) -> str:
+        """Return the lines of Python that do the same, if there are short ones."""
+        return ""
+
+    def command(self) -> None:
+        """Show the command line here, whenever `show_command` is called."""
+        self._command, self._shown = ui.column().classes("w-full gap-0"), ""
+
+    def show_command(self) -> None:
+        """Show the command line of what is chosen now; none while something is missing."""
+        task = None
+        with suppress(InputError):
+            task = self.task()
+        line = "" if task is None else task.line
+        if self._command is not None and line != self._shown:
+            self._command.clear()
+            self._shown = line
+            if line:
+                with self._command:
+                    where = f"The same on the command line, in {self.session.project.folder}"
+                    lines_shown(line, "command line", where)
+                    if lines := self.python():
+                        lines_shown(lines, "lines of Python", "The same in Python")
+
+    def start(self) -> bool:
+        """Have the task done; return whether it runs."""
+        with self.banner.caught():
+            task = self.task()
+            return task is not None and self.run(task)
+        return False
+
+    def run(self, task: Task) -> bool:
+        """Have a task of the page done; return whether it runs."""
+        with self.banner.caught():
+            self.session.jobs.start(self.name, task)
+            return True
+        return False
+
+    # --- what was written is given ----------------------------------------------------------------
+
+    def kind_buttons(self, asked: Callable[[str], Any]) -> None:
+        """Show a button for each of `KINDS`."""
+        with ui.row().classes("items-center"):
+            for kind, meaning in KINDS.items():
+                small_button(kind, lambda _, to=kind: asked(to)).tooltip(meaning)
+
+    def written(self, job: Job) -> bool:
+        """Return whether a job has written what was asked for, be it in part."""
+        return self.session.project.stamp(job.task.written) >= job.began
+
+    async def give(self, job: Job) -> None:
+        """Give what a job has written, several files as one."""
+        if not self.written(job):
+            return
+        path = self.session.project.path(job.task.written)
+        if path.is_dir():
+            new = [file for file in path.iterdir() if file.stat().st_mtime >= job.began]
+            if len(new) > 1:
+                packed = self.session.ask("full", "showing:packed", sorted(new))
+                await hand_over(packed, f"{path.name}.zip")
+                return
+            path = new[0]
+        ui.download.file(path)
+
+
+def several(text: str) -> list[str]:
+    """Return the parts of a text, between commas."""
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def outputs(stem: str, kind: str) -> dict[str, str]:
+    """Return the options that have a task write one of `KINDS`, whose name stands last.
+
+    Examples
+    --------
+    >>> outputs("a", "PDF"), outputs("a", "VTU")
+    ({'output': 'a.csv', 'plot': 'a.pdf'}, {'fields': 'a.fields'})
+    """
+    if kind == "VTU":
+        return {"fields": f"{stem}.fields"}
+    if kind in _TABLES:
+        return {"output": f"{stem}.{_TABLES[kind]}"}
+    return {"output": f"{stem}.csv", "plot": f"{stem}.{kind.lower()}"}
+
+
+def choice(label: str, options: Any, value: Any, changed: Any) -> ui.select:
+    """Show a choice, the first option if there is none.
+
+    A file that is not there any more stays chosen and is said to be missing: in its place another
+    would give other numbers without a word.
+    """
+    if value is None:
+        value = next(iter(options), None)
+    elif value not in options:
+        options = {**options, value: f"{value} (not in the folder)"}
+    return ui.select(options, label=label, value=value, on_change=changed).classes("w-full")
+
+
+class Work:
+    """The job that runs for a page, or ran last: progress, notes, its line, and cancelling.
+
+    Parameters
+    ----------
+    session : Session
+    page : str
+    then : callable
+        Called with the job when it has ended while the page is open.
+    during : callable, optional
+        Called with the job whenever there is something new of it.
+    notes : bool
+        Whether what the task notes is shown here, and not with its result.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        page: str,
+        then: Callable[[Job], Awaitable[None]],
+        *,
+        during: Callable[[Job], None] | None = None,
+        notes: bool = True,
+    ) -> None:
+        self._session, self._page, self._then, self._during = session, page, then, during
+        self._seen: tuple[int, int] = (0, -1)
+        self._hidden: Job | None = None
+        with ui.column().classes("w-full gap-1") as self._all:
+            with ui.row().classes("w-full items-center no-wrap") as self._running:
+                self._bar = ui.linear_progress(show_value=False, size="10px").props("rounded")
+                self._text = ui.label().classes("text-xs no-wrap").props("aria-live=polite")
+                ui.button("Cancel", on_click=self._cancel).props("dense outline color=negative")
+            self._message = ui.label().classes("banner w-full").props("role=alert")
+            self._notes = ui.column().classes("w-full gap-0 text-sm remark")
+            self._notes.set_visibility(notes)
+        self._told = self._job if self._has_ended else None
+        self._look()
+        ui.timer(_LOOK_S, self._tell)
+
+    @property
+    def _job(self) -> Job | None:
+        return self._session.jobs.by_page.get(self._page)
+
+    @property
+    def _has_ended(self) -> bool:
+        return self._job is not None and self._job.standing != "running"
+
+    def hide(self) -> None:
+        """Show nothing more of a job that has ended: something else is shown now."""
+        if self._has_ended:
+            self._hidden = self._job
+            self._look()
+
+    async def _cancel(self) -> None:
+        await self._session.jobs.cancel(self._page)
+        self._look()
+
+    async def _tell(self) -> None:
+        self._look()
+        job = self._job
+        if job is not None and self._has_ended and self._told is not job:
+            self._told = job
+            await self._then(job)
+
+    def _look(self) -> None:
+        job = self._job
+        self._all.set_visibility(job is not None and job is not self._hidden)
+        if job is None:
+            return
+        running = job.standing == "running"
+        self._running.set_visibility(running)
+        if running:
+            self._bar.props(**{"remove" if job.share else "add": "indeterminate"})
+            self._bar.set_value(job.share or 0.0)
+            left = job.left_s
+            more = "" if left is None else f", some {max(1.0, left):.0f} s left"
+            self._text.set_text(f"{job.label or 'starting'}{more}")
+        if self._seen == (id(job), job.version):
+            return
+        self._seen = (id(job), job.version)
+        cancelled = job.standing == "cancelled"
+        message = "cancelled: nothing was written" if cancelled else job.message
+        self._message.set_text("" if running else message)
+        self._message.set_visibility(not running and bool(message))
+        self._notes.clear()
+        with self._notes:
+            for text in job.notes:
+                ui.label(f"• {text}")
+        if self._during is not None:
+            self._during(job)

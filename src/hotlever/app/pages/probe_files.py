@@ -1,0 +1,272 @@
+"""What the page Lever is made of: a probe file, its dimensions and its picture, and drawings."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Awaitable, Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from hotlever.app.jobs import Job, Task
+from hotlever.app.pages.frame import asked, caption, figure, small_button, table
+from hotlever.app.project import LARGEST_PROBE, safe_name
+from hotlever.app.session import Session
+from hotlever.errors import HotleverError, InputError
+from hotlever.files import read_text
+
+
+class ProbeFile:
+    """The text of a probe file that is edited, and the file of its name: no edits are lost.
+
+    Parameters
+    ----------
+    session : Session
+    chosen : dict
+        What was chosen last on the page; see `hotlever.app.session.Lever`.
+    """
+
+    def __init__(self, session: Session, chosen: dict[str, Any]) -> None:
+        self._session, self._chosen = session, chosen
+
+    @property
+    def is_edited(self) -> bool:
+        """Whether there are edits of a text that are not saved."""
+        text = self._chosen["text"]
+        return bool(text) and _digest(text) != self._chosen["saved"]
+
+    def open(self, name: str) -> str:
+        """Read a file of the project; return its text.
+
+        Raises
+        ------
+        InputError
+            If it is no text file, or too large for a probe file.
+        """
+        text = read_text(self._session.project.path(name), largest=LARGEST_PROBE)
+        self._chosen |= {"name": name, "text": text, "saved": _digest(text)}
+        return text
+
+    def take_up(self) -> None:
+        """Take the file as it is now, unless it was edited here: others may have changed it.
+
+        Raises
+        ------
+        InputError
+            As `open`.
+        """
+        name = self._chosen["name"]
+        if self._chosen["text"] and not self.is_edited and self._session.project.stamp(name):
+            self.open(name)
+
+    async def may_go(self) -> bool:
+        """Ask whether edits that are not saved may go, if there are any."""
+        question = "The probe file that is open here has edits that are not saved."
+        return not self.is_edited or await asked(question, "Drop them", "Go on with it")
+
+    async def save(self, name: str, text: str) -> str | None:
+        """Write a text; ask before another file of its name is replaced.
+
+        Returns
+        -------
+        str or None
+            The name that it has now; None if it was not to be written.
+
+        Raises
+        ------
+        InputError
+            If there is nothing to be written, or what is there is no probe file.
+        """
+        if not text.strip():
+            raise InputError("there is no probe here yet: drop a drawing, or choose a shape")
+        project = self._session.project
+        name = safe_name(name)
+        name = name if name.endswith(".toml") else f"{name}.toml"
+        path = project.path(name)
+        there = read_text(path, largest=LARGEST_PROBE) if path.exists() else None
+        if there not in (None, text):
+            is_own = name == self._chosen["name"] and _digest(there) == self._chosen["saved"]
+            question = f"{name} is there already, and holds something else than was opened here."
+            if not is_own and not await asked(question, "Replace it", "Keep it"):
+                return None
+        if there != text:
+            project.write(name, text, f"saved {name}")
+        self._chosen |= {"name": name, "saved": _digest(text)}
+        return name
+
+
+def _digest(text: str | None) -> str:
+    """Return what tells whether a text is as it was."""
+    return "" if text is None else hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()
+
+
+class Dimensions:
+    """The dimensions of a parametric shape, to be changed; `changed` is told name and value."""
+
+    def __init__(self, changed: Callable[[str, float | None], Awaitable[None]]) -> None:
+        self._changed = changed
+        self._column = ui.column().classes("w-full gap-1")
+        self._numbers: dict[str, ui.number] = {}
+
+    def clear(self) -> None:
+        """Show none: another kind of probe is open."""
+        self._column.clear()
+        self._numbers = {}
+
+    def show(self, values: dict[str, tuple[float, str]]) -> None:
+        """Show values with their meanings."""
+        self.clear()
+        with self._column:
+            for name, (value, meaning) in values.items():
+                number = ui.number(name, value=value, format="%.4g", step=value / 50)
+                number.props(f'suffix=µm debounce=200 aria-label="{meaning}"')
+                number.classes("w-full").tooltip(meaning)
+                number.on_value_change(lambda event, n=name: self._changed(n, event.value))
+                self._numbers[name] = number
+
+    def mark(self, fault: str) -> None:
+        """Mark those that a line names which says what is wrong; none if nothing is."""
+        words = set(re.findall(r"\w+", fault))
+        for name, number in self._numbers.items():
+            number.props(remove="error")
+            if name in words:
+                number.props("error hide-bottom-space")
+
+
+class Picture:
+    """The lever from above, and what there is to know of it; `redraw` is called for another one."""
+
+    def __init__(
+        self, session: Session, chosen: dict[str, Any], redraw: Callable[[], Awaitable[None]]
+    ) -> None:
+        self._session, self._chosen = session, chosen
+
+        async def switch(event: Any) -> None:
+            chosen["mesh"] = event.value
+            await redraw()
+
+        mesh = ui.switch("mesh", value=chosen["mesh"], on_change=switch)
+        mesh.tooltip("The triangles that the lever is solved on")
+        self._column = ui.column().classes("w-full gap-1")
+        self._latest = 0
+
+    def clear(self) -> None:
+        """Show none, nor one that is being drawn."""
+        self._latest += 1
+        self._column.clear()
+
+    async def of(self, function: str, *arguments: Any) -> dict[str, Any] | None:
+        """Have a probe drawn by a function of the worker.
+
+        Returns
+        -------
+        dict or None
+            What the worker says of it; None if another picture was asked for meanwhile.
+
+        Raises
+        ------
+        HotleverError
+            If it cannot be drawn. No picture is shown then: the last one is of another probe.
+        """
+        self._latest += 1
+        turn, mesh = self._latest, self._chosen["mesh"]
+        drawn: dict[str, Any] = {}
+        failure: HotleverError | None = None
+        try:
+            drawn = await self._session.ask("quick", f"showing:{function}", *arguments, mesh)
+        except HotleverError as error:
+            failure = error
+        if turn != self._latest:
+            return None
+        self._column.clear()
+        if failure is not None:
+            raise failure
+        with self._column:
+            figure(drawn["figure"], "The lever from above: regions, terminals and tip", wide=True)
+            if not drawn["fault"]:
+                table(("region", "part", "area"), drawn["rows"])
+                if mesh:
+                    caption(f"mesh: {drawn['triangles']} triangles")
+        return drawn
+
+    def add(self, listing: str, outlines: str) -> None:
+        """Show below what a drawing holds, and the picture of all of it."""
+        with self._column, ui.expansion("What the drawing holds"):
+            ui.label(listing).classes("lines")
+            figure(outlines, "All outlines of the drawing, by layer")
+
+
+class Drawings:
+    """Drawings that are opened: each is shown as its probe file, which is proposed if need be.
+
+    Parameters
+    ----------
+    session : Session
+    chosen : dict
+        What was chosen last on the page.
+    run : callable
+        Has a task done; returns whether it runs.
+    begin : callable
+        Shows no lever until there is one.
+    show : callable
+        Shows a probe file, and what a drawing holds: the listing, and the file of its picture.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        chosen: dict[str, Any],
+        run: Callable[[Task], bool],
+        begin: Callable[[], None],
+        show: Callable[..., Awaitable[None]],
+    ) -> None:
+        self._session, self._chosen = session, chosen
+        self._run, self._begin, self._show = run, begin, show
+        self._awaited = ""
+        self._kept = ui.row().classes("items-center w-full")
+
+    def clear(self) -> None:
+        """Wait for none: something else is open."""
+        self._awaited, self._chosen["drawing"] = "", None
+        self._kept.clear()
+
+    async def open(self, drawing: str, job: Job | None) -> None:
+        """Show the probe file of a drawing; if there is none, have one proposed.
+
+        `job` is that of the page which ran last, be it before the page was opened.
+        """
+        if job is not None and job.standing == "running" and job.task.files == (drawing,):
+            self._await(drawing)
+            return
+        name, is_there = self._session.project.probe_of_drawing(drawing)
+        if not is_there:
+            self._propose(drawing, name)
+            return
+        await self._show(name)
+        with self._kept:
+            ui.label(f"{name} is there already, and was kept as it is.").classes("remark")
+            again = small_button("Propose anew", partial(self._propose, drawing, name))
+            again.tooltip(f"Writes what the drawing proposes over {name}")
+
+    def _propose(self, drawing: str, name: str) -> None:
+        files = {"output": name, "plot": f"{Path(name).stem}.svg"}
+        if self._run(Task("probe import", (drawing,), files)):
+            self._await(drawing)
+
+    def _await(self, drawing: str) -> None:
+        self._begin()
+        # whoever leaves before it is there, and comes back, is shown it
+        self._awaited = self._chosen["drawing"] = drawing
+
+    async def done(self, job: Job) -> None:
+        """Show what was proposed for the drawing that is waited for."""
+        if not self._awaited or job.task.files != (self._awaited,):
+            return  # something else was opened meanwhile
+        if job.standing == "done":
+            files = job.task.options
+            await self._show(files["output"], job.shown["result"], files["plot"])
+        else:
+            self._begin()

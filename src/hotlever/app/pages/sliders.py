@@ -1,0 +1,258 @@
+"""A lever that follows sliders: those of the bias and of each parameter, its numbers and plots.
+
+While sliders move a quick lever answers, then the full one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from nicegui import background_tasks, ui
+
+from hotlever.app.pages.frame import ErrorBanner, flat_button, number_shown
+from hotlever.app.pages.plots import LivePlots
+from hotlever.app.session import Session
+from hotlever.errors import HotleverError
+
+_GROUPS = {"material": "Material", "dimensions": "Dimensions", "circuit": "Circuit"}
+#: Seconds that sliders rest before the full lever is asked.
+_REST_S = 0.35
+#: What surrounds a lever: each combination gets a reduced lever of its own.
+_AROUND = {"medium", "surface_gap_um"}
+_MODELS = {
+    "full lever": "full lever: the numbers of hotlever sweep",
+    "reduced lever": "moving: reduced lever, within some 0.1 K",
+    "coarse lever": "moving: coarse lever, within some 2 K",
+}
+_NUMBERS = {
+    "tip_K": ("tip", "{:.1f} K"),
+    "current_mA": ("current I_h", "{:.4f} mA"),
+    "lever_V": ("lever voltage V_l", "{:.4f} V"),
+    "power_mW": ("power P_l", "{:.4f} mW"),
+    "reader_V": ("reader V_r", "{:.4f} V"),
+}
+
+
+class Sliders:
+    """What can be moved; `moved` is called when something was.
+
+    Attributes
+    ----------
+    free : set of str
+        What may change without another reduced lever.
+    of_bias : ui.element
+        The slider of the bias, which is not of the probe.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        banner: ErrorBanner,
+        chosen: dict[str, Any],
+        moved: Callable[[], None],
+    ) -> None:
+        self._session, self._banner, self._chosen = session, banner, chosen
+        self._moved, self.free = moved, set[str]()
+        self._show_surroundings()
+        self._show_bias()
+        self._of_probe = ui.column().classes("w-full gap-1")
+
+    def _show_surroundings(self) -> None:
+        changes = self._chosen["changes"]
+        with ui.row().classes("items-center w-full no-wrap"):
+            ui.label("in")
+            self._medium = ui.toggle(
+                ["vacuum", "air"],
+                value=changes.get("medium", "vacuum"),
+                on_change=lambda event: self._change("medium", event.value),
+            )
+            self._gap = ui.number(
+                "surface (µm)",
+                value=changes.get("surface_gap_um"),
+                min=0.01,
+                max=1e4,
+                on_change=lambda event: self._change("surface_gap_um", event.value),
+            ).props("clearable placeholder=none stack-label")
+            self._gap.bind_visibility_from(self._medium, "value", value="air")
+
+    def _show_bias(self) -> None:
+        with ui.column().classes("w-full gap-0") as self.of_bias:
+            with ui.row().classes("w-full items-center no-wrap justify-between"):
+                ui.label("Bias V_b").classes("text-bold")
+                number = ui.number(format="%.3f", min=0.0, step=0.05).classes("w-28")
+                number.props('suffix=V aria-label="Bias in volts"')
+            bias, most = self._chosen["bias"], self._chosen["most"]
+            self._slider_of_bias = ui.slider(min=0.0, max=most, step=0.01, value=bias)
+            number.bind_value(self._slider_of_bias.props('aria-label="Bias"'))
+            self._slider_of_bias.on_value_change(lambda event: self._move_bias(event.value))
+
+    async def open(self) -> None:
+        """Show the sliders of the probe, and say that they have moved."""
+        try:
+            probe = await self._session.ask("quick", "live:described", self._chosen["probe"])
+        except HotleverError as error:
+            self._banner.say(str(error))
+            return
+        if "medium" not in self._chosen["changes"]:
+            self._medium.set_value(probe["medium"])
+        if probe["gap_um"] is not None and "surface_gap_um" not in self._chosen["changes"]:
+            self._gap.set_value(probe["gap_um"])
+        self._of_probe.clear()
+        with self._of_probe:
+            for group, title in _GROUPS.items():
+                opened = ui.expansion(title, value=group == "material")
+                with opened.props("dense-toggle header-class=text-bold"):
+                    for slider in probe["sliders"][group]:
+                        self._slider(*slider)
+            flat_button("All as in the probe file", self._reset, icon="restart_alt")
+        of_material = {name for name, *_ in probe["sliders"]["material"]}
+        self.free = of_material | {"series_resistance_ohm"} if probe["reduced"] else set()
+        self._moved()
+
+    def _slider(
+        self, name: str, value: float, low: float, high: float, unit: str, meaning: str
+    ) -> None:
+        """Show the slider of a parameter, and its number."""
+        now = self._chosen["changes"].get(name, value)
+        unit = "" if unit == "1" else unit
+        with ui.column().classes("w-full gap-0"):
+            with ui.row().classes("w-full items-center no-wrap justify-between"):
+                ui.label(name).classes("text-sm").tooltip(meaning)
+                number = ui.number(format="%.4g").classes("w-36").props(remove="outlined")
+                number.props(f'borderless suffix="{unit}" input-class=text-right')
+                number.props(f'aria-label="{name}, {meaning}"')
+            slider = ui.slider(min=low, max=high, step=(high - low) / 400, value=now)
+            number.bind_value(slider.props(f'dense aria-label="{meaning}"'))
+        slider.on_value_change(lambda event: self._change(name, event.value, value))
+
+    async def _reset(self) -> None:
+        self._chosen["changes"] = {}
+        await self.open()
+
+    def _move_bias(self, value: float | None) -> None:
+        if value is not None:
+            self._chosen["bias"] = float(value)
+            if value > self._chosen["most"]:
+                # one may type more than the slider has, and the curves go as far
+                self._chosen["most"] = float(math.ceil(value))
+                self._slider_of_bias.props(f"max={self._chosen['most']:g}")
+            self._moved()
+
+    def _change(self, name: str, value: Any, of_probe: Any = None) -> None:
+        if value is None and name != "surface_gap_um":
+            return
+        changes = {key: old for key, old in self._chosen["changes"].items() if key != name}
+        if value != of_probe:
+            changes[name] = value
+        self._chosen["changes"] = changes
+        self._moved()
+
+
+class LiveLever:
+    """What the lever that is chosen shows at the bias that is chosen."""
+
+    def __init__(self, session: Session, banner: ErrorBanner, chosen: dict[str, Any]) -> None:
+        self._session, self._banner, self._chosen = session, banner, chosen
+        self._wanted: dict[str, Any] | None = None
+        self._settled: Any = None
+        self._rests = 0
+        self._busy = False
+        self._free: set[str] = set()
+        with ui.row().classes("w-full items-end gap-6"):
+            self._numbers = {key: number_shown(key, title) for key, (title, _) in _NUMBERS.items()}
+            self._knee = number_shown("knee", "knee of the I-V curve")
+        self._model = ui.label("starting").classes("text-xs opacity-70").props("aria-live=polite")
+        self._notes = ui.label().classes("text-sm remark")
+        with ui.column().classes("w-full") as self._drawn:
+            self._plots = LivePlots()
+
+    def follow(self, free: set[str]) -> None:
+        """Have the lever follow; while it does, only what is wanted last counts."""
+        self._free = free
+        self._ask()
+
+    def _ask(self) -> None:
+        self._wanted = {key: self._chosen[key] for key in ("probe", "changes", "bias", "most")}
+        if not self._busy:
+            self._busy = True
+            background_tasks.create(self._follow(), name="live lever")
+
+    async def _follow(self) -> None:
+        try:
+            while self._wanted is not None and not self._model.is_deleted:
+                wanted, self._wanted = self._wanted, None
+                settled = (wanted["probe"], wanted["changes"]) == self._settled
+                await self._show(wanted, quick=not settled)
+                if not settled and self._wanted is None:
+                    self._rests += 1
+                    background_tasks.create(self._settle(wanted, self._rests), name="full lever")
+        finally:
+            self._busy = False
+
+    async def _settle(self, wanted: dict[str, Any], turn: int) -> None:
+        """Ask the full lever once sliders have rested; they may move on meanwhile."""
+        await asyncio.sleep(_REST_S)
+        if turn != self._rests or self._wanted is not None or self._model.is_deleted:
+            return
+        if await self._show(wanted, quick=False):
+            self._settled = (wanted["probe"], wanted["changes"])
+            background_tasks.create(self._prepare(), name="reduced lever")
+            if wanted["bias"] != self._chosen["bias"]:
+                self._ask()
+
+    async def _show(self, wanted: dict[str, Any], quick: bool) -> bool:
+        probe, changes = wanted["probe"], wanted["changes"]
+        ask = {"bias": wanted["bias"], "most": wanted["most"], "quick": quick}
+        ask["reduced"] = self._session.reduced.get(self._geometry(probe, changes), False)
+        worker = "quick" if quick else "full"
+        try:
+            answer = await self._session.ask(worker, "live:answer", probe, changes, ask)
+        except HotleverError as error:
+            if not self._model.is_deleted:
+                self._blank()
+                self._banner.say(str(error))
+            return False
+        if self._model.is_deleted:  # the tab was closed meanwhile
+            return False
+        if not quick and (probe, changes) != (self._chosen["probe"], self._chosen["changes"]):
+            return False  # parameters have moved on while the full lever was solved
+        self._banner.clear()
+        self._drawn.set_visibility(True)
+        now, knee = answer["now"], answer["curves"]["knee"]
+        for key, (_, form) in _NUMBERS.items():
+            value = now[key]
+            self._numbers[key].set_text("none" if math.isnan(value) else form.format(value))
+        at_knee = "none" if knee is None else f"{knee['tip_K']:.0f} K, {knee['lever_V']:.3f} V"
+        self._knee.set_text(at_knee)
+        self._model.set_text(_MODELS[answer["model"]])
+        self._notes.set_text("; ".join(now["notes"]))
+        self._plots.show(answer)
+        return True
+
+    def _blank(self) -> None:
+        """Show no numbers where there are none: the last ones were of another state."""
+        for label in (*self._numbers.values(), self._knee):
+            label.set_text("–")
+        self._model.set_text("no state is shown")
+        self._notes.set_text("")
+        self._drawn.set_visibility(False)
+
+    def _geometry(self, probe: str | None, changes: dict[str, Any]) -> Any:
+        """Return what a reduced lever belongs to."""
+        fixed = {name: value for name, value in changes.items() if name not in self._free}
+        return probe, tuple(sorted(fixed.items(), key=str))
+
+    async def _prepare(self) -> None:
+        """Have the reduced lever of the geometry made, so that sliders are answered by it."""
+        probe, reduced = self._chosen["probe"], self._session.reduced
+        geometry = self._geometry(probe, self._chosen["changes"])
+        around = dict(geometry[1])
+        if not self._free or geometry in reduced or set(around) - _AROUND:
+            return
+        reduced[geometry] = False
+        with suppress(HotleverError):
+            reduced[geometry] = await self._session.ask("making", "live:prepare", probe, around)
