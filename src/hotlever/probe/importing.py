@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from hotlever.errors import InputError
-from hotlever.probe.drawing.contacts import REQUIRED, terminal_part
 from hotlever.probe.drawing.layer_inference import Drawn, LayerInference, infer_layers
-from hotlever.probe.drawing.layers import HEATER, SILICON
+from hotlever.probe.drawing.layers import HEATER, REQUIRED, SILICON, terminal_part
 from hotlever.probe.drawing.outlines import Ring
 from hotlever.probe.drawing.shape import TOLERANCE_UM
 from hotlever.probe.drawing.sheet import (

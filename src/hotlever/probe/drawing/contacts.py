@@ -8,7 +8,6 @@ that is cut away from the lever, and the border it leaves is the terminal.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -16,11 +15,10 @@ import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from hotlever.probe.drawing.layers import DrawnTerminal, terminal_part
 from hotlever.probe.drawing.outlines import DrawingError, Ring, parts_of, polygons
 from hotlever.probe.layout import Layout, Point, Terminal
 
-#: Terminals that a lever must have.
-REQUIRED = ("supply", "ground")
 #: Share of its length by which an edge may stick out of a terminal that names a line.
 _ENDS = 2.0
 #: How far (µm) from the outline an edge is none of it.
@@ -29,15 +27,6 @@ _OFF = 1e-6
 _COVERED = 0.1
 #: Share of what a contact covers that a film below it must take up to be that contact's metal.
 _IS_FILM = 0.9
-
-
-@dataclass(frozen=True)
-class DrawnTerminal:
-    """Outlines and lines of one terminal, and whether what lies below them is all contact."""
-
-    name: str
-    rings: tuple[Ring, ...]
-    by_area: bool = False
 
 
 def terminal_edges(
@@ -143,7 +132,7 @@ def covered(layout: Layout, terminals: Iterable[DrawnTerminal], films: Iterable[
     notes = []
     for terminal in terminals:
         ends = [end for end in layout.terminals if end.name == terminal.name]
-        areas = [Polygon(ring).buffer(0) for ring in terminal.rings if len(ring) > 2]
+        areas = [Polygon(ring).buffer(0) for ring in terminal.drawn if len(ring) > 2]
         below = body.intersection(shapely.union_all(areas))
         if terminal.by_area or not areas or below.area == 0:
             continue
@@ -167,11 +156,6 @@ def _farthest(edge: BaseGeometry, shape: BaseGeometry) -> float:
     """Return how far the corner of a shape that is farthest from an edge is (µm)."""
     corners = shapely.points(shapely.get_coordinates(shape))
     return float(shapely.distance(corners, edge).max())
-
-
-def terminal_part(name: str) -> str:
-    """Return how a terminal is named among the parts of a drawing."""
-    return f"terminal '{name}'"
 
 
 def outline_edges(silicon: Polygon) -> list[tuple[Point, Point]]:

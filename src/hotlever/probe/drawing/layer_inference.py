@@ -11,8 +11,8 @@ import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.probe.drawing.contacts import outline_edges, terminal_edges, terminal_part
-from hotlever.probe.drawing.layers import HEATER, SILICON
+from hotlever.probe.drawing.contacts import outline_edges, terminal_edges
+from hotlever.probe.drawing.layers import HEATER, SILICON, terminal_part
 from hotlever.probe.drawing.outlines import DrawingError, Ring, healed, parts_of, polygons, snapped
 from hotlever.probe.drawing.partition import Partition, partitioned
 from hotlever.probe.drawing.shape import rings_of

@@ -1,4 +1,4 @@
-"""What the layers of a drawing are made of, and what part that gives them.
+"""What is drawn: layers and what they are made of, terminals and what they hold.
 
 One layer is the *body*, the outline of the lever: ``silicon``, or ``body`` where it is something
 else. A layer with a thickness of its own is a *film*, which lies on the body; any other is a
@@ -8,7 +8,6 @@ else. A layer with a thickness of its own is a *film*, which lies on the body; a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from pydantic import Field
@@ -20,14 +19,51 @@ from hotlever.probe.drawing.outlines import Ring
 from hotlever.records import Record
 
 SILICON, BODY, HEATER = "silicon", "body", "heater"
-#: Key of a layer's outlines where a section says what it is made of.
-DRAWN = "drawn"
+#: Terminals that a lever must have.
+REQUIRED = ("supply", "ground")
+#: Keys of outlines where a section says what a layer is made of, and where all below a terminal's
+#: outlines is contact.
+DRAWN, AREA = "drawn", "area"
 #: Thickness that a film may have (µm).
 _THINNEST_UM, _THICKEST_UM = 0.001, 20.0
 
+Rings = tuple[Ring, ...]
 
-class Made(Record):
-    """What a layer is made of (section ``[layers.NAME]`` of a probe file)."""
+
+class DrawnPart(Record):
+    """What has outlines in a drawing; one of two points is a line."""
+
+    name: str
+    drawn: Rings
+
+    @property
+    def part(self) -> str:
+        """How it is named among the parts of a drawing."""
+        return self.name
+
+    def scaled(self, scale: float) -> Any:
+        """Return it some times as large."""
+        rings = tuple(tuple((scale * x, scale * y) for x, y in ring) for ring in self.drawn)
+        return self if scale == 1.0 else self.model_copy(update={DRAWN: rings})
+
+
+class DrawnTerminal(DrawnPart):
+    """Outlines and lines of one terminal, and whether what lies below them is all contact."""
+
+    by_area: bool
+
+    @property
+    def part(self) -> str:
+        """How it is named among the parts of a drawing."""
+        return terminal_part(self.name)
+
+    def section(self) -> Any:
+        """Return its value in ``[terminals]``."""
+        return {AREA: self.drawn} if self.by_area else self.drawn
+
+
+class DrawnLayer(DrawnPart):
+    """Outlines of one layer, and what they are made of (section ``[layers.NAME]``)."""
 
     material: str = Field(description="of [materials]")
     thickness_um: float | None = Field(
@@ -39,24 +75,10 @@ class Made(Record):
     #: That of the material; no key of a probe file.
     kind: str
 
-
-@dataclass(frozen=True)
-class DrawnLayer:
-    """Outlines of one layer, and what they are made of; `None` of the silicon of ``[material]``."""
-
-    name: str
-    rings: tuple[Ring, ...]
-    made: Made | None = None
-
     @property
     def is_body(self) -> bool:
         """Whether it is the outline of the lever."""
         return self.name in (SILICON, BODY)
-
-    @property
-    def thickness_um(self) -> float | None:
-        """Of a film (µm); None of the body and its parts."""
-        return None if self.made is None else self.made.thickness_um
 
     @property
     def is_film(self) -> bool:
@@ -64,90 +86,126 @@ class DrawnLayer:
         return self.thickness_um is not None
 
     @property
-    def material(self) -> str:
-        """The name of its material."""
-        if self.made is not None:
-            return self.made.material
-        return HIGH_DOPED if self.is_body else LOW_DOPED
+    def is_plain(self) -> bool:
+        """Whether it is of the silicon of ``[material]``, and so has no section of its own."""
+        return self.material in (LOW_DOPED, HIGH_DOPED)
 
     @property
-    def kind(self) -> type[Kind]:
-        """The kind of its material."""
-        if self.made is not None:
-            return KINDS[self.made.kind]
-        return KINDS["high-doped-silicon" if self.is_body else "n-silicon"]
+    def conducts(self) -> bool:
+        """Whether it carries a current."""
+        return KINDS[self.kind].conducts
 
     @property
     def is_low_doped(self) -> bool:
         """Whether dopant diffuses into it from high-doped silicon beside it."""
-        return issubclass(self.kind, LowDopedSilicon)
+        return issubclass(KINDS[self.kind], LowDopedSilicon)
 
     @property
     def is_high_doped(self) -> bool:
         """Whether dopant diffuses from it into low-doped silicon beside it."""
-        return issubclass(self.kind, HighDopedSilicon)
+        return issubclass(KINDS[self.kind], HighDopedSilicon)
+
+    def section(self) -> Any:
+        """Return its value in ``[layers]``."""
+        return self.drawn if self.is_plain else self.model_dump(exclude={"name", "kind"})
 
 
-def made_of(
-    layers: Mapping[str, Any], materials: Mapping[str, Kind], where: str
-) -> tuple[dict[str, Any], dict[str, Made]]:
-    """Return what is drawn of each layer, and what those are made of that say so.
+def terminal_part(name: str) -> str:
+    """Return how a terminal is named among the parts of a drawing."""
+    return f"terminal '{name}'"
+
+
+def layer_values(
+    section: Mapping[str, Any], materials: Mapping[str, Kind], where: str
+) -> dict[str, dict[str, Any]]:
+    """Return what ``[layers]`` says of each layer, its outlines as they are given.
 
     Raises
     ------
     InputError
         If the body or a heater is missing, a key is wrong, or a material does not exist.
     """
-    if (SILICON in layers) == (BODY in layers):
+    if (SILICON in section) == (BODY in section):
         raise InputError(
             f"{where}: {SILICON} is missing"
-            if BODY not in layers
+            if BODY not in section
             else f"{where}: {SILICON} and {BODY}: expected one of them, the outline of the lever"
         )
-    drawn, made = {}, {}
-    for name, given in layers.items():
-        if not isinstance(given, Mapping):
-            drawn[name] = given
-            continue
-        here = f"{where.removesuffix(']')}.{name}]"
-        values = dict(given)
-        if DRAWN not in values:
-            raise InputError(f"{here}: {DRAWN} is missing")
-        drawn[name] = values.pop(DRAWN)
-        material = values.get("material")
-        if "kind" in values:
-            raise unknown_name("key", "kind", (DRAWN, "material", "thickness_um"), here)
-        if isinstance(material, str):
-            if not materials:
-                raise InputError(f"{here}: material = {quoted(material)}: there is no [materials]")
-            if material not in materials:
-                raise unknown_name("material", material, materials, here)
-            values["kind"] = materials[material].kind
-        elif material is not None:
-            raise InputError(f"{here}: material = {quoted(material)}: expected a name")
+    layers = {}
+    for name, given in section.items():
+        if isinstance(given, Mapping):
+            own = _of_material(given, materials, f"{where.removesuffix(']')}.{name}]")
+        elif name in (SILICON, BODY):
+            own = {DRAWN: given, "material": HIGH_DOPED, "kind": "high-doped-silicon"}
         else:
-            values["kind"] = ""
-        made[name] = Made.from_values(values, here)
-    _check_roles(drawn, made, where)
-    return drawn, made
+            own = {DRAWN: given, "material": LOW_DOPED, "kind": "n-silicon"}
+        layers[name] = {"name": name, **own}
+    _check_roles(layers, [name for name in section if isinstance(section[name], Mapping)], where)
+    return layers
 
 
-def _check_roles(drawn: Mapping[str, Any], made: Mapping[str, Made], where: str) -> None:
-    body = SILICON if SILICON in drawn else BODY
-    if body == BODY and BODY not in made:
+def _of_material(
+    given: Mapping[str, Any], materials: Mapping[str, Kind], where: str
+) -> dict[str, Any]:
+    """Return what a section says of a layer, with the kind of its material."""
+    if DRAWN not in given:
+        raise InputError(f"{where}: {DRAWN} is missing")
+    for key in ("name", "kind"):
+        if key in given:
+            raise unknown_name("key", key, (DRAWN, "material", "thickness_um"), where)
+    if "material" not in given:
+        raise InputError(f"{where}: material is missing")
+    material = given["material"]
+    if not isinstance(material, str):
+        raise InputError(f"{where}: material = {quoted(material)}: expected a name")
+    if not materials:
+        raise InputError(f"{where}: material = {quoted(material)}: there is no [materials]")
+    if material not in materials:
+        raise unknown_name("material", material, materials, where)
+    return {**given, "kind": materials[material].kind}
+
+
+def _check_roles(layers: Mapping[str, dict[str, Any]], named: list[str], where: str) -> None:
+    """Refuse layers that make no lever; `named` are those of a material of their own."""
+    body = SILICON if SILICON in layers else BODY
+    if body == BODY and BODY not in named:
         raise InputError(
             f'{where}: {BODY}: expected a section [layers.{BODY}] with drawn = "1/0" and material'
         )
-    if body in made and made[body].thickness_um is not None:
+    if layers[body].get("thickness_um") is not None:
         raise InputError(
             f"{where}: {body}: thickness_um of the body stands in [probe], expected it there only"
         )
-    if HEATER not in drawn and not made:
+    if HEATER not in layers and not named:
         raise InputError(f"{where}: {HEATER} is missing")
-    if not DrawnLayer(body, (), made.get(body)).is_high_doped:
-        for name in drawn:
-            if name != body and name not in made:
+    if not issubclass(KINDS[layers[body]["kind"]], HighDopedSilicon):
+        for name in layers:
+            if name != body and name not in named:
                 raise InputError(
                     f"{where}: {name}: without a material it is low-doped silicon, which "
                     f"{body} is not the surroundings of; expected a section [layers.{name}]"
                 )
+
+
+def terminal_values(section: Mapping[str, Any], where: str) -> dict[str, dict[str, Any]]:
+    """Return what ``[terminals]`` says of each terminal, its outlines as they are given.
+
+    Raises
+    ------
+    InputError
+        If a required one is missing, or a key is wrong.
+    """
+    for name in REQUIRED:
+        if name not in section:
+            raise InputError(f"{where}: {name} is missing")
+    terminals = {}
+    for name, given in section.items():
+        by_area, here = isinstance(given, Mapping), f"{where.removesuffix(']')}.{name}]"
+        for key in given if by_area else ():
+            if key != AREA:
+                raise unknown_name("key", key, (AREA,), here)
+        if by_area and AREA not in given:
+            raise InputError(f"{here}: {AREA} is missing")
+        drawn = given[AREA] if by_area else given
+        terminals[name] = {"name": name, DRAWN: drawn, "by_area": by_area}
+    return terminals

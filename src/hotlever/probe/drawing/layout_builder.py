@@ -10,15 +10,12 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from hotlever.probe.drawing.contacts import (
-    REQUIRED,
-    DrawnTerminal,
     check_apart,
     cut_away,
     terminal_edges,
-    terminal_part,
 )
 from hotlever.probe.drawing.etching import Etching
-from hotlever.probe.drawing.layers import HEATER, DrawnLayer
+from hotlever.probe.drawing.layers import HEATER, REQUIRED, DrawnLayer, DrawnTerminal, terminal_part
 from hotlever.probe.drawing.outlines import (
     NARROWEST,
     DrawingError,
@@ -79,12 +76,12 @@ def build_layout(
     by_name = {layer.name: layer for layer in layers}
     narrowest = NARROWEST * tolerance_um
     body = next(layer.name for layer in layers if layer.is_body)
-    _check_extent(body, by_name[body].rings)
-    drawn = {layer.name: polygons(layer.name, layer.rings, tolerance_um) for layer in layers}
+    _check_extent(body, by_name[body].drawn)
+    drawn = {layer.name: polygons(layer.name, layer.drawn, tolerance_um) for layer in layers}
     outline = one_piece(body, healed(body, drawn[body], tolerance_um), drawn[body])
     check_widths(body, outline, drawn[body], narrowest)
-    by_area = {terminal_part(one.name): one for one in terminals if one.by_area}
-    drawn |= {name: polygons(name, one.rings, tolerance_um) for name, one in by_area.items()}
+    by_area = {one.part: one for one in terminals if one.by_area}
+    drawn |= {name: polygons(name, one.drawn, tolerance_um) for name, one in by_area.items()}
     on_body = {
         name: healed(name, areas, tolerance_um) for name, areas in drawn.items() if name != body
     }
@@ -92,7 +89,7 @@ def build_layout(
         _check_on_body(name, drawn[name], body, outline, tolerance_um)
     contacts = {one.name: on_body.pop(name) for name, one in by_area.items()}
     shapes = on_body
-    edges = {one.name: one.rings for one in terminals if not one.by_area}
+    edges = {one.name: one.drawn for one in terminals if not one.by_area}
     ends = terminal_edges(outline, edges, tolerance_um)
     if edge_bias_um:
         etching = Etching(body, outline, ends, edge_bias_um, tolerance_um)
@@ -202,7 +199,7 @@ def _regions(
     insulates = {
         number
         for number, piece in enumerate(partition.pieces)
-        if not any(layers[name].kind.conducts for name in piece.layers)
+        if not any(layers[name].conducts for name in piece.layers)
     }
     body = next(layer.name for layer in layers.values() if layer.is_body)
     parts = _parts(partition, body, at, insulates)

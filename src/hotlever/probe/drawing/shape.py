@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -11,12 +11,20 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hotlever.errors import InputError, quoted, unknown_name
+from hotlever.errors import InputError, quoted
 from hotlever.materials import Kind
-from hotlever.probe.drawing.contacts import REQUIRED, DrawnTerminal, covered, terminal_part
-from hotlever.probe.drawing.layers import BODY, DRAWN, SILICON, DrawnLayer, Made, made_of
+from hotlever.probe.drawing.contacts import covered
+from hotlever.probe.drawing.layers import (
+    DRAWN,
+    DrawnLayer,
+    DrawnTerminal,
+    Rings,
+    layer_values,
+    terminal_part,
+    terminal_values,
+)
 from hotlever.probe.drawing.layout_builder import build_layout
-from hotlever.probe.drawing.outlines import DrawingError, Ring, without_nested
+from hotlever.probe.drawing.outlines import DrawingError, without_nested
 from hotlever.probe.drawing.sheet import (
     Layer,
     Sheet,
@@ -27,18 +35,13 @@ from hotlever.probe.drawing.sheet import (
     sensible_unit,
 )
 from hotlever.probe.layout import Layout, Point
-from hotlever.probe.shapes import SHAPE_SECTIONS, Shape, edge_bias, thickness
+from hotlever.probe.shapes import Shape, edge_bias, thickness
 from hotlever.records import Record
 
 #: What is nearer is the same (µm), unless a probe file says otherwise.
 TOLERANCE_UM = 0.002
 #: What it may be.
 _FINEST_UM, _COARSEST_UM = 1e-4, 0.1
-
-#: Key of a terminal's outlines where all below them is contact.
-AREA = "area"
-
-Rings = tuple[Ring, ...]
 
 
 class Drawing(Shape):
@@ -78,22 +81,13 @@ class Drawing(Shape):
     )
     edge_bias_um: float = edge_bias()
     tip_um: Point = Field(description="place of the tip, as drawn")
-    layers: dict[str, Rings]
-    terminals: dict[str, Rings]
-    #: Of those layers that say so; part of ``[layers]`` in a probe file.
-    made: dict[str, Made] = Field(default_factory=dict)
-    #: Terminals that hold all below their outlines; part of ``[terminals]`` in a probe file.
-    by_area: tuple[str, ...] = ()
+    layers: tuple[DrawnLayer, ...]
+    terminals: tuple[DrawnTerminal, ...]
 
     @model_validator(mode="after")
     def _can_be_meshed(self) -> Self:
         self.layout()
         return self
-
-    def __hash__(self) -> int:
-        parts = (*self.layers.items(), *self.terminals.items(), *self.made.items())
-        sizes = (self.tip_um, self.tolerance_um, self.thickness_um, self.scale, self.edge_bias_um)
-        return hash((parts, self.by_area, sizes))
 
     def dimensions(self) -> dict[str, float]:
         """Return the thickness: the outline is as it is drawn."""
@@ -101,58 +95,41 @@ class Drawing(Shape):
 
     def sections(self) -> dict[str, dict[str, Any]]:
         """Return the sections of a probe file that describe it."""
-        values = self.model_dump(exclude={"made", "by_area"})
-        layers = dict(values["layers"])
-        for name, made in self.made.items():
-            layers[name] = {DRAWN: layers[name], **made.model_dump(exclude={"kind"})}
         return {
-            "probe": {name: one for name, one in values.items() if name not in SHAPE_SECTIONS},
-            "layers": layers,
-            "terminals": {
-                name: {AREA: rings} if name in self.by_area else rings
-                for name, rings in values["terminals"].items()
-            },
+            "probe": self.model_dump(exclude={"layers", "terminals"}),
+            "layers": {layer.name: layer.section() for layer in self.layers},
+            "terminals": {terminal.name: terminal.section() for terminal in self.terminals},
         }
 
     def layer_records(self) -> dict[str, type[Record]]:
         """Return what the sections ``[layers.NAME]`` hold, by the names of the layers."""
-        return dict.fromkeys(self.made, Made)
+        return {layer.name: DrawnLayer for layer in self.layers if not layer.is_plain}
 
     @property
     def materials(self) -> tuple[str, ...]:
         """The names of the materials that layers are said to be made of."""
-        return tuple(dict.fromkeys(made.material for made in self.made.values()))
+        named = (layer.material for layer in self.layers if not layer.is_plain)
+        return tuple(dict.fromkeys(named))
+
+    def _scaled(self, parts: Iterable[Any]) -> tuple[Any, ...]:
+        return tuple(part.scaled(self.scale) for part in parts)
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
+        layers, terminals = self._scaled(self.layers), self._scaled(self.terminals)
         x, y = self.tip_um
-        layers = tuple(
-            DrawnLayer(name, _scaled(rings, self.scale), self.made.get(name))
-            for name, rings in self.layers.items()
-        )
-        tip, terminals = (self.scale * x, self.scale * y), tuple(self._terminals)
+        tip = (self.scale * x, self.scale * y)
         try:
-            made = build_layout(layers, terminals, tip, self.tolerance_um, self.edge_bias_um)
+            layout = build_layout(layers, terminals, tip, self.tolerance_um, self.edge_bias_um)
         except DrawingError as error:
             raise error.drawn_at(self.scale) from None
-        return replace(made, thickness_um=self.thickness_um)
-
-    @property
-    def _terminals(self) -> list[DrawnTerminal]:
-        return [
-            DrawnTerminal(name, _scaled(rings, self.scale), name in self.by_area)
-            for name, rings in self.terminals.items()
-        ]
+        return replace(layout, thickness_um=self.thickness_um)
 
     def notes(self) -> list[str]:
         """Say which contacts cover more of a leg than they count for."""
-        films = [
-            ring
-            for name, made in self.made.items()
-            if made.thickness_um is not None
-            for ring in _scaled(self.layers[name], self.scale)
-        ]
-        return covered(self.layout(), self._terminals, films)
+        films = self._scaled(layer for layer in self.layers if layer.is_film)
+        rings = [ring for film in films for ring in film.drawn]
+        return covered(self.layout(), self._scaled(self.terminals), rings)
 
     @classmethod
     def read(
@@ -189,51 +166,37 @@ class Drawing(Shape):
             if not _is_points([tip, tip]):
                 raise InputError(f"{where}: [probe]: tip_um = {quoted(tip)}: expected [x, y] (µm)")
             values["tip_um"] = (float(tip[0]), float(tip[1]))
-        given = {name: _section(sections, name, where) for name in ("layers", "terminals")}
-        given["layers"], made = made_of(given["layers"], materials or {}, f"{where}: [layers]")
-        given["terminals"], by_area = _by_area(given["terminals"], f"{where}: [terminals")
-        named = {part: layer for part, layer in _by_part(given).items() if isinstance(layer, str)}
-        sheet = None
-        if named:
-            sheet = _sheet(values, where, folder, tolerance)
-        outlines = {
-            section: {
-                name: _rings(sheet, one, name, f"{where}: [{section}] {name}", section)
-                for name, one in drawn.items()
-            }
-            for section, drawn in given.items()
+        layers = layer_values(
+            _section(sections, "layers", where), materials or {}, f"{where}: [layers]"
+        )
+        terminals = terminal_values(_section(sections, "terminals", where), f"{where}: [terminals]")
+        given = {name: part[DRAWN] for name, part in layers.items()} | {
+            terminal_part(name): part[DRAWN] for name, part in terminals.items()
         }
+        named = {part: layer for part, layer in given.items() if isinstance(layer, str)}
+        sheet = _sheet(values, where, folder, tolerance) if named else None
+        for section, parts in (("layers", layers), ("terminals", terminals)):
+            for name, part in parts.items():
+                here = f"{where}: [{section}] {name}"
+                part[DRAWN] = _rings(sheet, part[DRAWN], name, here, section)
+        made = tuple(
+            DrawnLayer.from_values(layer, f"{where}: [layers.{name}]")
+            for name, layer in layers.items()
+        )
+        ends = tuple(DrawnTerminal(**terminal) for terminal in terminals.values())
         try:
             if sheet is not None:
-                _check_unit(sheet, outlines["layers"])
-            parts = {**outlines, "made": made, "by_area": by_area}
-            return cls.from_values({**values, **parts}, f"{where}: [probe]")
+                _check_unit(sheet, next(layer for layer in made if layer.is_body))
+            return cls.from_values(
+                {**values, "layers": made, "terminals": ends}, f"{where}: [probe]"
+            )
         except DrawingError as error:
             file = where if sheet is None else sheet.file
-            raise error.of_file(file, named, _by_part(outlines)) from None
+            outlines = {part.part: part.drawn for part in (*made, *ends)}
+            raise error.of_file(file, named, outlines) from None
 
 
-def _scaled(rings: Rings, scale: float) -> Rings:
-    if scale == 1.0:
-        return rings
-    return tuple(tuple((scale * x, scale * y) for x, y in ring) for ring in rings)
-
-
-def _by_area(terminals: dict[str, Any], where: str) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return what is drawn of each terminal, and the names of those stated by area."""
-    drawn = {}
-    for name, given in terminals.items():
-        if isinstance(given, Mapping):
-            for key in given:
-                if key != AREA:
-                    raise unknown_name("key", key, (AREA,), f"{where}.{name}]")
-            if AREA not in given:
-                raise InputError(f"{where}.{name}]: {AREA} is missing")
-        drawn[name] = given[AREA] if isinstance(given, Mapping) else given
-    return drawn, tuple(name for name, given in terminals.items() if isinstance(given, Mapping))
-
-
-def _check_unit(sheet: Sheet, layers: Mapping[str, Rings]) -> None:
+def _check_unit(sheet: Sheet, body: DrawnLayer) -> None:
     """Refuse a lever of a file that is far too large or too small.
 
     Raises
@@ -241,17 +204,11 @@ def _check_unit(sheet: Sheet, layers: Mapping[str, Rings]) -> None:
     DrawingError
         With the unit in which it would be a lever.
     """
-    body = SILICON if SILICON in layers else BODY
-    extent, unit_um = extent_of(layers[body]), sheet.unit_um
+    extent, unit_um = extent_of(body.drawn), sheet.unit_um
     if not is_lever(extent):
         unit = sensible_unit(extent, unit_um)
-        raise DrawingError(doubt(extent, unit_um, unit, "unit_um = {unit_um:g} in [probe]"), body)
-
-
-def _by_part(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Return what is drawn by the name that it has in an error."""
-    ends = {terminal_part(name): drawn for name, drawn in sections["terminals"].items()}
-    return {**sections["layers"], **ends}
+        words = doubt(extent, unit_um, unit, "unit_um = {unit_um:g} in [probe]")
+        raise DrawingError(words, body.name)
 
 
 def _section(sections: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
@@ -259,9 +216,6 @@ def _section(sections: Mapping[str, Any], name: str, where: str) -> dict[str, An
         raise InputError(f"{where}: section [{name}] is missing")
     if not isinstance(sections[name], Mapping):
         raise InputError(f"{where}: [{name}] must be a section")
-    for key in () if name == "layers" else REQUIRED:
-        if key not in sections[name]:
-            raise InputError(f"{where}: [{name}]: {key} is missing")
     return dict(sections[name])
 
 
