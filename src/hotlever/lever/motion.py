@@ -14,7 +14,7 @@ import numpy as np
 from hotlever.lever.full_space import FullSpace, thickness_at
 from hotlever.lever.space import Fields, Fluxes, PlacedFilm
 from hotlever.probe.layout import Taper
-from hotlever.probe.moving import LayoutRate, Movement
+from hotlever.probe.moving import Movement
 from hotlever.types import Array
 
 #: A small change of a dimension (µm), by which the thickness of a cone is differenced.
@@ -75,7 +75,7 @@ class Motion:
 
 def motion_of(space: FullSpace, movement: Movement) -> Motion:
     """Return what changes at the points of a flat lever as it moves with a dimension."""
-    elements, mesh, rate = space.elements, space.mesh, movement.rate
+    elements, mesh = space.elements, space.mesh
     corners = movement.velocity[:, mesh.elements.t]
     sides = corners[:, 1:] - corners[:, :1]
     # the velocity is linear in each triangle
@@ -87,9 +87,9 @@ def motion_of(space: FullSpace, movement: Movement) -> Motion:
     layout, at = mesh.layout, elements.positions
 
     def thickness(way: float) -> float | Array:
-        there = tuple((layout.tip + way * rate.tip).tolist())
-        thick = layout.thickness_um + way * rate.thickness
-        moved = replace(layout, tip=there, thickness_um=thick, cone=rate.cone(way))
+        there = tuple((layout.tip + way * movement.tip).tolist())
+        thick = layout.thickness_um + way * movement.thickness
+        moved = replace(layout, tip=there, thickness_um=thick, cone=movement.cone(way))
         return thickness_at(moved, at + way * velocity)
 
     thicker = (thickness(_SMALL_UM) - thickness(-_SMALL_UM)) / (2 * _SMALL_UM)
@@ -100,24 +100,26 @@ def motion_of(space: FullSpace, movement: Movement) -> Motion:
         strain,
         np.asarray(strain[0, 0] + strain[1, 1])[:, None],
         np.broadcast_to(thicker, space.weights.shape),
-        tuple(_from_borders(space, film, rate, velocity) for film in space.films),
-        tip=(rate.tip - at_tip) @ slopes[:, 0],
+        tuple(_from_borders(space, film, movement, velocity) for film in space.films),
+        tip=(movement.tip - at_tip) @ slopes[:, 0],
     )
 
 
-def _from_borders(space: FullSpace, film: PlacedFilm, rate: LayoutRate, velocity: Array) -> Array:
+def _from_borders(space: FullSpace, film: PlacedFilm, movement: Movement, velocity: Array) -> Array:
     """Return how the distances of a film's points from the borders of their regions change."""
     changes = np.zeros_like(film.distances)
     if not film.distances.size:
         return changes
     region = np.repeat(space.mesh.region, space.elements.per_element)[film.points]
     moved = velocity[:, film.points]
-    for number, (now, later) in enumerate(zip(rate.now.regions, rate.later.regions, strict=True)):
+    for number, (now, later) in enumerate(
+        zip(movement.now.regions, movement.later.regions, strict=True)
+    ):
         before, after, here = now.taper, later.taper, region == number
         # borders of any other shape belong to drawings, whose outlines do not move
         if isinstance(before, Taper) and isinstance(after, Taper):
-            centre = rate.of_point(before.centre, after.centre)
+            centre = movement.of_point(before.centre, after.centre)
             along = np.tensordot(before.axis, moved[:, here] - centre[:, None], axes=1)
-            longer = (after.length_um - before.length_um) / rate.step
+            longer = (after.length_um - before.length_um) / movement.step
             changes[:2, here, 0] = longer / 2 - along, longer / 2 + along
     return changes

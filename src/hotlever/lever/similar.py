@@ -59,7 +59,7 @@ class SimilarLevers:
         space = self._lever.space
         own = self._lever.probe
         if (probe.shape, probe.tip) != (own.shape, own.tip):
-            space = FullSpace(self._moving.at(probe), wiring=space.wiring)
+            space = FullSpace(self._moving.mesh_of(probe), wiring=space.wiring)
         space = copy(space)
         # air takes up from a place nearly what it took before the place moved a little
         space.air = self._air(probe, names)

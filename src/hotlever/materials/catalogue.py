@@ -31,12 +31,12 @@ def listing() -> list[str]:
         example = _example(name)
         lines.append(f"{name}: {(kind.__doc__ or '').partition('.')[0]}")
         rows = [["  parameter", "unit", "from", "to", "left out", ""]]
-        for own, known in kind.declared.items():
+        for own, parameter in kind.declared.items():
             value = getattr(example, own)
             given = name not in _EXAMPLES or own not in PRESETS[_EXAMPLES[name]].values
             default = f"{value:.4g}" if given and isinstance(value, float) else "–"
-            limits = f"{known.lower:.4g}", f"{known.upper:.4g}"
-            rows.append([f"  {own}", known.unit, *limits, default, known.meaning])
+            limits = f"{parameter.lower:.4g}", f"{parameter.upper:.4g}"
+            rows.append([f"  {own}", parameter.unit, *limits, default, parameter.meaning])
         lines += aligned(rows)
         for law in _laws(name, example):
             low, high = law.temperature_range
@@ -71,12 +71,12 @@ def curves() -> dict[str, tuple[Array, Array, Array | None]]:
     }
     for name, preset in PRESETS.items():
         made[name] = material_of({"kind": preset.kind, "preset": name}, name)
-    found = {}
+    curves_of = {}
     for name, kind in made.items():
         T = np.linspace(_FROM_K, min(_TO_K, kind.highest_K), _STEPS)
         kappa, _ = kind.thermal_conductivity(T, _LAYER_UM)
         rho = None
         if kind.conducts and name not in thin:
             rho = 1.0 / kind.electrical_conductivity(T, getattr(kind, "n_d", 0.0))[0]
-        found[name] = T, 100.0 * kappa, rho
-    return found
+        curves_of[name] = T, 100.0 * kappa, rho
+    return curves_of

@@ -73,8 +73,8 @@ class Kind(Record):
     def parameters(self) -> dict[str, Parameter]:
         """Those of the declared parameters that are numbers here."""
         return {
-            name: known
-            for name, known in self.declared.items()
+            name: parameter
+            for name, parameter in self.declared.items()
             if isinstance(getattr(self, name), float)
         }
 
@@ -281,7 +281,7 @@ class MetalFilm(Stored):
     def parameters(self) -> dict[str, Parameter]:
         """Those of the declared parameters that count here."""
         other = "kappa" if self.kappa is None else "lorenz_ratio"
-        return {name: known for name, known in self.declared.items() if name != other}
+        return {name: parameter for name, parameter in self.declared.items() if name != other}
 
     @property
     def laws(self) -> tuple[Law, ...]:

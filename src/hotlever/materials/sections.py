@@ -70,7 +70,7 @@ def materials_of(
     InputError
         See `material_of`.
     """
-    found = {}
+    materials = {}
     for name, section in sections.items():
         if not _NAME.fullmatch(name) or name in (*reserved, LOW_DOPED, HIGH_DOPED):
             raise InputError(
@@ -80,18 +80,18 @@ def materials_of(
         here = f"{where}: [materials.{name}]"
         if not isinstance(section, dict):
             raise InputError(f"{here} must be a section, found {quoted(section)}")
-        found[name] = material_of(section, here)
-    return found
+        materials[name] = material_of(section, here)
+    return materials
 
 
 def _preset(name: Any, kind: str, where: str) -> Mapping[str, float]:
     if name is None:
         return {}
-    known = [one for one, preset in PRESETS.items() if preset.kind == kind]
-    if not known:
+    names = [preset_name for preset_name, preset in PRESETS.items() if preset.kind == kind]
+    if not names:
         raise InputError(f"{where}: preset = {quoted(name)}: {kind} has no presets")
-    if name not in known:
-        raise unknown_name("preset", str(name), known, where)
+    if name not in names:
+        raise unknown_name("preset", str(name), names, where)
     return PRESETS[name].values
 
 

@@ -367,7 +367,9 @@ def inversion_temperature(n: ArrayLike, p: ArrayLike, impurity_exponent: ArrayLi
 
 def highest_resistivity(conductivity: Callable[..., Evaluated], *parameters: ArrayLike) -> Array:
     """Return the temperature (K) at which a conductivity of some parameters is lowest; or NaN."""
-    arguments = np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in parameters))
+    arguments = np.broadcast_arrays(
+        *(np.asarray(parameter, dtype=float) for parameter in parameters)
+    )
     cold, hot = (np.full(arguments[0].shape, T) for T in (300.0, FORMULA_TO))
 
     def slope(T: Array, *arguments: Array) -> Array:

@@ -135,10 +135,10 @@ class Circuit(Record):
         parts = contacts_apart(values)
         given = parts.get("contacts", {}).items()
         inside = {
-            name: one
-            if isinstance(one, Contact)
-            else Contact.from_values(one, f"{where[:-1]}.{name}]")
-            for name, one in given
+            name: contact
+            if isinstance(contact, Contact)
+            else Contact.from_values(contact, f"{where[:-1]}.{name}]")
+            for name, contact in given
         }
         return super().from_values({**parts, "contacts": inside}, where)
 
@@ -151,9 +151,9 @@ class Circuit(Record):
     def _one_supply_is_swept(self) -> Self:
         swept = self.contacts.get(self.swept)
         if swept is not None and (swept.kind != "supply" or swept.is_held):
-            found = f'kind = "{swept.kind}"' if swept.kind != "supply" else "a value of its own"
+            what = f'kind = "{swept.kind}"' if swept.kind != "supply" else "a value of its own"
             raise ValueError(
-                f"{self.swept}: found {found}, expected a supply without a value: it is swept"
+                f"{self.swept}: found {what}, expected a supply without a value: it is swept"
             )
         if swept is not None and swept.series_resistance_ohm:
             raise ValueError(
@@ -237,11 +237,11 @@ class Circuit(Record):
         others = {name: self.contact(name) for name in names if name != self.swept}
         bare = [
             name
-            for name, one in others.items()
-            if one.kind == "ground" and not one.series_resistance_ohm
+            for name, contact in others.items()
+            if contact.kind == "ground" and not contact.series_resistance_ohm
         ]
-        senses = tuple(name for name, one in others.items() if one.kind == "sense")
-        if not any(one.norton[0] for name, one in others.items() if name not in senses):
+        senses = tuple(name for name, contact in others.items() if contact.kind == "sense")
+        if not any(contact.norton[0] for name, contact in others.items() if name not in senses):
             raise InputError(f"{where}: [circuit]: no terminal is at ground, expected one")
         contacts = tuple(name for name in others if name not in (*bare, *senses))
         return Wiring(self.swept, tuple(bare), contacts, senses)
@@ -270,14 +270,16 @@ class Circuit(Record):
 
     def end_rises(self) -> dict[str, float]:
         """Return by how much leg ends are warmer than the base temperature (K), if they are."""
-        given = {name: one.base_temperature_K for name, one in self.contacts.items()}
+        given = {name: contact.base_temperature_K for name, contact in self.contacts.items()}
         rises = {name: T - self.base_temperature_K for name, T in given.items() if T is not None}
         return {name: rise for name, rise in rises.items() if rise}
 
     @property
     def starts_cold(self) -> bool:
         """Whether all of the lever is at the base temperature until the swept supply heats it."""
-        return not self.end_rises() and not any(one.norton[1] for one in self.contacts.values())
+        return not self.end_rises() and not any(
+            contact.norton[1] for contact in self.contacts.values()
+        )
 
     @property
     def is_plain(self) -> bool:
@@ -294,7 +296,7 @@ class Circuit(Record):
         """
         if not self.starts_cold:
             warm = self.end_rises()
-            name = next(n for n, one in self.contacts.items() if one.norton[1] or n in warm)
+            name = next(n for n, contact in self.contacts.items() if contact.norton[1] or n in warm)
             raise InputError(
                 f"[circuit.{name}]: {what} takes a lever that only the swept supply heats, found "
                 f"{'a held supply' if self.contacts[name].norton[1] else 'a warmer leg end'}"
@@ -304,9 +306,9 @@ class Circuit(Record):
 def contacts_apart(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of ``[circuit]`` with the sections inside it under ``contacts``."""
     inner = {
-        name: one
-        for name, one in values.items()
-        if name not in Circuit.model_fields and isinstance(one, Mapping | Contact)
+        name: value
+        for name, value in values.items()
+        if name not in Circuit.model_fields and isinstance(value, Mapping | Contact)
     }
-    own = {name: one for name, one in values.items() if name not in inner}
+    own = {name: value for name, value in values.items() if name not in inner}
     return {**own, "contacts": inner} if inner else own

@@ -61,13 +61,15 @@ class Imported:
     def outlines(self) -> dict[str, tuple[Ring, ...]]:
         """All that is drawn, by what it is and by layer."""
         roles = _by_part(self.inference)
-        of_layer = {one: role for role, one in roles.items() if isinstance(one, str)}
-        found = {}
+        of_layer = {drawn: role for role, drawn in roles.items() if isinstance(drawn, str)}
+        outlines = {}
         for name, layer in self.sheet.layers.items():
             role = of_layer.get(name)
             label = name if role in (None, name) else f"{role} ({name})"
-            found[label] = (*layer.rings, *layer.lines)
-        return found | {role: one for role, one in roles.items() if not isinstance(one, str)}
+            outlines[label] = (*layer.rings, *layer.lines)
+        return outlines | {
+            role: drawn for role, drawn in roles.items() if not isinstance(drawn, str)
+        }
 
 
 def import_drawing(path: Path, cell: str | None, folder: Path, unit: str | None = None) -> Imported:
@@ -142,7 +144,7 @@ def _silicon_in(sheet: Sheet, unit: str) -> str | None:
 
 def _by_part(inference: LayerInference) -> dict[str, Drawn]:
     """Return what is drawn by what it is taken as."""
-    ends = {terminal_part(name): one for name, one in inference.terminals.items()}
+    ends = {terminal_part(name): drawn for name, drawn in inference.terminals.items()}
     return inference.layers | ends
 
 
@@ -165,10 +167,10 @@ def _listing(sheet: Sheet, inference: LayerInference) -> list[str]:
     elif sheet.cell is None:
         lines.append(f"one unit of the file is {sheet.unit_um:g} µm")
     roles = _by_part(inference)
-    of_layer = {one: role for role, one in roles.items() if isinstance(one, str)}
+    of_layer = {drawn: role for role, drawn in roles.items() if isinstance(drawn, str)}
     rows = [["layer", "outlines", "area (µm²)", "x (µm)", "y (µm)", "taken as"]]
     for name, layer in list(sheet.layers.items())[:_MOST_LISTED]:
-        points = np.array([place for ring in (*layer.rings, *layer.lines) for place in ring])
+        points = np.array([point for ring in (*layer.rings, *layer.lines) for point in ring])
         (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
         number = f"{len(layer.rings)}" + (f" + {len(layer.lines)} open" if layer.lines else "")
         extent = [f"{x0:.6g} to {x1:.6g}", f"{y0:.6g} to {y1:.6g}"]

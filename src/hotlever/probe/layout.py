@@ -242,7 +242,7 @@ class Layout:
     @property
     def terminal_names(self) -> tuple[str, ...]:
         """The names of the terminals, each once."""
-        return tuple(dict.fromkeys(one.name for one in self.terminals))
+        return tuple(dict.fromkeys(terminal.name for terminal in self.terminals))
 
     @property
     def usual_wiring(self) -> Wiring:
@@ -269,8 +269,8 @@ class Layout:
         Corners that are hardly any, as where an arc is made of short edges, are left out.
         """
         conducting = tuple(region for region in self.regions if not region.insulates)
-        found = [_reentrant(some) for some in dict.fromkeys((self.regions, conducting))]
-        return list(dict.fromkeys(corner for corners in found for corner in corners))
+        corners_of = [_reentrant(some) for some in dict.fromkeys((self.regions, conducting))]
+        return list(dict.fromkeys(corner for corners in corners_of for corner in corners))
 
 
 def _reentrant(regions: tuple[Region, ...]) -> list[Point]:
@@ -278,8 +278,8 @@ def _reentrant(regions: tuple[Region, ...]) -> list[Point]:
     rings = [ring for region in regions for ring in region.rings]
     corners = np.unique(np.concatenate([np.array(ring) for ring in rings]).round(6), axis=0)
     angle = sum(_angles_at(corners, np.array(ring)) for ring in rings)
-    found = (angle > math.pi + _HARDLY) & (angle < 2 * math.pi - 1e-6)
-    return [(float(x), float(y)) for x, y in corners[found]]
+    reentrant = (angle > math.pi + _HARDLY) & (angle < 2 * math.pi - 1e-6)
+    return [(float(x), float(y)) for x, y in corners[reentrant]]
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> tuple[Point, ...]:

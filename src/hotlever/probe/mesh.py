@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hotlever.errors import ComputationError
 from hotlever.probe.circuit import Wiring
-from hotlever.probe.layout import Layout, Point, Region, Terminal
+from hotlever.probe.layout import Layout, Point, Region
 from hotlever.types import Array, Index
 
 if TYPE_CHECKING:
@@ -93,7 +92,7 @@ class ProbeMesh:
         """
         from skfem import MeshTri  # see `_netgen`
 
-        parts = {str(place): self.region == place for place in range(len(self.layout.regions))}
+        parts = {str(index): self.region == index for index in range(len(self.layout.regions))}
         named = self.elements.with_subdomains(
             {name: np.flatnonzero(inside) for name, inside in parts.items()}
         )
@@ -125,15 +124,15 @@ def mesh_layout(
         raise ComputationError(f"{_NOT_MESHED} ({error})") from error
     # where Netgen fails at a face it says so to the terminal only, and leaves a hole
     area = sum(region.area for region in layout.regions)
-    if not np.isclose(_area(mesh.p[:, mesh.t]), area, rtol=1e-9):
+    if not np.isclose(np.abs(doubled_areas(mesh.p[:, mesh.t])).sum() / 2, area, rtol=1e-9):
         raise ComputationError(_NOT_MESHED)
     return ProbeMesh(layout, mesh, region, terminal_facets(mesh, layout))
 
 
-def _area(corners: Array) -> float:
-    """Return the area of triangles (2, 3, n)."""
-    (ax, ay), (bx, by) = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return float(np.abs(ax * by - ay * bx).sum()) / 2
+def doubled_areas(corners: Array) -> Array:
+    """Return twice the signed areas of triangles (2, 3, n)."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.asarray(first[0] * second[1] - first[1] * second[0])
 
 
 def _netgen(
@@ -199,23 +198,23 @@ def terminal_facets(mesh: MeshTri | MeshTet, layout: Layout) -> dict[str, Index]
     """
     facets = mesh.boundary_facets()
     corners = mesh.p[:2, mesh.facets[:, facets]]
-    found: dict[str, Index] = {}
+    touched: dict[str, Index] = {}
     for terminal in layout.terminals:
-        before = found.get(terminal.name, np.empty(0, dtype=facets.dtype))
-        found[terminal.name] = np.union1d(before, facets[_on(terminal, corners)])
-    for name, here in found.items():
-        if not here.size:
+        _, on = on_line(terminal.start, terminal.end, corners)
+        before = touched.get(terminal.name, np.empty(0, dtype=facets.dtype))
+        touched[terminal.name] = np.union1d(before, facets[on.all(axis=0)])
+    for name, on_it in touched.items():
+        if not on_it.size:
             kind = "edge" if mesh.dim() == 2 else "face"
             raise ComputationError(f"terminal '{name}' touches no {kind} of the lever")
-    return found
+    return touched
 
 
-def _on(terminal: Terminal, corners: Array) -> NDArray[np.bool_]:
-    """Whether all corners of facets (2, k, facets) lie on a terminal's line."""
-    start = np.array(terminal.start)
-    line = np.array(terminal.end) - start
+def on_line(start: Point | Array, end: Point | Array, points: Array) -> tuple[Array, Array]:
+    """Return where points (2, ...) are along a line, and which lie on it."""
+    line = np.subtract(end, start)
     length = np.linalg.norm(line)
-    x, y = corners - start[:, None, None]
+    x, y = points[0] - start[0], points[1] - start[1]
     along, across = (line[0] * x + line[1] * y) / length, (line[0] * y - line[1] * x) / length
     on = (np.abs(across) < ON_LINE) & (along > -ON_LINE) & (along < length + ON_LINE)
-    return np.asarray(on.all(axis=0))
+    return along, on

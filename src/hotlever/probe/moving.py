@@ -15,9 +15,9 @@ from scipy.sparse.linalg import splu
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout, Point
-from hotlever.probe.mesh import ON_LINE, ProbeMesh
+from hotlever.probe.mesh import ProbeMesh, doubled_areas, on_line
 from hotlever.probe.parameters import dimensions_of
-from hotlever.probe.probe import Probe
+from hotlever.probe.parts import ProbeParts
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
 
@@ -27,23 +27,25 @@ _STEP = 1e-3
 
 
 @dataclass(frozen=True)
-class LayoutRate:
-    """How a layout changes, per unit of a dimension.
+class Movement:
+    """How a layout and the vertices of its mesh move, per unit of a dimension.
 
     Attributes
     ----------
     now, later : Layout
         The same regions, before and after a change by `step`.
     step : float
+    velocity : ndarray, shape (2, vertices)
     """
 
     now: Layout
     later: Layout
     step: float
+    velocity: Array
 
     @classmethod
-    def of(cls, probe: Probe, name: str) -> LayoutRate:
-        """Return how a probe's layout changes with one of its dimensions.
+    def from_probe(cls, probe: ProbeParts, name: str, mesh: ProbeMesh) -> Movement:
+        """Return how a probe's layout and flat mesh move with one of its dimensions.
 
         Raises
         ------
@@ -58,7 +60,7 @@ class LayoutRate:
                 f"{name} cannot change by itself here: parts of the lever would come apart; "
                 "expected a fit or priors without it"
             )
-        return cls(now, later, step)
+        return cls(now, later, step, _vertex_velocity(mesh, now, _corners(now, later, step)))
 
     def cone(self, change: float) -> Tip | None:
         """Return the tip's body after a small change of the dimension."""
@@ -83,39 +85,31 @@ class LayoutRate:
         """Velocity of the tip, shape (2,)."""
         return self.of_point(self.now.tip, self.later.tip)
 
-    def corners(self) -> dict[Point, Array]:
-        """Return the velocity of every corner of a region; where two meet, their mean."""
-        found: dict[Point, list[Array]] = {}
-        for now, later in zip(self.now.regions, self.later.regions, strict=True):
-            for corner, moved in zip(chain(*now.rings), chain(*later.rings), strict=True):
-                place = (round(corner[0], 9), round(corner[1], 9))
-                found.setdefault(place, []).append(self.of_point(corner, moved))
-        return {place: np.mean(velocities, axis=0) for place, velocities in found.items()}
+
+def _corners(now: Layout, later: Layout, step: float) -> dict[Point, Array]:
+    """Return the velocity of every corner of a region; where two meet, their mean."""
+    velocities: dict[Point, list[Array]] = {}
+    for before, after in zip(now.regions, later.regions, strict=True):
+        for corner, moved in zip(chain(*before.rings), chain(*after.rings), strict=True):
+            rounded = (round(corner[0], 9), round(corner[1], 9))
+            velocities.setdefault(rounded, []).append(np.subtract(moved, corner) / step)
+    return {corner: np.mean(rates, axis=0) for corner, rates in velocities.items()}
 
 
-@dataclass(frozen=True)
-class Movement:
-    """How a layout and the vertices (2, n) of its mesh move, per unit of a dimension."""
-
-    rate: LayoutRate
-    velocity: Array
-
-
-def vertex_velocity(mesh: ProbeMesh, rate: LayoutRate) -> Array:
-    """Return the velocity (2, vertices) of a flat mesh's vertices, per unit of a dimension."""
+def _vertex_velocity(mesh: ProbeMesh, layout: Layout, corners: dict[Point, Array]) -> Array:
+    """Return the velocity (2, vertices) of a flat mesh's vertices by that of the corners."""
     # see `hotlever.probe.mesh`
     from skfem import CellBasis, ElementTriP1
     from skfem.models.poisson import laplace
 
-    points, corners = mesh.elements.p, rate.corners()
-    places = np.array(list(corners))
+    points, places = mesh.elements.p, np.array(list(corners))
     velocities = np.array(list(corners.values()))
     velocity = np.zeros(points.shape)
     held = np.zeros(points.shape[1], dtype=bool)
-    for region in rate.now.regions:
+    for region in layout.regions:
         for start, end in region.edges:
-            along, near = _on_line(start, end, points)
-            knots, on = _on_line(start, end, places.T)
+            along, near = on_line(start, end, points)
+            knots, on = on_line(start, end, places.T)
             order = np.argsort(knots[on])
             for axis in (0, 1):
                 velocity[axis, near] = np.interp(
@@ -130,31 +124,20 @@ def vertex_velocity(mesh: ProbeMesh, rate: LayoutRate) -> Array:
     return velocity
 
 
-def _on_line(start: Array, end: Array, points: Array) -> tuple[Array, Array]:
-    """Return where points (2, n) are along a line, and which lie on it."""
-    line = end - start
-    length = np.linalg.norm(line)
-    away = points - start[:, None]
-    along, across = line @ away / length, (line[0] * away[1] - line[1] * away[0]) / length
-    on = (np.abs(across) < ON_LINE) & (along > -ON_LINE) & (along < length + ON_LINE)
-    return along, on
-
-
 class MovingMesh:
     """A flat mesh that follows its probe; it moves in proportion to the change of a dimension."""
 
-    def __init__(self, mesh: ProbeMesh, probe: Probe) -> None:
+    def __init__(self, mesh: ProbeMesh, probe: ProbeParts) -> None:
         self._mesh, self._probe = mesh, probe
-        self._known: dict[str, Movement] = {}
+        self._movements: dict[str, Movement] = {}
 
     def movement(self, name: str) -> Movement:
         """Return how mesh and layout move with a dimension."""
-        if name not in self._known:
-            rate = LayoutRate.of(self._probe, name)
-            self._known[name] = Movement(rate, vertex_velocity(self._mesh, rate))
-        return self._known[name]
+        if name not in self._movements:
+            self._movements[name] = Movement.from_probe(self._probe, name, self._mesh)
+        return self._movements[name]
 
-    def at(self, probe: Probe) -> ProbeMesh:
+    def mesh_of(self, probe: ProbeParts) -> ProbeMesh:
         """Return the mesh of a probe with other dimensions.
 
         Raises
@@ -166,18 +149,11 @@ class MovingMesh:
 
         points = self._mesh.elements.p.copy()
         names = dimensions_of(probe)
-        for name, change in zip(
-            names, probe.values(names) - self._probe.values(names), strict=True
-        ):
+        changes = probe.values(names) - self._probe.values(names)
+        for name, change in zip(names, changes, strict=True):
             if change:
                 points += change * self.movement(name).velocity
         before, triangles = self._mesh.elements.p, self._mesh.elements.t
-        if np.any(_doubled_areas(before[:, triangles]) * _doubled_areas(points[:, triangles]) <= 0):
+        if np.any(doubled_areas(before[:, triangles]) * doubled_areas(points[:, triangles]) <= 0):
             raise ComputationError("the mesh cannot follow so large a change of the dimensions")
         return replace(self._mesh, layout=probe.layout(), elements=MeshTri(points, triangles))
-
-
-def _doubled_areas(corners: Array) -> Array:
-    """Return twice the signed areas of triangles (2, 3, n)."""
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return np.asarray(first[0] * second[1] - first[1] * second[0])

@@ -83,7 +83,9 @@ def usual_parameters(probe: ProbeParts) -> tuple[str, ...]:
     >>> usual_parameters(Probe.reference())
     ('c_kappa', 'delta', 'n_d', 'p', 'a0', 'a1')
     """
-    tapered = {one.stack[0].material for one in probe.layout().regions if one.taper is not None}
+    tapered = {
+        region.stack[0].material for region in probe.layout().regions if region.taper is not None
+    }
     usual = [
         full_name(material, own)
         for material, kind in _kinds(probe)
@@ -108,7 +110,9 @@ def heat_capacities(probe: ProbeParts) -> tuple[str, ...]:
     >>> heat_capacities(Probe.reference())
     ('heat_capacity_scale',)
     """
-    return tuple(name for name, one in of_materials(probe, in_time=True).items() if one.in_time)
+    return tuple(
+        name for name, parameter in of_materials(probe, in_time=True).items() if parameter.in_time
+    )
 
 
 def parameters_of(

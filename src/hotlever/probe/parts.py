@@ -184,16 +184,16 @@ class ProbeParts(Record):
         }
         if dot and section not in records:
             raise unknown_name("section", section, [*SECTIONS, *named, *wired])
-        known = {part: [*record.model_fields] for part, record in records.items()}
+        keys = {part: [*record.model_fields] for part, record in records.items()}
         # in [probe] those of all shapes, its own first
-        known["probe"] += [key for one in PARAMETRIC.values() for key in one.model_fields]
+        keys["probe"] += [key for one in PARAMETRIC.values() for key in one.model_fields]
         own = [part for part in PARTS if getattr(self, part)]
         # those of a named material have its name before them
         for part in [section] if dot else ["probe", *own, *PARTS]:
-            if key in known[part] or (dot and records[part] is PriorTexts):
+            if key in keys[part] or (dot and records[part] is PriorTexts):
                 return part, key, records[part]
         # a prior has the name of what it is of
         dotted = {*named, *wired}
-        full = [f"{part}.{key}" if part in dotted else key for part in known for key in known[part]]
-        choices = known[section] if dot else full
+        full = [f"{part}.{key}" if part in dotted else key for part in keys for key in keys[part]]
+        choices = keys[section] if dot else full
         raise unknown_name("name", key, dict.fromkeys(choices))

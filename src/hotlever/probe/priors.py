@@ -174,7 +174,7 @@ class Moved(NamedTuple):
 
 def published_material() -> dict[str, Prior]:
     """Return what is known of the material of any lever: the published ones, and their scatter."""
-    return {name: Prior(*known) for name, known in PUBLISHED_SCATTER.items()}
+    return {name: Prior(*scatter) for name, scatter in PUBLISHED_SCATTER.items()}
 
 
 def default_priors(
@@ -187,14 +187,14 @@ def default_priors(
     known of the material instead may be given; what the probe file states wins.
     """
     materials, table = of_materials(probe), parameters_of(probe)
-    known = {
-        name: Prior(one.value, one.spread, one.relative)
-        for name, one in table.items()
-        if one.spread is not None and (one.value > 0 or not one.relative)
+    priors = {
+        name: Prior(parameter.value, parameter.spread, parameter.relative)
+        for name, parameter in table.items()
+        if parameter.spread is not None and (parameter.value > 0 or not parameter.relative)
     }
-    in_units = {name: name in materials for name, prior in known.items() if not prior.relative}
-    order = sorted(known, key=lambda name: (name in in_units, in_units.get(name, False)))
-    usual = {name: known[name] for name in order}
+    in_units = {name: name in materials for name, prior in priors.items() if not prior.relative}
+    order = sorted(priors, key=lambda name: (name in in_units, in_units.get(name, False)))
+    usual = {name: priors[name] for name in order}
     own = {name: prior for name, prior in (material or {}).items() if name in usual}
     return usual | own | priors_of(probe.stated_priors, probe, "[prior]")
 
@@ -274,21 +274,21 @@ def _check_common(
         )
 
 
-def _check(prior: Prior, known: Parameter, where: str, written: Written) -> None:
+def _check(prior: Prior, parameter: Parameter, where: str, written: Written) -> None:
     """Refuse a prior outside what a parameter can be, or with a spread that means nothing."""
-    if written == "factor" and known.lower < 0:
+    if written == "factor" and parameter.lower < 0:
         raise InputError(
             f"{where} may be negative: expected a spread in its unit such as '± "
-            f"{abs(known.upper) / 10:g}', found a factor"
+            f"{abs(parameter.upper) / 10:g}', found a factor"
         )
-    if not known.lower <= prior.value <= known.upper:
+    if not parameter.lower <= prior.value <= parameter.upper:
         raise InputError(
-            f"{where} = {prior.value:g}, expected a value from {known.lower:g} to {known.upper:g} "
-            f"{known.unit}"
+            f"{where} = {prior.value:g}, expected a value from {parameter.lower:g} to "
+            f"{parameter.upper:g} {parameter.unit}"
         )
     if prior.relative and prior.value == 0:
         raise InputError(f"{where}: a relative spread needs a value above 0")
-    share = prior.absolute / abs(prior.value or known.scale)
+    share = prior.absolute / abs(prior.value or parameter.scale)
     if not _LEAST <= share <= _MOST:
         raise InputError(
             f"{where}: a spread of {share:.2g} times the value, expected {_LEAST:g} to {_MOST:g}"

@@ -133,13 +133,13 @@ class Probe(ProbeParts):
 
     def sections(self) -> dict[str, dict[str, Any]]:
         """Return the sections as plain values: what `from_sections` takes, or refuses."""
-        found: dict[str, dict[str, Any]] = self.shape.sections()
+        sections: dict[str, dict[str, Any]] = self.shape.sections()
         if self.materials:
-            found[MATERIALS] = {name: kind.model_dump() for name, kind in self.materials.items()}
-        found |= {name: part.model_dump() for name, part in self.parts.items()}
+            sections[MATERIALS] = {name: kind.model_dump() for name, kind in self.materials.items()}
+        sections |= {name: part.model_dump() for name, part in self.parts.items()}
         if laws := own_laws(self.made_of):
-            found[LAWS] = laws
-        return {name: with_values(section) for name, section in found.items()}
+            sections[LAWS] = laws
+        return {name: with_values(section) for name, section in sections.items()}
 
     def with_(self, **changes: Any) -> Probe:
         """Return a copy with some values changed, each named by its key in a probe file.
@@ -161,8 +161,8 @@ class Probe(ProbeParts):
                     f"{name} counts when a drawing is read, expected it in the probe file"
                 )
             inside, (*above, last) = sections, section.split(".")
-            for one in [MATERIALS] if section in self.materials else above:
-                inside = inside.setdefault(one, {})
+            for part in [MATERIALS] if section in self.materials else above:
+                inside = inside.setdefault(part, {})
             inside.setdefault(last, {})[key] = value
         sections = {name: with_values(section) for name, section in sections.items()}
         shape = PARAMETRIC.get(str(sections["probe"]["shape"]))

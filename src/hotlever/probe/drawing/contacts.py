@@ -43,7 +43,7 @@ def terminal_edges(
         If a terminal touches nothing, or two touch each other.
     """
     edges = outline_edges(silicon)
-    found: list[Terminal] = []
+    ends: list[Terminal] = []
     for name, rings in terminals.items():
         lines = [ring for ring in rings if len(ring) == 2]
         part, closed = terminal_part(name), [ring for ring in rings if len(ring) != 2]
@@ -55,9 +55,9 @@ def terminal_edges(
         if not own:
             raise _touches_nothing(name, rings, silicon, edges, bool(areas))
         for start, end in dict.fromkeys(own):
-            found.append(Terminal(name, start, end))
-    check_apart(found)
-    return found
+            ends.append(Terminal(name, start, end))
+    check_apart(ends)
+    return ends
 
 
 def cut_away(
@@ -91,26 +91,26 @@ def cut_away(
         if area.covers(shapely.Point(tip)):
             raise DrawingError("it covers the tip", terminal_part(name), place=tip)
     pieces = parts_of(outline.difference(shapely.union_all(list(areas.values()))))
-    rest = next((one for one in pieces if one.covers(shapely.Point(tip))), None)
+    rest = next((piece for piece in pieces if piece.covers(shapely.Point(tip))), None)
     if rest is None:
         raise DrawingError(f"it lies outside the {body}", "tip_um", place=tip)
-    found = []
+    borders = []
     for start, end in outline_edges(rest):
         middle = LineString([start, end]).interpolate(0.5, normalized=True)
         if outline.boundary.distance(middle) > _OFF:
-            name = min(areas, key=lambda one: areas[one].boundary.distance(middle))
-            found.append(Terminal(name, start, end))
+            name = min(areas, key=lambda name: areas[name].boundary.distance(middle))
+            borders.append(Terminal(name, start, end))
     left = [
         end
         for end in ends
         if rest.boundary.distance(shapely.Point(np.mean([end.start, end.end], axis=0))) < _OFF
     ]
-    names = {end.name for end in (*left, *found)}
+    names = {end.name for end in (*left, *borders)}
     for name in (*areas, *(end.name for end in ends)):
         if name not in names:
             what = "between it and the tip another terminal, stated by area, takes all of the "
             raise DrawingError(f"{what}{body}", terminal_part(name), place=areas.get(name, outline))
-    return rest, [*left, *found]
+    return rest, [*left, *borders]
 
 
 def covered(layout: Layout, terminals: Iterable[DrawnTerminal], films: Iterable[Ring]) -> list[str]:
@@ -123,10 +123,14 @@ def covered(layout: Layout, terminals: Iterable[DrawnTerminal], films: Iterable[
     films : iterable of rings
         Outlines of all films: what these cover does not count as bare silicon.
     """
-    regions = [Polygon(one.outline, one.holes) for one in layout.regions]
+    regions = [Polygon(region.outline, region.holes) for region in layout.regions]
     body = shapely.union_all(regions)
     heaters = shapely.union_all(
-        [shape for shape, one in zip(regions, layout.regions, strict=True) if one.part == "heater"]
+        [
+            shape
+            for shape, region in zip(regions, layout.regions, strict=True)
+            if region.part == "heater"
+        ]
     )
     metal = shapely.union_all([Polygon(ring).buffer(0) for ring in films if len(ring) > 2])
     notes = []
@@ -187,8 +191,8 @@ def along(edge: tuple[Point, Point], line: Ring, tolerance: float) -> tuple[Poin
     return first, last
 
 
-def _point(place: np.ndarray) -> Point:
-    return float(place[0]), float(place[1])
+def _point(coordinates: np.ndarray) -> Point:
+    return float(coordinates[0]), float(coordinates[1])
 
 
 def _touches_nothing(
@@ -201,12 +205,12 @@ def _touches_nothing(
     shapes = [Polygon(ring) if len(ring) > 2 else LineString(ring) for ring in rings]
     away = [shape.distance(silicon.boundary) for shape in shapes]
     nearest = int(np.argmin(away))
-    place = shapely.shortest_line(shapes[nearest], silicon.boundary).coords[0]
+    point = shapely.shortest_line(shapes[nearest], silicon.boundary).coords[0]
     if away[nearest] > 0 or not has_area:
         what = f"it touches no edge of the silicon; the nearest is {away[nearest]:.3g} µm away"
     else:
         what = "no edge of the silicon lies inside it from corner to corner"
-    return DrawingError(what, terminal_part(name), nearest + 1, place)
+    return DrawingError(what, terminal_part(name), nearest + 1, point)
 
 
 def check_apart(terminals: list[Terminal]) -> None:
@@ -217,10 +221,10 @@ def check_apart(terminals: list[Terminal]) -> None:
     DrawingError
         With the place where they do.
     """
-    for place, one in enumerate(terminals):
-        for other in terminals[:place]:
-            a, b = LineString([one.start, one.end]), LineString([other.start, other.end])
-            if one.name != other.name and a.distance(b) < 1e-6:
+    for index, terminal in enumerate(terminals):
+        for other in terminals[:index]:
+            a, b = LineString([terminal.start, terminal.end]), LineString([other.start, other.end])
+            if terminal.name != other.name and a.distance(b) < 1e-6:
                 at = shapely.shortest_line(a, b).coords[0]
-                what, part = f"it touches '{other.name}'", terminal_part(one.name)
+                what, part = f"it touches '{other.name}'", terminal_part(terminal.name)
                 raise DrawingError(what, part, place=at)

@@ -127,7 +127,9 @@ class Etching:
         start, final = np.array(end.start), np.array(end.end)
         corners = shapely.get_coordinates(self.drawn)
         longer = _ASIDE * self._far * _unit(final - start)
-        whole = [np.linalg.norm(corners - one, axis=1).min() < _NEAR for one in (start, final)]
+        whole = [
+            np.linalg.norm(corners - corner, axis=1).min() < _NEAR for corner in (start, final)
+        ]
         line = (
             tuple(start - longer * whole[0]),
             tuple(final + longer * whole[1]),
@@ -156,9 +158,9 @@ class Etching:
                     strip = self._along_border(strip, points, borders)
             added += [
                 # without hairs, and a bit into the layer
-                one.buffer(-2 * _NEAR, **_STYLE).buffer(3 * _NEAR, **_STYLE)
-                for one in parts_of(strip.intersection(band))
-                if one.area > 10 * _NEAR * one.length
+                piece.buffer(-2 * _NEAR, **_STYLE).buffer(3 * _NEAR, **_STYLE)
+                for piece in parts_of(strip.intersection(band))
+                if piece.area > 10 * _NEAR * piece.length
             ]
         whole = shapely.union_all([shape, *added])
         return whole.simplify(STANDS_OUT * self._tolerance)
@@ -168,7 +170,11 @@ class Etching:
     ) -> BaseGeometry:
         """Return a strip along the outline whose end goes on where the layer's border does."""
         at, back = points[0], _unit(points[0] - points[1])
-        here = [one for one in _lines(borders) if one.distance(shapely.Point(at)) < 3 * _NEAR]
+        here = [
+            border_line
+            for border_line in _lines(borders)
+            if border_line.distance(shapely.Point(at)) < 3 * _NEAR
+        ]
         if not here:
             return strip
         coordinates = np.array(here[0].coords)
@@ -198,6 +204,6 @@ def _turn(before: tuple[Array, Array], after: tuple[Array, Array]) -> float:
 
 def _lines(shape: BaseGeometry) -> Iterable[LineString]:
     """Return the single lines of what two shapes have in common."""
-    parts = [one for one in shapely.get_parts(shape) if "Line" in one.geom_type]
+    parts = [line for line in shapely.get_parts(shape) if "Line" in line.geom_type]
     merged = shapely.line_merge(shapely.union_all(parts)) if parts else LineString()
-    return [one for one in shapely.get_parts(merged) if one.length > 0]
+    return [line for line in shapely.get_parts(merged) if line.length > 0]

@@ -53,7 +53,7 @@ def infer_layers(sheet: Sheet, tolerance: float) -> LayerInference:
     inferred = LayerInference()
     shapes = _shapes(sheet, tolerance, inferred.doubts)
     judged = [_Silicon(name, sheet, shapes, tolerance) for name in shapes]
-    best = max(judged, key=lambda one: one.merit, default=None)
+    best = max(judged, key=lambda candidate: candidate.merit, default=None)
     if best is None:
         inferred.doubts.append("no layer holds a closed outline")
         return inferred
@@ -104,7 +104,7 @@ class _Silicon:
         self, name: str, sheet: Sheet, shapes: dict[str, BaseGeometry], tolerance: float
     ) -> None:
         self.name, self.tolerance = name, tolerance
-        self.pieces = sorted(parts_of(shapes[name]), key=lambda one: -one.area)
+        self.pieces = sorted(parts_of(shapes[name]), key=lambda piece: -piece.area)
         self.shape: Polygon = self.pieces[0]
         self.areas = shapes
         self.cutters: list[str] = []
@@ -121,15 +121,17 @@ class _Silicon:
     def _is_cut_by(self, other: BaseGeometry) -> bool:
         """Whether the silicon falls apart, or has one more hole, without another layer."""
         inside = self._sizable(self.shape.intersection(other))
-        area = sum(one.area for one in inside)
+        area = sum(piece.area for piece in inside)
         if not 0 < area < _LARGEST_SHARE * self.shape.area:
             return False
         rest = self._sizable(self.shape.difference(other.buffer(self.tolerance)))
-        holes = sum(len(one.interiors) for one in rest)
+        holes = sum(len(piece.interiors) for piece in rest)
         return len(rest) > 1 or holes > len(self.shape.interiors)
 
     def _sizable(self, shape: BaseGeometry) -> list[Polygon]:
-        return [one for one in parts_of(shape) if one.area > 10 * self.tolerance * one.length]
+        return [
+            piece for piece in parts_of(shape) if piece.area > 10 * self.tolerance * piece.length
+        ]
 
     def ends_of(self, name: str, sheet: Sheet, layer: Layer) -> bool:
         """Whether a layer touches the outline along an edge."""
@@ -206,8 +208,8 @@ def _terminals(best: _Silicon, sheet: Sheet, inferred: LayerInference) -> None:
         inferred.doubts.append("no edges that could be terminals: supply and ground are missing")
         return
     rings_by = {
-        name: _terminal(sheet, sheet.layers[one]) if isinstance(one, str) else one
-        for name, one in given.items()
+        name: _terminal(sheet, sheet.layers[drawn]) if isinstance(drawn, str) else drawn
+        for name, drawn in given.items()
     }
     try:
         named = _named(best, inferred, rings_by)
@@ -263,7 +265,7 @@ def _grouped(partition: Partition, at: dict[str, set[int]], heaters: set[int]) -
     groups: list[list[str]] = []
     for name in at:
         reached = partition.reached(at[name], heaters)
-        group = next((one for one in groups if at[one[0]] & reached), None)
+        group = next((others for others in groups if at[others[0]] & reached), None)
         if group is None:
             groups.append([name])
         else:
@@ -275,7 +277,7 @@ def _behind_low_doped(partition: Partition, numbers: set[int], heaters: set[int]
     """Whether a terminal reaches the heater through another low-doped part only."""
     low = {number for number, piece in enumerate(partition.pieces) if SILICON not in piece.layers}
     reached = partition.reached(numbers, low)
-    return not any(partition.neighbours(one) & heaters for one in reached)
+    return not any(partition.neighbours(number) & heaters for number in reached)
 
 
 def _base(silicon: Polygon, heater: BaseGeometry) -> list[tuple[Point, Point]]:
@@ -299,14 +301,16 @@ def _tip(
     best: _Silicon, sheet: Sheet, shapes: dict[str, BaseGeometry], inferred: LayerInference
 ) -> None:
     """Find the place of the tip."""
-    for _, text, place in sheet.labels:
-        if "tip" in text.lower() and best.shape.contains(shapely.Point(place)):
-            inferred.tip = (round(place[0], 6), round(place[1], 6))
+    for _, text, point in sheet.labels:
+        if "tip" in text.lower() and best.shape.contains(shapely.Point(point)):
+            inferred.tip = (round(point[0], 6), round(point[1], 6))
             inferred.reasons["tip"] = f"the text '{text.strip()[:20]}' stands there"
             return
     heater = inferred.layers.get(HEATER)
     if isinstance(heater, str):
-        inside = max(parts_of(shapes[heater].intersection(best.shape)), key=lambda one: one.area)
+        inside = max(
+            parts_of(shapes[heater].intersection(best.shape)), key=lambda piece: piece.area
+        )
         middle = inside.centroid if inside.contains(inside.centroid) else inside.point_on_surface()
         inferred.tip = (round(middle.x, 6), round(middle.y, 6))
         inferred.reasons["tip"] = "the middle of the heater; no text in the drawing says 'tip'"

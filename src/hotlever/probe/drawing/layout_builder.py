@@ -181,13 +181,13 @@ def _check_on_body(
 ) -> None:
     for number, area in enumerate(areas, start=1):
         inside = area.intersection(outline)
-        if not any(one.area > tolerance**2 for one in parts_of(inside)):
+        if not any(piece.area > tolerance**2 for piece in parts_of(inside)):
             raise DrawingError(f"it lies outside the {body}", name, number, area)
 
 
 def _with_corners(silicon: Polygon, ends: list[Terminal]) -> Polygon:
     """Return the silicon with a corner wherever a terminal begins or ends."""
-    places = shapely.MultiPoint([place for end in ends for place in (end.start, end.end)])
+    places = shapely.MultiPoint([point for end in ends for point in (end.start, end.end)])
     return shapely.snap(silicon, places, 1e-6)
 
 
@@ -222,7 +222,7 @@ def _regions(
             taper,
             tuple(holes),
             material=layers[own].material,
-            films=tuple(Film(layers[one].material, layers[one].thickness_um) for one in films),
+            films=tuple(Film(layers[film].material, layers[film].thickness_um) for film in films),
             insulates=number in insulates,
         )
         regions.append(made if dopant_from is None else replace(made, dopant_from=dopant_from))
@@ -307,6 +307,6 @@ def _parts(
                 continue
             cut_off = leg - partition.reached(end, {*heaters, *insulates, number}) - {number}
             # current passes it if more of the leg, with heaters at it, lies behind it
-            if not any(partition.neighbours(one) & heaters for one in (*cut_off, number)):
+            if not any(partition.neighbours(piece) & heaters for piece in (*cut_off, number)):
                 parts |= dict.fromkeys((*cut_off, number), "reader branch")
     return [parts.get(number, "reader branch") for number in pieces]

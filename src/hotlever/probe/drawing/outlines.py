@@ -65,7 +65,7 @@ class DrawingError(InputError):
             place = place.representative_point().coords[0]
         self.place = None if place is None else (float(place[0]), float(place[1]))
         if isinstance(polygon, Sequence):
-            away = [one.boundary.distance(shapely.Point(self.place)) for one in polygon]
+            away = [candidate.boundary.distance(shapely.Point(self.place)) for candidate in polygon]
             polygon = 1 + int(np.argmin(away))
         self.what, self.part, self.polygon = what, part, polygon
         self.outlines = dict(outlines or {})
@@ -104,18 +104,18 @@ def polygons(part: str, rings: Iterable[Ring], tolerance: float) -> list[Polygon
     DrawingError
         If an outline is not closed, has no area, or crosses itself.
     """
-    found = []
+    areas = []
     for number, ring in enumerate(rings, start=1):
         if len(ring) < 3:
-            place = ring[0] if ring else None
-            raise DrawingError("an outline that is not closed", part, number, place)
+            start = ring[0] if ring else None
+            raise DrawingError("an outline that is not closed", part, number, start)
         polygon = Polygon(ring)
         if not polygon.is_valid:
             polygon = _unfolded(polygon, part, number)
         if polygon.area < tolerance**2:
             raise DrawingError("an outline without an area", part, number, ring[0])
-        found.append(polygon)
-    return found
+        areas.append(polygon)
+    return areas
 
 
 def _unfolded(polygon: Polygon, part: str, number: int) -> Polygon:
@@ -123,24 +123,24 @@ def _unfolded(polygon: Polygon, part: str, number: int) -> Polygon:
     unfolded = shapely.make_valid(polygon)
     enclosed = ring_area(np.array(polygon.exterior.coords))
     if unfolded.geom_type == "GeometryCollection":
-        areas = [one for one in unfolded.geoms if one.area > 0]
+        areas = [area for area in unfolded.geoms if area.area > 0]
         unfolded = areas[0] if len(areas) == 1 else MultiPolygon()
     if unfolded.geom_type == "Polygon" and math.isclose(unfolded.area, enclosed, rel_tol=1e-6):
         return unfolded
     reason = shapely.is_valid_reason(polygon)
-    place = tuple(map(float, reason.partition("[")[2].rstrip("]").split()[:2])) or None
-    raise DrawingError("an outline that crosses or touches itself", part, number, place)
+    point = tuple(map(float, reason.partition("[")[2].rstrip("]").split()[:2])) or None
+    raise DrawingError("an outline that crosses or touches itself", part, number, point)
 
 
-def together(found: list[Polygon]) -> BaseGeometry:
+def together(areas: list[Polygon]) -> BaseGeometry:
     """Return the union of polygons; one that lies inside another is a hole in it."""
-    unique = list({one.normalize().wkb: one for one in found}.values())
+    unique = list({area.normalize().wkb: area for area in areas}.values())
     inner, outer = STRtree(unique).query(unique, predicate="within")
     depth = np.bincount(inner[inner != outer], minlength=len(unique))
     whole: BaseGeometry = Polygon()
     for level in range(depth.max() + 1):
         here = shapely.union_all(
-            [unique[one] for one in np.flatnonzero(depth == level)], grid_size=GRID
+            [unique[index] for index in np.flatnonzero(depth == level)], grid_size=GRID
         )
         whole = whole.difference(here) if level % 2 else whole.union(here)
     return whole
@@ -149,7 +149,7 @@ def together(found: list[Polygon]) -> BaseGeometry:
 def without_nested(rings: tuple[Ring, ...]) -> tuple[Ring, ...]:
     """Return the outlines of a GDSII layer without those inside others, where they add nothing."""
     shapes = [Polygon(ring) if len(ring) > 2 else Polygon() for ring in rings]
-    sound = [one if one.is_valid else Polygon() for one in shapes]
+    sound = [polygon if polygon.is_valid else Polygon() for polygon in shapes]
     inner, outer = STRtree(sound).query(sound, predicate="within")
     # of equal ones the first stays
     nested = {
@@ -160,21 +160,21 @@ def without_nested(rings: tuple[Ring, ...]) -> tuple[Ring, ...]:
     return tuple(ring for number, ring in enumerate(rings) if number not in nested)
 
 
-def healed(part: str, found: list[Polygon], tolerance: float) -> BaseGeometry:
+def healed(part: str, areas: list[Polygon], tolerance: float) -> BaseGeometry:
     """Return the union of polygons, slits of less than the tolerance closed."""
-    whole = together(found)
+    whole = together(areas)
     half = tolerance / 2
     style = {"join_style": "mitre"}
     closed = whole.buffer(half * 1.01, **style).buffer(-half * 1.01, **style)
     # where there is no slit, closing changes the outline by rounding errors
     added = [
-        one
-        for one in parts_of(closed.difference(whole))
-        if one.area > GRID * (one.length + tolerance)
+        gap
+        for gap in parts_of(closed.difference(whole))
+        if gap.area > GRID * (gap.length + tolerance)
     ]
     if added:
         whole = shapely.union_all(
-            [whole, *(one.buffer(GRID, **style) for one in added)], grid_size=GRID
+            [whole, *(gap.buffer(GRID, **style) for gap in added)], grid_size=GRID
         )
     whole = whole.simplify(STANDS_OUT * tolerance)
     corners = shapely.count_coordinates(whole)
@@ -189,15 +189,15 @@ def healed(part: str, found: list[Polygon], tolerance: float) -> BaseGeometry:
 
 def parts_of(shape: BaseGeometry) -> list[Polygon]:
     """Return the polygons of a shape; lines and points are left out."""
-    return [one for one in shapely.get_parts(shape) if one.geom_type == "Polygon"] + [
+    return [part for part in shapely.get_parts(shape) if part.geom_type == "Polygon"] + [
         inner
-        for one in shapely.get_parts(shape)
-        if one.geom_type in ("MultiPolygon", "GeometryCollection")
-        for inner in parts_of(one)
+        for part in shapely.get_parts(shape)
+        if part.geom_type in ("MultiPolygon", "GeometryCollection")
+        for inner in parts_of(part)
     ]
 
 
-def one_piece(part: str, shape: BaseGeometry, found: list[Polygon]) -> Polygon:
+def one_piece(part: str, shape: BaseGeometry, drawn: list[Polygon]) -> Polygon:
     """Return a shape that must be one polygon.
 
     Raises
@@ -205,7 +205,7 @@ def one_piece(part: str, shape: BaseGeometry, found: list[Polygon]) -> Polygon:
     DrawingError
         If it is in several pieces, with the place where the two nearest nearly touch.
     """
-    pieces = sorted(parts_of(shape), key=lambda one: -one.area)
+    pieces = sorted(parts_of(shape), key=lambda piece: -piece.area)
     if len(pieces) == 1:
         return pieces[0]
     if not pieces:
@@ -213,12 +213,12 @@ def one_piece(part: str, shape: BaseGeometry, found: list[Polygon]) -> Polygon:
     others = pieces[1:]
     apart = [pieces[0].distance(other) for other in others]
     nearest = others[int(np.argmin(apart))]
-    place = shapely.shortest_line(nearest, pieces[0]).coords[0]
+    point = shapely.shortest_line(nearest, pieces[0]).coords[0]
     raise DrawingError(
         f"{len(pieces)} pieces, {min(apart):.3g} µm apart, expected one piece",
         part,
-        found,
-        place,
+        drawn,
+        point,
     )
 
 
@@ -246,7 +246,7 @@ def lines_of(shape: BaseGeometry) -> Array:
     return np.asarray(shapely.get_parts(shape))
 
 
-def check_widths(part: str, shape: Polygon, found: list[Polygon], narrowest: float) -> None:
+def check_widths(part: str, shape: Polygon, drawn: list[Polygon], narrowest: float) -> None:
     """Refuse a polygon that is narrow somewhere, or nearly touches itself.
 
     Raises
@@ -277,22 +277,22 @@ def check_widths(part: str, shape: Polygon, found: list[Polygon], narrowest: flo
                 f"a corner only {distance[worst]:.3g} µm from another edge of its outline, "
                 f"expected {narrowest:g} µm or more",
                 part,
-                found,
+                drawn,
                 points[worst],
             )
-    _check_angles(part, shape, found)
+    _check_angles(part, shape, drawn)
 
 
 def _ring_pairs(shape: Polygon) -> list[tuple[BaseGeometry, BaseGeometry]]:
     rings = [shape.exterior, *shape.interiors]
-    return [(one, other) for one in rings for other in rings]
+    return [(ring, other) for ring in rings for other in rings]
 
 
 #: Angle (rad) of a corner below which nothing is meshed.
 _SHARPEST = math.radians(1.0)
 
 
-def _check_angles(part: str, shape: Polygon, found: list[Polygon]) -> None:
+def _check_angles(part: str, shape: Polygon, drawn: list[Polygon]) -> None:
     for ring in (shape.exterior, *shape.interiors):
         corners = np.array(ring.coords)[:-1]
         before, after = (
@@ -305,6 +305,6 @@ def _check_angles(part: str, shape: Polygon, found: list[Polygon]) -> None:
             raise DrawingError(
                 f"a corner of {math.degrees(angle.min()):.2g}°, expected 1° or more",
                 part,
-                found,
+                drawn,
                 corners[int(angle.argmin())],
             )

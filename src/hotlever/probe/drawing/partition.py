@@ -52,38 +52,38 @@ class Partition:
 
     def neighbours(self, number: int) -> set[int]:
         """Return the pieces that touch one along an edge."""
-        return {one for pair in self.shared if number in pair for one in pair} - {number}
+        return {other for pair in self.shared if number in pair for other in pair} - {number}
 
     def reached(self, start: set[int], without: set[int]) -> set[int]:
         """Return the pieces that some are connected with, other than through these."""
-        found, new = set(start) - without, set(start) - without
+        reached, new = set(start) - without, set(start) - without
         while new:
-            new = set().union(*(self.neighbours(one) for one in new)) - found - without
-            found |= new
-        return found
+            new = set().union(*(self.neighbours(piece) for piece in new)) - reached - without
+            reached |= new
+        return reached
 
     def part_of(self, number: int) -> set[int]:
         """Return the pieces that make one part of the body with one, whatever lies on them."""
         own = self.pieces[number].layers[0]
-        others = {one for one, piece in enumerate(self.pieces) if piece.layers[0] != own}
+        others = {other for other, piece in enumerate(self.pieces) if piece.layers[0] != own}
         return self.reached({number}, others)
 
     def beside(self, number: int) -> set[str]:
         """Return the parts, or the body, that border on the part of a piece."""
-        around = set[int]().union(*(self.neighbours(one) for one in self.part_of(number)))
-        return {self.pieces[one].layers[0] for one in around} - {self.pieces[number].layers[0]}
+        around = set[int]().union(*(self.neighbours(other) for other in self.part_of(number)))
+        return {self.pieces[other].layers[0] for other in around} - {self.pieces[number].layers[0]}
 
     def touched_by(self, ends: list[Terminal], tolerance: float) -> dict[str, set[int]]:
         """Return the numbers of the pieces that each terminal touches."""
-        found: dict[str, set[int]] = {}
+        pieces: dict[str, set[int]] = {}
         for end in ends:
             edge = LineString([end.start, end.end])
             along = [piece.shape.boundary.intersection(edge).length for piece in self.pieces]
             touched = {number for number, length in enumerate(along) if length > tolerance}
             middle = edge.interpolate(0.5, normalized=True)
             away = [piece.shape.boundary.distance(middle) for piece in self.pieces]
-            found.setdefault(end.name, set()).update(touched or {int(np.argmin(away))})
-        return found
+            pieces.setdefault(end.name, set()).update(touched or {int(np.argmin(away))})
+        return pieces
 
     def taper(self, number: int, sources: set[str], tolerance: float) -> Taper | BorderTaper | None:
         """Return how the doping of a low-doped piece is tapered from its neighbours, if it is.
@@ -135,10 +135,10 @@ def partitioned(
     """
     (body_name, outline), films = body, films or {}
     names = list(parts)
-    for place, name in enumerate(names):
-        for other in names[:place]:
+    for index, name in enumerate(names):
+        for other in names[:index]:
             both = parts[name].intersection(parts[other])
-            if any(one.buffer(-10 * GRID).area > 0 for one in parts_of(both)):
+            if any(overlap.buffer(-10 * GRID).area > 0 for overlap in parts_of(both)):
                 raise DrawingError(f"it overlaps with '{other}'", name, place=both)
     drawn = [*parts.values(), *films.values()]
     noded = shapely.union_all(
@@ -153,9 +153,9 @@ def partitioned(
             kinds[part, *on_it].append(face)
     order = [*names, body_name]
     pieces = [
-        Piece(kind, orient(one))
+        Piece(kind, orient(shape))
         for kind in sorted(kinds, key=lambda kind: order.index(kind[0]))
-        for one in sorted(parts_of(shapely.union_all(kinds[kind])), key=lambda one: -one.area)
+        for shape in sorted(parts_of(shapely.union_all(kinds[kind])), key=lambda shape: -shape.area)
     ]
     owners: dict[Edge, list[int]] = defaultdict(list)
     for number, piece in enumerate(pieces):

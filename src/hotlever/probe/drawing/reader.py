@@ -48,13 +48,13 @@ def read_stream(path: str, kind: str, cell: str | None, unit_um: float | None) -
     stated_um = 1e6 * gdstk.gds_units(path)[0] if kind == "GDSII" else 1.0
     scale = 1.0 if unit_um is None else unit_um / stated_um
     library = (gdstk.read_gds if kind == "GDSII" else gdstk.read_oas)(path, unit=1e-6)
-    cells: dict[str, Any] = {one.name: one for one in library.cells}
-    top = [one.name for one in library.top_level()]
+    cells: dict[str, Any] = {each.name: each for each in library.cells}
+    top = [each.name for each in library.top_level()]
     sheet: dict[str, Any] = {"kind": kind, "cells": sorted(cells), "top": sorted(top)}
     sheet["unit_um"] = unit_um or stated_um
     counts: dict[str, int] = {}
-    for one in library.cells:
-        _count(one, counts, ())
+    for each in library.cells:
+        _count(each, counts, ())
     if cell is None:
         if len(top) != 1:
             return sheet | {"cell": None, "layers": {}, "labels": []}
@@ -84,14 +84,14 @@ def _count(cell: Any, counts: dict[str, int], above: tuple[str, ...]) -> int:
     if cell.name in above:
         raise Refusal(f"cell '{cell.name}' refers to itself")
     if cell.name not in counts:
-        found = len(cell.polygons) + len(cell.paths)
+        polygons = len(cell.polygons) + len(cell.paths)
         for reference in cell.references:
             inner = reference.cell
             if isinstance(inner, str):
                 raise Refusal(f"cell '{cell.name}' refers to '{inner}', which is not there")
             times = max(1, reference.repetition.size or 1)
-            found += times * _count(inner, counts, (*above, cell.name))
-        counts[cell.name] = found
+            polygons += times * _count(inner, counts, (*above, cell.name))
+        counts[cell.name] = polygons
     return counts[cell.name]
 
 

@@ -275,7 +275,9 @@ def _is_points(given: Any) -> bool:
         and all(
             isinstance(point, list | tuple)
             and len(point) == 2
-            and all(type(one) in (int, float) and abs(one) < 1e6 for one in point)
+            and all(
+                type(coordinate) in (int, float) and abs(coordinate) < 1e6 for coordinate in point
+            )
             for point in given
         )
     )

@@ -121,15 +121,15 @@ def read_sheet(
         If the file cannot be read, has no such cell or several top cells.
     """
     content = read_bytes(path, _LARGEST)
-    found = _read_apart(content, str(path), cell, unit_um, tolerance_um)
+    parsed = _read_apart(content, str(path), cell, unit_um, tolerance_um)
     layers = {}
-    for name, one in sorted(found["layers"].items()):
-        joined, lines = _joined(_points(one["lines"], str(path)), tolerance_um)
-        layers[name] = Layer((*_points(one["rings"], str(path)), *joined), lines)
-    labels = tuple((layer, text, (x, y)) for layer, text, x, y in found["labels"])
-    rest = {name: found[name] for name in ("unit_um", "unit_stated", "left_out") if name in found}
-    cells, top = tuple(found["cells"]), tuple(found["top"])
-    sheet = Sheet(str(path), found["kind"], cells, top, found["cell"], layers, labels, **rest)
+    for name, outlines in sorted(parsed["layers"].items()):
+        joined, lines = _joined(_points(outlines["lines"], str(path)), tolerance_um)
+        layers[name] = Layer((*_points(outlines["rings"], str(path)), *joined), lines)
+    labels = tuple((layer, text, (x, y)) for layer, text, x, y in parsed["labels"])
+    rest = {name: parsed[name] for name in ("unit_um", "unit_stated", "left_out") if name in parsed}
+    cells, top = tuple(parsed["cells"]), tuple(parsed["top"])
+    sheet = Sheet(str(path), parsed["kind"], cells, top, parsed["cell"], layers, labels, **rest)
     if sheet.kind == "DXF":
         if cell is not None:
             raise InputError(f"{path}: cell = {quoted(cell)}: a DXF file has no cells")
@@ -178,12 +178,12 @@ def _read_apart(
         except subprocess.TimeoutExpired:
             raise InputError(f"{path}: not read within {_PATIENCE_S:g} s") from None
     try:
-        found: dict[str, Any] = json.loads(done.stdout)
+        sheet: dict[str, Any] = json.loads(done.stdout)
     except ValueError:
         raise InputError(f"{path}: a damaged file, which cannot be read") from None
-    if "error" in found:
-        raise InputError(f"{path}: {' '.join(found['error'].split())}")
-    return found
+    if "error" in sheet:
+        raise InputError(f"{path}: {' '.join(sheet['error'].split())}")
+    return sheet
 
 
 def _points(rings: list[list[list[float]]], path: str) -> tuple[Ring, ...]:
@@ -201,7 +201,7 @@ def _joined(lines: tuple[Ring, ...], tolerance: float) -> tuple[tuple[Ring, ...]
     """Return the closed outlines that lines make whose ends meet, and the lines that are left."""
     if not lines:
         return (), ()
-    places = np.array([place for line in lines for place in (line[0], line[-1])])
+    places = np.array([point for line in lines for point in (line[0], line[-1])])
     # each end goes to the first of those near it
     near = spatial.cKDTree(places).query_ball_point(places, tolerance)
     ends = iter([tuple(places[min(some)].tolist()) for some in near])
@@ -209,7 +209,8 @@ def _joined(lines: tuple[Ring, ...], tolerance: float) -> tuple[tuple[Ring, ...]
     some = [LineString(line) for line in met if len(set(line)) > 1]
     closed, cuts, dangles, _ = shapely.polygonize_full(some)
     rings = tuple(
-        tuple((x, y) for x, y in one.exterior.coords[:-1]) for one in shapely.get_parts(closed)
+        tuple((x, y) for x, y in polygon.exterior.coords[:-1])
+        for polygon in shapely.get_parts(closed)
     )
     rest = [line for group in (cuts, dangles) for line in shapely.get_parts(group)]
     return rings, tuple(tuple((x, y) for x, y in line.coords) for line in rest)
@@ -243,7 +244,7 @@ def sensible_unit(extent_um: float, unit_um: float) -> str | None:
     >>> sensible_unit(0.0544, 1.0), sensible_unit(54_400.0, 1000.0), sensible_unit(0.0, 1.0)
     ('mm', 'um', None)
     """
-    sizes = {name: extent_um / unit_um * one for name, one in UNITS.items()}
+    sizes = {name: extent_um / unit_um * size_um for name, size_um in UNITS.items()}
     return next((name for name, size in sizes.items() if is_lever(size)), None)
 
 
