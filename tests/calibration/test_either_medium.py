@@ -145,8 +145,8 @@ def test_a_left_out_datum_is_no_gain():
     measured = Measurement(bias, shown, nothing, nothing, nothing, current_error_mA=errors)
     residuals = Residuals(measured, ["current"], "errors")
     values = np.stack([current, nothing, nothing])
-    plain = residuals.normalisation
+    plain = residuals.errors.normalisation
     assert plain == pytest.approx(2.0 * 20 * np.log(0.01))
-    residuals.lessen(values, gently=False)
+    residuals.errors.lessen(residuals.difference(values), gently=False)
     assert np.sum(residuals.weighted(values) ** 2) == pytest.approx(0.0, abs=1e-9)
-    assert residuals.normalisation == pytest.approx(plain + 36.0)
+    assert residuals.errors.normalisation == pytest.approx(plain + 36.0)

@@ -11,7 +11,7 @@ from test_fit import TRUTH, twin
 from hotlever.estimation import FitOptions, fit
 from hotlever.estimation.experiment_at_rest import reduced_experiment
 from hotlever.estimation.inverse_problem import estimate
-from hotlever.estimation.noise import Drift
+from hotlever.estimation.residuals import Drift
 
 
 @pytest.fixture(scope="module")

@@ -44,7 +44,7 @@ class OneUnknown(Objective):
             size=0,
             data=np.zeros((1, 0)),
             present=np.zeros((1, 0), dtype=bool),
-            without_errors=np.zeros(1, dtype=bool),
+            errors=SimpleNamespace(without=np.zeros(1, dtype=bool)),
             weighted=lambda values: np.zeros(0),
             jacobian=lambda slopes: np.zeros((0, 1)),
         )

@@ -45,10 +45,10 @@ def test_outliers_do_not_tell_how_noise_goes(place):
 
 def test_what_a_fit_has_taken_up_counts_as_noise():
     """The last ten residuals are half of the noise that was there."""
-    used_up = np.where(np.arange(SHOWN.size) < 30, 0.0, 0.75)
+    leverage = np.where(np.arange(SHOWN.size) < 30, 0.0, 0.75)
     whole = [noise(n, 2e-3) for n in range(40)]
-    left = [one * np.sqrt(1 - used_up) for one in whole]
-    found = [relative_noise(one, SHOWN, used_up, USUAL) for one in left]
+    left = [difference * np.sqrt(1 - leverage) for difference in whole]
+    found = [relative_noise(one, SHOWN, leverage, USUAL) for one in left]
     expected = [relative_noise(one, SHOWN, NOTHING, USUAL) for one in whole]
     np.testing.assert_allclose(found, expected)
 
@@ -69,19 +69,27 @@ def residuals_of(current):
     """Return the residuals of a measurement whose current is predicted as shown."""
     nothing = np.full(SHOWN.size, np.nan)
     measurement = Measurement(np.arange(1.0, 41.0), current, nothing, nothing, nothing)
-    found = Residuals(measurement, ("current",), "errors")
+    residuals = Residuals(measurement, ("current",), "errors")
     predicted = np.stack([SHOWN, SHOWN, SHOWN])
     for _ in range(3):
-        found.take_scatter(predicted, usual=1e-3)
-    return found, predicted
+        residuals.take_scatter(predicted, usual=1e-3)
+    return residuals, predicted
 
 
 def test_noise_of_large_data_makes_no_outliers_of_them():
     currents = [SHOWN + noise(n, 2e-3 * SHOWN) for n in range(40)]
     found = [residuals_of(current) for current in currents]
-    assert np.mean([one.has_outliers(predicted) for one, predicted in found]) < 0.1
+    assert (
+        np.mean(
+            [
+                residuals.errors.has_outliers(residuals.difference(predicted))
+                for residuals, predicted in found
+            ]
+        )
+        < 0.1
+    )
     # each datum has the weight that its own noise gives it
-    weights = np.mean([one.by[0] for one, _ in found], axis=0)
+    weights = np.mean([residuals.errors.weights[0] for residuals, _ in found], axis=0)
     np.testing.assert_allclose(weights[8:] * 2e-3 * SHOWN[8:], 1.0, atol=0.12)
 
 
@@ -89,14 +97,14 @@ def test_an_outlier_is_one():
     spoilt = SHOWN + noise(4, 2e-3 * SHOWN)
     spoilt[30] *= 1.02
     residuals, predicted = residuals_of(spoilt)
-    assert residuals.has_outliers(predicted)
+    assert residuals.errors.has_outliers(residuals.difference(predicted))
 
 
 def test_what_is_smooth_is_no_noise():
     """A current that bends away from the prediction by a tenth has noise of a thousandth."""
     bent = SHOWN + 0.1 * SHOWN.max() * np.sin(np.linspace(0.0, np.pi, SHOWN.size))
     wrong, _ = residuals_of(bent + noise(5, 1e-3 * SHOWN.max()))
-    assert np.sqrt(np.mean(wrong.by**-2.0)) < 6e-3 * SHOWN.max()
+    assert np.sqrt(np.mean(wrong.errors.weights**-2.0)) < 6e-3 * SHOWN.max()
     # and noise is counted in full
     right, _ = residuals_of(SHOWN + noise(5, 0.05 * SHOWN.max()))
-    assert np.sqrt(np.mean(right.by**-2.0)) > 0.04 * SHOWN.max()
+    assert np.sqrt(np.mean(right.errors.weights**-2.0)) > 0.04 * SHOWN.max()

@@ -59,7 +59,7 @@ def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
     found = estimate(reference_curve, Probe.u_shape(), FitOptions(), model=model)
     objective, at = found.objective, found.prediction
     least, optimum = objective.squares(at), objective.point(at.probe)
-    noise = found.residuals.noise_squares(at.values)
+    noise = found.residuals.errors.noise_squares(found.residuals.difference(at.values))
     assert found.optimum.converged
     jacobian = objective.jacobian(at.slopes, optimum)
     axes = np.linalg.svd(jacobian)[2]
@@ -70,7 +70,8 @@ def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
             step = min(np.sqrt(noise) / size, 0.2)
             there = objective.at(at.probe, optimum + way * step * axis)
             assert (
-                objective.squares(found.optimiser.model.predict(there, at)) > least - 0.05 * noise
+                objective.squares(found.predictor.experiment.predict(there, at))
+                > least - 0.05 * noise
             )
 
 
@@ -131,7 +132,7 @@ def test_a_search_that_was_ended_says_that_it_has_not_converged(coarse):
     model = full_experiment(coarse, residuals.bias).measuring(residuals.bias, residuals.shown)
     options = SearchOptions(most_branches=2)
     objective = Objective(residuals, far, model.names, list(PARAMETERS))
-    search = Optimiser(model, objective, options=options)
+    search = Optimiser(objective, model, options)
     optimum = search.solve(far)
     assert not optimum.converged
     assert optimum.decrement > 1e-3 * search.objective.squares(optimum.prediction)

@@ -24,10 +24,10 @@ from hotlever.calibration.tip_temperature import (
 )
 from hotlever.errors import ComputationError
 from hotlever.estimation import Fit, FitOptions, Measurement
+from hotlever.estimation.experiment import TIP
 from hotlever.estimation.experiment_at_rest import PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate, estimate
 from hotlever.estimation.lack_of_fit import suspicious_points
-from hotlever.estimation.objective import TIP
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE

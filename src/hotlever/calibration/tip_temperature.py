@@ -18,8 +18,8 @@ import xarray as xr
 from hotlever.calibration.table import TOTAL_POWER, table_by_bias, total_error
 from hotlever.datasets import quantity
 from hotlever.errors import InputError
+from hotlever.estimation.experiment import TIP
 from hotlever.estimation.inverse_problem import Estimate
-from hotlever.estimation.objective import TIP
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.profile import profile_of_tip
 from hotlever.lever import Branch
@@ -194,12 +194,14 @@ def _credible_interval(
         # what samples takes a second to load, for which few calibrations have to wait
         from hotlever.estimation.sampling import sample_tip
 
-        sampled = sample_tip(posterior, estimate.optimiser, samples=samples, progress=progress)
+        sampled = sample_tip(posterior, estimate.predictor, samples=samples, progress=progress)
         if sampled.enough:
             return *sampled.profile.credible_interval(tip, stderr, of_model), sampled.note
         too_few = sampled.note
     profile = (
-        profile_of_tip(posterior, estimate.optimiser.model) if estimate.objective.informed else None
+        profile_of_tip(posterior, estimate.predictor.experiment)
+        if estimate.objective.informed
+        else None
     )
     if profile is None or profile.linear:
         away = BAND * np.hypot(stderr, of_model)

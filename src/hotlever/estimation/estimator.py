@@ -13,10 +13,8 @@ import xarray as xr
 from hotlever.errors import unknown_name
 from hotlever.estimation.diagnosis import Diagnosis
 from hotlever.estimation.experiment import Experiment, Prediction
-from hotlever.estimation.experiment_in_time import PredictionInTime
 from hotlever.estimation.inverse_problem import Estimate, error_of_choice, estimate, likelier
 from hotlever.estimation.lack_of_fit import suspicious_points, undescribed
-from hotlever.estimation.objective import TIP
 from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
 from hotlever.estimation.result import Fit, band_dataset
 from hotlever.estimation.summary import undetermined
@@ -102,7 +100,9 @@ def _fit_of(estimate: Estimate) -> Fit:
     in_time = estimate.measurement.time_us is not None
     notes = suspicious_points(residuals, values, options.robust)
     notes += residuals.drifting_zeros(values, posterior.slopes)
-    chi_square = residuals.reduced_chi_square(values, len(options.varied))
+    chi_square = residuals.errors.reduced_chi_square(
+        residuals.difference(values), len(options.varied)
+    )
     converged, reason = estimate.verdict(undescribed(residuals, values))
     if chi_square is not None:
         text = (
@@ -123,8 +123,8 @@ def _fit_of(estimate: Estimate) -> Fit:
         sum_of_squares=float(weighted @ weighted),
         residual_rms=residuals.rms(values),
         band=_band(estimate),
-        evaluations=estimate.optimiser.evaluations,
-        steps=estimate.optimiser.steps,
+        evaluations=estimate.predictor.evaluations,
+        steps=estimate.optimum.optimiser.steps,
         reason=reason,
         converged=converged,
         seconds=estimate.seconds,
@@ -136,16 +136,12 @@ def _fit_of(estimate: Estimate) -> Fit:
 
 def _band(estimate: Estimate) -> xr.Dataset:
     """Return the tip temperature and its standard error, at the rows or where it was followed."""
-    at, posterior = estimate.prediction, estimate.posterior
-    values, slopes, along = at.values, at.slopes, {"bias_V": estimate.residuals.bias}
-    waveform = estimate.measurement.waveform
-    if waveform is not None and isinstance(at, PredictionInTime):
-        values, slopes = at.seen, at.seen_by
-        along = {"time_us": at.at, "bias_V": waveform.bias(at.at)}
-    by_tip = slopes[TIP][:, estimate.objective.columns]
-    power = estimate.probe.circuit.power(along["bias_V"], values[0])
-    stderr = np.sqrt(np.einsum("bi,ij,bj->b", by_tip, posterior.covariance, by_tip))
-    return band_dataset(**along, power_mW=power, tip_K=values[TIP], tip_stderr_K=stderr)
+    columns, covariance = estimate.prediction.columns, estimate.posterior.covariance
+    slopes = estimate.prediction.tip_slopes[:, estimate.objective.columns]
+    along = {name: columns[name] for name in ("time_us", "bias_V") if name in columns}
+    power = estimate.probe.circuit.power(columns["bias_V"], columns["current_mA"])
+    stderr = np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes))
+    return band_dataset(**along, power_mW=power, tip_K=columns["tip_K"], tip_stderr_K=stderr)
 
 
 def chosen_options(options: FitOptions | None, choices: dict[str, Any]) -> FitOptions:

@@ -7,14 +7,19 @@ by the full one at the probe of a prediction.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 from hotlever.estimation.surrogate import Surrogate
 from hotlever.probe import Probe
 from hotlever.types import Array
 
+#: Where predictions have the tip temperature; see `hotlever.datasets.OBSERVABLES`.
+TIP = 2
 
-class Prediction(Protocol):
+
+@dataclass(frozen=True)
+class Prediction:
     """What an instrument and a thermometer would show of a probe.
 
     Attributes
@@ -26,20 +31,19 @@ class Prediction(Protocol):
         Derivatives by the experiment's parameters.
     surrogate : Surrogate
         Predictions for similar probes.
+    columns : dict of str to ndarray, shape (m,)
+        What it shows where it was solved, by the names that a sweep or a history has, first that of
+        the bias or the time; ``bias_V``, ``current_mA`` and ``tip_K`` among them.
+    tip_slopes : ndarray, shape (m, k)
+        Derivatives of the last.
     """
 
-    @property
-    def probe(self) -> Probe: ...
-    @property
-    def values(self) -> Array: ...
-    @property
-    def slopes(self) -> Array: ...
-    @property
-    def surrogate(self) -> Surrogate: ...
-
-    def columns(self) -> dict[str, Array]:
-        """Return what it shows, by the names that a sweep or a history has."""
-        ...
+    probe: Probe
+    values: Array
+    slopes: Array
+    surrogate: Surrogate
+    columns: dict[str, Array]
+    tip_slopes: Array
 
 
 class Experiment(Protocol):

@@ -9,11 +9,11 @@ branches is added to the fast one's from then on. Parameters are what
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from scipy.interpolate import BSpline
 
+from hotlever.estimation.experiment import TIP, Prediction
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.surrogate import CurveSurrogate
 from hotlever.lever.branch import Branch, Reach, shifted
@@ -40,52 +40,23 @@ _BEYOND_ZERO = 0.05
 _CORRECTED_AT = 10
 
 
-class BranchSolver(Protocol):
-    """A lever that is solved for any similar probe: full, coarse or reduced."""
-
-    def linearised(
-        self,
-        probe: Probe,
-        reach: Reach,
-        near: Linearised | None = None,
-        names: tuple[str, ...] = ...,
-    ) -> Linearised:
-        """Return the branch of a probe, with its derivatives by some parameters."""
-        ...
+# A lever that is solved for any similar probe: full or coarse, or reduced.
+BranchSolver = SimilarLevers | ReducedLever
 
 
 @dataclass(frozen=True)
-class PredictionAtRest:
-    """What an instrument and a thermometer would show.
+class PredictionAtRest(Prediction):
+    """What an instrument and a thermometer would show at some biases.
 
     Attributes
     ----------
-    values : ndarray, shape (3, n)
-        I_h (mA), V_r (V) and T_tip (K) at the biases.
-    slopes : ndarray, shape (3, n, p)
-        Derivatives by the model's parameters at fixed bias.
-    linearised : Linearised
-        What they were read from, not corrected.
     surrogate : CurveSurrogate
-        Predictions for similar probes.
+    linearised : Linearised
+        What it was read from, not corrected.
     """
 
-    values: Array
-    slopes: Array
-    linearised: Linearised
     surrogate: CurveSurrogate
-
-    @property
-    def probe(self) -> Probe:
-        """The probe it is for."""
-        return self.linearised.probe
-
-    def columns(self) -> dict[str, Array]:
-        """Return what it shows, by the names that a sweep has, each (n,)."""
-        bias, (current, reader, tip) = self.surrogate.rows.bias_V, self.values
-        lever = self.probe.circuit.lever_voltage(bias, current)
-        shown = {"bias_V": bias, "lever_V": lever}
-        return shown | {"current_mA": current, "reader_V": reader, "tip_K": tip}
+    linearised: Linearised
 
 
 @dataclass(frozen=True)
@@ -99,11 +70,6 @@ class Correction:
     at: Array
     values: BSpline
     slopes: BSpline
-
-    @classmethod
-    def through(cls, at: Array, u: Array, values: Array, slopes: Array) -> Correction:
-        """Make curves through what is lacking at some u."""
-        return cls(at, spline_through(u, values), spline_through(u, slopes))
 
     def added(self, branch: Branch, at: Array) -> Branch:
         """Return a branch of the fast lever with what it lacks, for some values of parameters."""
@@ -178,9 +144,17 @@ class ExperimentAtRest:
             branch = self.correction.added(branch, probe.values(self.names))
             by_parameter = by_parameter + self.correction.slopes(branch.u)
         rows = Rows(self.bias, self.shown)
-        shown = rows.differentiated(branch, by_parameter, probe.circuit, self.names)
+        values, slopes = rows.differentiated(branch, by_parameter, probe.circuit, self.names)
+        current, reader, tip = values
+        columns = {
+            "bias_V": self.bias,
+            "lever_V": probe.circuit.lever_voltage(self.bias, current),
+            "current_mA": current,
+            "reader_V": reader,
+            "tip_K": tip,
+        }
         surrogate = CurveSurrogate(probe, self.names, branch, by_parameter, rows)
-        return PredictionAtRest(*shown, linearised, surrogate)
+        return PredictionAtRest(probe, values, slopes, surrogate, columns, slopes[TIP], linearised)
 
     @one_blas_thread
     def confirmed(self, at: PredictionAtRest) -> ExperimentAtRest:
@@ -207,9 +181,9 @@ class ExperimentAtRest:
         if equations.circuit.starts_cold:
             # without power nothing is lacking
             u = np.append(0.0, u)
-            values, slopes = (np.insert(lacking, 0, 0.0, axis=0) for lacking in (values, slopes))
-        correction = Correction.through(probe.values(self.names), u, values, slopes)
-        return replace(self, correction=correction)
+            values, slopes = (np.insert(each, 0, 0.0, axis=0) for each in (values, slopes))
+        lacking = spline_through(u, values), spline_through(u, slopes)
+        return replace(self, correction=Correction(probe.values(self.names), *lacking))
 
     def _full_states(
         self, fast: Branch, equations: LeverEquations, probe: Probe

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from hotlever.datasets import observables_of
+from hotlever.datasets import OBSERVABLES, observables_of
 from hotlever.errors import InputError
+from hotlever.estimation.experiment import TIP, Prediction
 from hotlever.estimation.surrogate import LinearSurrogate
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
@@ -30,6 +31,8 @@ from hotlever.types import Array, Index
 _PER_DECADE = 12
 #: Error of a step (K): some parts in a hundred thousand of the current.
 _TOLERANCE_K = 0.05
+#: What is shown, by the names that a history has.
+_SHOWN = [column.name for column in OBSERVABLES.values()]
 
 
 class _Times:
@@ -46,26 +49,26 @@ class _Times:
         ends: list[float] = []
         for piece in waveform.pieces(float(rows[-1]) * (1.0 + 1e-9)):
             here = (rows > piece.start) | ((rows == 0.0) & (piece.start == 0.0))
-            place = np.flatnonzero(here & (rows <= piece.end))
+            indices = np.flatnonzero(here & (rows <= piece.end))
             ends.append(min(piece.end, float(rows[-1])))
-            if place.size:
-                parts.append((place, *_few(rows[place], piece)))
+            if indices.size:
+                parts.append((indices, *_few(rows[indices], piece)))
         self.at = np.unique(np.concatenate([ends, *(at for _, at, _ in parts)]))
         self._parts = [
-            (place, np.searchsorted(self.at, at), None if start is None else (rows[place], start))
-            for place, at, start in parts
+            (indices, np.searchsorted(self.at, at), rows[indices], start)
+            for indices, at, start in parts
         ]
 
-    def at_rows(self, found: Array) -> Array:
+    def at_rows(self, values: Array) -> Array:
         """Return what is seen at the rows, (3, n, ...), of that at the times, (3, m, ...)."""
-        seen = np.empty((len(found), self._count, *found.shape[2:]))
-        for place, node, between in self._parts:
-            seen[:, place] = (
-                found[:, node]
-                if between is None
-                else _smooth(self.at[node], found[:, node], *between)
-            )
-        return seen
+        at_rows = np.empty((len(values), self._count, *values.shape[2:]))
+        for indices, nodes, rows, start in self._parts:
+            part = values[:, nodes]
+            if start is not None:
+                spline = make_interp_spline(np.log(self.at[nodes] - start), part, 3, axis=1)
+                part = spline(np.log(rows - start))
+            at_rows[:, indices] = part
+        return at_rows
 
 
 def _few(rows: Array, piece: Piece) -> tuple[Array, float | None]:
@@ -84,51 +87,19 @@ def _few(rows: Array, piece: Piece) -> tuple[Array, float | None]:
     return few, piece.start
 
 
-def _smooth(at: Array, found: Array, rows: Array, start: float) -> Array:
-    along = np.log(rows - start)
-    return np.asarray(make_interp_spline(np.log(at - start), found, 3, axis=1)(along))
-
-
 @dataclass(frozen=True)
-class PredictionInTime:
+class PredictionInTime(Prediction):
     """What an instrument and a thermometer would show in time.
 
     Attributes
     ----------
-    probe : Probe
-        That it is for.
-    values : ndarray, shape (3, n)
-        I_h (mA), V_r (V) and T_tip (K) at the rows.
-    slopes : ndarray, shape (3, n, p)
-        Their derivatives by the parameters.
-    names : tuple of str
-        The parameters.
-    at : ndarray, shape (m,)
-        Times (µs) at which the lever was followed.
-    seen, seen_by : ndarray, shapes (3, m) and (3, m, p)
-        The same there.
-    uncorrected : ndarray, shape (3, m)
-        What the coarse lever itself shows.
+    coarse : ndarray, shape (3, m)
+        What the coarse lever itself shows at the times at which it was followed.
+    coarse_slopes : ndarray, shape (3, m, k)
     """
 
-    probe: Probe
-    values: Array
-    slopes: Array
-    names: tuple[str, ...]
-    at: Array
-    seen: Array
-    seen_by: Array
-    uncorrected: Array
-
-    def columns(self) -> dict[str, Array]:
-        """Return what it shows, by the names that a history has, each (m,)."""
-        current, reader, tip = self.seen
-        return {"time_us": self.at, "current_mA": current, "reader_V": reader, "tip_K": tip}
-
-    @property
-    def surrogate(self) -> LinearSurrogate:
-        """Predictions for similar probes."""
-        return LinearSurrogate(self.probe.values(self.names), self.values, self.slopes)
+    coarse: Array
+    coarse_slopes: Array
 
 
 @dataclass(frozen=True)
@@ -184,20 +155,28 @@ class ExperimentInTime:
             If silicon melts, or a step fails.
         """
         if near is not None and near.probe == probe:
-            seen, seen_by = near.uncorrected, near.seen_by
+            coarse, coarse_slopes = near.coarse, near.coarse_slopes
         else:
-            found = with_sensitivities(
+            history = with_sensitivities(
                 self.fast.lever(probe),
                 self.waveform,
                 self.times.at,
                 self.names,
                 tolerance_K=_TOLERANCE_K,
             )
-            seen = observables_of(found)
-            seen_by = found.sensitivity.values
-        right = seen + self.offset
-        rows = self.times.at_rows(right), self.times.at_rows(seen_by)
-        return PredictionInTime(probe, *rows, self.names, self.times.at, right, seen_by, seen)
+            coarse, coarse_slopes = observables_of(history), history.sensitivity.values
+        corrected = coarse + self.offset
+        columns = {
+            "time_us": self.times.at,
+            "bias_V": self.waveform.bias(self.times.at),
+            **dict(zip(_SHOWN, corrected, strict=True)),
+        }
+        values, slopes = map(self.times.at_rows, (corrected, coarse_slopes))
+        surrogate = LinearSurrogate(probe.values(self.names), values, slopes)
+        tip_slopes = coarse_slopes[TIP]
+        return PredictionInTime(
+            probe, values, slopes, surrogate, columns, tip_slopes, coarse, coarse_slopes
+        )
 
     def confirmed(self, at: PredictionInTime) -> ExperimentInTime:
         """Return a model that is that of the full lever at the probe of a prediction.
@@ -209,11 +188,10 @@ class ExperimentInTime:
         """
         if self.full is None:
             return self
-        found = integrate(
-            self.full.lever(at.probe), self.waveform, at=at.at, tolerance_K=_TOLERANCE_K
+        history = integrate(
+            self.full.lever(at.probe), self.waveform, at=self.times.at, tolerance_K=_TOLERANCE_K
         )
-        right = observables_of(found)
-        return replace(self, offset=right - at.uncorrected)
+        return replace(self, offset=observables_of(history) - at.coarse)
 
 
 def known_in_time(
@@ -242,4 +220,4 @@ def known_in_time(
                 "parameters of materials, series_resistance_ohm or gas_conductivity"
             )
     notes = [f"held, since there are no derivatives in time by them: {', '.join(held)}"]
-    return {name: one for name, one in priors.items() if name not in held}, notes * bool(held)
+    return {name: prior for name, prior in priors.items() if name not in held}, notes * bool(held)

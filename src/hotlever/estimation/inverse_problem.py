@@ -25,7 +25,7 @@ from hotlever.estimation.experiment_at_rest import (
 from hotlever.estimation.experiment_in_time import ExperimentInTime, known_in_time
 from hotlever.estimation.noise import errors_of_scales
 from hotlever.estimation.objective import Objective
-from hotlever.estimation.optimiser import Optimiser, Optimum
+from hotlever.estimation.optimiser import Optimum, Predictor
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.outcome import Outcome
 from hotlever.estimation.posterior import Posterior
@@ -62,7 +62,6 @@ class Estimate:
     The lever as it was `stated` is in the circuit and medium of the measurement.
     """
 
-    optimiser: Optimiser
     optimum: Optimum
     stated: Probe
     measurement: Measurement
@@ -83,7 +82,12 @@ class Estimate:
     @property
     def objective(self) -> Objective:
         """What is least for it."""
-        return self.optimiser.objective
+        return self.optimum.optimiser.objective
+
+    @property
+    def predictor(self) -> Predictor:
+        """What predicts levers like it, by the experiment that was confirmed last."""
+        return self.optimum.optimiser.predictor
 
     @property
     def residuals(self) -> Residuals:
@@ -119,7 +123,7 @@ class Estimate:
 
     def predicted(self, bias: Array) -> PredictionAtRest:
         """Return what a slow ramp shows at other biases (V), as far as the measured ones reach."""
-        experiment, prediction = self.optimiser.model, self.prediction
+        experiment, prediction = self.predictor.experiment, self.prediction
         assert isinstance(experiment, ExperimentAtRest)
         assert isinstance(prediction, PredictionAtRest)
         return experiment.measuring(bias, None).predict(self.probe, prediction)
@@ -134,7 +138,7 @@ class Estimate:
         if self.optimum.converged or (lack_of_fit and share < _LITTLE):
             return True, lack_of_fit
         return False, (
-            f"the search was ended after {self.optimiser.evaluations} levers, before it converged: "
+            f"the search was ended after {self.predictor.evaluations} levers, before it converged: "
             f"another step would still lower the sum of squares by {share:.1%}"
         )
 
@@ -202,7 +206,7 @@ def estimate(
     )
     if measurement.waveform is not None:
         follow = partial(ExperimentInTime.of, waveform=measurement.waveform, names=options.varied)
-        optimiser, optimum = search.near((model or follow)(probe, residuals.along), start)
+        optimum = search.near((model or follow)(probe, residuals.along), start)
     else:
         names = tuple(dict.fromkeys([*options.usual, *options.varied]))
         experiment = (model or partial(experiment_of, names=names))(probe, residuals.bias)
@@ -210,9 +214,9 @@ def estimate(
         # with priors errors are a matter of standard deviations; the fast lever's slopes do
         experiment = replace(experiment, names=names, first_order=not informed)
         experiment = experiment.measuring(residuals.bias, residuals.shown)
-        optimiser, optimum = search.from_anywhere(experiment, measurement)
+        optimum = search.from_anywhere(experiment, measurement)
     seconds = time.perf_counter() - began
-    return Estimate(optimiser, optimum, probe, measurement, options, seconds, notes)
+    return Estimate(optimum, probe, measurement, options, seconds, notes)
 
 
 def _observables(

@@ -36,10 +36,12 @@ def undescribed(residuals: Residuals, values: Array) -> str:
     Tip temperatures are left out: a thermometer's scale may be off by more than its readings
     scatter.
     """
-    scatter = _SCATTER if residuals.errors_known else _HELD_SCATTER
+    scatter = _SCATTER if residuals.errors.known else _HELD_SCATTER
     difference = residuals.difference(values) / residuals.largest
     in_order = np.argsort(residuals.along, kind="stable")
-    for name, whole, down in zip(residuals.observables, difference, residuals.down, strict=True):
+    for name, whole, down in zip(
+        residuals.observables, difference, residuals.errors.down, strict=True
+    ):
         present = np.isfinite(whole)
         if name == "tip" or present.sum() < _ROWS:
             continue

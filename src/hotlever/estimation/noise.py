@@ -1,25 +1,23 @@
-"""The noise model: errors of single data, errors that data have in common, and drifting zeros.
+"""The noise model: errors of single data, and errors that data have in common.
 
 Meters have noise of two kinds: the same everywhere, and in proportion to what they show. Which it
 is matters where current varies by a factor of thirty: taken for the same everywhere, noise in
 proportion is underestimated where the lever is hot, and good data there are taken for outliers.
 
 What all data of an observable have in common is the scale of its meter or thermometer.
-
-The zero of I_h and of V_r may drift: it is a straight line over the order of the rows, which is
-that of time. It enters linearly, so for every trial of the parameters the best one follows at once
-(variable projection, Golub and Pereyra, Inverse Problems 19, R1 (2003)).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hotlever.measurement import Measurement
+from hotlever.measurement.data import noise_about_neighbours
 from hotlever.probe.priors import SCALES, Moved, Prior
 from hotlever.spieser2017 import RAMAN_ERROR_SHARE
 from hotlever.types import Array
@@ -37,13 +35,15 @@ _LEAST_FREE = 0.05
 METERS = 1e-3
 #: Rise (K) from which a stated error tells the scale of a thermometer.
 _WARM_K = 100.0
-#: Observables that have a zero, with the unit it is given in.
-ZEROED = {"current": "mA", "reader": "V"}
-#: A zero is worth a note beyond this many standard errors.
-_NOTICED = 7.0
+#: Huber's weights lessen from here on; the others are full up to, and nothing beyond, so many
+#: standard deviations: data without outliers keep nearly all of theirs, and their scatter.
+_HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
+#: What is smooth is no noise: data scatter by so many times as much as about their neighbours at
+#: most, or a search would be content with a wrong lever and noisy data. So many data tell.
+_OF_NOISE, _TELLING = 4.0, 7
 
 
-def relative_noise(difference: Array, shown: Array, used_up: Array, usual: float) -> Array:
+def relative_noise(difference: Array, shown: Array, leverage: Array, usual: float) -> Array:
     """Return the noise of data relative to its root mean square, (n,); one where there is none.
 
     Parameters
@@ -52,8 +52,8 @@ def relative_noise(difference: Array, shown: Array, used_up: Array, usual: float
         Data minus prediction; NaN where nothing was measured.
     shown : ndarray, shape (n,)
         The prediction.
-    used_up : ndarray, shape (n,)
-        Leverage: the share of each datum's noise that the fit has taken up.
+    leverage : ndarray, shape (n,)
+        The share of each datum's noise that the fit has taken up.
     usual : float
         Scatter that counts as one datum more, in the unit of the data.
 
@@ -64,7 +64,7 @@ def relative_noise(difference: Array, shown: Array, used_up: Array, usual: float
     that data that cannot tell them apart are not forced to.
     """
     here = np.isfinite(difference)
-    squares = difference[here] ** 2 / np.maximum(1.0 - used_up[here], _LEAST_FREE)
+    squares = difference[here] ** 2 / np.maximum(1.0 - leverage[here], _LEAST_FREE)
     size = shown[here] ** 2
     shape = 1.0 - _SHARES[:, None] + _SHARES[:, None] * size / np.mean(size)
     by_shape = np.append(squares / shape, np.full((_SHARES.size, 1), usual**2), axis=1)
@@ -79,6 +79,175 @@ def relative_noise(difference: Array, shown: Array, used_up: Array, usual: float
     relative = np.ones(difference.shape)
     relative[here] = np.sqrt(1.0 / (precision * np.mean(1.0 / precision)))
     return relative
+
+
+class DataErrors:
+    """Standard errors of data, each by itself, and how little outliers count.
+
+    Differences are data minus prediction, (observables, n), NaN where nothing was measured.
+
+    Parameters
+    ----------
+    present : ndarray of bool, shape (observables, n)
+        Which data count.
+    largest : ndarray, shape (observables, 1)
+        The largest value of each observable: the error of each datum, unless it is known better.
+    along : ndarray, shape (n,)
+        By which data have neighbours.
+    root : ndarray, shape (n,)
+        Of how many rows of a file each is the mean, as a root: by it errors are smaller.
+    measured : ndarray, shape (observables, n), optional
+        Standard errors. An observable without them begins with a hundredth of its largest value.
+
+    Attributes
+    ----------
+    scale : ndarray, shape (observables, n)
+        The standard errors.
+    down : ndarray, shape (observables, n)
+        By how much a robust fit has lessened the weight of each datum: one where it has not.
+    known : bool
+        Whether errors were measured.
+    without : ndarray of bool, shape (observables,)
+        Observables that are to take their scatter for their error.
+    """
+
+    def __init__(
+        self,
+        present: NDArray[np.bool_],
+        largest: Array,
+        along: Array,
+        root: Array,
+        measured: Array | None = None,
+    ) -> None:
+        self.present, self.largest, self._root = present, largest, root
+        self._order = np.argsort(along, kind="stable")
+        self.known, self.without = measured is not None, np.zeros(len(present), dtype=bool)
+        self.scale = np.broadcast_to(largest / root, present.shape)
+        if measured is not None:
+            self.without = np.all(np.isnan(measured), axis=1)
+            self.scale = np.where(np.isfinite(measured), measured, 0.01 * largest / root)
+        self.down = np.ones(present.shape)
+        # the noise of each datum over that of its observable
+        self._relative = np.ones(present.shape)
+
+    def fix(self, weights: Array) -> None:
+        """Take the weights that a fit has found, (observables, n); 0 leaves out."""
+        self.scale, self.down = np.ones(weights.shape), weights
+        self.present = self.present & (weights > 0)
+
+    def afresh(self) -> DataErrors:
+        """Return the same as before outliers were weighed."""
+        own = copy(self)
+        own.down, own._relative = np.ones(self.down.shape), self._relative.copy()
+        return own
+
+    @property
+    def weights(self) -> Array:
+        """What differences are multiplied by, (observables, n)."""
+        return np.asarray(self.down / self.scale)
+
+    def deviations(self, difference: Array) -> Array:
+        """Return differences in units of the scatter of their observable; 0 where nothing is.
+
+        Data may be off by their own errors, if they have some.
+        """
+        difference = difference * self._root / self._relative
+        scatter = 1.4826 * np.nanmedian(np.abs(difference), axis=1, keepdims=True)
+        # data without noise have no scatter to measure against
+        least = np.broadcast_to(1e-4 * self.largest, difference.shape)
+        if self.known:
+            least = np.where(self.without[:, None], least, self.scale * self._root)
+        return np.nan_to_num(difference / np.maximum(scatter, least))
+
+    def has_outliers(self, difference: Array) -> bool:
+        """Whether weights that forget outliers would lessen that of any datum."""
+        return bool((np.abs(self.deviations(difference)) > _FULL).any())
+
+    def lessen(self, difference: Array, gently: bool) -> None:
+        """Lessen the weight of data far from a prediction.
+
+        Gently, by Huber's weights, with which a fit has one optimum; or by some that forget
+        outliers.
+        """
+        size = np.abs(self.deviations(difference))
+        forgetful = np.clip((_NONE - size) / (_NONE - _FULL), 0.0, 1.0)
+        self.down = np.sqrt(_HUBER / np.maximum(size, _HUBER)) if gently else forgetful
+
+    def take_scatter(
+        self, difference: Array, shown: Array, leverage: Array | float = 0.0, usual: float = 0.0
+    ) -> None:
+        """Give observables without measurement errors their scatter about what is shown.
+
+        Outliers count as little as they weigh. The `leverage`, (observables, n), is the share of
+        each datum's noise that a fit has taken up. The `usual` scatter, a share of the largest
+        value, counts as one datum more: a few data say little of their own. With it the noise may
+        go with the size of what is shown (see `relative_noise`), and is not what is smooth; without
+        it is the same everywhere.
+        """
+        weight = np.where(self.present, self.down**2, 0.0)
+        difference = difference * self._root
+        leverage = np.broadcast_to(leverage, difference.shape)
+        least = usual * self.largest
+        if usual:
+            for row in np.flatnonzero(self.without):
+                self._relative[row] = relative_noise(
+                    difference[row], shown[row], leverage[row], float(least[row, 0])
+                )
+        squares = np.nansum(weight * (difference / self._relative) ** 2, axis=1, keepdims=True)
+        count = weight.sum(axis=1, keepdims=True)
+        if usual:
+            squares, count = squares + least**2, count + 1.0
+        free = np.maximum(count - leverage.sum(axis=1, keepdims=True), 1.0)
+        scatter = np.maximum(np.sqrt(squares / free), 1e-6 * self.largest)
+        if usual:
+            scatter = np.minimum(scatter, np.maximum(_OF_NOISE * self._noise(difference), least))
+        own = scatter * self._relative / self._root
+        self.scale = np.where(self.without[:, None], own, self.scale)
+
+    def noise_squares(self, difference: Array) -> float:
+        """Return the mean square of weighted noise, as data scatter about their neighbours.
+
+        Few data, which do not tell, are taken to scatter as they do about a prediction.
+        """
+        count, weights = self.present.sum(axis=1), self.weights
+        squares = np.nan_to_num(weights * difference) ** 2
+        every = np.sqrt(np.sum(squares, axis=1) / np.maximum(count, 1))
+        mean = np.sqrt(np.nanmean(np.where(self.present, weights, np.nan) ** 2, axis=1))
+        noise = np.minimum(self._noise(difference * self._root)[:, 0] * mean, every)
+        return float(np.average(noise**2, weights=count))
+
+    def _noise(self, difference: Array) -> Array:
+        """Return how much data scatter about their neighbours, (observables, 1).
+
+        Infinite where few data do not tell.
+        """
+        ordered = (difference / self._relative)[:, self._order]
+        present = [row[np.isfinite(row)] for row in ordered]
+        noise = [noise_about_neighbours(row) if row.size >= _TELLING else np.inf for row in present]
+        return np.array(noise)[:, None]
+
+    @property
+    def normalisation(self) -> float:
+        """Minus twice the logarithm of the normal densities' factors, beside the squares.
+
+        An outlier counts as one that is just so far off that it is left out.
+        """
+        each = 2.0 * np.log(self.scale) + _NONE**2 * (1.0 - self.down**2)
+        return float(np.sum(each[self.present]))
+
+    @property
+    def unit_weight(self) -> float:
+        """The largest weighted value of an observable: one, unless weights are those of errors."""
+        return float(np.max(np.where(self.present, self.weights * self.largest, 0.0)))
+
+    def reduced_chi_square(self, difference: Array, varied: int) -> float | None:
+        """Return that of the observables with measurement errors; None without."""
+        if not self.known or self.without.all():
+            return None
+        weighted = (difference / self.scale)[~self.without]
+        count = np.isfinite(weighted).sum()
+        share = varied / int(self.present.sum())
+        return float(np.nansum(weighted**2) / max(count - share * count, 1.0))
 
 
 @dataclass(frozen=True)
@@ -167,65 +336,3 @@ class CommonCovariance:
         left = np.sqrt(np.diag(own + by @ covariance @ by.T))
         moved = map(Moved, size.tolist(), left.tolist())
         return dict(zip((error.name for error in self._errors), moved, strict=True))
-
-
-class Drift:
-    """Straight lines over the rows of some observables.
-
-    Those of `ZEROED` get a line; `present`, (k, n), says which data there are. Weights, by which
-    residuals are multiplied, have the same shape.
-    """
-
-    def __init__(self, observables: Sequence[str], present: NDArray[np.bool_]) -> None:
-        self._present, self._names = present, tuple(observables)
-        order = np.linspace(-1.0, 1.0, present.shape[1])
-        self._columns = np.zeros((*present.shape, 2 * len(self._names)))
-        for place, name in enumerate(self._names):
-            if name in ZEROED:
-                self._columns[place, :, 2 * place] = 1.0
-                self._columns[place, :, 2 * place + 1] = order
-        kept = np.any(self._columns, axis=(0, 1))
-        self._columns = self._columns[:, :, kept]
-
-    def line(self, difference: Array, weights: Array) -> Array:
-        """Return the lines that fit a difference (data minus prediction) best, shape (k, n)."""
-        matrix = (weights[..., None] * self._columns)[self._present]
-        target = (weights * difference)[self._present]
-        return np.asarray(self._columns @ np.linalg.lstsq(matrix, target)[0])
-
-    def removed(self, matrix: Array, weights: Array) -> Array:
-        """Return the columns of a weighted matrix, (N, m), without what lines could take up."""
-        basis = np.linalg.qr((weights[..., None] * self._columns)[self._present])[0]
-        return np.asarray(matrix - basis @ (basis.T @ matrix))
-
-    def noticed(self, residual: Array, jacobian: Array, weights: Array) -> list[str]:
-        """Say which observables have a zero that stands out of the scatter.
-
-        By the weighted residual (data minus prediction, N) at the optimum without lines, and by
-        what the parameters could take up instead, (N, m).
-        """
-        columns = (weights[..., None] * self._columns)[self._present]
-        basis = np.linalg.qr(jacobian)[0]
-        columns = columns - basis @ (basis.T @ columns)
-        try:
-            inverse = np.linalg.inv(columns.T @ columns)
-        except np.linalg.LinAlgError:
-            return []
-        sizes = inverse @ (columns.T @ residual)
-        rest = residual - columns @ sizes
-        # each datum's own variance, as in the covariance of the parameters
-        influence = inverse @ columns.T * rest
-        errors = np.sqrt((influence**2).sum(axis=1))
-        out = np.abs(sizes) > _NOTICED * errors
-        return self.in_words(self._columns @ sizes, np.any(self._columns, axis=1) @ out)
-
-    def in_words(self, line: Array, which: NDArray[np.bool_] | None = None) -> list[str]:
-        """Describe lines from `line`; some of them, if not all."""
-        which = np.any(self._columns, axis=(1, 2)) if which is None else which
-        return [
-            f"{name}: the zero goes from {first:+.3g} to {last:+.3g} {ZEROED[name]} along the file"
-            for name, first, last, asked in zip(
-                self._names, *line[:, [0, -1]].T, which, strict=True
-            )
-            if asked
-        ]

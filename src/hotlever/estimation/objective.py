@@ -9,14 +9,14 @@ from typing import Protocol
 
 import numpy as np
 
-from hotlever.estimation.experiment import Prediction
+from hotlever.estimation.experiment import TIP, Prediction
 from hotlever.estimation.prior_density import FLAT, Coordinates, PriorDensity
 from hotlever.estimation.residuals import Residuals
 from hotlever.probe import Probe
 from hotlever.types import Array
 
-#: Where predictions have the tip temperature; see `hotlever.datasets.OBSERVABLES`.
-TIP = 2
+#: Share of the range between its bounds within which a parameter is at one of them.
+_AT_BOUND = 1e-5
 
 
 class Quantity(Protocol):
@@ -208,6 +208,37 @@ class Objective:
         rows = np.zeros((values.size, point.size))
         rows[:, self._of_prior] = self.prior.slopes(values)
         return np.asarray(rows * self.coordinates.rates(point))
+
+    def decrement(self, at: Prediction) -> float:
+        """Return by how much Gauss and Newton's step would lower the sum of squares.
+
+        Parameters at their bounds, beyond which it leads, stay there.
+        """
+        point, residual, jacobian = self.linearised(at)
+        low, high = self.bounds
+        margin = _AT_BOUND * (high - low)
+        free = np.ones(point.size, dtype=bool)
+        for _ in range(point.size):
+            step = np.zeros(point.size)
+            step[free] = np.linalg.lstsq(jacobian[:, free], -residual)[0]
+            held = ((point <= low + margin) & (step < 0)) | ((point >= high - margin) & (step > 0))
+            if not (held & free).any():
+                break
+            free &= ~held
+        return float(residual @ residual - np.sum((residual + jacobian @ step) ** 2))
+
+    def common_noise_covariance(self, at: Prediction) -> Array:
+        """Return the covariance (p, p) of the parameters if all residuals had the same noise.
+
+        That is the paper's assumption. NaN if it cannot be estimated.
+        """
+        point, residual, jacobian = self.linearised(at)
+        free = residual.size - point.size
+        if free <= 0:
+            return np.full((point.size, point.size), np.nan)
+        rates = self.coordinates.rates(point)
+        variance = residual @ residual / free * np.outer(rates, rates)
+        return np.asarray(inverse_or_nan(jacobian.T @ jacobian) * variance)
 
     # --- what follows at a point ------------------------------------------------------------------
 

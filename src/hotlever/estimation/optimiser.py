@@ -11,12 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation.experiment import Experiment, Prediction
-from hotlever.estimation.objective import Objective, inverse_or_nan
+from hotlever.estimation.lack_of_fit import undescribed
+from hotlever.estimation.objective import Objective
 from hotlever.estimation.options import SearchOptions
 from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe import Probe
@@ -24,8 +26,6 @@ from hotlever.types import Array, Progress
 
 #: Branches that most searches need, for a progress bar to fill.
 _USUAL_BRANCHES = 8
-#: Share of the range between its bounds within which a parameter is at one of them.
-_AT_BOUND = 1e-5
 
 
 @dataclass(frozen=True)
@@ -34,22 +34,28 @@ class Optimum:
 
     Attributes
     ----------
-    probe : Probe
+    optimiser : Optimiser
+        As the search left it.
     prediction : Prediction
-    covariance : ndarray, shape (p, p)
-        If all weighted data had the same noise: the paper's assumption. NaN if it
-        could not be estimated.
     decrement : float
         By how much Gauss and Newton's step would still lower the sum of squares.
     converged : bool
         Whether that is next to nothing.
+    covariance : ndarray, shape (p, p)
+        If all weighted data had the same noise: the paper's assumption. NaN if it could not be
+        estimated.
     """
 
-    probe: Probe
+    optimiser: Optimiser
     prediction: Prediction
-    covariance: Array
     decrement: float
     converged: bool
+    covariance: Array
+
+    @property
+    def probe(self) -> Probe:
+        """The lever."""
+        return self.prediction.probe
 
     @property
     def stderr(self) -> Array:
@@ -57,44 +63,130 @@ class Optimum:
         variance = np.diag(self.covariance)
         return np.sqrt(np.where(variance > 0, variance, np.inf))
 
+    @property
+    def describes_data(self) -> bool:
+        """Whether the search converged to a lever that describes the data."""
+        return self.converged and not undescribed(self.optimiser.residuals, self.prediction.values)
+
+    @property
+    def misfit(self) -> float:
+        """The mean square of differences, as shares of the largest of each observable."""
+        residuals = self.optimiser.residuals
+        share = residuals.difference(self.prediction.values) / residuals.largest
+        return float(np.nanmean((residuals.errors.down * share) ** 2))
+
+
+class Predictor:
+    """Predicts with an experiment, each lever from the latest one; the latest are at hand.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Kept as the attribute of this name, as confirmed last.
+    kept : int
+        How many predictions are at hand.
+    progress : callable, optional
+        Called with the levers solved and how many there usually are.
+    seen : callable, optional
+        Called with each prediction that is compared with the data.
+    near : Prediction, optional
+        Of a lever similar to that at which a search begins.
+
+    Attributes
+    ----------
+    evaluations : int
+        Levers solved.
+    """
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        kept: int,
+        progress: Progress | None = None,
+        seen: Callable[[Prediction], None] | None = None,
+        near: Prediction | None = None,
+    ) -> None:
+        self.experiment, self.evaluations = experiment, 0
+        self._kept, self._progress, self._seen = kept, progress, seen
+        self._at_hand = {} if near is None else {near.probe: near}
+
+    def predict(self, probe: Probe) -> Prediction:
+        """Predict from the latest prediction, unless what is asked is at hand."""
+        if probe not in self._at_hand:
+            self._at_hand[probe] = self._solved(probe)
+        self._at_hand[probe] = self._at_hand.pop(probe)  # the latest
+        if len(self._at_hand) > self._kept:
+            del self._at_hand[next(iter(self._at_hand))]
+        return self._at_hand[probe]
+
+    def _solved(self, probe: Probe) -> Prediction:
+        near = next(reversed(self._at_hand.values()), None)
+        self.evaluations += 1
+        try:
+            prediction = self.experiment.predict(probe, near)
+        except ComputationError:
+            if near is None:
+                raise
+            # a step too far to be followed from there
+            prediction = self.experiment.predict(probe)
+        if self._progress is not None:
+            self._progress(self.evaluations, max(_USUAL_BRANCHES, self.evaluations))
+        if self._seen is not None:
+            self._seen(prediction)
+        return prediction
+
+    def others(self, prediction: Prediction) -> list[Prediction]:
+        """Return the predictions at hand beside one."""
+        return [other for other in self._at_hand.values() if other is not prediction]
+
+    def confirm(self, at: Prediction) -> bool:
+        """Make the experiment exact at a prediction; return whether that makes another one.
+
+        Raises
+        ------
+        ComputationError
+            If the full lever cannot be solved there.
+        """
+        confirmed = self.experiment.confirmed(at)
+        if confirmed is self.experiment:
+            return False
+        self.experiment = confirmed
+        others, self._at_hand = self.others(at), {}
+        for other in others:
+            # with what the fast lever lacked, it may melt below the highest bias
+            with suppress(ComputationError):
+                self._at_hand[other.probe] = confirmed.predict(other.probe, other)
+        self._at_hand[at.probe] = confirmed.predict(at.probe, at)
+        return True
+
 
 class Optimiser:
     """Finds the parameters whose prediction is nearest to a measurement.
 
     Parameters
     ----------
-    model : Experiment
-        Kept as the attribute `model`, as confirmed last.
     objective : Objective
-    progress : callable, optional
-        Called with the branches solved and how many there usually are.
-    seen : callable, optional
-        Called with each prediction that is compared with the data.
-    near : Prediction, optional
-        Of a lever similar to that at which the search begins.
+    experiment : Experiment
     options : SearchOptions, optional
+    **predicting
+        Of the `Predictor`, which is the attribute `predictor`.
 
     Attributes
     ----------
-    evaluations, steps : int
-        Branches solved, and those of them that led nearer to the optimum.
+    steps : int
+        Levers that led nearer to the optimum.
     """
 
     def __init__(
         self,
-        model: Experiment,
         objective: Objective,
-        *,
-        progress: Progress | None = None,
-        seen: Callable[[Prediction], None] | None = None,
-        near: Prediction | None = None,
+        experiment: Experiment,
         options: SearchOptions | None = None,
+        **predicting: Any,
     ) -> None:
-        self.model, self.objective, self.residuals = model, objective, objective.residuals
-        self._progress, self._seen = progress, seen
-        self._at_hand = {} if near is None else {near.probe: near}
-        self._options = options or SearchOptions()
-        self.evaluations, self.steps = 0, 0
+        self.objective, self.residuals = objective, objective.residuals
+        self._options, self.steps = options or SearchOptions(), 0
+        self.predictor = Predictor(experiment, self._options.kept, **predicting)
 
     def solve_and_confirm(self, start: Probe, robust: bool) -> Optimum:
         """Find the optimum, make the model exact there, and go on until that matters no more.
@@ -108,23 +200,15 @@ class Optimiser:
         """
         options = self._options
         optimum = self.solve(start)
-        unknown = self.residuals.without_errors.any() and not self.objective.informed
+        unknown = self.residuals.errors.without.any() and not self.objective.informed
         for _ in range(options.scatter_rounds if unknown else 0):
             self.residuals.take_scatter(optimum.prediction.values)
             optimum = self.solve(optimum.probe)
         if robust:
             optimum = self._reweighted(start, optimum)
         for _ in range(options.confirmations):
-            confirmed = self.model.confirmed(optimum.prediction)
-            if confirmed is self.model:
+            if not self.predictor.confirm(optimum.prediction):
                 return optimum
-            self.model = confirmed
-            others, self._at_hand = self.others(optimum.prediction), {}
-            for other in others:
-                # with what the fast lever lacked, it may melt below the highest bias
-                with suppress(ComputationError):
-                    self._at_hand[other.probe] = confirmed.predict(other.probe, other)
-            self._at_hand[optimum.probe] = confirmed.predict(optimum.probe, optimum.prediction)
             previous, optimum = optimum, self.solve(optimum.probe)
             if not optimum.converged or self._settled(previous, optimum):
                 return optimum
@@ -137,13 +221,15 @@ class Optimiser:
         without any there is nothing to do.
         """
         options = self._options
-        if self.objective.informed and not self.residuals.has_outliers(optimum.prediction.values):
+        errors, informed = self.residuals.errors, self.objective.informed
+        difference = self.residuals.difference(optimum.prediction.values)
+        if informed and not errors.has_outliers(difference):
             return optimum
         for gently, most in ((True, options.gentle_rounds), (False, options.robust_rounds)):
             for _ in range(most):
-                self.residuals.lessen(optimum.prediction.values, gently)
+                errors.lessen(self.residuals.difference(optimum.prediction.values), gently)
                 # outliers can drive the first fit onto a bound, where it would stay without priors
-                origin = start if gently and not self.objective.informed else optimum.probe
+                origin = start if gently and not informed else optimum.probe
                 previous, optimum = optimum, self.solve(origin)
                 if not optimum.converged or self._settled(previous, optimum):
                     break
@@ -171,21 +257,23 @@ class Optimiser:
         self._check_start(start)
         # without priors a robust search begins anew with each choice of weights
         in_all = options.most_in_all * (1 if objective.informed else options.gentle_rounds)
-        most = min(self.evaluations + options.most_branches, in_all)
-        at, region = self.predict(start), options.first_region
+        most = min(self.predictor.evaluations + options.most_branches, in_all)
+        at, region = self.predictor.predict(start), options.first_region
         while True:
-            near = Subproblem(objective, at, self._bending(at))
+            # without priors residuals have no size that says what is near
+            others = self.predictor.others(at) if objective.informed else []
+            near = Subproblem(objective, at, others)
             room = objective.coordinates.room(near.origin)
             target, least = near.minimum(region=region * room)
             if self._takes_scatter:
                 target, least = self._with_scatter(target, region * room, near)
             squares, step = objective.squares(at), target - near.origin
             inner = bool(np.all(np.abs(step) < 0.99 * region * room))
-            left, enough = decrement(objective, at), tolerance(objective, at, options)
+            left, enough = objective.decrement(at), self._tolerance(at)
             # a step within the region that gains nothing is as good as none
             if left <= enough or (inner and squares - least <= enough):
                 return self._optimum(at, left, converged=True)
-            if region < options.smallest_region or self.evaluations >= most:
+            if region < options.smallest_region or self.predictor.evaluations >= most:
                 # only rounding errors are left, if so little is promised
                 precise = left <= options.negligible_of_misfit * squares
                 precise = precise and region < options.smallest_region
@@ -207,7 +295,7 @@ class Optimiser:
     @property
     def _takes_scatter(self) -> bool:
         """Whether the noise of some observables is found with the optimum."""
-        unknown = bool(self.residuals.without_errors.any())
+        unknown = bool(self.residuals.errors.without.any())
         return unknown and self.objective.informed and self._options.scatter_rounds > 0
 
     def _check_start(self, start: Probe) -> None:
@@ -223,20 +311,26 @@ class Optimiser:
         """Whether an optimum is so near that its errors hold, if values are not smooth there."""
         return self.objective.informed and left <= self._options.decrement_where_rough
 
+    def _tolerance(self, at: Prediction) -> float:
+        """Return by how much the sum of squares may still fall where a search ends."""
+        objective, residuals, options = self.objective, self.residuals, self._options
+        squares, difference = objective.squares(at), residuals.difference(at.values)
+        noise = 1.0 if objective.informed else residuals.errors.noise_squares(difference)
+        # so far above what noise explains that no lever is near
+        hopeless = squares > options.misfit * residuals.size * noise
+        least = (options.negligible_of_misfit if hopeless else options.negligible) * squares
+        if objective.informed:
+            return float(max(options.decrement, least))
+        precise = residuals.size * (options.precision * residuals.errors.unit_weight) ** 2
+        return float(max(options.relative_decrement * noise, least, precise))
+
     def _optimum(self, at: Prediction, left: float, *, converged: bool) -> Optimum:
-        point, residual, jacobian = self.objective.linearised(at)
-        free = residual.size - point.size
-        covariance = np.full((point.size, point.size), np.nan)
-        if free > 0:
-            rates = self.objective.coordinates.rates(point)
-            variance = residual @ residual / free * np.outer(rates, rates)
-            covariance = inverse_or_nan(jacobian.T @ jacobian) * variance
-        return Optimum(at.probe, at, covariance, left, converged)
+        return Optimum(self, at, left, converged, self.objective.common_noise_covariance(at))
 
     def _trial(self, at: Prediction, point: Array) -> Prediction | None:
         """Solve the lever of a point; None if it cannot be drawn or solved."""
         try:
-            return self.predict(self.objective.at(at.probe, point))
+            return self.predictor.predict(self.objective.at(at.probe, point))
         except HotleverError:
             return None
 
@@ -249,68 +343,3 @@ class Optimiser:
             self.residuals.take_scatter(values, leverage, options.usual_scatter)
             point, least = near.minimum(point, region)
         return point, least
-
-    def _bending(self, prediction: Prediction) -> list[Prediction]:
-        # without priors residuals have no size that says what is near
-        return self.others(prediction) if self.objective.informed else []
-
-    def others(self, prediction: Prediction) -> list[Prediction]:
-        """Return the predictions at hand beside one."""
-        return [other for other in self._at_hand.values() if other is not prediction]
-
-    def predict(self, probe: Probe) -> Prediction:
-        """Predict with the model, from the latest prediction; what was asked before is at hand."""
-        if probe not in self._at_hand:
-            self._at_hand[probe] = self._solved(probe)
-        self._at_hand[probe] = self._at_hand.pop(probe)  # the latest
-        if len(self._at_hand) > self._options.kept:
-            del self._at_hand[next(iter(self._at_hand))]
-        return self._at_hand[probe]
-
-    def _solved(self, probe: Probe) -> Prediction:
-        near = next(reversed(self._at_hand.values()), None)
-        self.evaluations += 1
-        try:
-            prediction = self.model.predict(probe, near)
-        except ComputationError:
-            if near is None:
-                raise
-            # a step too far to be followed from there
-            prediction = self.model.predict(probe)
-        if self._progress is not None:
-            self._progress(self.evaluations, max(_USUAL_BRANCHES, self.evaluations))
-        if self._seen is not None:
-            self._seen(prediction)
-        return prediction
-
-
-def decrement(objective: Objective, at: Prediction) -> float:
-    """Return by how much Gauss and Newton's step would lower the sum of squares.
-
-    Parameters at their bounds, beyond which it leads, stay there.
-    """
-    point, residual, jacobian = objective.linearised(at)
-    low, high = objective.bounds
-    margin = _AT_BOUND * (high - low)
-    free = np.ones(point.size, dtype=bool)
-    for _ in range(point.size):
-        step = np.zeros(point.size)
-        step[free] = np.linalg.lstsq(jacobian[:, free], -residual)[0]
-        held = ((point <= low + margin) & (step < 0)) | ((point >= high - margin) & (step > 0))
-        if not (held & free).any():
-            break
-        free &= ~held
-    return float(residual @ residual - np.sum((residual + jacobian @ step) ** 2))
-
-
-def tolerance(objective: Objective, at: Prediction, options: SearchOptions) -> float:
-    """Return by how much the sum of squares may still fall where a search ends."""
-    residuals, squares = objective.residuals, objective.squares(at)
-    noise = 1.0 if objective.informed else residuals.noise_squares(at.values)
-    # so far above what noise explains that no lever is near
-    hopeless = squares > options.misfit * residuals.size * noise
-    least = (options.negligible_of_misfit if hopeless else options.negligible) * squares
-    if objective.informed:
-        return float(max(options.decrement, least))
-    precise = residuals.size * (options.precision * residuals.unit_weight) ** 2
-    return float(max(options.relative_decrement * noise, least, precise))

@@ -152,7 +152,7 @@ class Posterior:
             # the noise is unknown and in common
             weighted = residuals.weighted(self.at.values)
             return residuals.size * float(np.log(weighted @ weighted))
-        return float(self.objective.squares(self.at) + residuals.normalisation)
+        return float(self.objective.squares(self.at) + residuals.errors.normalisation)
 
 
 @dataclass(frozen=True)

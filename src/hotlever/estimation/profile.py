@@ -16,9 +16,9 @@ from scipy.special import chdtri
 
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation.experiment import Experiment, Prediction
+from hotlever.estimation.experiment import TIP, Experiment, Prediction
 from hotlever.estimation.experiment_at_rest import experiment_of
-from hotlever.estimation.objective import TIP, Objective, ParameterValue, Pull, TipTemperature
+from hotlever.estimation.objective import Objective, ParameterValue, Pull, TipTemperature
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.result import Fit
@@ -233,7 +233,7 @@ def profile_likelihood(
             pulled = objective.pulled(Pull(quantity, target, _HELD * step))
             try:
                 start = near.probe.replace({name: target})
-                near = Optimiser(model, pulled, near=near).solve(start).prediction
+                near = Optimiser(pulled, model, near=near).solve(start).prediction
             except ComputationError:
                 reasons[side] = f"as far as the lever can be solved ({target:.4g} cannot)"
                 break

@@ -6,12 +6,20 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from pydantic import Field, JsonValue, PlainSerializer, ValidationInfo, model_validator
+from pydantic import (
+    Field,
+    JsonValue,
+    PlainSerializer,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    model_validator,
+)
 
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
@@ -36,7 +44,7 @@ from hotlever.materials import full_name
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameter_of, parameters_of, usual_parameters
-from hotlever.probe.priors import Prior, PriorUse
+from hotlever.probe.priors import Prior, PriorUse, priors_of
 from hotlever.records import Number, stored_as
 from hotlever.text import value_with_error
 from hotlever.types import Array
@@ -261,6 +269,14 @@ def _written_band(band: xr.Dataset) -> dict[str, list[float]]:
 _Band = Annotated[xr.Dataset, stored_as(dict[str, Vector], _read_band, _written_band)]
 
 
+def _options(values: Any, check: ValidatorFunctionWrapHandler, info: ValidationInfo) -> FitOptions:
+    """Read the options of a fit; what these refuse names the file too."""
+    try:
+        return cast("FitOptions", check(values))
+    except InputError as error:
+        raise InputError(f"{info.context}: options: {error}") from None
+
+
 class _Correlation(Section):
     names: list[str]
     matrix: Matrix
@@ -286,7 +302,7 @@ class FitFile(ResultFile):
     steps: int
     seconds: Annotated[float, PlainSerializer(lambda seconds: round(seconds, 3))]
     data: _FittedData
-    options: Annotated[FitOptions, PlainSerializer(FitOptions.values)]
+    options: Annotated[FitOptions, WrapValidator(_options), PlainSerializer(FitOptions.values)]
     common_noise_covariance: Matrix
     sum_of_squares: float
     band: _Band
@@ -301,6 +317,7 @@ class FitFile(ResultFile):
             parameter_of(self.probe, name, f"{path}: correlation", in_time=in_time)
         if in_time != ("time_us" in self.band):
             raise InputError(f"{path}: band: expected time_us in it of data in time, and only then")
+        priors_of(self.options.priors, self.probe, f"{path}: options: priors", in_time=in_time)
         square, weights = (len(names),) * 2, (len(self.observables), self.data.columns["V_b"].size)
         array(self.correlation.matrix, square, f"{path}: correlation")
         array(self.common_noise_covariance, square, f"{path}: common_noise_covariance")

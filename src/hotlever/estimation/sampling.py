@@ -23,13 +23,14 @@ from hotlever.estimation.chains import (
     rhat_of_ensembles,
     sample,
 )
+from hotlever.estimation.experiment import TIP
 from hotlever.estimation.experiment_at_rest import (
     ExperimentAtRest,
     PredictionAtRest,
     experiment_of,
 )
-from hotlever.estimation.objective import TIP, Objective, TipTemperature
-from hotlever.estimation.optimiser import Optimiser
+from hotlever.estimation.objective import Objective, TipTemperature
+from hotlever.estimation.optimiser import Predictor
 from hotlever.estimation.posterior import Noise, Posterior, PosteriorDensity
 from hotlever.estimation.profile import ErrorProfile, hotter_rows
 from hotlever.estimation.result import Fit
@@ -142,18 +143,18 @@ class SampledTip:
 
 def sample_tip(
     posterior: Posterior,
-    optimiser: Optimiser,
+    predictor: Predictor,
     *,
     samples: int,
     progress: Progress | None = None,
 ) -> SampledTip:
     """Sample the parameters of an estimate, and their tip temperatures.
 
-    Levers that the optimiser has solved far enough from the optimum say how values bend. What is
+    Levers that the predictor has solved far enough from the optimum say how values bend. What is
     sampled costs too little for processes of its own.
     """
     objective, at = posterior.objective, posterior.at
-    near = Subproblem(objective, at, optimiser.others(at), least=_TELLING)
+    near = Subproblem(objective, at, predictor.others(at), least=_TELLING)
     density = PosteriorDensity(objective, at, near.shown)
     chains = sample(
         density.log_probability, density.approximation, samples=samples, progress=progress

@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from hotlever.errors import ComputationError
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.experiment_at_rest import ExperimentAtRest
-from hotlever.estimation.lack_of_fit import undescribed
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser, Optimum
 from hotlever.estimation.options import SearchOptions
@@ -44,26 +42,6 @@ _OF_PORTIONS = SearchOptions(
 )
 
 
-class End(NamedTuple):
-    """Where a search ended, and the optimiser as it was left."""
-
-    optimiser: Optimiser
-    optimum: Optimum
-
-    @property
-    def describes(self) -> bool:
-        """Whether that is at a lever that describes the data."""
-        values = self.optimum.prediction.values
-        return self.optimum.converged and not undescribed(self.optimiser.residuals, values)
-
-    @property
-    def share(self) -> float:
-        """The mean square of differences, as shares of the largest of each observable."""
-        residuals = self.optimiser.residuals
-        share = residuals.difference(self.optimum.prediction.values) / residuals.largest
-        return float(np.nanmean((residuals.down * share) ** 2))
-
-
 @dataclass(frozen=True)
 class Search:
     """What is searched for.
@@ -78,7 +56,7 @@ class Search:
         Whether the weight of outliers is lessened.
     prior : PriorDensity
     progress, seen : callable, optional
-        See `hotlever.estimation.optimiser.Optimiser`.
+        See `hotlever.estimation.optimiser.Predictor`.
     """
 
     residuals: Residuals
@@ -89,12 +67,11 @@ class Search:
     progress: Progress | None = None
     seen: Callable[[Prediction], None] | None = None
 
-    def near(self, experiment: Experiment, start: Probe) -> End:
+    def near(self, experiment: Experiment, start: Probe) -> Optimum:
         """Search from a lever that is not far from the one that was measured."""
-        optimiser = self._optimiser(experiment, self.residuals.afresh(), start)
-        return End(optimiser, optimiser.solve_and_confirm(start, self.robust))
+        return self._optimiser(experiment, start).solve_and_confirm(start, self.robust)
 
-    def from_anywhere(self, experiment: ExperimentAtRest, measurement: Measurement) -> End:
+    def from_anywhere(self, experiment: ExperimentAtRest, measurement: Measurement) -> Optimum:
         """Search from a lever of which little may be known.
 
         If it shows something else than the data, or the search leads to a lever that does, it first
@@ -105,12 +82,12 @@ class Search:
         ComputationError
             If the lever cannot be solved at the start.
         """
-        ends: list[End] = []
-        optimiser = self._optimiser(experiment, self.residuals.afresh(), self.start)
+        ends: list[Optimum] = []
+        optimiser = self._optimiser(experiment, self.start)
         with suppress(ComputationError):
-            if not _is_far(self.residuals, optimiser.predict(self.start)):
-                ends.append(End(optimiser, optimiser.solve_and_confirm(self.start, self.robust)))
-                if ends[0].describes:
+            if not _is_far(self.residuals, optimiser.predictor.predict(self.start)):
+                ends.append(optimiser.solve_and_confirm(self.start, self.robust))
+                if ends[0].describes_data:
                     return ends[0]
         grown, nearer = self._grown(experiment, measurement)
         if ends and nearer == self.start:
@@ -121,25 +98,12 @@ class Search:
         except ComputationError:
             if not ends:
                 raise
-        return min(ends, key=lambda end: (not end.describes, end.share))
+        return min(ends, key=lambda end: (not end.describes_data, end.misfit))
 
-    def _optimiser(
-        self,
-        experiment: Experiment,
-        residuals: Residuals,
-        start: Probe,
-        prior: PriorDensity | None = None,
-        options: SearchOptions | None = None,
-    ) -> Optimiser:
-        objective = Objective(residuals, start, experiment.names, self.varied, prior or self.prior)
-        return Optimiser(
-            experiment,
-            objective,
-            progress=self.progress,
-            # what is seen of a portion is not seen at the rows of the measurement
-            seen=self.seen if options is None else None,
-            options=options,
-        )
+    def _optimiser(self, experiment: Experiment, start: Probe) -> Optimiser:
+        residuals = self.residuals.afresh()
+        objective = Objective(residuals, start, experiment.names, self.varied, self.prior)
+        return Optimiser(objective, experiment, progress=self.progress, seen=self.seen)
 
     def _grown(
         self, experiment: ExperimentAtRest, measurement: Measurement
@@ -167,7 +131,9 @@ class Search:
             if _has_moved(experiment.drawn, start):
                 experiment = experiment.drawn_anew(start)
             of_part = experiment.measuring(residuals.bias, residuals.shown)
-            optimiser = self._optimiser(of_part, residuals, start, prior, _OF_PORTIONS)
+            objective = Objective(residuals, start, of_part.names, self.varied, prior)
+            # what is seen of a portion is not seen at the rows of the measurement
+            optimiser = Optimiser(objective, of_part, _OF_PORTIONS, progress=self.progress)
             try:
                 start = optimiser.solve(start).probe
             except ComputationError:

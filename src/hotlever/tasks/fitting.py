@@ -119,7 +119,7 @@ def fit_one(
 
 def _show_curve(reporter: Reporter, prediction: Prediction) -> None:
     """Show how near to the data the lever is that was found so far."""
-    columns = prediction.columns()
+    columns = prediction.columns
     along, *_ = columns.values()
     some = along.argsort()[:: max(1, along.size // _DRAWN)]
     reporter.show("curve", {name: values[some].tolist() for name, values in columns.items()})
