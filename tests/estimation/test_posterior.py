@@ -14,6 +14,7 @@ from hotlever.estimation.experiment_at_rest import experiment_of, reduced_experi
 from hotlever.estimation.profile import profile_likelihood
 from hotlever.estimation.sampling import SampledLever, predictive_band, sample_posterior
 from hotlever.lever.lever import COARSE, Lever
+from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, default_priors
 
@@ -127,7 +128,8 @@ def test_effective_sample_size_of_an_autoregressive_chain():
 def sampled(coarse, reduced, bias=BIAS):
     """The reduced lever as samples see it, and what it shows of a material."""
     lever = SampledLever(reduced_experiment(coarse, reduced, bias), coarse.probe)
-    return lambda material: lever.shown(coarse.with_material(material).probe.values(lever.names))
+    shown, names = lever.at.surrogate.shown, tuple(PARAMETERS)
+    return lambda material: shown(coarse.with_material(material).probe.values(names))
 
 
 def test_the_surrogate_shows_nearby_what_the_full_lever_does(coarse, reduced):
@@ -226,9 +228,9 @@ def test_other_probes_are_predicted_by_powers_nearly_as_they_are_solved(coarse):
     names = ("n_d", "heater_length_um", "base_temperature_K")
     lever = SampledLever(experiment_of(coarse.probe, BIAS, names=names), coarse.probe)
     there = coarse.probe.with_(n_d=5.5e17, heater_length_um=4.1, base_temperature_K=295.0)
-    exact, parameters = Lever(there).sweep(BIAS).tip_K.values, there.values(names)
-    assert np.abs(lever.shown(parameters)[2] - exact).max() < 2.0
-    assert lever.error_K(parameters) < 2.0
+    exact, shown = Lever(there).sweep(BIAS).tip_K.values, lever.at.surrogate.shown
+    assert np.abs(shown(there.values(names))[2] - exact).max() < 2.0
+    assert lever.error_K(there) < 2.0
 
 
 def test_what_was_known_to_a_factor_is_compared_in_logarithms():

@@ -35,8 +35,12 @@ _WARM_UP = 25
 _BLOCK = 10
 #: Share of moves proposed from the linearised posterior; the others follow the walkers.
 _GAUSSIAN_SHARE = 0.6
-#: Effective samples that quantiles take at least.
-FEWEST_EFFECTIVE = 400
+#: Effective samples that quantiles take at least, and R̂ above which it is said that more should be
+#: taken (both after Vehtari et al.).
+FEWEST_EFFECTIVE, SETTLED_RHAT = 400, 1.01
+#: R̂ from which on quantiles are no limits. Ensembles that start alike drift alike, which it cannot
+#: see.
+HIGHEST_RHAT = 1.05
 
 
 def split_rhat(chains: Array) -> float:

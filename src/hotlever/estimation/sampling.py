@@ -7,7 +7,7 @@ surrogate.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import emcee
@@ -18,6 +18,7 @@ from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.estimation.chains import (
     FEWEST_EFFECTIVE,
+    HIGHEST_RHAT,
     Chains,
     independent_samples,
     rhat_of_ensembles,
@@ -26,10 +27,9 @@ from hotlever.estimation.chains import (
 from hotlever.estimation.experiment import TIP
 from hotlever.estimation.experiment_at_rest import (
     ExperimentAtRest,
-    PredictionAtRest,
     experiment_of,
 )
-from hotlever.estimation.objective import Objective, TipTemperature
+from hotlever.estimation.objective import TipTemperature
 from hotlever.estimation.optimiser import Predictor
 from hotlever.estimation.posterior import Noise, Posterior, PosteriorDensity
 from hotlever.estimation.profile import ErrorProfile, hotter_rows
@@ -50,8 +50,6 @@ from hotlever.types import Array, Progress
 BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)
 #: Standard deviations from which on a solved lever tells of those that samples reach.
 _TELLING = 1.0
-#: R̂ from which on samples are too few. Ensembles that start alike drift alike, which it cannot see.
-_SETTLED = 1.05
 
 
 class SampledLever:
@@ -65,12 +63,8 @@ class SampledLever:
 
     Attributes
     ----------
-    names : tuple of str
-        Parameters in which others differ.
     at : PredictionAtRest
-        Of the probe.
-    shown : callable
-        Return I_h, V_r and T_tip (3, n) for values of the parameters (k,).
+        Of the probe, with the surrogate that is sampled.
 
     Raises
     ------
@@ -79,23 +73,27 @@ class SampledLever:
     """
 
     def __init__(self, experiment: ExperimentAtRest, probe: Probe) -> None:
-        first = experiment.predict(probe)
-        self._experiment = experiment.confirmed(first)
-        self.at: PredictionAtRest = self._experiment.predict(probe, first)
-        self.names = experiment.names
-        self.shown: Callable[[Array], Array] = self.at.surrogate.shown
+        uncorrected = experiment.predict(probe)
+        self._experiment = experiment.confirmed(uncorrected)
+        self.at = self._experiment.predict(probe, uncorrected)
         if isinstance(experiment.fast, ReducedLever):
-            reduced = ReducedSurrogate(self.at.surrogate, experiment.fast, self.at.linearised)
-            self.shown = reduced.shown
+            local, linearised = self.at.surrogate, self.at.linearised
+            surrogate = ReducedSurrogate(local, experiment.fast, linearised)
+            self.at = replace(self.at, surrogate=surrogate)
 
-    def error_K(self, parameters: Array) -> float:
-        """Return by how much the tip temperature may be off for some values (k,) of the names.
+    @classmethod
+    def of_fit(cls, fit: Fit, probe: Probe, bias: Array) -> SampledLever:
+        """Return a lever that was fitted, at some biases (V), exact at a probe."""
+        return cls(experiment_of(probe, bias, names=tuple(fit.names), reduce=True), probe)
+
+    def error_K(self, probe: Probe) -> float:
+        """Return by how much the tip temperature of a similar probe may be off.
 
         By the lever that is solved there; of a reduced one by what the full one's residual says.
         """
-        probe = self.at.probe.replace(dict(zip(self.names, parameters.tolist(), strict=True)))
         solved = self._experiment.predict(probe, self.at)
-        error = float(np.abs(self.shown(parameters) - solved.values)[TIP].max())
+        surrogate = self.at.surrogate.shown(probe.values(self._experiment.names))
+        error = float(np.abs(surrogate - solved.values)[TIP].max())
         if isinstance(self._experiment.fast, ReducedLever):
             branch = solved.linearised.branch
             u = branch.u[np.linspace(1, branch.u.size - 1, 4).astype(int)]
@@ -125,7 +123,7 @@ class SampledTip:
     @property
     def enough(self) -> bool:
         """Whether the quantiles can be trusted."""
-        return self.rhat < _SETTLED and self.effective_samples >= FEWEST_EFFECTIVE
+        return self.rhat < HIGHEST_RHAT and self.effective_samples >= FEWEST_EFFECTIVE
 
     @property
     def note(self) -> str:
@@ -137,7 +135,7 @@ class SampledTip:
             )
         return (
             f"too few posterior samples: {worth}, where {FEWEST_EFFECTIVE} and less than "
-            f"{_SETTLED:g} are expected; the limits are those without samples, take more"
+            f"{HIGHEST_RHAT:g} are expected; the limits are those without samples, take more"
         )
 
 
@@ -161,8 +159,8 @@ def sample_tip(
     )
     points, rows = chains.points.reshape(-1, near.origin.size), hotter_rows(at)
     # a walker stands still where a proposal is refused
-    different, place = np.unique(points, axis=0, return_inverse=True)
-    tips = np.array([near.shown(point)[TIP, rows] for point in different])[place]
+    different, index = np.unique(points, axis=0, return_inverse=True)
+    tips = np.array([near.shown(point)[TIP, rows] for point in different])[index]
     middle, stderr = np.transpose([posterior.of(TipTemperature(int(row))) for row in rows])
     low, high = np.percentile(tips, (2.5, 97.5), axis=0)
     hottest = tips[:, -1].reshape(chains.points.shape[:3])
@@ -176,25 +174,12 @@ def sample_tip(
 # --- the parameters of a fit --------------------------------------------------------------------
 
 
-def _lever_like(fit: Fit, probe: Probe, bias: Array) -> SampledLever:
-    """Return a lever that was fitted, at some biases (V), exact at a probe."""
-    experiment = experiment_of(probe, bias, names=tuple(fit.names), reduce=True)
-    return SampledLever(experiment, probe)
-
-
 def _density_at(fit: Fit, probe: Probe, noise: Noise) -> tuple[PosteriorDensity, SampledLever]:
     """Return the density of a fit's parameters, approximated about a probe, and levers near it."""
     objective = fit.objective(fit.names)
-    lever = _lever_like(fit, probe, objective.residuals.bias)
-    shown = partial(_shown_at, lever.shown, objective, probe.values(lever.names))
-    return PosteriorDensity(objective, lever.at, shown, noise), lever
-
-
-def _shown_at(
-    shown: Callable[[Array], Array], objective: Objective, parameters: Array, point: Array
-) -> Array:
-    """Return what is shown at a point; a function of the module, so that it can be pickled."""
-    return shown(objective.among(parameters, point))
+    lever = SampledLever.of_fit(fit, probe, objective.residuals.bias)
+    near = Subproblem(objective, lever.at)
+    return PosteriorDensity(objective, lever.at, near.shown, noise), lever
 
 
 def sample_posterior(
@@ -261,10 +246,7 @@ def sample_posterior(
     objective = density.objective
     data = _dataset(fit, chains, objective.coordinates.values)
     points = chains.points.reshape(-1, density.optimum.size)
-    at_middle = middle.values(lever.names)
-    error = max(
-        lever.error_K(objective.among(at_middle, points[row])) for row in _outermost(points)
-    )
+    error = max(lever.error_K(objective.at(middle, points[row])) for row in _outermost(points))
     data.attrs |= {"seed": seed, "noise": noise, "rough_error_K": error}
     return data
 
@@ -279,11 +261,12 @@ def _outermost(points: Array) -> list[int]:
 def _dataset(fit: Fit, chains: Chains, values_of: Callable[[Array], Array]) -> xr.Dataset:
     ensembles, walkers, draws, _ = chains.points.shape
     values = values_of(chains.points)
-    columns = {name: values[..., place] for place, name in enumerate(fit.names)}
+    columns = {name: values[..., number] for number, name in enumerate(fit.names)}
     silicon, material = fit.probe.heater_silicon, fit.probe.layout().heater.stack[0].material
     if silicon is not None:
-        at = {own: columns.get(full_name(material, own)) for own in ("n_d", "p")}
-        moved = silicon.model_copy(update={own: one for own, one in at.items() if one is not None})
+        owned = {full_name(material, own): own for own in ("n_d", "p")}
+        sampled = {owned[name]: column for name, column in columns.items() if name in owned}
+        moved = silicon.model_copy(update=sampled)
         columns[INVERSION] = np.broadcast_to(moved.inversion_temperature(), values.shape[:3])
     rhat = [rhat_of_ensembles(column) for column in columns.values()]
     chained = {
@@ -365,18 +348,14 @@ def predictive_band(
         if bias is None
         else np.unique(np.asarray(bias, float))
     )
-    lever = _lever_like(fit, fit.probe, grid)
-    origin = fit.probe.values(lever.names)
-    varied = [lever.names.index(name) for name in fit.names]
+    surrogate = SampledLever.of_fit(fit, fit.probe, grid).at.surrogate
     flat = np.stack([posterior[name].values.ravel() for name in fit.names], axis=1)
     chosen = flat[np.linspace(0, len(flat) - 1, min(samples, len(flat))).round().astype(int)]
     tips, powers = [], []
     for done, row in enumerate(chosen, start=1):
-        parameters = origin.copy()
-        parameters[varied] = row
-        current, _, tip = lever.shown(parameters)
+        current, _, tip = surrogate.shown(row)
         tips.append(tip)
-        powers.append(lever.at.surrogate.circuit(parameters).power(grid, current))
+        powers.append(surrogate.circuit(row).power(grid, current))
         if progress is not None:
             progress(done, len(chosen))
     power = np.linspace(np.min(powers, axis=1).max(), np.max(powers, axis=1).min(), grid.size)

@@ -86,6 +86,7 @@ class CurveSurrogate:
         self, probe: Probe, names: tuple[str, ...], branch: Branch, by_parameter: Array, rows: Rows
     ) -> None:
         self.probe, self.names, self.branch, self.rows = probe, names, branch, rows
+        self.by_parameter = by_parameter
         self._origin = probe.values(names)
         scale = Coordinates.of(probe, names).scale
         self._unit = np.maximum(np.abs(self._origin), 0.1 * scale)
@@ -131,11 +132,11 @@ class CurveSurrogate:
         return self.probe.circuit.model_copy(update=own)
 
 
-class ReducedSurrogate:
+class ReducedSurrogate(CurveSurrogate):
     """A branch times what a reduced lever changes by at equal rises of the tip: good far away too.
 
     The reduced lever stays on its few points, and each of its states starts at a root; so this
-    costs little more than powers do.
+    costs little more than powers do. Derivatives are those of the powers.
 
     Parameters
     ----------
@@ -149,32 +150,32 @@ class ReducedSurrogate:
     def __init__(
         self, local: CurveSurrogate, reduced: ReducedLever, linearised: Linearised
     ) -> None:
-        self._local, self._reduced, self._linearised = local, reduced, linearised
+        super().__init__(local.probe, local.names, local.branch, local.by_parameter, local.rows)
+        self._reduced, self._linearised = reduced, linearised
         self._shown = self._on_few_points(local.probe)
 
     def _on_few_points(self, probe: Probe) -> Array:
         """Return V_l, I_h and V_r of the states of a probe, (k, 3)."""
         guess = self._linearised.states(probe)[:, 1:]
-        u = self._local.branch.u[1:]
+        u = self.branch.u[1:]
         few, states = self._reduced.solved(probe, u, guess, self._linearised.factors)
         return np.asarray(few.observed(states.x).T)
 
     @one_blas_thread
-    def shown(self, parameters: Array) -> Array:
-        """Return I_h, V_r and T_tip (3, n) for some values of the parameters (p,).
+    def branch_at(self, parameters: Array) -> Branch:
+        """See `CurveSurrogate.branch_at`.
 
         Raises
         ------
         ComputationError
             If such a lever has no such states.
         """
-        local = self._local
-        named = zip(local.names, parameters.tolist(), strict=True)
-        ratio = self._on_few_points(local.probe.replace(dict(named))) / self._shown
+        named = zip(self.names, parameters.tolist(), strict=True)
+        ratio = self._on_few_points(self.probe.replace(dict(named))) / self._shown
         # without power the ratio is that of a barely warm lever
         ratio = np.concatenate([ratio[:1], ratio])
-        growth = spline_through(local.branch.u, ratio)(local.branch.u, 1) / ratio
-        return local.rows.values(multiplied(local.branch, ratio, growth), local.probe.circuit)
+        growth = spline_through(self.branch.u, ratio)(self.branch.u, 1) / ratio
+        return multiplied(self.branch, ratio, growth)
 
 
 def multiplied(branch: Branch, factor: Array, growth: Array) -> Branch:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from hotlever.estimation.chains import FEWEST_EFFECTIVE
+from hotlever.estimation.chains import FEWEST_EFFECTIVE, SETTLED_RHAT
 from hotlever.estimation.profile import profile_likelihood
 from hotlever.estimation.result import Fit
 from hotlever.estimation.sampling import BAND_QUANTILES, predictive_band, sample_posterior
@@ -22,8 +22,6 @@ from hotlever.processes import PROCESSORS, local_processes
 from hotlever.text import BAND, aligned
 from hotlever.types import Array, Progress
 
-#: Chains are called unsettled above this R̂ (Vehtari et al., doi:10.1214/20-BA1221).
-_RHAT = 1.01
 #: A parameter is called undetermined if this share of the samples lies within the second share
 #: of its range from a bound, or if its spread is more than the third share of the prior's.
 _AT_BOUND, _NEAR, _AS_WIDE = 0.025, 0.02, 0.7
@@ -40,7 +38,7 @@ Table = tuple[str, list[str], list[list[str]]]
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Marginal:
     """What a posterior says of a quantity, as it stands in a fit file."""
 
     mean: float
@@ -95,15 +93,15 @@ class Uncertainty:
         return texts
 
     @property
-    def quantities(self) -> dict[str, Quantity]:
+    def quantities(self) -> dict[str, Marginal]:
         """What the posterior says of each quantity, by name."""
-        quantities: dict[str, Quantity] = {}
+        quantities: dict[str, Marginal] = {}
         if self.posterior is None:
             return quantities
         for name in self.posterior.quantity.values.tolist():
             samples, chains = self.posterior[name], self.posterior.sel(quantity=name)
             values = np.percentile(samples, BAND_QUANTILES).tolist()
-            quantities[name] = Quantity(
+            quantities[name] = Marginal(
                 mean=samples.mean().item(),
                 standard_deviation=samples.std().item(),
                 quantiles={
@@ -229,12 +227,14 @@ def examine(
 def _unsettled(posterior: xr.Dataset) -> list[str]:
     """Name the quantities whose chains do not agree, or say too little."""
     rhat, effective = posterior.rhat.values, posterior.effective_sample_size.values
-    names = posterior.quantity.values[(rhat > _RHAT) | (effective < FEWEST_EFFECTIVE)].tolist()
+    names = posterior.quantity.values[
+        (rhat > SETTLED_RHAT) | (effective < FEWEST_EFFECTIVE)
+    ].tolist()
     if not names:
         return []
     return [
         f"the posterior of {', '.join(names).replace('_temperature', ' temperature')} is not "
-        f"settled: R̂ up to {rhat.max():.3f} (expected at most {_RHAT:g}), as few as "
+        f"settled: R̂ up to {rhat.max():.3f} (expected at most {SETTLED_RHAT:g}), as few as "
         f"{effective.min():.0f} effective samples (expected at least {FEWEST_EFFECTIVE}); take "
         "more samples"
     ]
