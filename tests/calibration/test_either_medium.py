@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,7 +12,7 @@ import pytest
 from hotlever.calibration.procedure import calibrate
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.inverse_problem import likelier
+from hotlever.estimation.inverse_problem import in_medium
 from hotlever.estimation.residuals import Residuals
 from synthetic_curves import measured_curve, measurement_of
 
@@ -79,42 +79,53 @@ def answers(of: dict[str, tuple[str, float] | Exception]) -> Any:
             residuals=SimpleNamespace(rms=lambda _: {"current_mA": 0.00123}),
             prediction=SimpleNamespace(values=None),
         )
-        return estimate, SimpleNamespace(medium=medium, reason=reason)
+        return estimate, Answer(medium, reason)
 
     return answered
 
 
-def media(found: Any) -> tuple[str, str | None]:
-    """The medium of the answer, and of the other one if there is one."""
-    return found.answer.medium, None if found.other is None else found.other.medium
+@dataclass
+class Answer:
+    """An outcome of which only this much counts."""
+
+    medium: str
+    reason: str
+    notes: tuple[str, ...] = ()
+
+
+def likelier(of: dict[str, tuple[str, float] | Exception]) -> Any:
+    """The answer in an unknown medium, with both media in its name if it is of either."""
+
+    def of_either(first: Answer, second: Answer) -> Answer:
+        return replace(first, medium=f"{first.medium} or {second.medium}")
+
+    return in_medium("unknown", answers(of), of_either)[1]
 
 
 def test_a_described_answer_comes_before_a_likelier_one():
-    found = likelier(answers({"vacuum": ("", 9.0), "air": ("no such lever", 1.0)}))
-    assert media(found) == ("vacuum", None)
-    assert found.words == (
+    answer = likelier({"vacuum": ("", 9.0), "air": ("no such lever", 1.0)})
+    assert answer.medium == "vacuum"
+    assert answer.notes == [
         "the medium is not known: in vacuum a lever describes the data (rms 0.0012 mA); "
         "in air a lever does not describe the data (rms 0.0012 mA)"
-    )
+    ]
 
 
 def test_of_two_described_the_likelier_is_the_answer():
-    found = likelier(answers({"vacuum": ("", 9.0), "air": ("", 1.0)}))
-    assert media(found) == ("air", "vacuum")
+    assert likelier({"vacuum": ("", 9.0), "air": ("", 1.0)}).medium == "air or vacuum"
 
 
 def test_of_two_that_are_not_described_the_nearer_is_shown():
-    found = likelier(answers({"vacuum": ("no", 9.0), "air": ("no", 1.0)}))
-    assert media(found) == ("air", None)
+    assert likelier({"vacuum": ("no", 9.0), "air": ("no", 1.0)}).medium == "air"
 
 
 def test_what_cannot_be_solved_is_said():
     failure = ComputationError("it melts")
-    found = likelier(answers({"vacuum": failure, "air": ("", 1.0)}))
-    assert media(found) == ("air", None)
-    assert found.words.endswith("in vacuum none can be solved: it melts")
+    answer = likelier({"vacuum": failure, "air": ("", 1.0)})
+    assert answer.medium == "air"
+    assert answer.notes[0].endswith("in vacuum none can be solved: it melts")
     with pytest.raises(ComputationError, match="it melts"):
-        likelier(answers({"vacuum": failure, "air": failure}))
+        likelier({"vacuum": failure, "air": failure})
 
 
 def test_the_medium_that_is_asked_for_wins_over_what_the_file_says(cold):

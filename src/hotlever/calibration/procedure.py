@@ -18,8 +18,7 @@ from hotlever.calibration.table import budget_of, table_with_budget, total_error
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.inverse_problem import Estimate, error_of_choice, likelier
-from hotlever.estimation.options import UNKNOWN_MEDIUM
+from hotlever.estimation.inverse_problem import Estimate, error_of_choice, in_medium
 from hotlever.measurement import given_measurement, with_measured_circuit
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
@@ -130,14 +129,8 @@ def calibrate(
             result = replace(result, reason=f"{result.reason}; {cause}")
         return estimate, replace(result, notes=list(dict.fromkeys([*notes, *result.notes])))
 
-    if medium == UNKNOWN_MEDIUM:
-        estimate, result, other, words = likelier(within)
-        if other is not None:
-            result = _in_either(result, other)
-        result = replace(result, notes=[*more, words, *result.notes])
-    else:
-        estimate, result = within(medium)
-        result = replace(result, notes=[*more, *result.notes])
+    estimate, result = in_medium(medium, within, _in_either)
+    result = replace(result, notes=[*more, *result.notes])
     if pulse is None:
         return result
     if not result.describes_data:

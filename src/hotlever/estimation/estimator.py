@@ -13,9 +13,9 @@ import xarray as xr
 from hotlever.errors import unknown_name
 from hotlever.estimation.diagnosis import Diagnosis
 from hotlever.estimation.experiment import Experiment, Prediction
-from hotlever.estimation.inverse_problem import Estimate, error_of_choice, estimate, likelier
+from hotlever.estimation.inverse_problem import Estimate, error_of_choice, estimate, in_medium
 from hotlever.estimation.lack_of_fit import suspicious_points, undescribed
-from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
+from hotlever.estimation.options import FitOptions
 from hotlever.estimation.result import Fit, band_dataset
 from hotlever.estimation.summary import undetermined
 from hotlever.measurement import Measurement, given_measurement
@@ -68,19 +68,12 @@ def fit(
     given = Probe.reference() if probe is None else Probe.coerce(probe)
     whole = given_measurement(measurement, given.circuit)
 
-    def fitted(options: FitOptions) -> tuple[Estimate, Fit]:
-        solution = estimate(whole, given, options, model=model, progress=progress, seen=seen)
+    def fitted(medium: Any) -> tuple[Estimate, Fit]:
+        within = replace(options, medium=medium)
+        solution = estimate(whole, given, within, model=model, progress=progress, seen=seen)
         return solution, _fit_of(solution)
 
-    if options.medium == UNKNOWN_MEDIUM:
-        solution, result, other, words = likelier(
-            lambda medium: fitted(replace(options, medium=medium))
-        )
-        result = replace(result, notes=[words, *result.notes])
-        if other is not None:
-            result = replace(result, band=_either(result.band, other.band))
-    else:
-        solution, result = fitted(options)
+    solution, result = in_medium(options.medium, fitted, _either)
     # a search that has not come to its end contradicts nothing
     if result.describes_data is not False or result.in_time or "current" not in result.observables:
         return result
@@ -159,8 +152,8 @@ def chosen_options(options: FitOptions | None, choices: dict[str, Any]) -> FitOp
     return replace(options or FitOptions(), **choices)
 
 
-def _either(band: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
-    """Return a band whose errors hold another as well, at the same rows or times."""
-    tip_K, stderr = band.tip_K.values, band.tip_stderr_K.values
-    wider = np.hypot(stderr, error_of_choice(tip_K, other.tip_K.values))
-    return band.assign(tip_stderr_K=band.tip_stderr_K.copy(data=wider))
+def _either(fit: Fit, other: Fit) -> Fit:
+    """Return a fit in whose band the errors hold that of another one, at the same rows or times."""
+    band, of_choice = fit.band, error_of_choice(fit.band.tip_K.values, other.band.tip_K.values)
+    stderr = band.tip_stderr_K.copy(data=np.hypot(band.tip_stderr_K.values, of_choice))
+    return replace(fit, band=band.assign(tip_stderr_K=stderr))

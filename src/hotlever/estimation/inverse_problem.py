@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Generic, NamedTuple, TypeVar, get_args
+from typing import Any, TypeVar, cast, get_args
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from hotlever.estimation.experiment_in_time import ExperimentInTime, known_in_ti
 from hotlever.estimation.noise import errors_of_scales
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimum, Predictor
-from hotlever.estimation.options import FitOptions
+from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
 from hotlever.estimation.outcome import Outcome
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.prior_density import FLAT, PriorDensity
@@ -245,60 +245,56 @@ def _observables(
 Answer = TypeVar("Answer", bound=Outcome)
 
 
-class Likelier(NamedTuple, Generic[Answer]):
-    """Answers for a lever in either medium.
+def in_medium(
+    asked: str | None,
+    answered: Callable[[str | None], tuple[Estimate, Answer]],
+    of_either: Callable[[Answer, Answer], Answer],
+) -> tuple[Estimate, Answer]:
+    """Answer for a lever in the medium that is asked; if that is unknown, in the likelier one.
 
-    Attributes
+    Then a note says how well either describes the data.
+
+    Parameters
     ----------
-    estimate : Estimate
-        That the answer is read from.
-    answer : Outcome
-        The one that describes the data, or describes them better.
-    other : Outcome or None
-        That in the other medium, if it describes the data too: they do not tell which it is.
-    words : str
-        How well either describes them.
-    """
-
-    estimate: Estimate
-    answer: Answer
-    other: Answer | None
-    words: str
-
-
-def likelier(answered: Callable[[Medium], tuple[Estimate, Answer]]) -> Likelier[Answer]:
-    """Answer for a lever in either medium.
+    asked : str or None
+        None is what measurement and probe say.
+    answered : callable
+        Return an estimate in a medium, and the outcome that is read from it.
+    of_either : callable
+        Return an outcome whose errors hold another: where both describe the data, these do not
+        tell which it is.
 
     Raises
     ------
     ComputationError
-        If the lever can be solved in neither.
+        If the lever can be solved in none of them.
     """
-    tried: dict[Medium, tuple[Estimate, Answer]] = {}
-    failed: dict[Medium, ComputationError] = {}
+    if asked != UNKNOWN_MEDIUM:
+        return answered(asked)
+    answers: dict[str, tuple[Estimate, Answer]] = {}
+    failures: dict[str, ComputationError] = {}
     for medium in get_args(Medium):
         try:
-            tried[medium] = answered(medium)
+            answers[medium] = answered(medium)
         except ComputationError as error:
-            failed[medium] = error
-    if not tried:
-        raise next(iter(failed.values()))
+            failures[medium] = error
+    if not answers:
+        raise next(iter(failures.values()))
 
-    def unlikeliness(medium: Medium) -> tuple[bool, float]:
+    def unlikeliness(medium: str) -> tuple[bool, float]:
         # what describes the data comes first, and of two of a kind the more probable one
-        estimate, answer = tried[medium]
+        estimate, answer = answers[medium]
         return bool(answer.reason), estimate.posterior.deviance
 
-    best, *rest = sorted(tried, key=unlikeliness)
-    said = [f"in {medium} a lever {_how_well(*tried[medium])}" for medium in (best, *rest)]
-    said += [f"in {medium} none can be solved: {error}" for medium, error in failed.items()]
-    words = f"the medium is not known: {'; '.join(said)}"
-    estimate, answer = tried[best]
-    others = [tried[medium][1] for medium in rest if not tried[medium][1].reason]
-    if not others:
-        return Likelier(estimate, answer, None, words)
-    words += "; the data do not tell which, and the errors of the tip temperature hold both"
-    return Likelier(estimate, answer, others[0], words)
+    best, *rest = sorted(answers, key=unlikeliness)
+    texts = [f"in {medium} a lever {_how_well(*answers[medium])}" for medium in (best, *rest)]
+    texts += [f"in {medium} none can be solved: {error}" for medium, error in failures.items()]
+    note = f"the medium is not known: {'; '.join(texts)}"
+    estimate, answer = answers[best]
+    for other in (answers[medium][1] for medium in rest if not answers[medium][1].reason):
+        answer = of_either(answer, other)
+        note += "; the data do not tell which, and the errors of the tip temperature hold both"
+    return estimate, replace(cast("Any", answer), notes=[note, *answer.notes])
 
 
 def error_of_choice(tip_K: Array, other_K: Array) -> Array:

@@ -87,15 +87,18 @@ class FitOptions:
                     raise InputError(f"{name} is fixed and {what}, expected one of them")
         if not self.varied:
             raise InputError("all parameters are fixed; nothing is left to fit")
-        asked: list[tuple[str, Any, tuple[str, ...]]] = [
-            ("weights", self.weights, get_args(Weights))
-        ]
-        asked += [("observable", name, tuple(OBSERVABLES)) for name in self.observables or ()]
-        if self.medium is not None:
-            asked.append(("medium", self.medium, (*get_args(Medium), UNKNOWN_MEDIUM)))
-        for kind, name, known in asked:
-            if name not in known:
-                raise unknown_name(kind, str(name), known)
+        for kind, names, existing in (
+            ("weights", [self.weights], get_args(Weights)),
+            ("observable", self.observables or (), tuple(OBSERVABLES)),
+            (
+                "medium",
+                [] if self.medium is None else [self.medium],
+                (*get_args(Medium), UNKNOWN_MEDIUM),
+            ),
+        ):
+            for name in names:
+                if name not in existing:
+                    raise unknown_name(kind, str(name), existing)
         if self.observables is None:
             return
         if not self.observables:
@@ -104,15 +107,10 @@ class FitOptions:
         object.__setattr__(self, "observables", chosen)
 
     @property
-    def material(self) -> list[str]:
-        """The parameters to find of those that are usually varied."""
-        return [name for name in self.usual if name not in self.fixed]
-
-    @property
     def varied(self) -> list[str]:
         """All parameters to find."""
-        more = dict.fromkeys([*self.priors, *self.free])
-        return [*self.material, *(name for name in more if name not in {*self.usual, *SCALES})]
+        named = dict.fromkeys([*self.usual, *self.priors, *self.free])
+        return [name for name in named if name not in {*self.fixed, *SCALES}]
 
     def of(self, probe: Probe, *, in_time: bool = False) -> FitOptions:
         """Return the options for a probe: what usually varies is what it is made of.
@@ -123,10 +121,10 @@ class FitOptions:
             If it has no such parameter as is fixed or free, with the nearest that it has; or if
             all are fixed.
         """
-        known = of_materials(probe, in_time=in_time)
+        existing = of_materials(probe, in_time=in_time)
         for name in self.fixed:
-            if name not in known:
-                raise unknown_name("parameter", name, known)
+            if name not in existing:
+                raise unknown_name("parameter", name, existing)
         for name in self.free:
             parameter_of(probe, name, in_time=in_time)
         usual = heat_capacities(probe) if in_time else usual_parameters(probe)
@@ -161,12 +159,12 @@ class FitOptions:
 
     def values(self) -> dict[str, Any]:
         """Return the options as plain values."""
-        found = asdict(self) | {"fixed": dict(self.fixed), "free": list(self.free)}
-        if not found["usual_priors"]:
-            del found["usual_priors"]
-        if tuple(found.pop("usual")) != tuple(PARAMETERS):
-            found["usual"] = list(self.usual)
-        return found
+        values = asdict(self) | {"fixed": dict(self.fixed), "free": list(self.free)}
+        if not values["usual_priors"]:
+            del values["usual_priors"]
+        if tuple(values.pop("usual")) != tuple(PARAMETERS):
+            values["usual"] = list(self.usual)
+        return values
 
 
 @dataclass(frozen=True)
