@@ -12,7 +12,7 @@ import pytest
 from hotlever.errors import BranchEndError, ComputationError, InputError
 from hotlever.estimation import Measurement, fit, read_measurement
 from hotlever.estimation.experiment_at_rest import full_experiment, reduced_experiment
-from hotlever.estimation.lack_of_fit import suspicious_points
+from hotlever.estimation.lack_of_fit import outlier_notes
 from hotlever.estimation.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -134,7 +134,7 @@ def test_of_many_wrong_points_the_worst_are_named(coarse):
     values = np.stack([data.current_mA, data.reader_V, data.tip_K])
     data.current_mA[::3] *= 1.1
     data.current_mA[30] *= 2.0
-    *named, last = suspicious_points(Residuals(data, ["current", "tip"]), values, robust=False)
+    *named, last = outlier_notes(Residuals(data, ["current", "tip"]), values, robust=False)
     assert len(named) == 10
     assert any(f"at {data.bias_V[30]:g} V" in text for text in named)
     assert last == f"{67 - 10} more data are as far from the fit"

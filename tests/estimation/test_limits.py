@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hotlever.calibration.tip_temperature import error_of_model
-from hotlever.estimation.objective import Objective, Pull, TipTemperature
+from hotlever.estimation.objective import Objective, Penalty, TipTemperature
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.prior_density import Coordinates, PriorDensity
 from hotlever.estimation.profile import ErrorProfile, profile_of_tip
@@ -49,7 +49,7 @@ class OneUnknown(Objective):
             jacobian=lambda slopes: np.zeros((0, 1)),
         )
         self.prior = PriorDensity.of_priors({"x": Prior(0.0, 1.0, relative=False)})
-        self._of_prior, self._pull = [0], None
+        self._of_prior, self._penalty = [0], None
 
     def values(self, probe):
         return probe.values(["x"])
@@ -97,12 +97,12 @@ def test_changes_along_the_axes_add_up_to_the_variance():
 
 
 def test_a_pulled_quantity_is_on_its_profile():
-    """Of all levers with this tip the pulled one is nearest to what was known: x² tells how far."""
+    """Of all levers with this tip it is the one nearest to what was known: x² tells how far."""
     known = posterior(0.0)
     tip = TipTemperature(2)
     for target in (TIPS[2] + 30.0, TIPS[2] - 50.0):
-        pulled = known.objective.pulled(Pull(tip, target, 1e-3))
-        there, squares = Subproblem(pulled, known.at).minimum()
+        penalised = known.objective.penalised(Penalty(tip, target, 1e-3))
+        there, squares = Subproblem(penalised, known.at).minimum()
         assert there[0] == pytest.approx((target - TIPS[2]) / SLOPES[2], rel=1e-4)
         assert squares == pytest.approx(there[0] ** 2, rel=1e-3)
 
@@ -119,12 +119,12 @@ def test_what_is_linear_has_the_linearised_error():
 def test_what_bends_has_other_limits_either_way(bend):
     found = profile(bend)
     assert not found.linear
-    # as far as x is pulled, x standard errors away the tip is b |x + bend x²| away
+    # as far as x is moved, x standard errors away the tip is b |x + bend x²| away
     low, high = found.credible_interval(TIPS[1:], SLOPES[1:], np.zeros(2))
     wide, narrow = (high - TIPS[1:], TIPS[1:] - low)[:: 1 if bend > 0 else -1]
     for away, way in ((wide, np.sign(bend)), (narrow, -np.sign(bend))):
         exact = np.abs(way + bend * BAND) * BAND * SLOPES[1:]
-        # the pulled estimate is not exactly 95 % away
+        # the penalised estimate is not exactly 95 % away
         np.testing.assert_allclose(away, exact, rtol=0.1)
     assert np.all(wide > 1.5 * narrow)
 

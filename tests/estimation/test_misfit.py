@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hotlever.estimation import Measurement
-from hotlever.estimation.lack_of_fit import off_together, undescribed
+from hotlever.estimation.lack_of_fit import lack_of_fit_text, run_of_outliers
 from hotlever.estimation.residuals import Residuals
 
 COUNT = 40
@@ -30,8 +30,8 @@ def compared(off: np.ndarray, bias: np.ndarray = BIAS, tip: bool = False) -> Res
 
 def test_noise_is_described():
     residuals = compared(0.01 * np.random.default_rng(1).standard_normal(COUNT))
-    assert undescribed(residuals, MODEL) == ""
-    assert off_together(residuals, MODEL) == ""
+    assert lack_of_fit_text(residuals, MODEL) == ""
+    assert run_of_outliers(residuals, MODEL) == ""
 
 
 @pytest.mark.parametrize("seed", range(1, 9))
@@ -39,28 +39,28 @@ def test_noise_is_described():
 def test_much_noise_is_described_too(seed, size):
     """Once runs of four rows were compared with 1.2 %, whatever the noise."""
     noise = size * 1.1 * np.random.default_rng(seed).standard_normal(COUNT)
-    assert undescribed(compared(noise), MODEL) == ""
+    assert lack_of_fit_text(compared(noise), MODEL) == ""
 
 
 def test_a_smooth_misfit_is_none_of_little_noise():
     noise = 0.003 * np.random.default_rng(1).standard_normal(COUNT)
-    assert undescribed(compared(noise + 0.05 * ALONG**3), MODEL) != ""
+    assert lack_of_fit_text(compared(noise + 0.05 * ALONG**3), MODEL) != ""
 
 
 @pytest.mark.parametrize("row", [0, 20, -1])
 def test_an_outlier_is_at_random_wherever_it_is(row):
     off = np.zeros(COUNT)
     off[row] = 0.06
-    assert undescribed(compared(off), MODEL) == ""
+    assert lack_of_fit_text(compared(off), MODEL) == ""
 
 
 def test_perfect_data_are_described():
     data = Measurement(BIAS, MODEL[0], *np.full((3, COUNT), np.nan))
-    assert undescribed(Residuals(data, ["current"]), MODEL) == ""
+    assert lack_of_fit_text(Residuals(data, ["current"]), MODEL) == ""
 
 
 def test_what_is_off_smoothly_is_not_and_the_worst_place_is_named():
-    text = undescribed(compared(0.05 * ALONG**3), MODEL)
+    text = lack_of_fit_text(compared(0.05 * ALONG**3), MODEL)
     assert text.startswith("current differs by 1.8%")
     assert text.endswith("most at 11 V")
 
@@ -68,17 +68,17 @@ def test_what_is_off_smoothly_is_not_and_the_worst_place_is_named():
 def test_a_drift_over_rows_up_and_down_is_not_described():
     bias = np.concatenate([BIAS[::2], BIAS[::-2]])
     values = np.stack([0.1 * bias, np.full(COUNT, np.nan), np.full(COUNT, 300.0)])
-    assert "not at random" in undescribed(compared(0.03 * ALONG, bias), values)
+    assert "not at random" in lack_of_fit_text(compared(0.03 * ALONG, bias), values)
 
 
 def test_another_lever_shows_also_in_shuffled_rows():
     order = np.random.default_rng(2).permutation(COUNT)
     residuals = compared(0.05 * ALONG[order], BIAS[order])
-    assert "not at random" in undescribed(residuals, MODEL[:, order])
+    assert "not at random" in lack_of_fit_text(residuals, MODEL[:, order])
 
 
 def test_the_scale_of_a_thermometer_is_no_misfit():
-    assert undescribed(compared(0.05 * ALONG, tip=True), MODEL) == ""
+    assert lack_of_fit_text(compared(0.05 * ALONG, tip=True), MODEL) == ""
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_outliers_stand_alone(rows, where):
     off = np.zeros(COUNT)
     off[list(rows)] = 0.02
     said = f"current is off in neighbouring rows, {where}" if where else ""
-    assert off_together(compared(off), MODEL) == said
+    assert run_of_outliers(compared(off), MODEL) == said
 
 
 @pytest.mark.slow

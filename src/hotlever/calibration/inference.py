@@ -27,7 +27,7 @@ from hotlever.estimation import Fit, FitOptions, Measurement
 from hotlever.estimation.experiment import TIP
 from hotlever.estimation.experiment_at_rest import PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate, estimate
-from hotlever.estimation.lack_of_fit import suspicious_points
+from hotlever.estimation.lack_of_fit import outlier_notes
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
@@ -151,7 +151,7 @@ def calibrated_by_estimate(
     notes = [*what_data_lack(measured, tip.table.tip_K.values), *estimate.notes]
     notes += [tip.asymmetry] if tip.asymmetry and not reason else []
     notes += [jump.note for jump in tip.jumps]
-    notes += suspicious_points(estimate.residuals, estimate.prediction.values, robust=True)
+    notes += outlier_notes(estimate.residuals, estimate.prediction.values, robust=True)
     own, lever = estimate.branch, Lever(probe.in_medium("vacuum"), COARSE)
     vacuum = lever.branch()
     # beyond the measured range a coarse lever says where the knee is

@@ -9,7 +9,7 @@ from scipy.special import chdtrc
 
 from hotlever.errors import InputError
 from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.lack_of_fit import off_together, undescribed
+from hotlever.estimation.lack_of_fit import lack_of_fit_text, run_of_outliers
 from hotlever.estimation.residuals import Residuals
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
@@ -146,7 +146,7 @@ def misfit(
     moved: Mapping[str, Moved],
 ) -> str:
     """Return why data are not described by what was fitted to them; empty if they are."""
-    reason = undescribed(residuals, values) or off_together(residuals, values)
+    reason = lack_of_fit_text(residuals, values) or run_of_outliers(residuals, values)
     if reason:
         return reason
     name = max(moved, key=lambda name: abs(moved[name].pull), default="")

@@ -14,7 +14,7 @@ from hotlever.errors import unknown_name
 from hotlever.estimation.diagnosis import Diagnosis
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.inverse_problem import Estimate, error_of_choice, estimate, in_medium
-from hotlever.estimation.lack_of_fit import suspicious_points, undescribed
+from hotlever.estimation.lack_of_fit import lack_of_fit_text, outlier_notes
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.result import Fit, band_dataset
 from hotlever.estimation.summary import undetermined
@@ -77,7 +77,7 @@ def fit(
     # a search that has not come to its end contradicts nothing
     if result.describes_data is not False or result.in_time or "current" not in result.observables:
         return result
-    if solution.options.robust or not suspicious_points(
+    if solution.options.robust or not outlier_notes(
         solution.residuals, solution.prediction.values, robust=False
     ):
         cause = Diagnosis(solution.measurement, solution.stated, options.priors or None).named()
@@ -91,12 +91,12 @@ def _fit_of(estimate: Estimate) -> Fit:
     options, residuals, prediction = estimate.options, estimate.residuals, estimate.prediction
     values, posterior = prediction.values, estimate.posterior
     in_time = estimate.measurement.time_us is not None
-    notes = suspicious_points(residuals, values, options.robust)
+    notes = outlier_notes(residuals, values, options.robust)
     notes += residuals.drifting_zeros(values, posterior.slopes)
     chi_square = residuals.errors.reduced_chi_square(
         residuals.difference(values), len(options.varied)
     )
-    converged, reason = estimate.verdict(undescribed(residuals, values))
+    converged, reason = estimate.verdict(lack_of_fit_text(residuals, values))
     if chi_square is not None:
         text = (
             f"the scatter about the fit is {np.sqrt(chi_square):.2f} times the measurement errors"

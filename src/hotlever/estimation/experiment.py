@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
+from hotlever.datasets import OBSERVABLES
 from hotlever.estimation.surrogate import Surrogate
 from hotlever.probe import Probe
 from hotlever.types import Array
@@ -44,6 +45,11 @@ class Prediction:
     surrogate: Surrogate
     columns: dict[str, Array]
     tip_slopes: Array
+
+
+def named(values: Array) -> dict[str, Array]:
+    """Return what is shown, (3, n), by the names that a sweep or a history has."""
+    return {column.name: row for column, row in zip(OBSERVABLES.values(), values, strict=True)}
 
 
 class Experiment(Protocol):

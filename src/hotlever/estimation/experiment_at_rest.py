@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import BSpline
 
-from hotlever.estimation.experiment import TIP, Prediction
+from hotlever.estimation.experiment import TIP, Prediction, named
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.surrogate import CurveSurrogate
 from hotlever.lever.branch import Branch, Reach, shifted
@@ -145,14 +145,8 @@ class ExperimentAtRest:
             by_parameter = by_parameter + self.correction.slopes(branch.u)
         rows = Rows(self.bias, self.shown)
         values, slopes = rows.differentiated(branch, by_parameter, probe.circuit, self.names)
-        current, reader, tip = values
-        columns = {
-            "bias_V": self.bias,
-            "lever_V": probe.circuit.lever_voltage(self.bias, current),
-            "current_mA": current,
-            "reader_V": reader,
-            "tip_K": tip,
-        }
+        lever = probe.circuit.lever_voltage(self.bias, values[0])
+        columns = {"bias_V": self.bias, "lever_V": lever, **named(values)}
         surrogate = CurveSurrogate(probe, self.names, branch, by_parameter, rows)
         return PredictionAtRest(probe, values, slopes, surrogate, columns, slopes[TIP], linearised)
 
@@ -184,6 +178,18 @@ class ExperimentAtRest:
             values, slopes = (np.insert(each, 0, 0.0, axis=0) for each in (values, slopes))
         lacking = spline_through(u, values), spline_through(u, slopes)
         return replace(self, correction=Correction(probe.values(self.names), *lacking))
+
+    def exact_at(self, probe: Probe) -> tuple[ExperimentAtRest, PredictionAtRest]:
+        """Return a model that is exact at a probe, and its prediction there.
+
+        Raises
+        ------
+        ComputationError
+            If the lever cannot be solved.
+        """
+        uncorrected = self.predict(probe)
+        exact = self.confirmed(uncorrected)
+        return exact, exact.predict(probe, uncorrected)
 
     def _full_states(
         self, fast: Branch, equations: LeverEquations, probe: Probe

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from hotlever.datasets import OBSERVABLES, observables_of
+from hotlever.datasets import observables_of
 from hotlever.errors import InputError
-from hotlever.estimation.experiment import TIP, Prediction
+from hotlever.estimation.experiment import TIP, Prediction, named
 from hotlever.estimation.surrogate import LinearSurrogate
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
@@ -31,8 +31,6 @@ from hotlever.types import Array, Index
 _PER_DECADE = 12
 #: Error of a step (K): some parts in a hundred thousand of the current.
 _TOLERANCE_K = 0.05
-#: What is shown, by the names that a history has.
-_SHOWN = [column.name for column in OBSERVABLES.values()]
 
 
 class _Times:
@@ -169,7 +167,7 @@ class ExperimentInTime:
         columns = {
             "time_us": self.times.at,
             "bias_V": self.waveform.bias(self.times.at),
-            **dict(zip(_SHOWN, corrected, strict=True)),
+            **named(corrected),
         }
         values, slopes = map(self.times.at_rows, (corrected, coarse_slopes))
         surrogate = LinearSurrogate(probe.values(self.names), values, slopes)

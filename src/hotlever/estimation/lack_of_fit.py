@@ -30,7 +30,7 @@ _SUSPICIOUS, _NAMED = 8.0, 10
 USUAL_SCATTER = _SCATTER
 
 
-def undescribed(residuals: Residuals, values: Array) -> str:
+def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
     """Return where data are not described by predicted values (3, n); empty if they are.
 
     Tip temperatures are left out: a thermometer's scale may be off by more than its readings
@@ -71,7 +71,7 @@ def undescribed(residuals: Residuals, values: Array) -> str:
     return ""
 
 
-def off_together(residuals: Residuals, values: Array) -> str:
+def run_of_outliers(residuals: Residuals, values: Array) -> str:
     """Return where neighbouring data are off together, as no outliers are; empty if none are."""
     in_order = np.argsort(residuals.along, kind="stable")
     along = residuals.along[in_order]
@@ -88,7 +88,7 @@ def off_together(residuals: Residuals, values: Array) -> str:
     return ""
 
 
-def suspicious_points(residuals: Residuals, values: Array, robust: bool) -> list[str]:
+def outlier_notes(residuals: Residuals, values: Array, robust: bool) -> list[str]:
     """Name the points that lie far outside the scatter of the others."""
     advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
     size = np.abs(residuals.deviations(values))

@@ -1,4 +1,4 @@
-"""What an estimate makes small: data, priors and a pull, as residuals of what is varied."""
+"""What an estimate makes small: data, priors and a penalty, as residuals of what is varied."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ class ParameterValue:
 
 
 @dataclass(frozen=True)
-class Pull:
-    """A further datum that pulls a quantity to a value, by an error in its unit.
+class Penalty:
+    """A further datum: a quantity has a value, within an error in its unit.
 
     The optimum with it lies on the profile likelihood of the quantity: of all levers with its
     value there, it is the one nearest to data and priors.
@@ -118,17 +118,17 @@ class Objective:
         logarithms = np.array(prior.names, dtype=str)[prior.relative]
         self.coordinates = Coordinates.of(probe, varied, logarithms.tolist())
         self.bounds = self.coordinates.bounds
-        self._pull: Pull | None = None
+        self._penalty: Penalty | None = None
 
     @property
     def informed(self) -> bool:
         """Whether there are priors."""
         return bool(self.prior.names)
 
-    def pulled(self, pull: Pull) -> Objective:
+    def penalised(self, penalty: Penalty) -> Objective:
         """Return the same with a further datum."""
         other = copy(self)
-        other._pull = pull
+        other._penalty = penalty
         return other
 
     # --- parameters and points --------------------------------------------------------------------
@@ -163,24 +163,24 @@ class Objective:
     def residual(self, values: Array, point: Array) -> Array:
         """Return the residuals of data and priors, for predicted values (3, n)."""
         parts = [self.residuals.weighted(values), self.from_priors(point)]
-        if self._pull is not None:
-            pull, parameters = self._pull, self.coordinates.values(point)
-            parts.append(np.array([pull.quantity.value(values, parameters) - pull.target]))
-            parts[-1] /= pull.error
+        if self._penalty is not None:
+            penalty, parameters = self._penalty, self.coordinates.values(point)
+            away = penalty.quantity.value(values, parameters) - penalty.target
+            parts.append(np.array([away / penalty.error]))
         return np.concatenate(parts)
 
     def unsolved(self, point: Array) -> Array:
         """Return residuals of a lever that has no states: far beyond any real ones."""
         data = np.full(self.residuals.size, _UNSOLVED)
-        pull = np.full(0 if self._pull is None else 1, _UNSOLVED)
-        return np.concatenate([data, self.from_priors(point), pull])
+        penalty = np.full(0 if self._penalty is None else 1, _UNSOLVED)
+        return np.concatenate([data, self.from_priors(point), penalty])
 
     def jacobian(self, slopes: Array, point: Array) -> Array:
         """Return their derivatives by the coordinates, for predicted slopes (3, n, k)."""
         rows = [self.of_data(slopes, point), self.of_priors(point)]
-        if self._pull is not None:
-            by = self._pull.quantity.gradient(slopes[:, :, self.columns])
-            rows.append(by[None] * self.coordinates.rates(point) / self._pull.error)
+        if self._penalty is not None:
+            by = self._penalty.quantity.gradient(slopes[:, :, self.columns])
+            rows.append(by[None] * self.coordinates.rates(point) / self._penalty.error)
         return np.concatenate(rows)
 
     def squares(self, at: Prediction) -> float:

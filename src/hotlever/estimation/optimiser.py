@@ -17,7 +17,7 @@ import numpy as np
 
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation.experiment import Experiment, Prediction
-from hotlever.estimation.lack_of_fit import undescribed
+from hotlever.estimation.lack_of_fit import lack_of_fit_text
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.options import SearchOptions
 from hotlever.estimation.subproblem import Subproblem
@@ -66,7 +66,9 @@ class Optimum:
     @property
     def describes_data(self) -> bool:
         """Whether the search converged to a lever that describes the data."""
-        return self.converged and not undescribed(self.optimiser.residuals, self.prediction.values)
+        return self.converged and not lack_of_fit_text(
+            self.optimiser.residuals, self.prediction.values
+        )
 
     @property
     def misfit(self) -> float:

@@ -1,6 +1,6 @@
-"""Profiles: how much worse a fit gets as a quantity is pulled off its optimum.
+"""Profile likelihoods: how much worse a fit gets as a quantity is moved off its optimum.
 
-A quantity is pulled by a further datum (`hotlever.estimation.objective.Pull`), and all parameters
+A quantity is moved by a further datum (`hotlever.estimation.objective.Penalty`), and all parameters
 are estimated anew; the rise ΔS of the sum of squares says how many standard errors away it is. A
 calibration asks so for the tip temperature, a fit for each of its parameters.
 """
@@ -18,7 +18,7 @@ from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.experiment import TIP, Experiment, Prediction
 from hotlever.estimation.experiment_at_rest import experiment_of
-from hotlever.estimation.objective import Objective, ParameterValue, Pull, TipTemperature
+from hotlever.estimation.objective import Objective, ParameterValue, Penalty, TipTemperature
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.result import Fit
@@ -27,16 +27,16 @@ from hotlever.probe.parameters import parameter_of, usual_parameters
 from hotlever.text import BAND
 from hotlever.types import Array, Index
 
-#: Biases, in the hotter half, at which the tip temperature is pulled away, and by how many
+#: Biases, in the hotter half, at which the tip temperature is moved away, and by how many
 #: standard errors.
 _ROWS, _AWAY = 3, 2.0
-#: Levers that are solved on each side at most; one is near enough if the pulled estimate is no
+#: Levers that are solved on each side at most; one is near enough if the moved estimate is no
 #: further from it than this share of the way from the optimum: where levers were solved on until
 #: the sum of squares was known within 0.4, the standard error changed by 3 % at most.
 _MOST_SOLVED, _NEAR = 3, 0.3
 #: A rise of the sum of squares below which a side is open.
 _LEAST_RISE = 0.25
-#: No side is narrower than this share of the linearised error. Near a fold the search for a pulled
+#: No side is narrower than this share of the linearised error. Near a fold the search for a moved
 #: lever may end short of the nearest one, and its sum of squares rises by too much: one of 200
 #: levers of which little is known was eleven of its errors off, on a side of a seventh.
 _NARROWEST = 0.6
@@ -87,9 +87,9 @@ class ErrorProfile:
 
 
 def profile_of_tip(posterior: Posterior, experiment: Experiment) -> ErrorProfile:
-    """Pull the tip temperature of an estimate with priors away from its optimum.
+    """Move the tip temperature of an estimate with priors away from its optimum.
 
-    On either side the lever is solved whose tip is pulled away where it is hottest; what is near it
+    On either side the lever is solved whose tip is moved away where it is hottest; what is near it
     serves the other biases. What the optimum tells of levers so far away does not hold where
     parameters make up for each other along a bent valley. Where no such lever is found the
     linearised error is kept.
@@ -99,12 +99,12 @@ def profile_of_tip(posterior: Posterior, experiment: Experiment) -> ErrorProfile
     tips = [TipTemperature(int(row)) for row in rows]
     sides = np.ones((2, rows.size))
     for side, way in enumerate((-1.0, 1.0)):
-        pulled = [objective.pulled(_pull(posterior, tip, way)) for tip in tips]
-        near = _solved_near(pulled[-1], posterior, experiment)
+        penalised = [objective.penalised(_penalty(posterior, tip, way)) for tip in tips]
+        near = _solved_near(penalised[-1], posterior, experiment)
         if near is None:
             continue
         for number, tip in enumerate(tips):
-            there, _ = near.of(pulled[number]).minimum()
+            there, _ = near.of(penalised[number]).minimum()
             value, stderr = posterior.of(tip)
             away = abs(tip.value(near.shown(there), there) - value)
             rise = max(near.squares(there) - least, _LEAST_RISE)
@@ -113,11 +113,11 @@ def profile_of_tip(posterior: Posterior, experiment: Experiment) -> ErrorProfile
 
 
 def _solved_near(
-    pulled: Objective, posterior: Posterior, experiment: Experiment
+    penalised: Objective, posterior: Posterior, experiment: Experiment
 ) -> Subproblem | None:
     """Solve the lever that a pulled objective leads to, and return what is near it.
 
-    It is pulled again from there until that moves it little; None if that does not end. No trial is
+    It is moved again from there until that moves it little; None if that does not end. No trial is
     rejected, as a search would: what is near a lever that lies too far off knows the way back.
     """
     objective, at = posterior.objective, posterior.at
@@ -126,7 +126,7 @@ def _solved_near(
     errors = np.sqrt(np.diag(posterior.covariance)) / objective.coordinates.rates(optimum)
     near = Subproblem(objective, at)
     for count in range(_MOST_SOLVED + 1):
-        there, _ = near.of(pulled).minimum()
+        there, _ = near.of(penalised).minimum()
         moved = np.linalg.norm((there - near.origin) / errors)
         if count and moved < _NEAR * np.linalg.norm((near.origin - optimum) / errors):
             return near
@@ -139,13 +139,13 @@ def _solved_near(
     return None
 
 
-def _pull(posterior: Posterior, tip: TipTemperature, way: float) -> Pull:
+def _penalty(posterior: Posterior, tip: TipTemperature, way: float) -> Penalty:
     """Return a datum that moves an estimate to `_AWAY` standard errors, if everything is linear.
 
     It is twice as far away, with the error that the tip is known by: the estimate moves half way.
     """
     value, stderr = posterior.of(tip)
-    return Pull(tip, value + 2.0 * way * _AWAY * stderr, stderr)
+    return Penalty(tip, value + 2.0 * way * _AWAY * stderr, stderr)
 
 
 def hotter_rows(at: Prediction) -> Index:
@@ -206,10 +206,10 @@ def profile_likelihood(
     names = tuple(dict.fromkeys([*usual_parameters(result.probe), *result.names]))
     objective = result.objective(names)
     residuals = objective.residuals
-    model = experiment_of(result.probe, residuals.bias, names=names, reduce=True)
     # exact to first order at the optimum, and used as it is from there
-    model = model.confirmed(model.predict(result.probe))
-    at_optimum = model.predict(result.probe)
+    experiment, at_optimum = experiment_of(
+        result.probe, residuals.bias, names=names, reduce=True
+    ).exact_at(result.probe)
     # with priors, residuals are in standard deviations
     variance = 1.0 if objective.informed else _noise_variance(result, name, residuals.size)
     least = objective.squares(at_optimum) if objective.informed else result.sum_of_squares
@@ -230,10 +230,10 @@ def profile_likelihood(
             if sign * (target - bound) >= 0:
                 reasons[side] = f"{way} to its bound {bound:g}"
                 break
-            pulled = objective.pulled(Pull(quantity, target, _HELD * step))
+            penalised = objective.penalised(Penalty(quantity, target, _HELD * step))
             try:
                 start = near.probe.replace({name: target})
-                near = Optimiser(pulled, model, near=near).solve(start).prediction
+                near = Optimiser(penalised, experiment, near=near).solve(start).prediction
             except ComputationError:
                 reasons[side] = f"as far as the lever can be solved ({target:.4g} cannot)"
                 break

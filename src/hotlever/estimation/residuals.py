@@ -21,8 +21,8 @@ from hotlever.measurement import Measurement
 from hotlever.probe.priors import Moved
 from hotlever.types import Array
 
-#: Observables that have a zero, with the unit it is given in.
-ZEROED = {"current": "mA", "reader": "V"}
+#: Observables that have a zero.
+ZEROED = ("current", "reader")
 #: A zero is worth a note beyond this many standard errors.
 _NOTICED = 7.0
 
@@ -279,7 +279,8 @@ class Drift:
         """Describe lines from `line`; some of them, if not all."""
         which = np.any(self._columns, axis=(1, 2)) if which is None else which
         return [
-            f"{name}: the zero goes from {first:+.3g} to {last:+.3g} {ZEROED[name]} along the file"
+            f"{name}: the zero goes from {first:+.3g} to {last:+.3g} {OBSERVABLES[name].unit} "
+            "along the file"
             for name, first, last, asked in zip(
                 self._names, *line[:, [0, -1]].T, which, strict=True
             )

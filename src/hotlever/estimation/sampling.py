@@ -73,9 +73,7 @@ class SampledLever:
     """
 
     def __init__(self, experiment: ExperimentAtRest, probe: Probe) -> None:
-        uncorrected = experiment.predict(probe)
-        self._experiment = experiment.confirmed(uncorrected)
-        self.at = self._experiment.predict(probe, uncorrected)
+        self._experiment, self.at = experiment.exact_at(probe)
         if isinstance(experiment.fast, ReducedLever):
             local, linearised = self.at.surrogate, self.at.linearised
             surrogate = ReducedSurrogate(local, experiment.fast, linearised)
