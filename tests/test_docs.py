@@ -44,7 +44,7 @@ LAWS = (
     "calibration",
     "lever/reduced/error_estimate.py",
     "estimation/optimiser.py",
-    "estimation/residuals.py",
+    "estimation/noise.py",
 )
 
 with_examples = [
