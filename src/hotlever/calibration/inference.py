@@ -157,7 +157,7 @@ def calibrated_by_estimate(
     # beyond the measured range a coarse lever says where the knee is
     if own.knee is None:
         own = vacuum if medium == "vacuum" else lever.in_medium(medium).branch()
-    knee, threshold = knee_of(estimate, own), vacuum.knee
+    knee, threshold = knee_with_errors(estimate, own), vacuum.knee
     law, residual, k, k_stderr, turns = None, np.nan, np.nan, np.nan, ""
     if circuit.starts_cold:
         turns = power_turns(own, medium) or power_turns(vacuum, "vacuum")
@@ -217,7 +217,7 @@ def _tips(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
     return branch.tip_K(branch.read(circuit, measured.bias_V).u)
 
 
-def knee_of(estimate: Estimate, branch: Branch) -> Knee:
+def knee_with_errors(estimate: Estimate, branch: Branch) -> Knee:
     """Return the knee of a branch of the estimated lever, with standard errors; NaN without one.
 
     There are no errors of a knee that the lever may have beyond the measured range.
