@@ -84,7 +84,7 @@ def speed(vacuum, air):
         for _ in range(RUNS):  # in turns, so that a slow spell of the machine meets both
             for name in levers:
                 times[name].append(processor_seconds(partial(action, name)))
-        in_vacuum, in_air = (median(found) for found in times.values())
+        in_vacuum, in_air = (median(seconds) for seconds in times.values())
         rows.append((kind, f"{in_vacuum:.3f}", f"{in_air:.3f}", f"{in_air / in_vacuum:.2f}"))
     print("\n25-point sweep, operator at hand: CPU seconds, median (air ≤ 2 × vacuum)\n")
     table(("", "vacuum", "air", "ratio"), rows)

@@ -54,12 +54,12 @@ def twin(rng: np.random.Generator) -> Probe:
         if getattr(reference.shape, name) is not None
     }
     names = [name for name in Material.model_fields if name != "n_hd"]
-    known = np.log(
+    logarithms = np.log(
         [[getattr(published(lever).material, name) for name in names] for lever in SCATTER_OF]
     )
     # normal deviates with the covariance of the four levers
-    deviations = (known - known.mean(axis=0)).T @ rng.standard_normal(len(known))
-    deviations /= np.sqrt(len(known) - 1)
+    deviations = (logarithms - logarithms.mean(axis=0)).T @ rng.standard_normal(len(logarithms))
+    deviations /= np.sqrt(len(logarithms) - 1)
     material = {
         name: getattr(reference.material, name) * float(np.exp(change))
         for name, change in zip(names, deviations, strict=True)
@@ -73,11 +73,11 @@ def models_of(probe: Probe) -> dict[str, Branch]:
 
 
 def full_measurement(
-    probe: Probe, known: Branch, medium: str, rng: np.random.Generator
+    probe: Probe, branch: Branch, medium: str, rng: np.random.Generator
 ) -> Measurement:
     """Measure current, reader voltage and tip temperature at 25 biases."""
     bias = np.linspace(1.0, HIGHEST_BIAS[medium], 25)
-    bias = bias[np.isfinite(current_at(known, bias, CIRCUIT))]
+    bias = bias[np.isfinite(current_at(branch, bias, CIRCUIT))]
     sweep = Lever(probe.in_medium(medium), MESH).sweep(bias)
     error = 5.0 + 0.02 * (sweep.tip_K.values - BASE)  # the paper's calibration error
     tip = sweep.tip_K.values + 0.5 * error * rng.standard_normal(bias.size)
@@ -113,7 +113,7 @@ def routes(
 ) -> dict[str, Temperatures]:
     knee = find_knee(curve, reference[medium]).power_mW
     nominal = Probe.reference().material
-    found: dict[str, Temperatures] = {
+    temperatures: dict[str, Temperatures] = {
         "bare rule, nominal doping": bare_rule(knee, nominal),
         "bare rule, doping known": bare_rule(knee, probe.material),
         "Eq. 12 times k": lambda power: curve_of_law(EQ12, BASE).at(power, knee),
@@ -123,10 +123,12 @@ def routes(
         "probe known, vacuum times k": lambda power: curve_of_model(own["vacuum"]).at(power, knee),
     }
     if medium == "air":
-        found["reference probe, air model"] = lambda power: curve_of_model(reference["air"]).at(
+        temperatures["reference probe, air model"] = lambda power: curve_of_model(
+            reference["air"]
+        ).at(power, knee)
+        temperatures["probe known, air model"] = lambda power: curve_of_model(own["air"]).at(
             power, knee
         )
-        found["probe known, air model"] = lambda power: curve_of_model(own["air"]).at(power, knee)
     for fit_medium, (models, fit_knee) in fits.items():
         if fit_medium == "air" and medium == "vacuum":
             continue
@@ -135,8 +137,8 @@ def routes(
         above = fit_knee / knee_of(models[fit_medium]).power_mW
         fitted = models[medium]
         fitted_curve = TemperatureCurve(fitted.tip_temperature, above * knee_of(fitted).power_mW)
-        found[f"fit in {fit_medium}"] = lambda power, of=fitted_curve: of.at(power, knee)
-    return found
+        temperatures[f"fit in {fit_medium}"] = lambda power, of=fitted_curve: of.at(power, knee)
+    return temperatures
 
 
 def main(count: int, fitted_in_air: int) -> None:
@@ -169,13 +171,13 @@ def main(count: int, fitted_in_air: int) -> None:
         f"{'in':<8}{'route':<34}{'levers':>7}{'rms K':>7}"
         f"{'median of largest K':>21}{'largest K':>11}"
     )
-    for (medium, name), found in sorted(
+    for (medium, name), of_levers in sorted(
         errors.items(), key=lambda entry: -MEDIA.index(entry[0][0])
     ):
-        largest = [float(np.nanmax(np.abs(error))) for error in found]
-        rms = np.sqrt(np.nanmean(np.concatenate(found) ** 2))
+        largest = [float(np.nanmax(np.abs(error))) for error in of_levers]
+        rms = np.sqrt(np.nanmean(np.concatenate(of_levers) ** 2))
         print(
-            f"{medium:<8}{name:<34}{len(found):>7}{rms:>7.1f}{np.median(largest):>21.1f}"
+            f"{medium:<8}{name:<34}{len(of_levers):>7}{rms:>7.1f}{np.median(largest):>21.1f}"
             f"{max(largest):>11.1f}"
         )
     ratio = np.mean(scales, axis=0)

@@ -82,17 +82,23 @@ def same() -> None:
         {
             "probe": {"shape": "drawing", "thickness_um": 0.4, "tip_um": list(layout.tip)},
             "layers": {
-                "silicon": [one.outline for one in layout.regions],
-                "heater": next(one.outline for one in layout.regions if one.name == "heater"),
-                "reader": next(one.outline for one in layout.regions if one.name == "reader"),
+                "silicon": [region.outline for region in layout.regions],
+                "heater": next(
+                    region.outline for region in layout.regions if region.name == "heater"
+                ),
+                "reader": next(
+                    region.outline for region in layout.regions if region.name == "reader"
+                ),
             },
-            "terminals": {one.name: [one.start, one.end] for one in layout.terminals},
+            "terminals": {
+                terminal.name: [terminal.start, terminal.end] for terminal in layout.terminals
+            },
         },
         "benchmark",
     )
     sweeps, rows = {}, []
-    for name, one in {"parametric": reference, "drawn": probe}.items():
-        lever = Lever(one)
+    for name, compared in {"parametric": reference, "drawn": probe}.items():
+        lever = Lever(compared)
         seconds = processor_seconds(lambda lever=lever: fresh(lever).sweep(BIAS), 7)
         sweeps[name] = sweep = lever.sweep(BIAS)
         first = sweeps["parametric"]
@@ -195,10 +201,10 @@ def solid() -> None:
     table(["heater", "T_tip (K)", "rise of T_tip (≤ 5e-3)", "I_h (≤ 1e-3)", "heat into air"], rows)
 
 
-def differences(one: xr.Dataset, other: xr.Dataset) -> list[str]:
+def differences(sweep: xr.Dataset, other: xr.Dataset) -> list[str]:
     """The largest relative ones of rise, current and heat into the air."""
-    rise = (one.tip_K - BASE_TEMPERATURE_K) / (other.tip_K - BASE_TEMPERATURE_K)
-    ratios = (rise, one.current_mA / other.current_mA, one.air_heat_mW / other.air_heat_mW)
+    rise = (sweep.tip_K - BASE_TEMPERATURE_K) / (other.tip_K - BASE_TEMPERATURE_K)
+    ratios = (rise, sweep.current_mA / other.current_mA, sweep.air_heat_mW / other.air_heat_mW)
     return [f"{float(np.abs(ratio - 1).max()):.1e}" for ratio in ratios]
 
 

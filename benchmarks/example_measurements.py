@@ -125,16 +125,16 @@ def make(name: str) -> str:
     problem = peer_problem(
         lever.probe, lever.space.mesh, degree=3, quadrature=5, bias=bias.tolist()
     )
-    found = {name: np.array(values) for name, values in solve_with_peer(problem).items()}
+    solved = {name: np.array(values) for name, values in solve_with_peer(problem).items()}
     rng = np.random.default_rng(example.seed)
-    columns = {"V_b (V)": bias, "I_h (mA)": noisy(found["current_mA"], CURRENT, rng)}
-    if "reader_V" in found:
-        columns["V_r (mV)"] = 1e3 * noisy(found["reader_V"], READER, rng)
+    columns = {"V_b (V)": bias, "I_h (mA)": noisy(solved["current_mA"], CURRENT, rng)}
+    if "reader_V" in solved:
+        columns["V_r (mV)"] = 1e3 * noisy(solved["reader_V"], READER, rng)
     text = {key: [f"{value:.5g}" for value in values] for key, values in columns.items()}
     if example.temperatures:
-        rise = found["tip_K"] - lever.probe.circuit.base_temperature_K
+        rise = solved["tip_K"] - lever.probe.circuit.base_temperature_K
         scale = 1.0 + THERMOMETER * rng.standard_normal()
-        tip = found["tip_K"] + noisy(scale * rise, TEMPERATURE, rng) - rise
+        tip = solved["tip_K"] + noisy(scale * rise, TEMPERATURE, rng) - rise
         error = np.hypot(THERMOMETER, TEMPERATURE) * rise
         for heading, values in {"T_tip (K)": tip, "dT_tip (K)": error}.items():
             text[heading] = [
@@ -156,15 +156,15 @@ def compared(name: str) -> tuple[Calibration, xr.Dataset]:
 
     Both read the power that the true lever takes at that temperature.
     """
-    found = calibrate(FOLDER / f"{name}.csv", probe=nominal(name))
-    true = true_lever(name).sweep(found.table.bias_V.values)
+    calibration = calibrate(FOLDER / f"{name}.csv", probe=nominal(name))
+    true = true_lever(name).sweep(calibration.table.bias_V.values)
     power = np.interp(ASKED, true.tip_K, true.power_mW)
-    measured = found.table
+    measured = calibration.table
     tip = np.interp(power, measured.power_mW, measured.tip_K)
     error = np.interp(power, measured.power_mW, measured.tip_stderr_K)
     at = {"true_K": ("true_K", list(ASKED))}
     columns = {"power_mW": power, "tip_K": tip, "tip_stderr_K": error}
-    return found, xr.Dataset({key: ("true_K", one) for key, one in columns.items()}, at)
+    return calibration, xr.Dataset({key: ("true_K", values) for key, values in columns.items()}, at)
 
 
 def compare(name: str) -> None:
@@ -172,16 +172,16 @@ def compare(name: str) -> None:
     calibration, at = compared(name)
     columns = (at.true_K, at.power_mW, at.tip_K, at.tip_stderr_K)
     off = (at.tip_K - at.true_K) / at.tip_stderr_K
-    rows = zip(*(one.values for one in (*columns, off)), strict=True)
+    rows = zip(*(column.values for column in (*columns, off)), strict=True)
     form = ("{:.0f}", "{:.3f}", "{:.0f}", "{:.0f}", "{:+.1f}")
-    shown = [[one.format(cell) for one, cell in zip(form, row, strict=True)] for row in rows]
+    shown = [[column.format(cell) for column, cell in zip(form, row, strict=True)] for row in rows]
     table(("T_tip (K), true", "P_l (mW)", "calibrated", "±", "off / ±"), shown)
     print()
     rows = []
     for key, true in EXAMPLES[name].values.items():
-        known = calibration.priors.get(key)
-        found = _with_error(known) if known else "not looked for"
-        rows.append((key, f"{nominal(name).values([key])[0]:.4g}", f"{true:.4g}", found))
+        prior = calibration.priors.get(key)
+        calibrated = _with_error(prior) if prior else "not looked for"
+        rows.append((key, f"{nominal(name).values([key])[0]:.4g}", f"{true:.4g}", calibrated))
     table(("parameter", "probe file", "true", "calibrated"), rows)
 
 

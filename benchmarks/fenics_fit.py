@@ -56,12 +56,12 @@ def paper_fit(measurement, probe, plain):
     largest = np.nanmax(np.abs(data), axis=1, keepdims=True)
     present = np.isfinite(data)
     parameters = lmfit.Parameters()
-    for name, known in PARAMETERS.items():
+    for name, parameter in PARAMETERS.items():
         parameters.add(
             name,
-            value=getattr(probe.material, name) / known.scale,
-            min=known.lower / known.scale,
-            max=known.upper / known.scale,
+            value=getattr(probe.material, name) / parameter.scale,
+            min=parameter.lower / parameter.scale,
+            max=parameter.upper / parameter.scale,
         )
     sweeps, processor = 0, 0.0
 
@@ -71,12 +71,14 @@ def paper_fit(measurement, probe, plain):
             nonlocal sweeps, processor
             sweeps += 1
             print(f"\rFEniCS: sweep {sweeps}", end="", file=sys.stderr, flush=True)
-            values = {name: trial[name].value * known.scale for name, known in PARAMETERS.items()}
-            found = ask(values)
-            processor += found["processor_seconds"]
-            if "error" in found:
+            values = {
+                name: trial[name].value * parameter.scale for name, parameter in PARAMETERS.items()
+            }
+            answer = ask(values)
+            processor += answer["processor_seconds"]
+            if "error" in answer:
                 return np.full(present.sum(), FAR)
-            model = np.stack([found[column.name] for column in OBSERVABLES.values()])
+            model = np.stack([answer[column.name] for column in OBSERVABLES.values()])
             return ((model - data) / largest)[present]
 
         began = time.perf_counter()
@@ -125,12 +127,12 @@ def main():
     print("Option-III fit of lever-a.csv: the same optimum\n")
     rows = []
     worst = dict.fromkeys(peers, 0.0)
-    for name, known in PARAMETERS.items():
+    for name, parameter in PARAMETERS.items():
         mine = ours.parameters[name]
-        row = [name, f"{mine.value / known.scale:.5f}", f"{mine.stderr / known.scale:.5f}"]
+        row = [name, f"{mine.value / parameter.scale:.5f}", f"{mine.stderr / parameter.scale:.5f}"]
         for way, (result, _, _) in peers.items():
             theirs = result.params[name].value
-            apart = abs(theirs - mine.value / known.scale) / (mine.stderr / known.scale)
+            apart = abs(theirs - mine.value / parameter.scale) / (mine.stderr / parameter.scale)
             worst[way] = max(worst[way], apart)
             row += [f"{theirs:.5f}", f"{apart:.3f}"]
         rows.append(row)
@@ -142,18 +144,18 @@ def main():
     print(f"\nlargest distance: {apart:.3f} standard errors (target: at most 0.05)")
     print(f"\nTime; load of the machine at the end {os.getloadavg()[0]:.1f}\n")
     rows = []
-    for place, kind in enumerate(("seconds", "processor seconds")):
+    for column, kind in enumerate(("seconds", "processor seconds")):
         for way, (_, sweeps, times) in peers.items():
-            ratios = times[place] / warm[place], times[place] / cold[place]
+            ratios = times[column] / warm[column], times[column] / cold[column]
             rows.append(
-                (f"FEniCS {way}, lmfit", sweeps, kind, f"{times[place]:.1f}",
+                (f"FEniCS {way}, lmfit", sweeps, kind, f"{times[column]:.1f}",
                  *(f"{ratio:.0f}" for ratio in ratios))
             )  # fmt: skip
         for name, sweeps, times in (
             ("hotlever, geometry reduced before", ours.evaluations, warm),
             ("hotlever, whole command, empty cache", "", cold),
         ):
-            rows.append((name, sweeps, kind, f"{times[place]:.2f}", "", ""))
+            rows.append((name, sweeps, kind, f"{times[column]:.2f}", "", ""))
     table(("", "sweeps", "unit", "time", "times ours warm", "times ours cold"), rows)
     print("\ntargets: 300 times ours warm, 30 times ours cold")
 

@@ -48,9 +48,9 @@ def information(values: np.ndarray, slopes: np.ndarray, places: list[int]) -> np
 def main() -> None:
     probe = Probe.reference()
     lever = Lever(probe, COARSE)
-    found = with_sensitivities(lever, pulse(HEIGHT, LENGTH), TIMES, NAMES)
-    values = shown(found)
-    slopes = found.sensitivity.values
+    history = with_sensitivities(lever, pulse(HEIGHT, LENGTH), TIMES, NAMES)
+    values = shown(history)
+    slopes = history.sensitivity.values
     rest = lever.sweep(BIASES, sensitivities=True)
     at_rest, around = shown(rest), []
     for share in (1.0, -1.0):
@@ -67,13 +67,13 @@ def main() -> None:
     for what, places in (("current", [0]), ("current and reader", [0, 1])):
         moving = information(values, slopes, places)
         still = information(at_rest, by_rest, places)
-        for data, known in (
+        for data, told in (
             ("in the pulse, nothing beforehand", moving),
             ("in the pulse", moving + beforehand),
             ("at rest", still + beforehand),
             ("both", moving + still + beforehand),
         ):
-            scaled = np.linalg.pinv(known * np.outer(scale, scale), rcond=1e-15, hermitian=True)
+            scaled = np.linalg.pinv(told * np.outer(scale, scale), rcond=1e-15, hermitian=True)
             covariance = scaled * np.outer(scale, scale)
             error = np.sqrt(tip @ covariance @ tip)
             rows.append((what, data, f"{error:.1f}", f"{100 * np.sqrt(covariance[-1, -1]):.2f}"))

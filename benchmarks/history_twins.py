@@ -55,18 +55,19 @@ def main() -> None:
         number += 1
         shown = [truth.current_mA.values, truth.reader_V.values]
         measured = [
-            (1.0 + METERS * rng.normal()) * one + NOISE * one.max() * rng.normal(size=one.size)
-            for one in shown
+            (1.0 + METERS * rng.normal()) * values
+            + NOISE * values.max() * rng.normal(size=values.size)
+            for values in shown
         ]
         tip = truth.tip_K.values
         cells = [str(number), f"{tip[-1]:.0f}", f"{guess - tip[-1]:+.0f}"]
         for what, count in (("current", 1), ("current and reader", 2)):
             data = Measurement.in_time(TIMES, wave, *measured[:count])
             began = time.process_time()
-            found = fit(data, probe, model=model, priors=priors)
-            at = found.band.isel(time=-1)
+            fitted = fit(data, probe, model=model, priors=priors)
+            at = fitted.band.isel(time=-1)
             error, stated = at.tip_K.item() - tip[-1], at.tip_stderr_K.item()
-            scale = found.parameters["heat_capacity_scale"]
+            scale = fitted.parameters["heat_capacity_scale"]
             own = 100.0 * (scale.value - moved["heat_capacity_scale"])
             cells += [
                 f"{error:+.1f} ± {stated:.1f}",

@@ -88,13 +88,13 @@ def levers() -> dict[str, Lever]:
 
 
 def main(trials: int) -> None:
-    known = {name: lever.branch() for name, lever in levers().items()}
+    branches = {name: lever.branch() for name, lever in levers().items()}
     print(
         f"{'lever':<14}{'way':<28}{'found':>6}{'bias %':>8}{'rms %':>7}{'95 % %':>7}"
         f"{'68 %':>6}{'95 %':>6}{'ms':>6}"
     )
-    for name, lever in known.items():
-        other = known["lever 3" if name == "reference" else "reference"]
+    for name, lever in branches.items():
+        other = branches["lever 3" if name == "reference" else "reference"]
         ways = {
             "highest point": highest_point,
             "local cubic": local_polynomial(3, 1.22),
@@ -107,13 +107,13 @@ def main(trials: int) -> None:
         true = lever.knee.power_mW if lever.knee else NONE
         for way, find in ways.items():
             began = processor_time()
-            found = np.array([find(curve) for curve in curves])
+            knees = np.array([find(curve) for curve in curves])
             milliseconds = (processor_time() - began) / trials * 1000
-            error = 100 * (found[:, 0] / true - 1)
-            pull = np.abs(found[:, 0] - true) / found[:, 1]
+            error = 100 * (knees[:, 0] / true - 1)
+            pull = np.abs(knees[:, 0] - true) / knees[:, 1]
             here = np.isfinite(error)
             honest = [f"{np.mean(pull[here] < width):.0%}" for width in (1.0, 1.96)]
-            if np.isnan(found[:, 1]).all():
+            if np.isnan(knees[:, 1]).all():
                 honest = ["", ""]
             print(
                 f"{name:<14}{way:<28.28}{here.sum():>6}{error[here].mean():>8.2f}"
@@ -128,8 +128,8 @@ def print_reasons() -> None:
     reasons = reasons_of_the_knee(Lever(Probe.reference()))
     print("\nreference lever, tip temperature (K) where V_l and R_l are highest")
     for name in reasons.lever.values:
-        one = reasons.sel(lever=name)
-        print(f"  {name:<22}{one.knee_K.item():>8.1f}{one.resistance_K.item():>8.1f}")
+        lever = reasons.sel(lever=name)
+        print(f"  {name:<22}{lever.knee_K.item():>8.1f}{lever.resistance_K.item():>8.1f}")
     print(f"from the inversion temperature of {reasons.attrs['inversion_K']:.1f} K to the knee:")
     for reason, kelvins in steps_to_the_knee(reasons):
         print(f"  {kelvins:>+6.1f} K  {reason}")

@@ -41,10 +41,10 @@ def main():
             options = MeshOptions(refinement=refinement)
             seconds = processor_seconds(lambda options=options: mesh_layout(layout, options))
             lever = Lever(probe, options)
-            found = observed(lever)
+            sweep = observed(lever)
 
-            def apart(column, found=found, reference=reference):
-                return np.abs(found[column].values / reference[column].values - 1).max()
+            def apart(column, sweep=sweep, reference=reference):
+                return np.abs(sweep[column].values / reference[column].values - 1).max()
 
             rows.append(
                 (
@@ -53,7 +53,7 @@ def main():
                     lever.space.mesh.elements.nelements,
                     f"{apart('current_mA'):.1e}",
                     f"{apart('reader_V'):.1e}",
-                    f"{np.abs(found.tip_K.values - reference.tip_K.values).max():.3f}",
+                    f"{np.abs(sweep.tip_K.values - reference.tip_K.values).max():.3f}",
                     f"{seconds:.2f}",
                 )
             )

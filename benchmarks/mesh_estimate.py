@@ -75,11 +75,11 @@ def compared(seed: int) -> list[object]:
     estimate = energy_between_degrees(usual.space, probe.made_of, probe.circuit).sum()
     row: list[object] = [seed, probe.shape.shape, f"{estimate:.1e}"]
     for lever in (usual, chosen):
-        found = lever.sweep(bias)
+        sweep = lever.sweep(bias)
         row += [
             lever.space.mesh.elements.nelements,
-            f"{np.abs(found.current_mA / expected.current_mA - 1).max().item():.1e}",
-            f"{np.abs(found.tip_K - expected.tip_K).max().item():.3f}",
+            f"{np.abs(sweep.current_mA / expected.current_mA - 1).max().item():.1e}",
+            f"{np.abs(sweep.tip_K - expected.tip_K).max().item():.3f}",
         ]
     return row
 

@@ -327,26 +327,26 @@ def good(number: int) -> tuple[int, str, float]:
     began = time.process_time()
     data = Measurement(*bench.columns.values(), *np.full((3, bench.bias.size), np.nan))
     try:
-        found = calibrate(data, probe=bench.probe)
-        said = found.reason
+        calibration = calibrate(data, probe=bench.probe)
+        said = calibration.reason
     except HotleverError as error:
         said = str(error)
     return number, said, time.process_time() - began
 
 
 def report(mistakes: list[Mistake], outcomes: list[Outcome]) -> None:
-    rows, found = [], 0
+    rows, right = [], 0
     for mistake, outcome in zip(mistakes, outcomes, strict=True):
         named = (
             bool(re.search(mistake.named, outcome.said)) if mistake.named else not outcome.status
         )
-        found += named
+        right += named
         said = " / ".join(outcome.said.splitlines())
         rows.append((mistake.name, said[-SHOWN:], outcome.status, "yes" if named else "NO",
                      f"{outcome.seconds:.1f}"))  # fmt: skip
     table(("what was done", "what was said (its end)", "status", "right", "s"), rows)
     seconds = [outcome.seconds for outcome in outcomes]
-    print(f"\nright: {found} of {len(rows)}; seconds of processor at most {max(seconds):.1f}\n")
+    print(f"\nright: {right} of {len(rows)}; seconds of processor at most {max(seconds):.1f}\n")
 
 
 def main(count: int = 40, first: int = 0) -> None:
@@ -355,7 +355,7 @@ def main(count: int = 40, first: int = 0) -> None:
         outcomes = list(pool.map(partial(run, first=first), every))
         report(MISTAKES, outcomes[: len(MISTAKES)])
         report(HARMLESS, outcomes[len(MISTAKES) :])
-        alarms = [one for one in pool.map(good, range(1000, 1000 + count)) if one[1]]
+        alarms = [verdict for verdict in pool.map(good, range(1000, 1000 + count)) if verdict[1]]
     for number, said, seconds in alarms:
         print(f"false alarm: lever {number}, {seconds:.1f} s: {said}")
     print(f"good levers: {count}, false alarms: {len(alarms)}")

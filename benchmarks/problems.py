@@ -173,10 +173,10 @@ def _peer_environment(folder: str) -> dict[str, str]:
 
 def check_peer() -> None:
     """Stop, saying how to install it, if legacy FEniCS is not there."""
-    found = shutil.which(DEBIAN_PYTHON) and (
+    installed = shutil.which(DEBIAN_PYTHON) and (
         subprocess.run([DEBIAN_PYTHON, "-c", "import dolfin"], capture_output=True).returncode == 0
     )
-    if not found:
+    if not installed:
         sys.exit("legacy FEniCS is not installed: run benchmarks/fenics/install.sh (Debian)")
 
 

@@ -46,7 +46,7 @@ CASES = (
 def pulls(case: Case, count: int, seed: int = 2017) -> tuple[np.ndarray, int]:
     """Pulls of centre, width and area, (spectra, 3), and the number of failed fits."""
     rng = np.random.default_rng(seed)
-    found, failed = [], 0
+    deviations, failed = [], 0
     for _ in range(count):
         temperature = float(rng.uniform(295.0, 1150.0))
         x, y = synthetic.spectrum(temperature, rng, case.instrument)
@@ -56,21 +56,21 @@ def pulls(case: Case, count: int, seed: int = 2017) -> tuple[np.ndarray, int]:
         except InputError:
             failed += 1
             continue
-        found.append(
+        deviations.append(
             [
                 (peak.centre - centre) / peak.centre_stderr,
                 (peak.fwhm - fwhm) / peak.fwhm_stderr,
                 (peak.area - area) / peak.area_stderr,
             ]
         )
-    return np.array(found), failed
+    return np.array(deviations), failed
 
 
 def peer(case: Case, count: int, seed: int = 2017) -> np.ndarray:
     """Pulls of the centre by an unweighted Lorentzian on a constant."""
     rng = np.random.default_rng(seed)
     model = lmfit.models.LorentzianModel() + lmfit.models.ConstantModel()
-    found = []
+    deviations = []
     for _ in range(count):
         temperature = float(rng.uniform(295.0, 1150.0))
         x, y = synthetic.spectrum(temperature, rng, case.instrument)
@@ -80,26 +80,30 @@ def peer(case: Case, count: int, seed: int = 2017) -> np.ndarray:
         )
         result = model.fit(y, start, x=x)
         if result.params["center"].stderr:
-            found.append((result.params["center"].value - centre) / result.params["center"].stderr)
-    return np.array(found)
+            deviations.append(
+                (result.params["center"].value - centre) / result.params["center"].stderr
+            )
+    return np.array(deviations)
 
 
 def main(count: int = 1000) -> None:
     print(f"{count} spectra each; width of the pulls (target 0.90 to 1.10), worst |pull|, failures")
     print(f"{'case':<32}{'centre':>8}{'fwhm':>8}{'area':>8}{'bias':>8}{'worst':>8}{'failed':>8}")
     for case in CASES:
-        found, failed = pulls(case, count)
-        width = found.std(axis=0)
+        deviations, failed = pulls(case, count)
+        width = deviations.std(axis=0)
         print(
             f"{case.name:<32}{width[0]:8.3f}{width[1]:8.3f}{width[2]:8.3f}"
-            f"{found[:, 0].mean():8.3f}{np.abs(found[:, 0]).max():8.1f}{failed:8d}"
+            f"{deviations[:, 0].mean():8.3f}{np.abs(deviations[:, 0]).max():8.1f}{failed:8d}"
         )
     print("\nthe peer's centre; its median |pull| would be 0.67")
     few = max(count // 10, 10)
     for case in (CASES[0], Case("no spikes", Instrument(spike_rate=0.0), PeakOptions())):
-        found = np.abs(peer(case, few))
+        deviations = np.abs(peer(case, few))
         name = f"lmfit, {case.name} ({few})"
-        print(f"{name:<42} median |pull| {np.median(found):6.2f}   worst {found.max():8.1f}")
+        print(
+            f"{name:<42} median |pull| {np.median(deviations):6.2f}   worst {deviations.max():8.1f}"
+        )
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from hotlever.types import Array
 
 
 def measured_curve(
-    known: Branch,
+    branch: Branch,
     rng: np.random.Generator,
     *,
     circuit: Circuit | None = None,
@@ -27,7 +27,7 @@ def measured_curve(
 
     Parameters
     ----------
-    known : Branch
+    branch : Branch
     rng : numpy.random.Generator
     circuit : Circuit, optional
     from_V, to_V : float
@@ -44,13 +44,13 @@ def measured_curve(
     circuit = circuit or Circuit()
     spacing = (to_V - from_V) / max(points - 1, 1)
     bias = np.linspace(from_V, to_V, points) + rng.uniform(-0.3, 0.3, points) * spacing
-    current = current_at(known, bias := np.clip(bias, from_V, to_V), circuit)
+    current = current_at(branch, bias := np.clip(bias, from_V, to_V), circuit)
     here = np.isfinite(current)
     current[here] *= 1.0 + noise * rng.standard_normal(here.sum())
     return IVCurve.of(bias, current, circuit)
 
 
-def current_at(known: Branch, bias_V: ArrayLike, circuit: Circuit) -> Array:
+def current_at(branch: Branch, bias_V: ArrayLike, circuit: Circuit) -> Array:
     """Return the current (mA) at biases (V); NaN beyond the hottest state.
 
     Raises
@@ -60,14 +60,14 @@ def current_at(known: Branch, bias_V: ArrayLike, circuit: Circuit) -> Array:
         large.
     """
     bias = np.asarray(bias_V, dtype=float)
-    reading = known.read(circuit, bias.ravel())
+    reading = branch.read(circuit, bias.ravel())
     # where the bias falls along the branch, a ramp jumps, or ends before the branch does
-    if reading.jumps or reading.last_K < known.hottest_K:
+    if reading.jumps or reading.last_K < branch.hottest_K:
         raise InputError(
             f"with a series resistance of {circuit.series_resistance_ohm:g} ohm several states of "
             "the lever belong to one bias"
         )
-    return known.shown(reading.u)["current_mA"].reshape(bias.shape)
+    return branch.shown(reading.u)["current_mA"].reshape(bias.shape)
 
 
 def measurement_of(curve: IVCurve) -> Measurement:

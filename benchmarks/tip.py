@@ -112,10 +112,10 @@ def air() -> None:
 
 def main() -> None:
     """Print the tables asked for."""
-    known = {"fitted": fitted, "solid": solid, "air": air}
-    for name in sys.argv[1:] or known:
+    questions = {"fitted": fitted, "solid": solid, "air": air}
+    for name in sys.argv[1:] or questions:
         print(f"\n## {name}\n")
-        known[name]()
+        questions[name]()
 
 
 if __name__ == "__main__":

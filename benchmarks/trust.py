@@ -52,13 +52,13 @@ def coverage(probe, twins, proportional):
     hot, warm = BIAS.size - 1, int(np.argmin(np.abs(sweep.tip_K.values - 900.0)))
     pulls = []
     for _ in range(twins):
-        found = fit(twin(sweep, rng, proportional), probe, model=REDUCED)
+        fitted = fit(twin(sweep, rng, proportional), probe, model=REDUCED)
         pull = [
-            (found.parameters[name].value - getattr(probe.material, name))
-            / found.parameters[name].stderr
+            (fitted.parameters[name].value - getattr(probe.material, name))
+            / fitted.parameters[name].stderr
             for name in PARAMETERS
         ]
-        missed = (found.band.tip_K.values - sweep.tip_K.values) / found.band.tip_stderr_K.values
+        missed = (fitted.band.tip_K.values - sweep.tip_K.values) / fitted.band.tip_stderr_K.values
         pulls.append([*pull, missed[hot], missed[warm]])
     pulls = np.array(pulls)
     kind = "noise in proportion to each value" if proportional else "constant noise"
@@ -102,13 +102,13 @@ def starts(count, model, name):
         material = ParameterDomain.of(probe).probe(probe, rng.random(len(PAPER))).material
         material = material.with_(c_kappa=rng.uniform(0.4, 1.0))
         try:
-            found = fit(data, probe.model_copy(update={"material": material}), model=model)
+            fitted = fit(data, probe.model_copy(update={"material": material}), model=model)
         except ComputationError:
             apart.append(np.inf)
             continue
         apart.append(
             max(
-                abs(found.parameters[name].value - parameter.value) / parameter.stderr
+                abs(fitted.parameters[name].value - parameter.value) / parameter.stderr
                 for name, parameter in best.parameters.items()
             )
         )

@@ -64,15 +64,15 @@ def judged(number: int, medium: str, what: str, departures: list[str]) -> xr.Dat
 
 
 def report(results: list[xr.Dataset | str], title: str) -> None:
-    found = concatenated([result for result in results if not isinstance(result, str)])
-    total = summary(found)
-    refused = found.isel(lever=(found.refused != "").values)
+    answers = concatenated([result for result in results if not isinstance(result, str)])
+    total = summary(answers)
+    refused = answers.isel(lever=(answers.refused != "").values)
     print(f"\n## {title}\n\n{total.answered} levers answered, {refused.sizes['lever']} refused")
     for number in refused.lever.values[:5]:
         print(f"  refused: {number}: {refused.refused.sel(lever=number).item()}")
     for reason in [result for result in results if isinstance(result, str)][:5]:
         print(f"  no lever: {reason}")
-    print(f"said not to be described: {int((found.doubted != '').sum())}\n")
+    print(f"said not to be described: {int((answers.doubted != '').sum())}\n")
     rows = [
         (way, *(f"{value:.1f}" for value in total.largest_K.sel(way=way).values))
         for way in total.way.values
@@ -81,7 +81,7 @@ def report(results: list[xr.Dataset | str], title: str) -> None:
     print(f"\npooled rms of error / stated: {total.rms:.2f}")
     print(f"levers within 2 stated errors everywhere: {total.everywhere:.0%}")
     print_coverage(total.coverage.values)
-    seconds = found.seconds.values
+    seconds = answers.seconds.values
     print(f"seconds of processor: median {np.median(seconds):.1f}, worst {seconds.max():.1f}")
 
 
@@ -102,8 +102,8 @@ def two_at_a_time(judged: Callable[[int], Any], numbers: list[int]) -> Iterator[
 
 
 def main(count: int, medium: str, what: str, departures: list[str]) -> None:
-    one = partial(judged, medium=medium, what=what, departures=departures)
-    results = list(two_at_a_time(one, [*range(count)]))
+    judge_one = partial(judged, medium=medium, what=what, departures=departures)
+    results = list(two_at_a_time(judge_one, [*range(count)]))
     without = [name for name in DEPARTURES if name not in departures]
     ending = f", without {', '.join(without)}" if without else ""
     report(results, f"{medium}, {what}{ending}")
@@ -184,13 +184,13 @@ def report_wild(records: list[dict[str, Any]], title: str) -> None:
     print(f"\nof the {len(of[DESCRIBED])} described:")
     off = [np.abs(record["off_K"]) for record in of[DESCRIBED]]
     stated = [np.array(record["stated_K"]) for record in of[DESCRIBED]]
-    ratios = [one / other for one, other in zip(off, stated, strict=True)]
+    ratios = [error / band for error, band in zip(off, stated, strict=True)]
     print_coverage(coverage_by_decile(ratios))
-    largest = [float(one.max()) for one in off]
-    there = [float(other[np.argmax(one)]) for one, other in zip(off, stated, strict=True)]
+    largest = [float(error.max()) for error in off]
+    there = [float(band[np.argmax(error)]) for error, band in zip(off, stated, strict=True)]
     print(f"largest error: median {np.median(largest):.1f} K, worst {max(largest):.1f} K")
     print(f"stated there: median {np.median(there):.1f} K")
-    most = [float(one.max()) for one in ratios]
+    most = [float(ratio.max()) for ratio in ratios]
     print(f"largest error in stated errors: median {np.median(most):.1f}, worst {max(most):.1f}")
 
 
