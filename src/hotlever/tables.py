@@ -174,14 +174,15 @@ def read_table(
     raw = read_bytes(path)
     numbered = enumerate(text_lines(raw, str(path)), start=1)
     lines = [(number, line) for number, line in numbered if line.strip(' \t,;"\u00a0')]
-    first = next((at for at, (_, line) in enumerate(lines) if not _is_comment(line)), None)
+    first = next((i for i, (_, line) in enumerate(lines) if not _is_comment(line)), None)
     if first is None:
         raise InputError(f"{path}: no header row and no rows, expected {expected}")
-    at = first if is_heading is None else _header_row(lines, is_heading)
-    start = first if at is None else at
-    reader = _Reader(str(path), lines[start:], at is not None, header, is_heading is not None)
+    header_row = first if is_heading is None else _header_row(lines, is_heading)
+    start = first if header_row is None else header_row
+    named, loose = header_row is not None, is_heading is not None
+    reader = _Reader(str(path), lines[start:], named, header, loose)
     comments = lines[:start]
-    for number, line in lines[start if at is None else start + 1 :]:
+    for number, line in lines[start + named :]:
         if _is_comment(line) or not reader.takes(number, line):
             comments.append((number, line))
     names, rows, numbers = reader.names, reader.rows, [lines[start][0], *reader.lines]
@@ -190,13 +191,15 @@ def read_table(
     if reader.skipping or not rows:
         where = f"line {reader.skipping}: another table" if reader.skipping else "no data rows"
         raise InputError(f"{path}: {where} after the header")
+    if loose:
+        names = reader.with_units(comments) if named else []
     with_comma = Dialect(reader.separator, decimal_comma=True)
     comma = any("," in cell and with_comma.number(cell) is not None for row in rows for cell in row)
     return Table(
         path=str(path),
         sha256=hashlib.sha256(raw).hexdigest(),
         comments=comments,
-        names=[] if at is None else reader.with_units(comments) if is_heading else names,
+        names=names,
         rows=rows,
         lines=numbers,
         dialect=Dialect(reader.separator, comma),
@@ -342,25 +345,25 @@ def _headings(line: str) -> list[str]:
 def _header_row(lines: list[tuple[int, str]], is_heading: Callable[[str], bool]) -> int | None:
     """Return the index of the header row, None if there are numbers only (see `read_table`)."""
 
-    def width(at: int) -> int:
-        names = _headings(lines[at][1])
+    def width(index: int) -> int:
+        names = _headings(lines[index][1])
         asked = [name for name in names if len(name) <= _LONGEST_HEADING]
         return len(names) if sum(map(is_heading, asked)) >= 2 else 0
 
-    plain = [at for at, (_, line) in enumerate(lines) if not _is_comment(line)]
+    plain = [index for index, (_, line) in enumerate(lines) if not _is_comment(line)]
     named: list[int] = []
-    for order, at in enumerate(plain[:_MOST_ABOVE]):
-        if _row_of_numbers(lines[at][1]):
-            above = range(max(plain[order - 1] + 1 if order else 0, at - _NEAR), at)
+    for order, index in enumerate(plain[:_MOST_ABOVE]):
+        if _row_of_numbers(lines[index][1]):
+            above = range(max(plain[order - 1] + 1 if order else 0, index - _NEAR), index)
             for comment in reversed(above):
-                if _row_of_numbers(lines[at][1], width(comment) or -1):
+                if _row_of_numbers(lines[index][1], width(comment) or -1):
                     return comment
             break
-        if count := width(at):
+        if count := width(index):
             cells = _headings(lines[plain[order + 1]][1]) if order + 1 < len(plain) else []
             if len(cells) == count and any(map(_begins_number, cells)):
-                return at
-            named.append(at)
+                return index
+            named.append(index)
     else:
         return (named or plain)[0]
     texts = plain[:order]

@@ -1,4 +1,4 @@
-"""Which column of a measurement file is which quantity, by its heading or because one is told."""
+"""Which column of a measurement file is which quantity, by its heading or as the user says."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
             raise InputError(
                 f"{where}: found '{shown(line)}', expected one like 'I_h (uA)=Current'"
             )
-        symbol, unit = _quantity(quantity, told=True)
+        symbol, unit = _quantity(quantity, assigned=True)
         if symbol is None:
             raise unknown_name("quantity", name_and_unit(quantity)[0], MEASURANDS, where)
         if unit is not None and conversion(unit, MEASURANDS[symbol].unit) is None:
@@ -108,32 +108,33 @@ def _lines(text: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
             yield f"{text}: line {row}", line
 
 
-def _quantity(heading: str, told: bool = False) -> tuple[str | None, str | None]:
+def _quantity(heading: str, assigned: bool = False) -> tuple[str | None, str | None]:
     """Return the quantity that a heading names, None if that is not known, and its unit.
 
-    The name alone is no time, unless it is told: settings of instruments are called so too.
+    The name alone is no time, unless it is assigned: settings of instruments are called so too.
     """
     name, unit = name_and_unit(heading)
-    is_time = name.casefold() in TIMES and (told or conversion(unit or "", MEASURANDS[TIME].unit))
+    of_time = assigned or conversion(unit or "", MEASURANDS[TIME].unit)
+    is_time = name.casefold() in TIMES and of_time
     return TIME if is_time else symbol_of(name), unit
 
 
-def is_heading(name: str, told: Mapping[str, str]) -> bool:
-    """Whether a heading is that of a known quantity, or of a column that one is told of."""
+def is_heading(name: str, assigned: Mapping[str, str]) -> bool:
+    """Whether a heading is that of a known quantity, or of a column that one is assigned."""
     bare = name_and_unit(name)[0]
-    headings = {heading.casefold() for heading in told.values()}
+    headings = {heading.casefold() for heading in assigned.values()}
     return symbol_of(bare) is not None or bool({name.casefold(), bare.casefold()} & headings)
 
 
 def find_columns(
-    table: Table, told: Mapping[str, str], *, driven: bool = False
+    table: Table, assigned: Mapping[str, str], *, driven: bool = False
 ) -> dict[str, Column]:
     """Find the column of each quantity, that of the time only in a table of what is in time.
 
     Parameters
     ----------
     table : Table
-    told : mapping of str to str
+    assigned : mapping of str to str
         From `parse_columns`.
     driven : bool
         Whether a wave form is given, so that the table needs times and no bias.
@@ -146,8 +147,8 @@ def find_columns(
     """
     where = table.where(-1)
     columns: dict[str, Column] = {}
-    for quantity, heading in told.items():
-        symbol, unit = _quantity(quantity, told=True)
+    for quantity, heading in assigned.items():
+        symbol, unit = _quantity(quantity, assigned=True)
         assert symbol is not None
         index = table.index(heading)
         for other, column in columns.items():
@@ -170,7 +171,7 @@ def find_columns(
         first, *others = own or indices
         if others and symbol != TIME:
             raise InputError(
-                f"{where}: column '{symbol}' stands twice; {_told(symbol)} says which it is"
+                f"{where}: column '{symbol}' stands twice; {_assignment(symbol)} says which it is"
             )
         columns[symbol] = _column(table, symbol, first, None)
     if TIME in columns and not (in_time or _are_brief(table, columns[TIME])):
@@ -179,36 +180,36 @@ def find_columns(
     return columns
 
 
-def _column(table: Table, symbol: str, index: int, told: str | None) -> Column:
+def _column(table: Table, symbol: str, index: int, assigned: str | None) -> Column:
     """Return a column with its unit, which the file or the user gives."""
     heading, inside = table.names[index] if table.names else "", MEASURANDS[symbol].unit
     where = f"{table.where(-1)}: column '{shown(heading or str(index + 1))}'"
     written = name_and_unit(heading)[1]
     if table.names[:1] == [_IN_SI]:
         written = written or inside[-1]
-    unit = told or written
+    unit = assigned or written
     if unit is None:
         raise InputError(
             f"{where} has no unit, expected '{MEASURANDS[symbol].heading}' or another unit in "
-            f"parentheses; {_told(symbol, heading or str(index + 1))} gives one"
+            f"parentheses; {_assignment(symbol, heading or str(index + 1))} gives one"
         )
     difference = symbol.startswith("d")
     scale = conversion(unit, inside, difference)
     if scale is None:
         raise unknown_unit(unit, inside, f"{table.where(-1)}: {shown(heading)}")
-    if told and written and _contradicts(written, inside, difference, scale):
-        raise InputError(f"{where}: its unit is {written}, expected {told} as --column says")
+    if assigned and written and _contradicts(written, inside, difference, scale):
+        raise InputError(f"{where}: its unit is {written}, expected {assigned} as --column says")
     return Column(symbol, index, heading, unit, *scale)
 
 
 def _contradicts(written: str, inside: str, difference: bool, scale: tuple[float, float]) -> bool:
-    """Whether the unit of a heading, of any quantity, is not the one that is told."""
+    """Whether the unit of a heading, of any quantity, is not the one that is assigned."""
     if (own := conversion(written, inside, difference)) is not None:
         return own != scale
     return any(conversion(written, measurand.unit) for measurand in MEASURANDS.values())
 
 
-def _told(symbol: str, heading: str = "HEADING") -> str:
+def _assignment(symbol: str, heading: str = "HEADING") -> str:
     return f"--column '{MEASURANDS[symbol].heading}={shown(heading)}'"
 
 
@@ -241,7 +242,7 @@ def _require(table: Table, columns: Mapping[str, Column], driven: bool) -> None:
     raise InputError(
         f"{table.where(-1)}: {given}; expected 'V_b (V)' and at least one of 'I_h (mA)', "
         "'V_r (mV)', 'T_tip (K)', or 'V_l (V)' and 'I_h (mA)'; beside a time V_b, or a wave form "
-        f"such as --pulse 10V,5us, and any of them; other names with {_told('V_b', example)}"
+        f"such as --pulse 10V,5us, and any of them; other names with {_assignment('V_b', example)}"
     )
 
 

@@ -68,11 +68,11 @@ def read_measurement(
         Naming file, line and column, what was found and what is expected; also for values that
         no lever can have, or whose unit must be wrong.
     """
-    told = parse_columns(f"{name}={heading}" for name, heading in (columns or {}).items())
+    assigned = parse_columns(f"{name}={heading}" for name, heading in (columns or {}).items())
     expected = "one like 'V_b (V),I_h (mA),V_r (mV)'"
-    table = read_table(path, expected, is_heading=partial(is_heading, told=told))
+    table = read_table(path, expected, is_heading=partial(is_heading, assigned=assigned))
     settings = Settings.of(table)
-    quantities = find_columns(table, told, driven=waveform is not None)
+    quantities = find_columns(table, assigned, driven=waveform is not None)
     remarks = (
         f"{table.path}: line {line}: '{shown(text)}' is taken for a comment"
         for line, text in table.remarks

@@ -6,7 +6,7 @@ import csv
 import io
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -60,9 +60,10 @@ def corrections_text(corrections: Mapping[str, Correction]) -> str:
     written = io.StringIO()
     table = csv.writer(written, lineterminator="\n")
     table.writerow(COLUMNS)
-    for name, said in corrections.items():
-        numbers = ("" if at is None else f"{at:.10g}" for at in (said.start, said.low, said.high))
-        table.writerow((name, *numbers, "yes" if said.use else "no"))
+    for name, correction in corrections.items():
+        *numbers, use = astuple(correction)
+        cells = ("" if number is None else f"{number:.10g}" for number in numbers)
+        table.writerow((name, *cells, "yes" if use else "no"))
     return written.getvalue()
 
 

@@ -164,8 +164,8 @@ def _start(x: Array, y: Array, options: PeakOptions) -> tuple[Problem, Array] | 
     # three samples and their median: no single spike makes a line, a coarse axis keeps one
     smooth = median_filter(flat, 3, mode="wrap")
     in_range = _in_range(x) & clean
-    said = np.ones_like(clean) if options.start is None else _near(x, options.start)
-    candidates = in_range & said
+    allowed = np.ones_like(clean) if options.start is None else _near(x, options.start)
+    candidates = in_range & allowed
     if not candidates.any():
         return None
     top = int(np.argmax(np.where(candidates, smooth, -np.inf)))
@@ -177,7 +177,7 @@ def _start(x: Array, y: Array, options: PeakOptions) -> tuple[Problem, Array] | 
     run = next(run for run in noise.runs(above) if run.start <= top < run.stop)
     fwhm = float(np.clip(np.ptp(x[run]) + step, 1.5 * step, _MAX_FWHM))
     clipped = noise.plateau(y, in_range, float(np.percentile(y, 5)))
-    if clipped is not None and not said[clipped].any():
+    if clipped is not None and not allowed[clipped].any():
         clipped = None  # another line
     if clipped is not None:
         # flanks alone: the hidden top is higher than the clipped one
