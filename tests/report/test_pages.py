@@ -10,7 +10,7 @@ from hotlever.estimation import Measurement, fit
 from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.estimation.uncertainty import examine
 from hotlever.report.fit_pages import fit_page
-from hotlever.report.reproduce import LONG_SECTIONS, NEVER_SEEN, SECTIONS, simulated
+from hotlever.report.reproduce import LONG_SECTIONS, NEVER_SEEN, SECTIONS, inference
 from hotlever.report.reproduce.findings import Findings
 from hotlever.studies.simulation_based_calibration import WAYS
 
@@ -43,12 +43,12 @@ def judged(monkeypatch):
         asked.append((number, other))
         return made_up.judged_levers(other).isel(lever=number % 3).assign_coords(lever=number)
 
-    monkeypatch.setattr(simulated, "judge", judge)
+    monkeypatch.setattr(inference, "judge", judge)
     return asked
 
 
 @pytest.mark.parametrize(
-    ("section", "count"), [(simulated.many_levers_section, 12), (simulated.few_levers_section, 2)]
+    ("section", "count"), [(inference.many_levers_section, 12), (inference.few_levers_section, 2)]
 )
 def test_levers_never_seen_are_made_with_both_laws_and_counted(coarse, judged, section, count):
     told = []
@@ -67,7 +67,7 @@ def test_levers_never_seen_are_made_with_both_laws_and_counted(coarse, judged, s
 
 def test_the_page_says_when_the_stated_errors_do_not_hold(coarse, judged):
     page = Findings(coarse)
-    simulated.many_levers_section(page)
+    inference.many_levers_section(page)
     # a third of the made-up levers is off by three stated errors
     assert "do not cover this departure" in page.blocks[1]["text"]
     assert "67% in its 95 % band" in page.blocks[1]["text"]

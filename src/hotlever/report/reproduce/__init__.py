@@ -8,7 +8,7 @@ from hotlever.lever import Lever
 from hotlever.materials import published
 from hotlever.probe import Probe
 from hotlever.report.page import Page
-from hotlever.report.reproduce import air, fits, simulated, thermometer, vacuum
+from hotlever.report.reproduce import air, inference, vacuum
 from hotlever.report.reproduce.findings import Findings
 from hotlever.steps import each
 from hotlever.types import Progress
@@ -22,14 +22,14 @@ SECTIONS: dict[str, Callable[[Findings], None]] = {
     "Characteristics in vacuum (Figs. 5 and 6)": vacuum.characteristics_section,
     "Inside the heater (Fig. 7)": vacuum.heater_section,
     "Why the knee is not at the inversion temperature": vacuum.knee_section,
-    "Material parameters from a measurement (option III)": fits.fit_section,
-    "What each observable adds (options I to III, Figs. 3 and 4, Table I)": fits.options_section,
-    "The Raman thermometer (Fig. 2)": thermometer.thermometer_section,
+    "Material parameters from a measurement (option III)": inference.fit_section,
+    "What each observable adds (options I to III, Figs. 3 and 4, Table I)": inference.data_section,
+    "The Raman thermometer (Fig. 2)": inference.thermometer_section,
     "Heat into air depends on the surroundings (Fig. 8)": air.disc_section,
     "Characteristics in air (Figs. 9 and 10)": air.characteristics_section,
     "Is air one factor of the power? (Fig. 10b)": air.scale_section,
     "Where the heat goes": air.map_section,
-    NEVER_SEEN: simulated.few_levers_section,
+    NEVER_SEEN: inference.few_levers_section,
     "Balances": vacuum.balance_section,
 }
 #: Left out of the quick form, or shorter there.
@@ -37,7 +37,7 @@ LONG_SECTIONS: dict[str, Callable[[Findings], None]] = {
     "k by size, gap and pressure": air.geometry_section,
     "The missing tip": air.tip_section,
     "Mesh": vacuum.mesh_section,
-    NEVER_SEEN: simulated.many_levers_section,
+    NEVER_SEEN: inference.many_levers_section,
 }
 
 
@@ -61,11 +61,8 @@ def reproduce_page(quick: bool, progress: Progress, within: Progress | None = No
         section(page)
     filled, page.blocks = page.blocks, []
     page.heading("What the paper says, and what was found")
-    page.table(
-        ("where", "claim", "verdict", "found in this run"),
-        page.claims,
-        "Every verdict is computed from the sections below.",
-        prose=True,
+    page.tabulate(
+        "claims", ("where", "claim", "verdict", "found in this run"), page.claims, prose=True
     )
     page.blocks += filled
     return page

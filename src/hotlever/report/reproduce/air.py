@@ -22,52 +22,29 @@ from hotlever.studies.tip_effect import tip_effects
 def disc_section(page: Findings) -> None:
     """A disc between two planes, from near to far (Fig. 8)."""
     loss = disc.loss_between_planes()
-    page.figure(
-        "disc",
-        figures.disc_between_planes(loss),
-        "Heat lost by a disc midway between two planes, over κ r ΔT: the exact solution between "
-        "its two limits.",
-    )
+    page.draw("disc", figures.disc_between_planes(loss))
     far = disc.loss_between_planes(1e3).loss.item()
     nearest = loss.isel(distance=0)
     near = (nearest.loss / nearest.near).item()
-    page.claim(
-        "Fig. 8b",
-        "a disc far from any surface loses 4 κ r ΔT",
-        f"{far:.2f} κ r ΔT",
-        holds=abs(far - 4.0) < 0.1,
-        because="4 counts one face, while the area in the same formula counts both",
-    )
-    page.claim(
-        "Fig. 8a",
-        "a disc between near surfaces loses κ ΔT/h per area",
-        f"{near:.3f} of that at h = {nearest.distance.item():.2f} r",
-        holds=abs(near - 1.0) < 0.1,
-        as_found=f" within {abs(near - 1.0):.1%} at h = {nearest.distance.item():.2f} r",
-        because="the edge adds more",
-    )
+    page.claim("disc_far", holds=abs(far - 4.0) < 0.1, far=far)
+    off, distance = abs(near - 1.0), nearest.distance.item()
+    page.claim("disc_near", holds=off < 0.1, off=off, near=near, distance=distance)
 
 
 def characteristics_section(page: Findings) -> None:
     """What is measured, in air; and what air costs (Figs. 9 and 10)."""
     ramp = page.air.sweep(paper.RAMP)
-    page.figure(
-        "air_sweep",
-        figures.sweep_overview(ramp),
-        "The reference probe in still air, freely suspended, with the material of option III.",
-    )
+    page.draw("air_sweep", figures.sweep_overview(ramp))
     knees = {"vacuum": page.lever.knee(), "air": page.air.knee()}
-    page.figure(
-        "air_iv",
-        figures.iv_curves({"vacuum": page.lever.sweep(MANY), "air": page.air.sweep(MANY)}, knees),
-        "I-V curves in vacuum and in air, with their knees.",
-    )
-    there = [f"{at.power_mW.item():.2f} mW and {at.tip_K.item():.0f} K" for at in knees.values()]
-    page.text(f"The knee moves from {there[0]} in vacuum to {there[1]} in air.")
+    curves = {"vacuum": page.lever.sweep(MANY), "air": page.air.sweep(MANY)}
+    page.draw("air_iv", figures.iv_curves(curves, knees))
+    there = {
+        medium: f"{knee.power_mW.item():.2f} mW and {knee.tip_K.item():.0f} K"
+        for medium, knee in knees.items()
+    }
+    page.say("knee_in_air", **there)
     balance = abs((ramp.end_heat_mW + ramp.air_heat_mW) / ramp.power_mW - 1).max().item()
-    page.text(
-        f"Heat through the leg ends and into the air adds up to V_l I_h within {balance:.1e}."
-    )
+    page.say("balance_in_air", balance=balance)
     seconds = []
     for lever in (page.lever, page.air):
         again = lever.with_probe(lever.probe)
@@ -75,74 +52,51 @@ def characteristics_section(page: Findings) -> None:
         again.solve(paper.RAMP)
         seconds.append(time.perf_counter() - began)
     ratio = seconds[1] / seconds[0]
-    page.claim(
-        "Section V",
-        "air multiplies the cost of a simulation by a thousand",
-        f"by {ratio:.1f}, the operator of the air at hand",
-        holds=ratio > 100.0,
-        because="still air is linear in ∫κ_air dT, so that one matrix stands for all of it",
-    )
+    page.claim("cost_of_air", holds=ratio > 100.0, ratio=ratio)
 
 
 def scale_section(page: Findings) -> None:
     """One factor of the power: is it one?"""
     vacuum, air = page.lever.branch(), page.air.branch()
     ramp, curve = page.air.sweep(paper.RAMP), page.air.sweep(MANY)
-    hottest = float(ramp.tip_K.max())
-    found = air_scaling.find_scale_factor(vacuum, air, hottest)
-    page.figure(
-        "air_temperature_power",
-        figures.temperature_power(curve, EQ12.scaled(paper.K_IN_AIR)),
-        "Tip temperature against power in air, beside Eq. 12 with the power over "
-        f"{paper.K_IN_AIR}.",
-    )
-    page.figure(
-        "scale_factor",
-        figures.scale_factor({"free space": found.k}, paper.K_IN_AIR),
-        "Power in air over power in vacuum at the same tip temperature.",
-    )
-    paper_error = air_scaling.error_of_one_factor(vacuum, air, paper.K_IN_AIR, hottest)
-    cold, hot = found.k.interp(tip_K=[COLD, HOT]).values
-    best, left = found.best_k.item(), found.best_error_K.item()
-    page.text(
-        f"k rises from {cold:.3f} at {COLD:.0f} K to {hot:.3f} at {HOT:.0f} K. The best single "
-        f"factor is {best:.3f}; with it the temperature is wrong by up to {left:.0f} K below "
-        f"{hottest:.0f} K, with {paper.K_IN_AIR} by up to {paper_error:.0f} K."
-    )
-    law_error = np.abs(
-        EQ12.scaled(paper.K_IN_AIR).tip_temperature(curve.power_mW) - curve.tip_K
-    ).max()
-    page.claim(
-        "Section V",
-        f"Eq. 12 with the power over k = {paper.K_IN_AIR} gives T(P) in air within "
-        f"{paper.POWER_LAW_SPREAD_K:.0f} K",
-        f"{law_error.item():.0f} K from our curve in air; our own vacuum curve at P/"
-        f"{paper.K_IN_AIR} {paper_error:.0f} K, at the best single k = {best:.2f} {left:.0f} K",
-        holds=law_error.item() < paper.POWER_LAW_SPREAD_K,
-        because=f"k rises from {cold:.2f} to {hot:.2f} with the temperature",
-    )
+    hottest, k, spread = float(ramp.tip_K.max()), paper.K_IN_AIR, paper.POWER_LAW_SPREAD_K
+    factor = air_scaling.find_scale_factor(vacuum, air, hottest)
+    law = EQ12.scaled(k)
+    page.draw("air_temperature_power", figures.temperature_power(curve, law), k=k)
+    page.draw("scale_factor", figures.scale_factor({"free space": factor.k}, k))
+    cold, hot = factor.k.interp(tip_K=[COLD, HOT]).values
+    numbers = {
+        "cold": cold,
+        "COLD": COLD,
+        "hot": hot,
+        "HOT": HOT,
+        "hottest": hottest,
+        "k": k,
+        "best": factor.best_k.item(),
+        "left": factor.best_error_K.item(),
+        "spread": spread,
+        "error": air_scaling.error_of_one_factor(vacuum, air, k, hottest),
+    }
+    page.say("scale", **numbers)
+    law_error = np.abs(law.tip_temperature(curve.power_mW) - curve.tip_K).max().item()
+    page.claim("one_factor", holds=law_error < spread, law_error=law_error, **numbers)
     share, coldest = (ramp.air_heat_mW / ramp.power_mW).values, ramp.tip_K.values[0]
     tips = np.array([COLD, HOT])
     low, high = thermal_conductivity_of_air(tips)[0] / thermal_conductivity(tips)[0]
     page.claim(
-        "Section V",
-        "air takes a constant share of the power at any tip temperature",
-        f"{share[0]:.0%} at {coldest:.0f} K, {share[-1]:.0%} at {hottest:.0f} K",
+        "constant_share",
         holds=abs(share[-1] / share[0] - 1.0) < 0.1,
-        because=f"κ_air/κ_Si grows {high / low:.1f}-fold from {COLD:.0f} to {HOT:.0f} K "
-        f"and k − 1 with it, {air_scaling.unevenness(found):.1f}-fold",
+        first=share[0],
+        last=share[-1],
+        coldest=coldest,
+        ratio=high / low,
+        growth=air_scaling.unevenness(factor),
+        **numbers,
     )
     if air.knee is not None and vacuum.knee is not None:
         by_knee = air.knee.power_mW / vacuum.knee.power_mW
         error = air_scaling.error_of_one_factor(vacuum, air, by_knee, hottest)
-        page.claim(
-            "Section V",
-            "k follows from the power at the knee, k = P_knee/P_th",
-            f"{by_knee:.3f}, which leaves {error:.0f} K",
-            holds=error < paper.POWER_LAW_SPREAD_K,
-            as_found=f" within {error:.0f} K",
-            because=f"a k that is right at the knee leaves {error:.0f} K elsewhere",
-        )
+        page.claim("factor_of_the_knee", holds=error < spread, by_knee=by_knee, error=error)
 
 
 def map_section(page: Findings) -> None:
@@ -151,46 +105,29 @@ def map_section(page: Findings) -> None:
     fields = AirFields(page.air)
     shares, hottest = fields.shares(states), states[-1]
     layout, title = page.air.probe.layout(), f"bias {hottest.bias_V:.1f} V"
-    page.figure(
-        "air_loss",
-        figures.air_loss(layout, fields.panels, fields.flux(hottest), shares, title),
-        "Heat flux from the top face into the air at the highest bias, and the share of the power "
-        "that each region loses to the air.",
-    )
+    flux = fields.flux(hottest)
+    page.draw("air_loss", figures.air_loss(layout, fields.panels, flux, shares, title))
     last: xr.DataArray = shares.air_heat_mW.isel(bias=-1)
-    page.text(
-        f"At {hottest.bias_V:.1f} V the region that loses most is the "
-        f"{last.idxmax('region').item()}: {(last.max() / last.sum()).item():.0%} of the heat into "
-        "the air."
-    )
+    share, region = (last.max() / last.sum()).item(), last.idxmax("region").item()
+    page.say("regions", bias=hottest.bias_V, region=region, share=share)
 
 
 def geometry_section(page: Findings) -> None:
     """How k depends on size, gap and pressure, and where it would be constant."""
-    found = air_scaling.surroundings_study(page.lever.probe)
-    page.figure(
-        "scale_factor_map",
-        figures.scale_factor(
-            {str(case): found.k.sel(case=case) for case in found.case.values}, paper.K_IN_AIR
-        ),
-        "Power in air over power in vacuum at the same tip temperature, for other sizes and "
-        "surroundings.",
-    )
+    study = air_scaling.surroundings_study(page.lever.probe)
+    curves = {str(case): study.k.sel(case=case) for case in study.case.values}
+    page.draw("scale_factor_map", figures.scale_factor(curves, paper.K_IN_AIR))
     columns = {
-        "": (found.case, ""),
-        **{f"k at {tip:.0f} K": (found.k.interp(tip_K=tip), ".3f") for tip in (COLD, HOT)},
-        "growth of k − 1": (found.unevenness, ".2f"),
-        "best single k": (found.best_k, ".3f"),
-        "error it leaves (K)": (found.best_error_K, ".0f"),
+        "": (study.case, ""),
+        **{f"k at {tip:.0f} K": (study.k.interp(tip_K=tip), ".3f") for tip in (COLD, HOT)},
+        "growth of k − 1": (study.unevenness, ".2f"),
+        "best single k": (study.best_k, ".3f"),
+        "error it leaves (K)": (study.best_error_K, ".0f"),
     }
-    page.columns(columns, f"Up to {HOT:.0f} K.")
-    steadiest = abs(found.unevenness - 1.0).idxmin("case").item()
-    page.text(
-        f"k − 1 is steadiest for '{steadiest}', where it grows "
-        f"{found.unevenness.sel(case=steadiest).item():.2f}-fold. "
-        "A constant k needs a heat loss whose conductance falls with the temperature as that of "
-        "silicon does; the conductance of air rises in dense air whatever the geometry."
-    )
+    page.columns("geometry", columns, HOT=HOT)
+    steadiest = abs(study.unevenness - 1.0).idxmin("case").item()
+    growth = study.unevenness.sel(case=steadiest).item()
+    page.say("geometry", case=steadiest, growth=growth)
 
 
 def tip_section(page: Findings) -> None:
@@ -204,16 +141,7 @@ def tip_section(page: Findings) -> None:
         "T at equal power (K)": (effects.at_power_K, "+.1f"),
         "a tipless fit misses the knee by (K)": (effects.missed_K, "+.1f"),
     }
-    page.columns(
-        columns,
-        "Cones on the heater as a thickening of the lever, in vacuum; the last column fits a lever "
-        "without tip to the data of the lever with it, as the paper did.",
-    )
-    gap, missed = paper.KNEE_MEASURED_K - paper.KNEE_PREDICTED_K, effects.missed_K.values
-    page.claim(
-        "Conclusions",
-        f"the missing tip is responsible for the {gap:.0f} K that the knee is off",
-        f"a tipless fit misses the knee by {missed.min():+.1f} to {missed.max():+.1f} K",
-        holds=bool(missed.max() > 0.75 * gap),
-        because=f"tips of plausible size move it by {missed.max():+.1f} K at most",
-    )
+    page.columns("tips", columns)
+    gap = paper.KNEE_MEASURED_K - paper.KNEE_PREDICTED_K
+    least, most = float(effects.missed_K.min()), float(effects.missed_K.max())
+    page.claim("missing_tip", holds=most > 0.75 * gap, gap=gap, least=least, most=most)

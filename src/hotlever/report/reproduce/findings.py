@@ -1,11 +1,15 @@
-"""What the sections of the page share: the levers, and the list of claims."""
+"""What the sections of the page share: the levers, the words, and the list of claims."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
 from hotlever.lever import Lever
 from hotlever.report.page import Linked, Page
@@ -14,6 +18,10 @@ from hotlever.types import Progress
 
 #: Biases (V) of a curve without visible corners.
 MANY = np.linspace(0.1, RAMP[-1], 110)
+#: Captions, paragraphs and claims by name, with what a run finds in braces.
+_TEXTS = tomllib.loads(
+    (files("hotlever") / "report" / "reproduce" / "texts.toml").read_text(encoding="utf-8")
+)
 
 
 class Findings(Page):
@@ -44,23 +52,39 @@ class Findings(Page):
         self.lever, self.air, self.progress = lever, lever.in_medium("air"), progress
         self.claims: list[tuple[str, str, str, str]] = []
 
-    def claim(
-        self,
-        where: str,
-        statement: str,
-        found: str,
-        *,
-        holds: bool,
-        as_found: str = "",
-        because: str = "",
-    ) -> None:
-        """Add a claim of the paper: how it holds in this run (`as_found`), or why it does not."""
-        verdict = f"holds{as_found}"
-        if not holds:
-            verdict = f"does not hold here, because {because}"
-        self.claims.append((Linked(where, self.anchor), statement, verdict, found))
+    def say(self, name: str, /, **numbers: Any) -> None:
+        """Add the paragraph of a name."""
+        self.text(_TEXTS["paragraphs"][name].format(**numbers))
 
-    def columns(self, columns: Mapping[str, tuple[xr.DataArray, str]], caption: str) -> None:
+    def draw(self, name: str, figure: Figure, /, file: str = "", **numbers: Any) -> None:
+        """Add a figure with the caption of its name, which is that of its file by default."""
+        self.figure(file or name, figure, _TEXTS["figures"][name].format(**numbers))
+
+    def tabulate(
+        self,
+        name: str,
+        columns: Sequence[str],
+        rows: Sequence[Sequence[str]],
+        /,
+        *,
+        prose: bool = False,
+        **numbers: Any,
+    ) -> None:
+        """Add a table with the caption of its name."""
+        self.table(columns, rows, _TEXTS["tables"][name].format(**numbers), prose=prose)
+
+    def columns(
+        self, name: str, columns: Mapping[str, tuple[xr.DataArray, str]], /, **numbers: Any
+    ) -> None:
         """Add a table of some values and their format by heading."""
-        cells = [[f"{value:{form}}" for value in found.values] for found, form in columns.values()]
-        self.table(list(columns), list(zip(*cells, strict=True)), caption)
+        cells = [[f"{value:{form}}" for value in data.values] for data, form in columns.values()]
+        self.tabulate(name, list(columns), list(zip(*cells, strict=True)), **numbers)
+
+    def claim(self, name: str, /, *, holds: bool, **numbers: Any) -> None:
+        """Add the claim of a name, and whether it holds in this run."""
+        claim = {"holds": "holds", **_TEXTS["claims"][name]}
+        text = {key: words.format(**numbers) for key, words in claim.items()}
+        verdict = text["holds"] if holds else f"does not hold here, because {text['fails']}"
+        self.claims.append(
+            (Linked(text["where"], self.anchor), text["claim"], verdict, text["ours"])
+        )

@@ -25,12 +25,7 @@ _WELL_COVERED_MW = 3.3
 
 def probe_section(page: Findings) -> None:
     """The layout."""
-    page.figure(
-        "probe",
-        figures.probe_drawing(page.lever.space.mesh.layout),
-        "The reference probe from above. The current enters at the supply, passes the heater and "
-        "leaves by the left leg to ground; the right leg senses the potential of the bridge.",
-    )
+    page.draw("probe", figures.probe_drawing(page.lever.space.mesh.layout))
 
 
 def parameter_section(page: Findings) -> None:
@@ -43,24 +38,13 @@ def parameter_section(page: Findings) -> None:
         if printed is not None:
             away.append(abs(ours - printed))
         values = (
-            value_with_error(getattr(material, name), error.get(name), known.scale)
-            for name, known in PARAMETERS.items()
+            value_with_error(getattr(material, name), error.get(name), parameter.scale)
+            for name, parameter in PARAMETERS.items()
         )
         shown = "" if printed is None else f"{printed:.0f}"
         rows.append((entry.name, *values, shown, f"{ours:.1f}"))
-    page.table(
-        ("set", *PARAMETER_COLUMNS, "T_i published (K)", "T_i (K)"),
-        rows,
-        "Published values; the last column is computed from n_d and p.",
-    )
-    page.claim(
-        "Tables I and II",
-        "the inversion temperatures T_i follow from n_d and p",
-        f"largest difference {max(away):.1f} K",
-        holds=max(away) < 1.0,
-        as_found=" within 1 K",
-        because="the laws give other temperatures",
-    )
+    page.tabulate("parameters", ("set", *PARAMETER_COLUMNS, "T_i published (K)", "T_i (K)"), rows)
+    page.claim("inversion_temperatures", holds=max(away) < 1.0, away=max(away))
 
 
 def published_biases(lever: Lever) -> list[float]:
@@ -72,9 +56,8 @@ def operating_points_section(page: Findings) -> None:
     """The three published points."""
     ours = page.lever.sweep(published_biases(page.lever))
     rows, away = [], []
-    for place, point in enumerate(paper.OPERATING_POINTS):
-        here = ours.isel(bias=place)
-        bias, lever_V, current_mA, tip_K = _point(here)
+    for index, point in enumerate(paper.OPERATING_POINTS):
+        bias, lever_V, current_mA, tip_K = _point(ours.isel(bias=index))
         off_V, off_mA = lever_V / point.lever_V - 1, current_mA / point.current_mA - 1
         away += [abs(off_V), abs(off_mA)]
         volts = (f"{point.lever_V:.2f}", f"{lever_V:.3f} ({off_V:+.2%})")
@@ -84,31 +67,17 @@ def operating_points_section(page: Findings) -> None:
     bias, lever_V, current_mA, tip = _point(page.lever.knee())
     exact = (f"{bias:.3f}", "", f"{lever_V:.3f}", "", f"{current_mA:.3f}", "", f"{tip:.1f}")
     rows.append(("dV_l/dI_h = 0", *exact))
-    page.table(
+    page.tabulate(
+        "operating_points",
         (
             *("point", "bias (V)", "V_l published (V)", "V_l (V)"),
             *("I_h published (mA)", "I_h (mA)", "T_tip published (K)", "T_tip (K)"),
         ),
         rows,
-        "At the bias V_l + R_s I_h of each published point, with the option-III parameters. The "
-        "last row is the exact knee, which the paper reads off its 25 points.",
     )
-    page.claim(
-        "Figs. 6 and 7",
-        "option III gives the three operating points of plateau, knee and hot branch",
-        f"largest difference {max(away):.2%} in V_l and I_h",
-        holds=max(away) < 0.01,
-        as_found=" within 1 %",
-        because="V_l or I_h differs by more; the published layout is not known",
-    )
-    page.claim(
-        "Fig. 6",
-        f"the simulated knee lies at {paper.KNEE_PREDICTED_K:.0f} K",
-        f"{tip:.1f} K where dV_l/dI_h = 0",
-        holds=abs(tip - paper.KNEE_PREDICTED_K) < 10.0,
-        as_found=" within 10 K: the paper reads it off 25 points",
-        because="the exact knee lies elsewhere",
-    )
+    page.claim("operating_points", holds=max(away) < 0.01, away=max(away))
+    published = paper.KNEE_PREDICTED_K
+    page.claim("simulated_knee", holds=abs(tip - published) < 10.0, tip=tip, published=published)
 
 
 def _point(state: xr.Dataset) -> list[float]:
@@ -119,23 +88,13 @@ def _point(state: xr.Dataset) -> list[float]:
 def characteristics_section(page: Findings) -> None:
     """I-V curve, T(P) and resistances (Figs. 5 and 6)."""
     curve, knee = page.lever.sweep(MANY), page.lever.knee()
-    page.figure(
+    page.draw(
         "iv",
         figures.iv_curves({"vacuum": curve}, {"vacuum": knee}, published=paper.OPERATING_POINTS),
-        "Heater current against lever voltage in vacuum, option III, up to 11 V, with the knee "
-        "dV_l/dI_h = 0 and the three published operating points.",
     )
-    page.figure(
-        "temperature_power",
-        figures.temperature_power(curve),
-        "Tip temperature against dissipated power, beside the published law (Eq. 12).",
-    )
+    page.draw("temperature_power", figures.temperature_power(curve))
     power_law(page, curve)
-    page.figure(
-        "resistances",
-        figures.resistances(curve),
-        "Resistance of the lever, the heater and the legs against tip temperature.",
-    )
+    page.draw("resistances", figures.resistances(curve))
 
 
 def power_law(page: Findings, curve: xr.Dataset) -> None:
@@ -149,32 +108,27 @@ def power_law(page: Findings, curve: xr.Dataset) -> None:
         cold = refit.largest_residual_K(to_mW=_WELL_COVERED_MW)
         hot = refit.largest_residual_K(from_mW=_WELL_COVERED_MW)
         rows.append((name, *_coefficients(refit.law), f"{cold:.0f}", f"{hot:.0f}"))
-    page.table(
+    page.tabulate(
+        "power_law",
         (
             *("Eq. 12", "a (K/mW)", "b (K)", "m", "c (K/mW)", "P_th (mW)", "jump (K)"),
             *(f"residual to {_WELL_COVERED_MW} mW (K)", "above (K)"),
         ),
         rows,
-        "Coefficients of the power law, and its largest distance from the computed curve.",
     )
-    everywhere = difference.max().item()
+    everywhere, spread = difference.max().item(), paper.POWER_LAW_SPREAD_K
     page.claim(
-        "Eq. 12",
-        f"T_tip follows the power law within {paper.POWER_LAW_SPREAD_K:.0f} K",
-        f"{below:.0f} K up to {_WELL_COVERED_MW} mW, {difference.values[-1]:.0f} K at "
-        f"{last.power_mW.item():.2f} mW ({last.tip_K.item():.0f} K)",
-        holds=everywhere < paper.POWER_LAW_SPREAD_K,
-        because=f"it is left by {everywhere:.0f} K at the hot end, where κ_Si keeps falling and "
-        "the law is straight",
+        "power_law",
+        holds=everywhere < spread,
+        everywhere=everywhere,
+        spread=spread,
+        below=below,
+        covered=_WELL_COVERED_MW,
+        last=difference.values[-1],
+        power=last.power_mW.item(),
+        tip=last.tip_K.item(),
     )
-    page.claim(
-        "Eq. 12",
-        "one formula in two branches describes the temperature",
-        f"the branches miss each other by {EQ12.jump_K:.1f} K at P_th",
-        holds=abs(EQ12.jump_K) < paper.POWER_LAW_SPREAD_K,
-        as_found=", but for a jump that the claimed accuracy covers",
-        because="the jump is larger than the claimed accuracy",
-    )
+    page.claim("two_branches", holds=abs(EQ12.jump_K) < spread, jump=EQ12.jump_K)
 
 
 def _coefficients(law: PowerLaw) -> list[str]:
@@ -190,34 +144,19 @@ def heater_section(page: Findings) -> None:
     names = [point.name for point in paper.OPERATING_POINTS]
     profiles = {name: heater_profile(state) for name, state in zip(names, states, strict=True)}
     profile, layout = profiles[names[0]], page.lever.space.mesh.layout
-    page.figure(
-        "doping_profile",
-        figures.doping_profile(profile),
-        "Doping concentration along the heater and the inversion temperature that follows from it.",
-    )
+    page.draw("doping_profile", figures.doping_profile(profile))
     lowly = profile.doping < 2.0 * page.lever.probe.material.n_d
     length = float(lowly.mean() * np.ptp(profile.position.values))
     nominal = layout.heater_taper.length_um
+    share = length / nominal
     page.claim(
-        "Fig. 7a",
-        "dopant diffusion shortens the heater to about half its drawn length",
-        f"doping below 2 n_d over {length:.2f} of {nominal:.2f} µm",
-        holds=0.35 < length / nominal < 0.65,
-        as_found=f" roughly: {length / nominal:.0%} of the length are left",
-        because=f"{length / nominal:.0%} of the length are left",
+        "heater_length", holds=0.35 < share < 0.65, length=length, nominal=nominal, share=share
     )
-    page.figure(
-        "heater_profiles",
-        figures.heater_profiles(profiles),
-        "Local resistivity and temperature along the heater at the three published points.",
-    )
+    page.draw("heater_profiles", figures.heater_profiles(profiles))
     knee = states[names.index("knee")]
     fields = FieldMapper(page.lever).map(knee)
-    page.figure(
-        "field_maps",
-        figures.field_maps(fields, layout, f"bias {knee.bias_V:.2f} V (knee)"),
-        "Temperature, potential and current density at the knee; the heater magnified.",
-    )
+    title = f"bias {knee.bias_V:.2f} V (knee)"
+    page.draw("field_maps", figures.field_maps(fields, layout, title))
 
 
 def knee_section(page: Findings) -> None:
@@ -228,30 +167,16 @@ def knee_section(page: Findings) -> None:
     for name, step in kelvins.items():
         at += step
         rows.append((name, f"{step:+.1f}", f"{at:.1f}"))
-    page.table(
-        ("from T_i to the knee", "step (K)", "T_tip (K)"),
-        rows,
-        "Levers without leg resistance, without dopant diffusion, and without both, solved.",
-    )
+    page.tabulate("knee", ("from T_i to the knee", "step (K)", "T_tip (K)"), rows)
     legs = kelvins["the legs have a resistance"]
     page.claim(
-        "Section IV",
-        "leg resistance raises the knee by about 15 K",
-        f"{legs:+.1f} K",
-        holds=7.5 < legs < 22.5,
-        as_found=f" within {abs(legs - 15.0):.1f} K",
-        because=f"a lever without leg resistance has its knee {-legs:+.0f} K away",
+        "knee_by_legs", holds=7.5 < legs < 22.5, legs=legs, off=abs(legs - 15.0), without=-legs
     )
     rest = reasons.knee_K.sel(lever="as it is").item() - reasons.inversion_K - legs
     doping = kelvins["the doping is not uniform"]
-    page.claim(
-        "Section IV",
-        "the rest of the distance from T_i is the non-uniform doping",
-        f"{doping:+.1f} K of {rest:+.1f} K",
-        holds=abs(doping - rest) < 0.25 * abs(rest),
-        because="two more reasons remain with uniform doping: "
-        + "; ".join(f"{name} ({step:+.0f} K)" for name, step in list(kelvins.items())[:2]),
-    )
+    others = "; ".join(f"{name} ({step:+.0f} K)" for name, step in list(kelvins.items())[:2])
+    holds = abs(doping - rest) < 0.25 * abs(rest)
+    page.claim("knee_by_doping", holds=holds, doping=doping, rest=rest, others=others)
 
 
 def balance_section(page: Findings) -> None:
@@ -259,11 +184,7 @@ def balance_section(page: Findings) -> None:
     sweep = page.lever.sweep(paper.RAMP)
     charge = np.abs(sweep.ground_current_mA / sweep.current_mA - 1).max().item()
     energy = np.abs(sweep.end_heat_mW / sweep.power_mW - 1).max().item()
-    page.text(
-        f"Over the 25 biases, the current to ground equals the current from the supply within "
-        f"{charge:.1e}, and the heat through the leg ends equals V_l I_h within {energy:.1e} "
-        "(relative)."
-    )
+    page.say("balances", charge=charge, energy=energy)
 
 
 def mesh_section(page: Findings) -> None:
@@ -276,9 +197,9 @@ def mesh_section(page: Findings) -> None:
         cells = [f"{relative.max().item():.1e}" for relative in (current, reader)]
         triangles = str(lever.space.mesh.elements.nelements)
         rows.append((name, triangles, *cells, f"{away.tip_K.max().item():.3f}"))
-    page.table(
+    page.tabulate(
+        "mesh",
         ("mesh", "triangles", "I_h (relative)", "V_r (relative)", "T_tip (K)"),
         rows,
-        f"Largest difference over 1 to 11 V from a mesh of {fine.space.mesh.elements.nelements} "
-        "triangles (sizes / 3).",
+        triangles=fine.space.mesh.elements.nelements,
     )
