@@ -6,11 +6,12 @@ import numpy as np
 
 from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError
-from hotlever.lever.transient.waveform import MOST_BIAS, Polyline, Waveform
+from hotlever.lever.transient.waveform import Polyline, Waveform
 from hotlever.measurement.contents import NOISE, Contents
 from hotlever.measurement.data import LEVER, TIME, noise_about_neighbours
 from hotlever.probe import Circuit
 from hotlever.types import Array
+from hotlever.units import MOST_BIAS
 
 #: Times the largest resistance of a lever: in series, it makes the bias rise along its curve.
 _ENOUGH = 2.0

@@ -18,10 +18,10 @@ import numpy as np
 from hotlever.errors import InputError, shown
 from hotlever.tables import read_table
 from hotlever.types import Array
-from hotlever.units import name_and_unit, setting
+from hotlever.units import MOST_BIAS, name_and_unit, setting
 
-#: Biases (V), times (µs) and numbers of pulses that a wave form may have at most.
-MOST_BIAS, LONGEST, MOST_PULSES = 1e4, 1e12, 100_000
+#: Times (µs) and numbers of pulses that a wave form may have at most.
+LONGEST, MOST_PULSES = 1e12, 100_000
 #: What a wave form is followed for beyond its last corner (µs), if nobody says; and periods.
 _AFTERWARDS, _PERIODS = 100.0, 10
 #: After a step it takes so long (µs) until next to nothing changes.
