@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
+from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,22 +25,30 @@ MODULES = sorted(
     # scripts of the gallery are data of the package
     if path.stem != "__init__" and "examples" not in path.relative_to(SOURCE).parts
 )
-#: From the ground up: a layer imports none of those behind it.
-LAYERS = (
-    ("materials",),
-    ("probe",),
-    ("air",),
-    ("lever",),
-    ("lever3d", "measurement"),
-    ("raman", "estimation"),
-    ("calibration",),
-    ("studies",),
-    ("figures",),
-    ("report",),
-    ("tasks",),
-    ("app",),
-    ("cli",),
-)
+#: From the ground up: what stands on a floor imports of those below it, and nothing beside it but
+#: on the floors of single modules.
+FLOORS = {
+    "ground": ("colours", "errors", "memory", "threads", "types"),
+    "numbers and files": ("files", "records", "spieser2017", "steps", "units"),
+    "texts": ("cache", "cells", "datasets", "text", "unforeseen"),
+    "tables and processes": ("blocks", "cluster", "processes", "tables"),
+    "materials": ("materials",),
+    "probe": ("probe",),
+    "air": ("air",),
+    "lever": ("lever",),
+    "measurement": ("lever3d", "measurement", "raman"),
+    "estimation": ("estimation",),
+    "calibration": ("calibration",),
+    "studies": ("studies",),
+    "figures": ("figures",),
+    "report": ("report",),
+    "tasks": ("tasks",),
+    "app": ("app",),
+    "command line": ("cli",),
+}
+#: A module named by a text, to be loaded later.
+MODULE = re.compile(r"hotlever(\.\w+)+")
+SINGLE = {"ground", "numbers and files", "texts", "tables and processes"}
 
 
 @pytest.mark.parametrize("name", hotlever.__all__)
@@ -58,10 +68,10 @@ def test_the_words_of_the_story():
 
 def test_importing_the_package_loads_nothing_heavy():
     script = "import sys, hotlever; print(*{name.partition('.')[0] for name in sys.modules})"
-    found = subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
-    assert not {"numpy", "scipy", "xarray", "skfem", "matplotlib"} & set(found.stdout.split())
+    assert not {"numpy", "scipy", "xarray", "skfem", "matplotlib"} & set(done.stdout.split())
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -73,36 +83,47 @@ def test_no_module_has_the_name_of_something_in_it(name):
     assert getattr(import_module(package), last, module) is module
 
 
-def imported(path: Path) -> set[str]:
-    """Packages of hotlever that a file imports."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("hotlever."):
-            found.add(node.module.split(".")[1])
-    return found
-
-
-@pytest.mark.parametrize("layer", range(len(LAYERS)))
-def test_no_layer_imports_one_above_it(layer):
-    above = {name for names in LAYERS[layer + 1 :] for name in names}
-    for package in LAYERS[layer]:
-        for path in (SOURCE / package).rglob("*.py"):
-            assert not imported(path) & above, path
-
-
+@cache
 def imports_between_modules() -> dict[str, set[str]]:
-    """Return what each module imports of the others, anywhere and for types too."""
-    of = {}
+    """Return what each module imports of the others: inside functions, for types and by a text."""
+    imports = {}
     for name in MODULES:
-        source = find_spec(name).origin
-        nodes = ast.walk(ast.parse(Path(source).read_text(encoding="utf-8")))
-        of[name] = {
-            f"{node.module}.{one.name}" if f"{node.module}.{one.name}" in MODULES else node.module
-            for node in nodes
-            if isinstance(node, ast.ImportFrom) and node.module
-            for one in node.names
-        } - {name}
-    return of
+        source = Path(find_spec(name).origin).read_text(encoding="utf-8")
+        imports[name] = set()
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.Import):
+                imports[name] |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                assert node.level == 0, name
+                names = {f"{node.module}.{alias.name}" for alias in node.names}
+                imports[name] |= (names & set(MODULES)) or {node.module}
+            elif isinstance(node, ast.Constant) and re.fullmatch(
+                r"hotlever(\.\w+)+", str(node.value)
+            ):
+                imports[name].add(node.value)
+        imports[name] = {other for other in imports[name] - {name} if other.startswith("hotlever.")}
+    return imports
+
+
+def test_every_package_and_module_has_a_floor():
+    names = {path.stem for path in SOURCE.iterdir() if path.is_dir() or path.suffix == ".py"}
+    names -= {"__init__", "__main__", "__pycache__", "examples"}
+    assert sorted(names) == sorted(name for floor in FLOORS.values() for name in floor)
+
+
+def test_imports_go_down():
+    floor_of = {name: floor for floor, names in FLOORS.items() for name in names}
+    level = {floor: number for number, floor in enumerate(FLOORS)}
+    rising = []
+    for module, others in imports_between_modules().items():
+        for other in others:
+            here, there = module.split(".")[1], other.split(".")[1]
+            if here in floor_of and here != there:
+                mine, other_floor = floor_of[here], floor_of[there]
+                beside = mine == other_floor and mine in SINGLE
+                if level[other_floor] >= level[mine] and not beside:
+                    rising.append(f"{module} -> {other}")
+    assert rising == []
 
 
 def test_modules_do_not_import_each_other_in_circles():
@@ -110,7 +131,7 @@ def test_modules_do_not_import_each_other_in_circles():
     graph = np.array([[other in names for other in MODULES] for names in imports.values()])
     _, part = connected_components(graph, connection="strong")
     circles = {MODULES[k] for k in range(len(MODULES)) if np.sum(part == part[k]) > 1}
-    assert not circles
+    assert circles == set()
 
 
 # --- what Python users do -----------------------------------------------------------------------
