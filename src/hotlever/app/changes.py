@@ -59,12 +59,12 @@ class Change:
             if head["schema"] != _SCHEMA or not folder.name.isdecimal():
                 return None
             change = cls(folder, str(head["what"]))
-            for one in entries:
-                kept = one["before"]
+            for entry in entries:
+                kept = entry["before"]
                 # names of ours are numbers: another would lead out of the folder
                 if kept is not None and not str(kept).isdecimal():
                     return None
-                change.before[str(one["file"])] = kept
+                change.before[str(entry["file"])] = kept
         except (OSError, ValueError, LookupError, TypeError, RecursionError):
             return None
         return change
@@ -134,8 +134,8 @@ class Changes:
 
     def latest(self, most: int = _MOST) -> list[Change]:
         """Return the changes, the latest first."""
-        found = (Change.from_folder(folder) for folder in reversed(self._folders()))
-        return [change for change in found if change is not None and change.before][:most]
+        changes = map(Change.from_folder, reversed(self._folders()))
+        return [change for change in changes if change is not None and change.before][:most]
 
     def undo(self, change: Change) -> None:
         """Make the files of a change what they were before it; itself a change.
@@ -169,16 +169,14 @@ class Changes:
 
     def _folders(self) -> list[Path]:
         """Return the folders of the changes, the oldest first."""
-        if not self._folder.is_dir():
-            return []
-        there = (one for one in self._folder.iterdir() if one.name.isdecimal())
-        return sorted(there, key=lambda one: int(one.name))
+        folders = (path for path in self._folder.glob("*") if path.name.isdecimal())
+        return sorted(folders, key=lambda path: int(path.name))
 
     def _forget_oldest(self) -> None:
         size = 0
         for number, folder in enumerate(reversed(self._folders())):
             with suppress(OSError):  # another process may be as far
-                size += sum(one.stat().st_size for one in folder.iterdir())
+                size += sum(path.stat().st_size for path in folder.iterdir())
             if number and (number >= _MOST or size > _MOST_BYTES):
                 shutil.rmtree(folder, ignore_errors=True)
 

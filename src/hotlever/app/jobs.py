@@ -56,7 +56,7 @@ class Task:
                 words.append(option)
             elif value not in (None, "", False):
                 values = value if isinstance(value, list) else [value]
-                words += [word for one in values for word in (option, _plain(str(one)))]
+                words += [word for text in values for word in (option, _plain(str(text)))]
         return shlex.join(["hotlever", *words])
 
     def writing(self, files: Mapping[str, str]) -> Task:

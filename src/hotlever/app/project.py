@@ -57,10 +57,18 @@ def file_stamp(path: Path) -> float:
     InputError
         If it does not exist.
     """
+    stamp = _time_of(path)
+    if not stamp:
+        raise InputError(f"{path.name}: no such file")
+    return stamp
+
+
+def _time_of(path: Path) -> float:
+    """Return when a file was written; 0 if it does not exist."""
     try:
         return path.stat().st_mtime
     except OSError:
-        raise InputError(f"{path.name}: no such file") from None
+        return 0.0
 
 
 class Project:
@@ -110,15 +118,12 @@ class Project:
 
     def names(self, *suffixes: str) -> list[str]:
         """Return the files with one of some endings, the latest first."""
-        found = []
-        for path in self.folder.iterdir():
-            if path.name.lower().endswith(suffixes) and not path.name.startswith("."):
-                try:
-                    if path.is_file():
-                        found.append((-path.stat().st_mtime, path.name))
-                except OSError:
-                    continue
-        return [name for _, name in sorted(found)[:_MOST]]
+        files = [
+            (-_time_of(path), path.name)
+            for path in self.folder.glob("[!.]*")
+            if path.name.lower().endswith(suffixes) and path.is_file()
+        ]
+        return [name for _, name in sorted(files)[:_MOST]]
 
     @property
     def probes(self) -> list[str]:
@@ -170,8 +175,7 @@ class Project:
 
     def stamp(self, name: str) -> float:
         """Return when a file was written; 0 if it does not exist."""
-        path = self.path(name)
-        return file_stamp(path) if path.exists() else 0.0
+        return _time_of(self.path(name))
 
     def probe_of_drawing(self, drawing: str) -> tuple[str, bool]:
         """Return the name of the probe file of a drawing, and whether it is there already.

@@ -134,8 +134,8 @@ def probe_of_text(
         try:
             probe = Probe.from_file(file.name)
         except InputError as error:
-            said = str(error).replace(file.name, title)
-            return _at_fault(error, said, lambda: read_sections(file.name)["probe"])
+            fault = str(error).replace(file.name, title)
+            return _at_fault(error, fault, lambda: read_sections(file.name)["probe"])
     return _described(probe, title, mesh)
 
 
@@ -222,7 +222,7 @@ def _regions(layout: Layout) -> list[tuple[str, str, str]]:
 
 
 def _at_fault(
-    error: InputError, said: str, section: Callable[[], Mapping[str, Any]]
+    error: InputError, fault: str, section: Callable[[], Mapping[str, Any]]
 ) -> dict[str, Any]:
     """Return the picture of what is wrong with a drawing, or with the dimensions of a section.
 
@@ -234,16 +234,16 @@ def _at_fault(
     from hotlever.probe.drawing.outlines import DrawingError
 
     if isinstance(error, DrawingError):
-        made = figures.outlines_drawing(error.outlines, fault=said, place=error.place)
-        return {"figure": _svg(made), "fault": said}
+        made = figures.outlines_drawing(error.outlines, fault=fault, place=error.place)
+        return {"figure": _svg(made), "fault": fault}
     try:
         # a section may hold anything
-        return {"figure": _svg(_impossible(section(), said)), "fault": said}
+        return {"figure": _svg(_impossible(section(), fault)), "fault": fault}
     except (InputError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
-        raise InputError(said) from None
+        raise InputError(fault) from None
 
 
-def _impossible(values: Mapping[str, Any], said: str) -> Figure:
+def _impossible(values: Mapping[str, Any], fault: str) -> Figure:
     """Draw dimensions that do not go together, and mark the part that a line about them names.
 
     Raises
@@ -251,17 +251,17 @@ def _impossible(values: Mapping[str, Any], said: str) -> Figure:
     ValueError
         If it names none of them, or no picture has room for them.
     """
-    shape, words = PARAMETRIC[values["shape"]], set(re.findall(r"\w+", said))
+    shape, words = PARAMETRIC[values["shape"]], set(re.findall(r"\w+", fault))
     if not words & set(shape.model_fields):
-        raise ValueError(said)
+        raise ValueError(fault)
     regions = shape.model_construct(**values).layout().regions
     if not np.abs([region.rings[0] for region in regions]).max() < _DRAWABLE_UM:
-        raise ValueError(said)
+        raise ValueError(fault)
     parts = {word.partition("_")[0] for word in words}
     wrong = next((region for region in regions if region.name.partition(" ")[0] in parts), None)
     place = None if wrong is None else np.mean(wrong.rings[0], axis=0).tolist()
     outlines = {region.name: region.rings for region in regions}
-    return figures.outlines_drawing(outlines, fault=said, place=place)
+    return figures.outlines_drawing(outlines, fault=fault, place=place)
 
 
 def _probe(folder: Path, name: str | None) -> Probe:
@@ -315,11 +315,11 @@ def _calibration_page(
     names = [name for name in TABLE_COLUMNS[:-2] if described or name not in STATED]
     columns = [f"{QUANTITIES[name][1]} ({QUANTITIES[name][0]})" for name in names]
     rows = [
-        [f"{float(table[name][place]):.4g}" for name in names]
-        for place in range(0, table.sizes["bias"], step)
+        [f"{float(table[name][number]):.4g}" for name in names]
+        for number in range(0, table.sizes["bias"], step)
     ]
-    said = "for the instrument." if described else "of the nearest lever, not for an instrument."
-    made.table(columns, rows, f"Some rows of the table {said}")
+    purpose = "for the instrument." if described else "of the nearest lever, not for an instrument."
+    made.table(columns, rows, f"Some rows of the table {purpose}")
     return made
 
 

@@ -37,7 +37,7 @@ class LeverPage(Page):
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
-        self._file = ProbeFile(session, self.chosen)
+        self._file = ProbeFile(self)
         self._shown_text, self._fault = "", ""
         with two_columns() as (left, right):
             with left:
@@ -50,9 +50,8 @@ class LeverPage(Page):
                 self._dimensions = Dimensions(self._change)
             with right:
                 self._work = Work(session, self.name, self._ended)
-                shown = self.run, self._begin, self._show
-                self._drawings = Drawings(session, self.chosen, *shown)
-                self._picture = Picture(session, self.chosen, self._draw)
+                self._drawings = Drawings(self, self._begin, self._show)
+                self._picture = Picture(self, self._draw)
                 with ui.row().classes("items-center w-full"):
                     self._name = ui.input("Save as", value=self.chosen["name"])
                     ui.button("Save", icon="save", on_click=self._write)
@@ -147,7 +146,7 @@ class LeverPage(Page):
         self.banner.clear()
         self._work.hide()
         if name.lower().endswith(DRAWINGS):
-            await self._drawings.open(name, self.session.jobs.by_page.get(self.name))
+            await self._drawings.open(name)
         else:
             await self._show(name)
 

@@ -13,8 +13,8 @@ from nicegui import ui
 
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import asked, caption, figure, small_button, table
+from hotlever.app.pages.page import Page
 from hotlever.app.project import LARGEST_PROBE, safe_name
-from hotlever.app.session import Session
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import read_text
 
@@ -22,15 +22,11 @@ from hotlever.files import read_text
 class ProbeFile:
     """The text of a probe file that is edited, and the file of its name: no edits are lost.
 
-    Parameters
-    ----------
-    session : Session
-    chosen : dict
-        What was chosen last on the page; see `hotlever.app.session.Lever`.
+    What is chosen of it on the page is told by `hotlever.app.session.Lever`.
     """
 
-    def __init__(self, session: Session, chosen: dict[str, Any]) -> None:
-        self._session, self._chosen = session, chosen
+    def __init__(self, page: Page) -> None:
+        self._session, self._chosen = page.session, page.chosen
 
     @property
     def is_edited(self) -> bool:
@@ -139,16 +135,14 @@ class Dimensions:
 class Picture:
     """The lever from above, and what there is to know of it; `redraw` is called for another one."""
 
-    def __init__(
-        self, session: Session, chosen: dict[str, Any], redraw: Callable[[], Awaitable[None]]
-    ) -> None:
-        self._session, self._chosen = session, chosen
+    def __init__(self, page: Page, redraw: Callable[[], Awaitable[None]]) -> None:
+        self._session, self._chosen = page.session, page.chosen
 
         async def switch(event: Any) -> None:
-            chosen["mesh"] = event.value
+            self._chosen["mesh"] = event.value
             await redraw()
 
-        mesh = ui.switch("mesh", value=chosen["mesh"], on_change=switch)
+        mesh = ui.switch("mesh", value=self._chosen["mesh"], on_change=switch)
         mesh.tooltip("The triangles that the lever is solved on")
         self._column = ui.column().classes("w-full gap-1")
         self._latest = 0
@@ -204,11 +198,7 @@ class Drawings:
 
     Parameters
     ----------
-    session : Session
-    chosen : dict
-        What was chosen last on the page.
-    run : callable
-        Has a task done; returns whether it runs.
+    page : Page
     begin : callable
         Shows no lever until there is one.
     show : callable
@@ -216,32 +206,24 @@ class Drawings:
     """
 
     def __init__(
-        self,
-        session: Session,
-        chosen: dict[str, Any],
-        run: Callable[[Task], bool],
-        begin: Callable[[], None],
-        show: Callable[..., Awaitable[None]],
+        self, page: Page, begin: Callable[[], None], show: Callable[..., Awaitable[None]]
     ) -> None:
-        self._session, self._chosen = session, chosen
-        self._run, self._begin, self._show = run, begin, show
+        self._page, self._begin, self._show = page, begin, show
         self._awaited = ""
         self._kept = ui.row().classes("items-center w-full")
 
     def clear(self) -> None:
         """Wait for none: something else is open."""
-        self._awaited, self._chosen["drawing"] = "", None
+        self._awaited, self._page.chosen["drawing"] = "", None
         self._kept.clear()
 
-    async def open(self, drawing: str, job: Job | None) -> None:
-        """Show the probe file of a drawing; if there is none, have one proposed.
-
-        `job` is that of the page which ran last, be it before the page was opened.
-        """
+    async def open(self, drawing: str) -> None:
+        """Show the probe file of a drawing; if there is none, have one proposed."""
+        job = self._page.session.jobs.by_page.get(self._page.name)
         if job is not None and job.standing == "running" and job.task.files == (drawing,):
-            self._await(drawing)
+            self._await(drawing)  # since before the page was opened
             return
-        name, is_there = self._session.project.probe_of_drawing(drawing)
+        name, is_there = self._page.session.project.probe_of_drawing(drawing)
         if not is_there:
             self._propose(drawing, name)
             return
@@ -253,13 +235,13 @@ class Drawings:
 
     def _propose(self, drawing: str, name: str) -> None:
         files = {"output": name, "plot": f"{Path(name).stem}.svg"}
-        if self._run(Task("probe import", (drawing,), files)):
+        if self._page.run(Task("probe import", (drawing,), files)):
             self._await(drawing)
 
     def _await(self, drawing: str) -> None:
         self._begin()
         # whoever leaves before it is there, and comes back, is shown it
-        self._awaited = self._chosen["drawing"] = drawing
+        self._awaited = self._page.chosen["drawing"] = drawing
 
     async def done(self, job: Job) -> None:
         """Show what was proposed for the drawing that is waited for."""

@@ -53,8 +53,7 @@ class RamanPage(Page):
                 measure.classes("w-full")
             with right:
                 Work(session, self.name, self._measured)
-                asked = self.chosen, self.thermometer, self._corrected
-                self._spectrum = OneSpectrum(session, banner, *asked)
+                self._spectrum = OneSpectrum(self, self.thermometer, self._corrected)
                 self._result = ui.column().classes("w-full gap-2")
                 self.command()
         self.show_command()

@@ -29,12 +29,12 @@ class SimulatePage(Page):
         with two_columns() as (left, right):
             with left:
                 self.probe_choice()
-                self._sliders = Sliders(session, banner, self.chosen, self._moved)
+                self._sliders = Sliders(self, self._moved)
             with right:
                 view = ui.toggle(_VIEWS, value=self.chosen["view"])
                 view.props('aria-label="What is shown"').on_value_change(self._view)
                 with ui.column().classes("w-full gap-3") as rest:
-                    self._lever = LiveLever(session, banner, self.chosen)
+                    self._lever = LiveLever(self)
                     with ui.card().classes("w-full").props("flat bordered"):
                         ui.label("Take it with you").classes("text-bold")
                         self.kind_buttons(lambda kind: self.run(self._sweep(kind)))

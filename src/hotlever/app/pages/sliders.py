@@ -13,9 +13,9 @@ from typing import Any
 
 from nicegui import background_tasks, ui
 
-from hotlever.app.pages.frame import ErrorBanner, flat_button, number_shown
+from hotlever.app.pages.frame import flat_button, number_shown
+from hotlever.app.pages.page import Page
 from hotlever.app.pages.plots import LivePlots
-from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 
 _GROUPS = {"material": "Material", "dimensions": "Dimensions", "circuit": "Circuit"}
@@ -48,15 +48,10 @@ class Sliders:
         The slider of the bias, which is not of the probe.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        banner: ErrorBanner,
-        chosen: dict[str, Any],
-        moved: Callable[[], None],
-    ) -> None:
-        self._session, self._banner, self._chosen = session, banner, chosen
-        self._moved, self.free = moved, set[str]()
+    def __init__(self, page: Page, moved: Callable[[], None]) -> None:
+        self._session, self._banner, self._chosen = page.session, page.banner, page.chosen
+        self._moved = moved
+        self.free = set[str]()
         self._show_surroundings()
         self._show_bias()
         self._of_probe = ui.column().classes("w-full gap-1")
@@ -155,8 +150,8 @@ class Sliders:
 class LiveLever:
     """What the lever that is chosen shows at the bias that is chosen."""
 
-    def __init__(self, session: Session, banner: ErrorBanner, chosen: dict[str, Any]) -> None:
-        self._session, self._banner, self._chosen = session, banner, chosen
+    def __init__(self, page: Page) -> None:
+        self._session, self._banner, self._chosen = page.session, page.banner, page.chosen
         self._wanted: dict[str, Any] | None = None
         self._settled: Any = None
         self._rests = 0
@@ -218,7 +213,10 @@ class LiveLever:
             return False
         if self._model.is_deleted:  # the tab was closed meanwhile
             return False
-        if not quick and (probe, changes) != (self._chosen["probe"], self._chosen["changes"]):
+        if not quick and (probe, changes) != (
+            self._chosen["probe"],
+            self._chosen["changes"],
+        ):
             return False  # parameters have moved on while the full lever was solved
         self._banner.clear()
         self._drawn.set_visibility(True)

@@ -9,9 +9,9 @@ from typing import Any
 
 from nicegui import ui
 
-from hotlever.app.pages.frame import ErrorBanner, caption, flat_button
+from hotlever.app.pages.frame import caption, flat_button
+from hotlever.app.pages.page import Page
 from hotlever.app.pages.plots import INK, axes, plotted, short
-from hotlever.app.session import Session
 from hotlever.colours import BLUE, GREEN, VERMILION
 from hotlever.errors import HotleverError
 from hotlever.raman import Correction, read_corrections
@@ -46,10 +46,8 @@ class OneSpectrum:
 
     Parameters
     ----------
-    session : Session
-    banner : ErrorBanner
-    chosen : dict
-        What was chosen last on the page; ``spectrum`` is the name.
+    page : Page
+        Under whose ``spectrum`` the name is chosen.
     thermometer : callable
         Returns the options of the thermometer; see `hotlever.app.spectra.measured`.
     corrected : callable
@@ -58,14 +56,11 @@ class OneSpectrum:
 
     def __init__(
         self,
-        session: Session,
-        banner: ErrorBanner,
-        chosen: dict[str, Any],
+        page: Page,
         thermometer: Callable[[], dict[str, str]],
         corrected: Callable[[], None],
     ) -> None:
-        self._session, self._banner, self._chosen = session, banner, chosen
-        self._thermometer, self._corrected = thermometer, corrected
+        self._page, self._thermometer, self._corrected = page, thermometer, corrected
         self._turn, self._quiet = 0, False
         with ui.card().classes("w-full gap-1").props("flat bordered") as self._all:
             with ui.row().classes("w-full items-center no-wrap"):
@@ -96,16 +91,16 @@ class OneSpectrum:
         return str(self._select.value or "")
 
     def _corrections(self) -> dict[str, Correction]:
-        path = self._session.project.path(CORRECTIONS)
+        path = self._page.session.project.path(CORRECTIONS)
         return read_corrections(path) if path.is_file() else {}
 
     async def look(self, folders: list[str]) -> None:
         """Offer the spectra of some folders, and show the one that was chosen last."""
-        names = await self._session.ask("full", "spectra:names", folders)
+        names = await self._page.session.ask("full", "spectra:names", folders)
         if self._all.is_deleted:
             return
         self._all.set_visibility(bool(names))
-        chosen = self._chosen["spectrum"]
+        chosen = self._page.chosen["spectrum"]
         self._quiet = True
         self._select.set_options(names, value=chosen if chosen in names else (names or [None])[0])
         self._quiet = False
@@ -119,7 +114,7 @@ class OneSpectrum:
 
     async def _pick(self) -> None:
         if not self._quiet:
-            self._chosen["spectrum"] = self._name
+            self._page.chosen["spectrum"] = self._name
             await self.show_chosen()
 
     def _move(self, step: int) -> None:
@@ -150,7 +145,7 @@ class OneSpectrum:
 
     async def _correct(self, **what: Any) -> None:
         """Keep a correction in the table, and have everything follow."""
-        with self._banner.caught():
+        with self._page.banner.caught():
             corrections = self._corrections()
             before = corrections.pop(self._name, Correction())
             after = replace(before, **what)
@@ -158,7 +153,7 @@ class OneSpectrum:
                 return
             if after != Correction():
                 corrections[self._name] = after
-            project = self._session.project
+            project = self._page.session.project
             if corrections:
                 text = corrections_text(corrections)
                 project.write(CORRECTIONS, text, f"corrected {self._name}")
@@ -178,10 +173,10 @@ class OneSpectrum:
         try:
             correction = self._corrections().get(name, Correction())
             asked = name, self._thermometer()
-            spectrum = await self._session.ask("full", "spectra:measured", *asked)
+            spectrum = await self._page.session.ask("full", "spectra:measured", *asked)
         except HotleverError as error:
             if not self._all.is_deleted:
-                self._text.set_text(str(error).replace(f"{self._session.project.folder}/", ""))
+                self._text.set_text(str(error).replace(f"{self._page.session.project.folder}/", ""))
             return
         if turn != self._turn or self._all.is_deleted:  # another one has been chosen meanwhile
             return
