@@ -198,7 +198,7 @@ class Session:
         Raises
         ------
         HotleverError
-            As the function says; what it says of the folder's files is without the folder.
+            As the function says, or if the process died.
         """
         name, folder = f"hotlever.app.{function}", self.project.folder
         return await self._worker(worker).call(name, folder, *arguments, heard=heard)

@@ -84,8 +84,18 @@ class Page:
         return keep
 
     def choice(self, key: str, label: str, options: Any, without: Any = "") -> ui.select:
-        """Ask for one of some options; where a name is empty `without` is chosen."""
-        return choice(label, options, self.chosen[key], self._keep(key, without))
+        """Ask for one of some options; where its name is empty `without` is chosen.
+
+        The first is shown if none was chosen. A file that is not there any more stays chosen and is
+        said to be missing: in its place another would give other numbers without a word.
+        """
+        value = self.chosen[key]
+        if value is None:
+            value = next(iter(options), None)
+        elif value not in options:
+            options = {**options, value: f"{value} (not in the folder)"}
+        changed = self._keep(key, without)
+        return ui.select(options, label=label, value=value, on_change=changed).classes("w-full")
 
     def probe_choice(self) -> ui.select:
         """Ask for a probe, the reference probe or one of the project."""
@@ -197,19 +207,6 @@ def outputs(stem: str, kind: str) -> dict[str, str]:
     if kind in _TABLES:
         return {"output": f"{stem}.{_TABLES[kind]}"}
     return {"output": f"{stem}.csv", "plot": f"{stem}.{kind.lower()}"}
-
-
-def choice(label: str, options: Any, value: Any, changed: Any) -> ui.select:
-    """Show a choice, the first option if there is none.
-
-    A file that is not there any more stays chosen and is said to be missing: in its place another
-    would give other numbers without a word.
-    """
-    if value is None:
-        value = next(iter(options), None)
-    elif value not in options:
-        options = {**options, value: f"{value} (not in the folder)"}
-    return ui.select(options, label=label, value=value, on_change=changed).classes("w-full")
 
 
 class Work:
