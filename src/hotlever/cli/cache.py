@@ -30,6 +30,6 @@ def cache_command(clear: bool = Option(False, "--clear", help="Remove all that i
         sizes[path.parent.name].append(status.st_size)
     sizes["in all"] = [status.st_size for status, _ in kept]
     lines = [f"{folder} (at most {largest_size() / 1e9:g} GB)"]
-    for kind, found in sizes.items():
-        lines.append(f"{kind:<10} {len(found):>6} files {sum(found) / 1e6:>10.1f} MB")
+    for kind, bytes_of in sizes.items():
+        lines.append(f"{kind:<10} {len(bytes_of):>6} files {sum(bytes_of) / 1e6:>10.1f} MB")
     give("\n".join([*lines, ""]))

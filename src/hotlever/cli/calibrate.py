@@ -52,14 +52,14 @@ def calibrate_command(
     from hotlever.measurement import parse_columns
     from hotlever.tasks.calibrating import Tables, calibrate_file
 
-    given = {"--fit": fit_file, "--probe": probe_file, "--power-law": power_law}
-    several = [name for name, path in given.items() if path is not None]
+    sources = {"--fit": fit_file, "--probe": probe_file, "--power-law": power_law}
+    several = [name for name, path in sources.items() if path is not None]
     if len(several) > 1:
-        raise InputError(f"{' and '.join(several)}: expected at most one of {', '.join(given)}")
+        raise InputError(f"{' and '.join(several)}: expected at most one of {', '.join(sources)}")
     check_medium(medium, UNKNOWN_MEDIUM)
     timing = None if pulse is None else parse_timing(pulse)
     columns = parse_columns(column or [])
-    outputs = Outputs(data, *given.values(), *column_files(column))
+    outputs = Outputs(data, *sources.values(), *column_files(column))
     outputs.file(output)
     outputs.file(table, ".csv")
     outputs.file(plot, *FIGURE_TYPES)

@@ -53,8 +53,8 @@ def design_command(
     start = study.Design(load_probe(probe_file), annealing_K, annealing_min)
     if vary is None:
         with progress("design") as update:
-            found = study.sensitivities(start, power_mW=power, air=air, progress=update)
-        give(study.sensitivity_text(found) + "\n")
+            sensitivities = study.sensitivities(start, power_mW=power, air=air, progress=update)
+        give(study.sensitivity_text(sensitivities) + "\n")
         if start.probe.shape.shape == DRAWING:
             names = ", ".join(start.numbers)
             note(f"a drawing has no dimensions but these; --vary NAME=START:STOP:COUNT of {names}")

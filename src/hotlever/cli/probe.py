@@ -109,11 +109,11 @@ def import_command(
 def _described(probe: Probe, mesh: ProbeMesh, name: str) -> list[str]:
     circuit, silicon, layout = probe.circuit, probe.heater_silicon, mesh.layout
     x, y = layout.tip
-    given = {key: getattr(probe.shape, key) for key in probe.shape.description()}
+    values = {key: getattr(probe.shape, key) for key in probe.shape.description()}
     dimensions = [
-        f"  {key:<22} {given[key]:>8{'g' if isinstance(given[key], float) else ''}}  {text}"
+        f"  {key:<22} {values[key]:>8{'g' if isinstance(values[key], float) else ''}}  {text}"
         for key, text in probe.shape.description().items()
-        if isinstance(given[key], float | str)
+        if isinstance(values[key], float | str)
     ]
     if probe.shape.shape == "drawing":
         dimensions += [f"  {text}" for text in _regions(layout)]
@@ -138,10 +138,10 @@ def _materials(probe: Probe) -> list[str]:
     """Return the values of what a probe is made of, a line for each material."""
     plain = {"material": probe.material} if probe.has_plain_silicon else {}
     lines = []
-    for name, one in {**plain, **probe.materials}.items():
+    for name, material in {**plain, **probe.materials}.items():
         values = [
             f"{key} {value:g}" if isinstance(value, float) else str(value)
-            for key, value in one
+            for key, value in material
             if value is not None and key != "preset"
         ]
         lines.append(f"{name}: {', '.join(values)}")

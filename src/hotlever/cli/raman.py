@@ -96,9 +96,10 @@ class SeveralFiles(typer.core.TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Repeat the option before each of its paths, then parse as usual."""
-        options = (one for one in self.params if one.param_type_name == "option")
-        valued = {n for one in options if not getattr(one, "is_flag", False) for n in one.opts}
-        return super().parse_args(ctx, spread_option(args, "--calibrate-from", valued))
+        options = [param for param in self.params if param.param_type_name == "option"]
+        valued = [option for option in options if not getattr(option, "is_flag", False)]
+        names = {name for option in valued for name in option.opts}
+        return super().parse_args(ctx, spread_option(args, "--calibrate-from", names))
 
 
 def spread_option(args: list[str], option: str, takes_value: set[str]) -> list[str]:

@@ -94,9 +94,9 @@ def judged_calibrations(judged: xr.Dataset) -> Figure:
     laws = [law for law in (False, True) if law in other]
     with figure(8.0, 3.8, 1, 2, letters=True) as (made, (by_way, by_bias)):
         beside: Any = {"transform": by_way.get_yaxis_transform(), "va": "center", "fontsize": 8}
-        for place, (way, colour) in enumerate(zip(WAYS, _BY_WAY, strict=True)):
+        for row, (way, colour) in enumerate(zip(WAYS, _BY_WAY, strict=True)):
             for law in laws:
-                at = place + (0.2 if law else -0.2) * (len(laws) - 1)
+                at = row + (0.2 if law else -0.2) * (len(laws) - 1)
                 here = largest.sel(way=way).values[other == law]
                 marks: Any = {"color": colour, "mfc": "white" if law else colour}
                 by_way.plot(here, np.linspace(-0.12, 0.12, here.size) + at, "o", ms=4, **marks)
@@ -114,8 +114,8 @@ def judged_calibrations(judged: xr.Dataset) -> Figure:
             marks = {"color": BLACK, "mfc": "white" if law else BLACK, "ls": "--" if law else "-"}
             label = "another law" if law else "mobility of Eq. 8"
             by_way.plot([], [], "o", label=label, **{**marks, "ls": "none"})
-            for one in ratio.values[other == law]:
-                known = one[np.isfinite(one)]
+            for errors in ratio.values[other == law]:
+                known = errors[np.isfinite(errors)]
                 share = np.linspace(0.0, 1.0, known.size)
                 by_bias.plot(share, known, color=_BY_WAY[0], ls=marks["ls"], lw=0.9)
             by_bias.plot([], [], color=_BY_WAY[0], ls=marks["ls"], label=label)

@@ -154,8 +154,8 @@ def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
         axes.grid(False)
         for (row, column), value in np.ndenumerate(correlation):
             colour = "white" if abs(value) > 0.7 else "black"
-            place: Any = {"ha": "center", "va": "center", "fontsize": 7.5}
-            axes.text(column, row, f"{round(value, 2) + 0.0:.2f}", color=colour, **place)
+            style: Any = {"ha": "center", "va": "center", "fontsize": 7.5}
+            axes.text(column, row, f"{round(value, 2) + 0.0:.2f}", color=colour, **style)
         made.colorbar(image, label="correlation (1)", shrink=0.9)
     return made
 
@@ -348,25 +348,25 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
         From `hotlever.estimation.levers.compare_levers`; without what was held or does not count.
     """
     count = levers.sizes["lever"]
-    place = np.arange(1, count + 1)
+    number = np.arange(1, count + 1)
     many = count > _MOST_NAMES
     levers = levers.assign(value=levers.value.where(levers.counts))
-    known = (np.isfinite(levers.stderr) & levers.counts).any("lever")
-    free = levers.quantity.values[known.values].tolist()
+    determined = (np.isfinite(levers.stderr) & levers.counts).any("lever")
+    free = levers.quantity.values[determined.values].tolist()
     height, shape = 1.2 * len(free) + (0.8 if many else 1.2), {"sharex": True, "squeeze": False}
     with figure(7.4, height, len(free), 1, letters=True, **shape) as (made, grid):
         column = grid[:, 0]
         for name, axes in zip(free, column, strict=True):
-            one = levers.sel(quantity=name)
+            quantity = levers.sel(quantity=name)
             label, scale = parameter_label(name)
-            mean, scatter = one["mean"].item() / scale, one.scatter.item() / scale
+            mean, scatter = quantity["mean"].item() / scale, quantity.scatter.item() / scale
             if np.isfinite(scatter):
                 low, high = mean - scatter, mean + scatter
                 axes.axhspan(low, high, color="0.9", lw=0, label="mean ± scatter between levers")
             axes.axhline(mean, color=VERMILION, lw=1.0, label="mean of the levers")
             style: dict[str, Any] = {"ms": 1.5, "lw": 0.5} if many else {"ms": 4, "lw": 1.0}
             style |= {"fmt": "o", "color": BLUE, "label": "lever, with standard error"}
-            axes.errorbar(place, one.value / scale, one.stderr / scale, **style)
+            axes.errorbar(number, quantity.value / scale, quantity.stderr / scale, **style)
             # a unit below the symbol, as the panels are low
             axes.set_ylabel(label.replace(" (", "\n(", 1))
             axes.grid(False, axis="x")
@@ -374,7 +374,7 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
             column[-1].set(xlabel="lever", xlim=(0, count + 1))
         else:
             names = levers.lever.values
-            column[-1].set_xticks(place, names, rotation=45, ha="right", parse_math=False)
+            column[-1].set_xticks(number, names, rotation=45, ha="right", parse_math=False)
             column[-1].set_xlim(0.5, count + 0.5)
         made.align_ylabels()
         handles, labels = column[0].get_legend_handles_labels()

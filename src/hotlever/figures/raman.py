@@ -56,16 +56,17 @@ def thermometry(
         return made
     if series:
         stated = {point.file: point.temperature_K for point in calibration.points}
-        known = [(stated[one.spectrum.name], one) for one in series if one.spectrum.name in stated]
-        known.sort(key=lambda pair: pair[0])
-        stacked = [(f"{temperature:.0f} K", line) for temperature, line in known]
+        known = [line for line in series if line.spectrum.name in stated]
+        heated = [(stated[line.spectrum.name], line) for line in known]
+        heated.sort(key=lambda pair: pair[0])
+        stacked = [(f"{temperature:.0f} K", line) for temperature, line in heated]
     else:
         read = zip(names, table.temperature_K.values, lines, strict=True)
         stacked = [(f"{t:.0f} K" if np.isfinite(t) else name, line) for name, t, line in read]
     with figure(10.0, 5.4) as (made, alone):
         alone.remove()  # for a column of one panel beside a column of two
         grid = made.add_gridspec(2, 2, width_ratios=(1.0, 1.35), height_ratios=(1.5, 1.0))
-        panels = [made.add_subplot(place) for place in (grid[:, 0], grid[0, 1], grid[1, 1])]
+        panels = [made.add_subplot(cell) for cell in (grid[:, 0], grid[0, 1], grid[1, 1])]
         _stack(panels[0], stacked)
         _calibration(panels[1], calibration, table)
         _residuals(panels[2], calibration)
@@ -82,7 +83,7 @@ def _stack(axes: Axes, stacked: Sequence[tuple[str, Line]]) -> None:
     """Spectra above each other, each scaled to its line, with the fit."""
     if len(stacked) > STACKED:
         chosen = np.unique(np.linspace(0, len(stacked) - 1, STACKED).round().astype(int))
-        stacked = [stacked[place] for place in chosen]
+        stacked = [stacked[index] for index in chosen]
     for level, (label, line) in enumerate(stacked):
         x, y = _in_window(line)
         peak = line.peak
@@ -114,7 +115,7 @@ def _short(label: str, limit: int = 22) -> str:
 
 
 def _calibration(axes: Axes, calibration: RamanCalibration, table: xr.Dataset) -> None:
-    found, line = calibration.residuals(), calibration.linear
+    residuals, line = calibration.residuals(), calibration.linear
     low, high = calibration.range_K
     room = calibration.room_temperature_K
     measured = table.isel(spectrum=np.isfinite(table.temperature_K.values))
@@ -124,9 +125,9 @@ def _calibration(axes: Axes, calibration: RamanCalibration, table: xr.Dataset) -
     axes.plot(shift, temperature, color=BLUE, lw=1.6, label="anharmonic law")
     label = f"line: {line.constant_K:.1f} K − {-line.slope_K_cm:.1f} K cm × shift"
     axes.plot(shift, line.temperature(shift, room), "--", color=VERMILION, label=label)
-    if found["temperature_K"].size:
+    if residuals["temperature_K"].size:
         style: Any = {"mfc": "none", "color": BLACK, "label": "hot plate"}
-        axes.plot(found["shift_cm"], found["temperature_K"], "o", **style)
+        axes.plot(residuals["shift_cm"], residuals["temperature_K"], "o", **style)
     if measured.spectrum.size:
         points = (measured.shift_per_cm, measured.temperature_K, measured.temperature_error_K)
         style = {"fmt": "s", "ms": 4, "color": GREEN, "capsize": 2, "lw": 1.0, "label": "measured"}
@@ -139,8 +140,8 @@ def _calibration(axes: Axes, calibration: RamanCalibration, table: xr.Dataset) -
 
 
 def _residuals(axes: Axes, calibration: RamanCalibration) -> None:
-    found = calibration.residuals()
-    at, linear = found["temperature_K"], found["linear_K"]
+    residuals = calibration.residuals()
+    at, linear = residuals["temperature_K"], residuals["linear_K"]
     if not at.size:
         text = "published laws: no hot-plate series"
         axes.text(0.5, 0.5, text, ha="center", transform=axes.transAxes)
@@ -150,12 +151,12 @@ def _residuals(axes: Axes, calibration: RamanCalibration) -> None:
     band = calibration.linear.band(grid - calibration.room_temperature_K)
     style: Any = {"color": VERMILION, "alpha": 0.18, "lw": 0}
     axes.fill_between(grid, -band, band, label=f"paper: {_BAND}", **style)
-    out = np.abs(linear) > found["band_K"]
+    out = np.abs(linear) > residuals["band_K"]
     label = f"line (filled: {np.count_nonzero(out)} of {out.size} outside the band)"
     axes.plot(at, linear, "^", mfc="none", color=VERMILION, ms=5, label=label)
     axes.plot(at[out], linear[out], "^", color=VERMILION, ms=5)
     label = f"anharmonic (rms {calibration.anharmonic.residual_rms_K:.1f} K)"
-    axes.plot(at, found["anharmonic_K"], "o", color=BLUE, ms=3.5, label=label)
+    axes.plot(at, residuals["anharmonic_K"], "o", color=BLUE, ms=3.5, label=label)
     axes.axhline(0.0, color=BLACK, lw=0.8)
     reach = max(float(np.abs(linear).max()), float(band.max()))
     axes.set(xlabel="hot-plate temperature (K)", ylabel="law − hot plate (K)")
@@ -172,13 +173,13 @@ def raman_check(check: xr.Dataset) -> Figure:
     with figure(7.2, 6.4, 2, 1, height_ratios=(1.7, 1.0)) as (made, (upper, lower)):
         style: Any = {"color": GREY, "alpha": 0.2, "lw": 0}
         upper.fill_between(temperature, -band, band, label=f"the paper's error, {_BAND}", **style)
-        for place, (color, dash) in enumerate(((VERMILION, "--"), (BLUE, "-."))):
-            one = check.isel(line=place)
-            name = str(one.line.item())
-            upper.plot(temperature, one.error, dash, color=color, lw=1.8, label=name)
-            upper.plot([hottest], [one.error_at_hottest.item()], "o", color=color, ms=5)
+        for index, (color, dash) in enumerate(((VERMILION, "--"), (BLUE, "-."))):
+            law = check.isel(line=index)
+            name = str(law.line.item())
+            upper.plot(temperature, law.error, dash, color=color, lw=1.8, label=name)
+            upper.plot([hottest], [law.error_at_hottest.item()], "o", color=color, ms=5)
             shown = name.split(":")[0] + ",\ncurvature corrected"
-            bars.append((shown, one.discrepancy.item(), color))
+            bars.append((shown, law.discrepancy.item(), color))
         text = f"{low:.0f} to {high:.0f} K too hot\nat {hottest:.0f} K"
         upper.text(hottest - 55.0, 0.99 * high, text, ha="right", va="top", fontsize=9)
         upper.axvline(check.calibrated_to_K, color=BLACK, lw=0.8, ls=":")

@@ -21,7 +21,7 @@ _POINTS = 110
 
 
 def fit_page(
-    fit: Fit, found: Uncertainty | None = None, added: Callable[[Block], None] | None = None
+    fit: Fit, uncertainty: Uncertainty | None = None, added: Callable[[Block], None] | None = None
 ) -> Page:
     """Return the report page of one fit, and of what was sampled and profiled of it.
 
@@ -34,8 +34,8 @@ def fit_page(
         added,
     )
     (_add_fit_in_time if fit.in_time else add_fit)(page, fit)
-    if found is not None:
-        _add_uncertainty(page, found)
+    if uncertainty is not None:
+        _add_uncertainty(page, uncertainty)
     return page
 
 
@@ -121,34 +121,34 @@ def _add_fit_in_time(page: Page, fit: Fit) -> None:
     _add_correlation(page, fit)
 
 
-def _add_uncertainty(page: Page, found: Uncertainty) -> None:
+def _add_uncertainty(page: Page, uncertainty: Uncertainty) -> None:
     page.heading("How sure")
-    for text in found.statements():
+    for text in uncertainty.statements():
         page.text(sentence(text))
-    for caption, columns, rows in found.tables():
+    for caption, columns, rows in uncertainty.tables():
         page.table(columns, rows, caption)
-    fit = found.fit
-    if found.profiles:
+    fit = uncertainty.fit
+    if uncertainty.profiles:
         page.figure(
             "profiles",
-            figures.profile_curves(list(found.profiles.values())),
+            figures.profile_curves(list(uncertainty.profiles.values())),
             "Profile likelihoods: how much worse the fit gets with one parameter held and the "
             "others fitted again, beside the parabola of the standard error.",
         )
-    if found.posterior is not None:
+    if uncertainty.posterior is not None:
         optimum = {name: fit.parameters[name].value for name in fit.names}
         page.figure(
             "posterior",
             figures.posterior_corner(
-                found.posterior, {**optimum, INVERSION: fit.inversion_temperature_K}
+                uncertainty.posterior, {**optimum, INVERSION: fit.inversion_temperature_K}
             ),
             "Posterior of each quantity and pair. Above each histogram: its median and half of "
             "its 68 % interval.",
         )
-    if found.band is not None:
+    if uncertainty.band is not None:
         page.figure(
             "tip_band_posterior",
-            figures.tip_band(found.band, fit.measurement.dataset(fit.probe.circuit)),
+            figures.tip_band(uncertainty.band, fit.measurement.dataset(fit.probe.circuit)),
             "Tip temperature that follows from the posterior, against bias and power (model "
             "errors not included).",
         )

@@ -79,8 +79,8 @@ class Page:
     @property
     def anchor(self) -> str:
         """That of the section being filled; nothing before the first."""
-        found = [block["anchor"] for block in self.blocks if block["kind"] == "heading"]
-        return found[-1] if found else ""
+        anchors = [block["anchor"] for block in self.blocks if block["kind"] == "heading"]
+        return anchors[-1] if anchors else ""
 
     def text(self, text: str) -> None:
         """Add a paragraph."""

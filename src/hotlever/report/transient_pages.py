@@ -76,9 +76,9 @@ def _step(page: Page, lever: Lever, biases: list[float]) -> None:
     page.figure("step", figures.history_overview(history), f"The bias is switched to {bias:g} V.")
     times = [1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0]
     rows = []
-    for one in biases:
-        tip = simulate(lever, step(one), at=times).tip_K.values
-        rows.append([f"{one:g}", *(f"{value:.0f}" for value in tip)])
+    for bias in biases:
+        tip = simulate(lever, step(bias), at=times).tip_K.values
+        rows.append([f"{bias:g}", *(f"{value:.0f}" for value in tip)])
     heads = ["bias (V)", *(f"{time:g} µs" for time in times)]
     page.table(heads, rows, "Tip temperature (K) so long after the bias was switched on.")
     for text in filter(None, history.attrs["notes"].split("\n")):
@@ -100,10 +100,10 @@ def _time_constants(page: Page, lever: Lever, biases: list[float]) -> None:
     }
     times = rise_times(lever, biases)
     rows = []
-    for place, bias in enumerate(biases):
-        slowest = [found.time_constant_us.values[place, 0] for found in columns.values()]
-        around = [times.heating_us.values[place], times.cooling_us.values[place]]
-        tip = times.tip_K.values[place]
+    for index, bias in enumerate(biases):
+        slowest = [constants.time_constant_us.values[index, 0] for constants in columns.values()]
+        around = [times.heating_us.values[index], times.cooling_us.values[index]]
+        tip = times.tip_K.values[index]
         rows.append([f"{bias:g}", f"{tip:.0f}", *(f"{one:.1f}" for one in (*slowest, *around))])
     held = [f"{source} held" for source in columns]
     page.table(
