@@ -32,7 +32,7 @@ from hotlever.lever.transient.waveform_texts import waveform_from_text
 from hotlever.materials.parameters import sentence
 from hotlever.measurement import parse_columns
 from hotlever.probe import Layout, Probe
-from hotlever.probe.sections import read_sections
+from hotlever.probe.probe import read_sections
 from hotlever.probe.shapes import PARAMETRIC
 from hotlever.raman import read_spectra
 from hotlever.report.fit_pages import fit_page

@@ -24,8 +24,7 @@ from hotlever.probe.drawing.sheet import (
     sensible_unit,
 )
 from hotlever.probe.layout import Point, ring_area
-from hotlever.probe.probe import Probe
-from hotlever.probe.sections import commented
+from hotlever.probe.probe import Probe, commented
 from hotlever.text import aligned, as_toml
 
 #: Layers that are listed.
@@ -112,15 +111,17 @@ def _check_unit(sheet: Sheet, inference: LayerInference, unit: str | None) -> No
     One without a heater is read in other units, since its parts may be lost in the tolerance of
     this one; frames and marks beside a lever may be as large as a lever.
     """
-    extents = {name: extent_of((*one.rings, *one.lines)) for name, one in sheet.layers.items()}
-    name, better = max(extents, key=lambda one: extents[one]), None
+    extents = {
+        name: extent_of((*layer.rings, *layer.lines)) for name, layer in sheet.layers.items()
+    }
+    name, better = max(extents, key=lambda name: extents[name]), None
     if HEATER in inference.layers:
         name = str(inference.layers[SILICON])
         if is_lever(extents[name]):
             return
     elif unit is None and not sheet.unit_stated:
-        tried = ((one, _silicon_in(sheet, one)) for one in UNITS)
-        better, name = next(((one, layer) for one, layer in tried if layer), (None, name))
+        tried = ((unit, _silicon_in(sheet, unit)) for unit in UNITS)
+        better, name = next(((unit, layer) for unit, layer in tried if layer), (None, name))
     if better is None:
         if HEATER not in inference.layers and any(map(is_lever, extents.values())):
             return

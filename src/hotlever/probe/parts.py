@@ -173,20 +173,20 @@ class ProbeParts(Record):
             If it is no key of a probe file; the nearest one is given.
         """
         section, dot, key = name.rpartition(".")
-        named = {one: type(kind) for one, kind in self.materials.items()}
+        named = {material: type(kind) for material, kind in self.materials.items()}
         wired = {f"circuit.{name}": Contact for name in self.layout().terminal_names}
         records: dict[str, type[Record]] = {
             "probe": type(self.shape),
             **named,
             **PARTS,
             **wired,
-            **{f"layers.{one}": record for one, record in self.shape.layer_records().items()},
+            **{f"layers.{key}": layer for key, layer in self.shape.layer_records().items()},
         }
         if dot and section not in records:
             raise unknown_name("section", section, [*SECTIONS, *named, *wired])
         keys = {part: [*record.model_fields] for part, record in records.items()}
         # in [probe] those of all shapes, its own first
-        keys["probe"] += [key for one in PARAMETRIC.values() for key in one.model_fields]
+        keys["probe"] += [key for shape in PARAMETRIC.values() for key in shape.model_fields]
         own = [part for part in PARTS if getattr(self, part)]
         # those of a named material have its name before them
         for part in [section] if dot else ["probe", *own, *PARTS]:

@@ -232,46 +232,42 @@ def priors_of(
     >>> priors_of({"n_d": "3.3e17 ± 15%"}, Probe.reference(), "here")["n_d"]
     Prior(value=3.3e+17, spread=0.15, relative=True)
     """
-    known, found = parameters_of(probe, anywhere=True), dict[str, Prior]()
+    table, priors = parameters_of(probe, anywhere=True), dict[str, Prior]()
     for name, text in stated.items():
-        if name not in known and name not in (ALL_DIMENSIONS, *SCALES):
-            raise unknown_name("prior", name, [*known, ALL_DIMENSIONS, *SCALES], where)
+        if name not in table and name not in (ALL_DIMENSIONS, *SCALES):
+            raise unknown_name("prior", name, [*table, ALL_DIMENSIONS, *SCALES], where)
+        here = f"{where}: {name}"
         if isinstance(text, Prior):
-            found[name] = text
-            continue
-        value, spread, written = parsed(text, f"{where}: {name}")
-        if name in (ALL_DIMENSIONS, *SCALES):
-            _check_common(name, text, where, value is None, spread, written)
-        if name in SCALES:
-            found[name] = Prior(1.0, spread)
-            continue
-        if name == ALL_DIMENSIONS:
+            priors[name] = text
+        elif name in SCALES:
+            priors[name] = Prior(1.0, _share(text, here, ("share",)))
+        elif name == ALL_DIMENSIONS:
+            spread = _share(text, here, ("share", "factor"))
             if not probe.shape.outline_moves:
                 raise InputError(
-                    f"{where}: {name}: the outline of a drawing is taken as exact so far; expected "
+                    f"{here}: the outline of a drawing is taken as exact so far; expected "
                     "thickness_um alone"
                 )
             # those that are named have their own
-            some = [one for one in nuisances(probe) if one not in stated]
+            unnamed = [dimension for dimension in nuisances(probe) if dimension not in stated]
+            priors |= {dimension: Prior(table[dimension].value, spread) for dimension in unnamed}
         else:
-            some = [name]
-        for one, own in zip(some, probe.values(some).tolist(), strict=True):
-            found[one] = Prior(own if value is None else value, spread, written != "unit")
-            _check(found[one], known[one], f"{where}: {one}", written)
+            value, spread, written = parsed(text, here)
+            own = table[name].value if value is None else value
+            priors[name] = Prior(own, spread, written != "unit")
+            _check(priors[name], table[name], here, written)
     counting = parameters_of(probe, in_time=in_time)
-    return {name: prior for name, prior in found.items() if name in counting or name in SCALES}
+    return {name: prior for name, prior in priors.items() if name in counting or name in SCALES}
 
 
-def _check_common(
-    name: str, text: str, where: str, own: bool, spread: float, written: Written
-) -> None:
-    """Refuse what cannot be said of all dimensions, or of what an instrument shows."""
-    as_share = written == "share" or (written == "factor" and name not in SCALES)
-    if not (own and as_share and _LEAST <= spread <= _LARGEST_SHARE):
+def _share(text: str, where: str, allowed: tuple[Written, ...]) -> float:
+    """Return the spread of all dimensions, or of what an instrument shows, about what it is."""
+    value, spread, written = parsed(text, where)
+    if not (value is None and written in allowed and _LEAST <= spread <= _LARGEST_SHARE):
         raise InputError(
-            f"{where}: {name} = '{text}', expected a share such as '± 5%', at most "
-            f"{_LARGEST_SHARE:.0%}"
+            f"{where} = '{text}', expected a share such as '± 5%', at most {_LARGEST_SHARE:.0%}"
         )
+    return spread
 
 
 def _check(prior: Prior, parameter: Parameter, where: str, written: Written) -> None:

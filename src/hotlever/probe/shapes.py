@@ -301,10 +301,6 @@ class UShape(Parametric):
         """Whether the heater fills the gap."""
         return self.heater_length_um == self.gap_um
 
-    def notes(self) -> list[str]:
-        """Return what a user should hear of it before anything is solved."""
-        return []
-
     def tied(self) -> tuple[str, ...]:
         """Return gap and length of a heater that fills it."""
         return ("heater_length_um", "gap_um") if self._filled else ()

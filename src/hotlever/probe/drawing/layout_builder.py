@@ -80,23 +80,23 @@ def build_layout(
     drawn = {layer.name: polygons(layer.name, layer.drawn, tolerance_um) for layer in layers}
     outline = one_piece(body, healed(body, drawn[body], tolerance_um), drawn[body])
     check_widths(body, outline, drawn[body], narrowest)
-    by_area = {one.part: one for one in terminals if one.by_area}
-    drawn |= {name: polygons(name, one.drawn, tolerance_um) for name, one in by_area.items()}
+    by_area = {terminal.part: terminal for terminal in terminals if terminal.by_area}
+    drawn |= {name: polygons(name, end.drawn, tolerance_um) for name, end in by_area.items()}
     on_body = {
         name: healed(name, areas, tolerance_um) for name, areas in drawn.items() if name != body
     }
     for name in on_body:
         _check_on_body(name, drawn[name], body, outline, tolerance_um)
-    contacts = {one.name: on_body.pop(name) for name, one in by_area.items()}
+    contacts = {end.name: on_body.pop(name) for name, end in by_area.items()}
     shapes = on_body
-    edges = {one.name: one.drawn for one in terminals if not one.by_area}
+    edges = {end.name: end.drawn for end in terminals if not end.by_area}
     ends = terminal_edges(outline, edges, tolerance_um)
     if edge_bias_um:
         etching = Etching(body, outline, ends, edge_bias_um, tolerance_um)
         shapes, contacts = (
             {
-                name: etching.layer(snapped(one, outline, _SNAP * tolerance_um))
-                for name, one in group.items()
+                name: etching.layer(snapped(shape, outline, _SNAP * tolerance_um))
+                for name, shape in group.items()
             }
             for group in (shapes, contacts)
         )
@@ -104,8 +104,8 @@ def build_layout(
         check_widths(body, outline, drawn[body], narrowest)
     near = [outline]
     for name, shape in shapes.items():
-        for one in near:
-            shape = snapped(shape, one, _SNAP * tolerance_um)
+        for below in near:
+            shape = snapped(shape, below, _SNAP * tolerance_um)
         shapes[name] = shape
         # parts lie apart from each other, films on all that is below
         if by_name[name].is_film:

@@ -107,7 +107,9 @@ class Partition:
         ]
         if edges:
             merged = shapely.line_merge(MultiLineString(edges))
-            borders = sorted(shapely.get_parts(merged).tolist(), key=lambda one: one.coords[0])
+            borders = sorted(
+                shapely.get_parts(merged).tolist(), key=lambda border: border.coords[0]
+            )
         if not borders:
             return None
         shape = self.pieces[number].shape

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from hotlever.errors import InputError, quoted
 from hotlever.materials import Kind
@@ -24,8 +24,9 @@ from hotlever.probe.drawing.layers import (
     terminal_values,
 )
 from hotlever.probe.drawing.layout_builder import build_layout
-from hotlever.probe.drawing.outlines import DrawingError, without_nested
+from hotlever.probe.drawing.outlines import DrawingError, Ring, without_nested
 from hotlever.probe.drawing.sheet import (
+    FARTHEST_UM,
     Layer,
     Sheet,
     doubt,
@@ -40,22 +41,19 @@ from hotlever.records import Record
 
 #: What is nearer is the same (µm), unless a probe file says otherwise.
 TOLERANCE_UM = 0.002
-#: What it may be.
-_FINEST_UM, _COARSEST_UM = 1e-4, 0.1
 
 
-class Drawing(Shape):
-    """A lever of any outline; lengths in µm.
+#: A place that is drawn, and an outline or a line, as lists or tuples (µm).
+_Coordinate = Annotated[float, Field(strict=True, gt=-FARTHEST_UM, lt=FARTHEST_UM)]
+_PLACE = TypeAdapter[Point](tuple[_Coordinate, _Coordinate])
+_OUTLINE = TypeAdapter[Ring](
+    Annotated[tuple[tuple[_Coordinate, _Coordinate], ...], Field(min_length=2)]
+)
 
-    Layers that a probe file takes from a drawing file are read once, when the drawing is made
-    with `read`; here, and wherever a drawn probe is kept, they are lists of points. An outline
-    inside another is a hole in it; a terminal of two points is a line.
-    """
 
-    outline_moves: ClassVar[bool] = False
-    read_with: ClassVar[tuple[str, ...]] = ("file", "cell", "unit_um")
+class DrawingFile(Record):
+    """The file that a drawing is read from, and how its numbers and curves are taken."""
 
-    shape: Literal["drawing"] = "drawing"
     file: str | None = Field(default=None, description="GDSII, OASIS or DXF, relative to this file")
     cell: str | None = Field(
         default=None, description="of GDSII and OASIS; the top cell if left out"
@@ -68,10 +66,38 @@ class Drawing(Shape):
     )
     tolerance_um: float = Field(
         default=TOLERANCE_UM,
-        ge=_FINEST_UM,
-        le=_COARSEST_UM,
+        ge=1e-4,
+        le=0.1,
         description="curves become lines within it, what is nearer is the same",
     )
+
+    def sheet(self, where: str, folder: Path | None) -> Sheet:
+        """Read the file, whose name is relative to a folder.
+
+        Raises
+        ------
+        InputError
+            If it is missing, or see `hotlever.probe.drawing.sheet.read_sheet`.
+        """
+        if not self.file:
+            raise InputError(f"{where}: file is missing (GDSII, OASIS or DXF)")
+        path = os.fspath(Path(self.file) if folder is None else folder / self.file)
+        unit_um, tolerance_um = self.unit_um, self.tolerance_um
+        return read_sheet(path, self.cell, unit_um=unit_um, tolerance_um=tolerance_um)
+
+
+class Drawing(DrawingFile, Shape):
+    """A lever of any outline; lengths in µm.
+
+    Layers that a probe file takes from a drawing file are read once, when the drawing is made
+    with `read`; here, and wherever a drawn probe is kept, they are lists of points. An outline
+    inside another is a hole in it; a terminal of two points is a line.
+    """
+
+    outline_moves: ClassVar[bool] = False
+    read_with: ClassVar[tuple[str, ...]] = ("file", "cell", "unit_um")
+
+    shape: Literal["drawing"] = "drawing"
     thickness_um: float = thickness("of the lever, without films on it")
     scale: float = Field(
         default=1.0,
@@ -160,12 +186,12 @@ class Drawing(Shape):
             If what is drawn is at fault.
         """
         values = dict(sections["probe"])
-        tolerance = values.get("tolerance_um", TOLERANCE_UM)
-        tip = values.get("tip_um")
-        if tip is not None:
-            if not _is_points([tip, tip]):
-                raise InputError(f"{where}: [probe]: tip_um = {quoted(tip)}: expected [x, y] (µm)")
-            values["tip_um"] = (float(tip[0]), float(tip[1]))
+        here = f"{where}: [probe]"
+        if (tip := values.get("tip_um")) is not None:
+            try:
+                values["tip_um"] = _PLACE.validate_python(tip)
+            except ValidationError:
+                raise InputError(f"{here}: tip_um = {quoted(tip)}: expected [x, y] (µm)") from None
         layers = layer_values(
             _section(sections, "layers", where), materials or {}, f"{where}: [layers]"
         )
@@ -174,11 +200,13 @@ class Drawing(Shape):
             terminal_part(name): part[DRAWN] for name, part in terminals.items()
         }
         named = {part: layer for part, layer in given.items() if isinstance(layer, str)}
-        sheet = _sheet(values, where, folder, tolerance) if named else None
+        stated = {key: values[key] for key in DrawingFile.model_fields if key in values}
+        sheet = DrawingFile.from_values(stated, here).sheet(here, folder) if named else None
         for section, parts in (("layers", layers), ("terminals", terminals)):
             for name, part in parts.items():
-                here = f"{where}: [{section}] {name}"
-                part[DRAWN] = _rings(sheet, part[DRAWN], name, here, section)
+                part[DRAWN] = _rings(
+                    sheet, part[DRAWN], name, f"{where}: [{section}] {name}", section
+                )
         made = tuple(
             DrawnLayer.from_values(layer, f"{where}: [layers.{name}]")
             for name, layer in layers.items()
@@ -187,9 +215,7 @@ class Drawing(Shape):
         try:
             if sheet is not None:
                 _check_unit(sheet, next(layer for layer in made if layer.is_body))
-            return cls.from_values(
-                {**values, "layers": made, "terminals": ends}, f"{where}: [probe]"
-            )
+            return cls.from_values({**values, "layers": made, "terminals": ends}, here)
         except DrawingError as error:
             file = where if sheet is None else sheet.file
             outlines = {part.part: part.drawn for part in (*made, *ends)}
@@ -219,24 +245,6 @@ def _section(sections: Mapping[str, Any], name: str, where: str) -> dict[str, An
     return dict(sections[name])
 
 
-def _sheet(values: dict[str, Any], where: str, folder: Path | None, tolerance: Any) -> Sheet:
-    """Read the file whose layers are named."""
-    file = values.get("file")
-    if not isinstance(file, str) or not file:
-        raise InputError(f"{where}: [probe]: file is missing (GDSII, OASIS or DXF)")
-    for key, kinds, default in (("cell", str, None), ("unit_um", (int, float), None)):
-        if not isinstance(values.get(key, default), (kinds, type(None))):
-            raise InputError(f"{where}: [probe]: {key} = {quoted(values[key])}: not understood")
-    if not (type(tolerance) in (int, float) and _FINEST_UM <= tolerance <= _COARSEST_UM):
-        raise InputError(
-            f"{where}: [probe]: tolerance_um = {quoted(tolerance)}: expected {_FINEST_UM:g} to "
-            f"{_COARSEST_UM:g}"
-        )
-    path = Path(file) if folder is None else folder / file
-    unit, cell = values.get("unit_um"), values.get("cell")
-    return read_sheet(os.fspath(path), cell, unit_um=unit, tolerance_um=float(tolerance))
-
-
 def rings_of(sheet: Sheet, layer: Layer, *, lines: bool = False) -> Rings:
     """Return the outlines of a layer; with `lines` the steps of open ones too."""
     closed = layer.rings if sheet.kind == "DXF" else without_nested(layer.rings)
@@ -257,27 +265,12 @@ def _rings(sheet: Sheet | None, given: Any, name: str, where: str, section: str)
                 "is not closed"
             )
         return rings_of(sheet, layer)
-    if _is_points(given):
-        given = [given]
-    elif not (isinstance(given, list | tuple) and given and all(map(_is_points, given))):
-        raise InputError(
-            f'{where} = {quoted(given)}: expected a layer such as "1/0", or points such as '
-            "[[0.0, -1.5], [0.0, 1.5]] (µm)"
-        )
-    return tuple(tuple((float(x), float(y)) for x, y in ring) for ring in given)
-
-
-def _is_points(given: Any) -> bool:
-    """Whether something is a list of two points or more."""
-    return (
-        isinstance(given, list | tuple)
-        and len(given) > 1
-        and all(
-            isinstance(point, list | tuple)
-            and len(point) == 2
-            and all(
-                type(coordinate) in (int, float) and abs(coordinate) < 1e6 for coordinate in point
-            )
-            for point in given
-        )
+    for outlines in ([given], given) if isinstance(given, list | tuple) and given else ():
+        try:
+            return tuple(map(_OUTLINE.validate_python, outlines))
+        except ValidationError:
+            continue
+    raise InputError(
+        f'{where} = {quoted(given)}: expected a layer such as "1/0", or points such as '
+        "[[0.0, -1.5], [0.0, 1.5]] (µm)"
     )

@@ -25,7 +25,7 @@ from hotlever.probe.layout import Point
 #: Bytes that a file may have, and of memory and seconds that reading it may take.
 _LARGEST, _MEMORY, _PATIENCE_S = 64 * 2**20, 4 * 2**30, 60.0
 #: Coordinates (µm) beyond which nothing is drawn on a wafer.
-_FARTHEST = 1e6
+FARTHEST_UM = 1e6
 #: Extent of a lever (µm).
 SMALLEST_UM, LARGEST_UM = 5.0, 2000.0
 #: Units of drawings (µm), the likeliest first.
@@ -189,10 +189,10 @@ def _read_apart(
 def _points(rings: list[list[list[float]]], path: str) -> tuple[Ring, ...]:
     for ring in rings:
         for x, y in ring:
-            if not (abs(x) < _FARTHEST and abs(y) < _FARTHEST):
+            if not (abs(x) < FARTHEST_UM and abs(y) < FARTHEST_UM):
                 raise InputError(
-                    f"{path}: a corner at ({x:g}, {y:g}) µm, expected less than {_FARTHEST:g} µm; "
-                    "is the unit right?"
+                    f"{path}: a corner at ({x:g}, {y:g}) µm, expected less than {FARTHEST_UM:g} "
+                    "µm; is the unit right?"
                 )
     return tuple(tuple((x, y) for x, y in ring) for ring in rings)
 
