@@ -93,8 +93,8 @@ def _in_pairs(table: Block, where: str) -> list[Spectrum]:
 def _in_columns(table: Block, where: str) -> list[Spectrum]:
     """Spectra beside each other with one axis, or below each other as in WiRE's maps, or both."""
     values, names = table.values, table.names
-    at, x = axis_of(table, where)
-    others = [j for j in range(values.shape[1]) if j != at]
+    axis, x = axis_of(table, where)
+    others = [j for j in range(values.shape[1]) if j != axis]
     groups = _groups(x, values, others)
     first = np.array([rows[0] for rows in groups])
     fixed = [
@@ -199,7 +199,7 @@ _OTHER_QUANTITY = re.compile(
 
 
 def axis_of(table: Block, where: str) -> tuple[int, Array]:
-    """Place of the axis among the columns, and the Raman shift (cm⁻¹) in it.
+    """Index of the axis among the columns, and the Raman shift (cm⁻¹) in it.
 
     Raises
     ------
@@ -208,44 +208,38 @@ def axis_of(table: Block, where: str) -> tuple[int, Array]:
     """
     values, names = table.values, table.names
     axes = [j for j in range(values.shape[1]) if is_axis(values[:, j])]
-    for j in axes:
-        wavelength = _WAVELENGTH.search(names[j]) and not _RAMAN.search(names[j])
-        if _SHIFT.search(names[j]) and not wavelength:
-            return _checked(table, j, where)
-    for j in axes:
-        if _WAVELENGTH.search(names[j]):
-            return _checked(table, j, where)
+    headed = [j for j in axes if _SHIFT.search(names[j]) and not _is_wavelength(names[j])]
+    headed += [j for j in axes if _WAVELENGTH.search(names[j])]
     reaching = [j for j in axes if reaches_line(values[:, j])]
     # a position in a map reaches it too, and an axis has many values there
     reaching = [j for j in reaching if covers_line(values[:, j])] or reaching
-    named = [j for j in reaching if _ABSOLUTE.search(names[j])]
+    absolute = [j for j in reaching if _ABSOLUTE.search(names[j])]
     # a running number reaches 520 too, but a later column may be the axis
     others = [j for j in reaching if not is_index(values[:, j])]
-    at, x = _checked(table, (*named, *others, *reaching, *axes, 0)[0], where)
+    axis = (*headed, *absolute, *others, *reaching, *axes, 0)[0]
+    x = raman_shift(table, axis, where)
+    require_line(x, where)
+    in_window(np.unique(x[np.isfinite(x)]), f"{where}: ")
     if not axes:
         raise InputError(
             f"{where}: none of {len(names)} columns rises or falls all the way, expected a Raman "
             "shift (cm⁻¹) in one"
         )
-    if _OTHER_QUANTITY.search(names[at]):
+    if not headed and _OTHER_QUANTITY.search(names[axis]):
         raise InputError(
-            f"{where}: the axis is '{shown(names[at])}', expected a Raman shift in cm⁻¹"
+            f"{where}: the axis is '{shown(names[axis])}', expected a Raman shift in cm⁻¹"
         )
-    return at, x
+    return axis, x
 
 
-def _checked(table: Block, at: int, where: str) -> tuple[int, Array]:
-    """The column as a Raman shift that holds silicon's line, or InputError."""
-    x = raman_shift(table, at, where)
-    require_line(x, where)
-    in_window(np.unique(x[np.isfinite(x)]), f"{where}: ")
-    return at, x
+def _is_wavelength(name: str) -> bool:
+    return bool(_WAVELENGTH.search(name) and not _RAMAN.search(name))
 
 
-def raman_shift(table: Block, at: int, where: str) -> Array:
+def raman_shift(table: Block, column: int, where: str) -> Array:
     """Return a column in cm⁻¹: a wavelength is converted by the laser that the header names."""
-    x, name = table.values[:, at], table.names[at]
-    if not _WAVELENGTH.search(name) or _RAMAN.search(name):
+    x, name = table.values[:, column], table.names[column]
+    if not _is_wavelength(name):
         return x
     laser = _laser(table.metadata)
     if laser is None:
