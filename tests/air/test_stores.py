@@ -7,9 +7,10 @@ import pytest
 from plates import disc
 from scipy.spatial import ConvexHull
 
+from hotlever.air.laplace import Laplace
 from hotlever.air.operator import PanelledAir
 from hotlever.air.panels import Panels
-from hotlever.air.screened_layer import screened_layers, screened_potential
+from hotlever.air.screened import Screened, screened_potential
 from hotlever.air.single_layer import single_layer_matrix
 from hotlever.air.stores import stores_of
 from hotlever.air.surface import PanelOptions
@@ -48,7 +49,7 @@ def sphere(halvings: int) -> Panels:
 @pytest.fixture(scope="module")
 def spheres():
     """Panels and their static layers, of which the error of one is a fourth of the other's."""
-    return [(panels, single_layer_matrix(panels)) for panels in map(sphere, (1, 2))]
+    return [(panels, single_layer_matrix(panels, Laplace())) for panels in map(sphere, (1, 2))]
 
 
 @pytest.mark.parametrize("turns", [1e-3, 0.1, 1.0, 4.0])
@@ -57,7 +58,7 @@ def test_a_sphere_in_a_medium_loses_as_it_should(spheres, turns):
     q = np.sqrt(1j * turns)
     loss = []
     for panels, layer in spheres:
-        screened = screened_layers(panels, np.array([q]))[0]
+        screened = single_layer_matrix(panels, Screened(np.array([q])))[0]
         loss.append(panels.areas @ np.linalg.solve(layer + screened, panels.areas))
     inside = 4.0 * np.pi * (q / np.tanh(q) - 1.0)
     outside = (4.0 * loss[1] - loss[0]) / 3.0 - inside

@@ -42,11 +42,16 @@ def test_heat_goes_to_the_leg_ends_and_the_air_and_charge_to_ground(sweep):
     np.testing.assert_allclose(sweep.ground_current_mA, sweep.current_mA, rtol=1e-7)
 
 
-def test_all_heat_that_leaves_the_surface_arrives_at_infinity(in_air, state, sweep):
-    coefficients, heat = in_air.in_the_air(state)
-    assert heat.sum() == pytest.approx(sweep.air_heat_mW.item())
-    far = in_air.space.air.operator.at_infinity(coefficients)
-    assert far == pytest.approx(heat.sum(), rel=1e-3)
+def test_all_heat_that_leaves_the_surface_arrives_at_infinity(state, sweep):
+    slices = temperature_slices(state).attrs
+    assert slices["air_heat_mW"] == pytest.approx(sweep.air_heat_mW.item())
+    assert slices["heat_at_infinity_mW"] == pytest.approx(slices["air_heat_mW"], rel=1e-3)
+
+
+def test_sensitivities_are_those_of_the_flat_lever(lever):
+    solid, flat = SolidLever(Probe.reference(), COARSE), lever
+    found, expected = (one.sweep([3.0], sensitivities=True).sensitivity for one in (solid, flat))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_the_regions_give_all_the_heat_and_the_bridge_the_most(state, sweep):

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.linalg import cho_factor, cho_solve
 
+from hotlever.air.laplace import Laplace
 from hotlever.air.panels import Mirror, Panels, mirror_group
 from hotlever.air.single_layer import single_layer_matrix
 
@@ -21,7 +22,7 @@ PLANES = [Mirror.in_plane((0, 0, 0), normal, +1.0) for normal in np.eye(3)]
 def heat(panels: Panels, planes: list[Mirror]) -> float:
     """Heat that leaves the panels and all their images for θ = 1 on them."""
     mirrors = mirror_group(planes)
-    layer = single_layer_matrix(panels, mirrors)
+    layer = single_layer_matrix(panels, Laplace(), mirrors)
     return len(mirrors) * float(panels.areas @ cho_solve(cho_factor(layer), panels.areas))
 
 

@@ -7,7 +7,7 @@ import pytest
 from bare import bare_equations
 from skfem import MeshTri
 
-from hotlever.lever.transient.sinusoidal import HarmonicBalance
+from hotlever.lever.transient.frequency_domain import HarmonicBalance
 from hotlever.materials import published
 from hotlever.materials.kinds import MetalFilm
 from hotlever.probe import Circuit, Terminal

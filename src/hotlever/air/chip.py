@@ -111,7 +111,7 @@ def chip_panels(layout: Layout, refinement: float = 1.0) -> Panels:
     InputError
         If leg ends are not on one line, or the lever is on both sides of it.
     """
-    from hotlever.air.covering import divided  # loads Shapely; see `PanelledAir`
+    from hotlever.air.panelling import divided  # loads Shapely; see `PanelledAir`
 
     line = BaseLine.of(layout, "the chip")
     seen = line.seen(layout.corners)

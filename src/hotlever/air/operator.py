@@ -17,9 +17,10 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from hotlever.air.chip import BaseLine, chip_panels
+from hotlever.air.laplace import Laplace, layer_potential
 from hotlever.air.panels import Mirror, PanelOptions, Panels, mirror_group
-from hotlever.air.screened_layer import Numbers, screened_layers
-from hotlever.air.single_layer import layer_potential, single_layer_matrix
+from hotlever.air.screened import Screened
+from hotlever.air.single_layer import Numbers, single_layer_matrix
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout
@@ -162,7 +163,7 @@ class PanelledAir:
         mid_plane = [Mirror.in_plane((0, 0, 0), (0, 0, 1), +1.0)] if surroundings.symmetric else []
         self._halves = 1.0 + len(mid_plane)
         self.mirrors = mirror_group([*mid_plane, *below])
-        self._layer = single_layer_matrix(self.panels, self.mirrors, progress)
+        self._layer = single_layer_matrix(self.panels, Laplace(), self.mirrors, progress)
         own = np.arange(len(self.surface.panels))
         jump = np.full(len(self.panels), surroundings.jump_length_um(base_temperature_K))
         jump[own] = surroundings.jump_length_um(surroundings.jump_temperature_K)
@@ -200,7 +201,7 @@ class PanelledAir:
         Parameters
         ----------
         q : ndarray, shape (k,)
-            √(rate / diffusivity) (1/µm), see `hotlever.air.screened_layer`.
+            √(rate / diffusivity) (1/µm), see `hotlever.air.screened`.
         shapes : ndarray, shape (sites, m)
             Of θ (mW/µm), by their values at the sites.
 
@@ -211,7 +212,7 @@ class PanelledAir:
         """
         moments = self._moments @ shapes
         heat = []
-        for screened in screened_layers(self.panels, q, self.mirrors):
+        for screened in single_layer_matrix(self.panels, Screened(q), self.mirrors):
             flux = np.linalg.solve(self._layer + screened, moments.astype(screened.dtype))
             heat.append(self._halves * (moments.T @ flux))
         found = np.array(heat)

@@ -1,43 +1,74 @@
 """The single-layer operator of a surface: densities on its panels to potentials.
 
-Galerkin's method with constant densities: V_ij = Σ_m s_m ∫_i ∫_{m(j)} 1/(4π|x − y|), where m runs
-over the mirrors that stand for symmetry or for isothermal planes and s_m is their sign. V is
-symmetric and positive definite; for ∇²θ = 0 outside the surface, θ given on it and no flux at
-infinity, the heat that leaves panel i is A_i q_i with V q = b, b_i = ∫_i θ.
+Galerkin's method with constant densities: V_ij = Σ_m s_m ∫_i ∫_{m(j)} G(|x − y|)/4π, where m runs
+over the mirrors that stand for symmetry or for isothermal planes, s_m is their sign, and G the
+kernel: 1/R (`hotlever.air.laplace`) or what air adds that takes up heat itself
+(`hotlever.air.screened`). V is symmetric; with 1/R it is positive definite, and for ∇²θ = 0 outside
+the surface, θ given on it and no flux at infinity, the heat that leaves panel i is A_i q_i with
+V q = b, b_i = ∫_i θ.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hotlever.air.integrals import far_pairs, potential, rectangle_pairs
 from hotlever.air.panels import IDENTITY, Mirror, Panels
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index, Progress
 
-#: Pairs whose centroids are this many times the sum of their radii apart are far.
-FAR = 3.0
-#: Gauss points per direction for near pairs that have no closed form, and up to how many times the
-#: sum of their radii the centroids are apart.
-ORDERS = ((8, 0.5), (6, 1.0), (4, 1.5), (3, 2.0), (2, np.inf))
-#: Rectangles turned by less (rad) against each other are parallel.
-_SAME_ANGLE = 2e-6
+# Real or complex, as the kernel is.
+Numbers = NDArray[Any]
+# Gauss points per direction, and up to how many times the sum of their radii the centroids of two
+# panels are apart for which they suffice.
+Orders = Sequence[tuple[int, float]]
+
 #: Panels expanded, pairs integrated and Gauss points taken at once: arrays that stay in the cache.
 _ROWS, _PAIRS, _POINTS = 32, 8192, 8192
 
 
+class Kernel(Protocol):
+    """Integrals of one or several functions of the distance R over pairs of panels.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Of the functions side by side.
+    dtype : dtype
+        Of the integrals.
+    far : float
+        Pairs whose centroids are this many times the sum of their radii apart are far.
+    """
+
+    shape: tuple[int, ...]
+    dtype: Any
+    far: float
+
+    def far_pairs(self, first: Panels, second: Panels, offsets: Array) -> Numbers:
+        """Return ∫∫ G over all pairs that are far, (..., n, m), of their centroids' offsets."""
+        ...
+
+    def near_pairs(self, first: Panels, second: Panels, i: Index, j: Index) -> Numbers:
+        """Return ∫∫ G over pairs of panels, by their numbers (n,) in both, (..., n)."""
+        ...
+
+
 @one_blas_thread
 def single_layer_matrix(
-    panels: Panels, mirrors: Sequence[Mirror] = (IDENTITY,), progress: Progress | None = None
-) -> Array:
-    """Return the Galerkin matrix of 1/(4πR).
+    panels: Panels,
+    kernel: Kernel,
+    mirrors: Sequence[Mirror] = (IDENTITY,),
+    progress: Progress | None = None,
+) -> Numbers:
+    """Return the Galerkin matrix of a kernel.
 
     Parameters
     ----------
     panels : Panels
+    kernel : Kernel
     mirrors : sequence of Mirror, optional
         The identity among them; each its own inverse.
     progress : callable, optional
@@ -45,98 +76,64 @@ def single_layer_matrix(
 
     Returns
     -------
-    ndarray, shape (n, n)
-        µm³, symmetric.
+    ndarray, shape (..., n, n)
+        µm³, symmetric; one for each function of the kernel.
     """
     count = len(panels)
-    matrix = np.zeros((count, count))
+    matrix = np.zeros((*kernel.shape, count, count), dtype=kernel.dtype)
     for done, mirror in enumerate(mirrors):
         images = panels.reflected(mirror)
         one = np.empty_like(matrix)
-        near: list[tuple[Index, Index]] = []
+        near = []
         for start in range(0, count, _ROWS):
             rows = np.arange(start, min(start + _ROWS, count))
             some = panels.chosen(rows)
             offsets = some.centres[:, None] - images.centres
-            one[rows] = far_pairs(some, images, offsets)
-            reach = FAR * (some.radii[:, None] + images.radii)
+            one[..., rows, :] = kernel.far_pairs(some, images, offsets)
+            reach = kernel.far * (some.radii[:, None] + images.radii)
             i, j = np.nonzero(np.einsum("nmd,nmd->nm", offsets, offsets) < reach**2)
             half = rows[i] <= j
-            near.append((rows[i][half], j[half]))
-        first, second = (np.concatenate(numbers) for numbers in zip(*near, strict=True))
-        closed = _in_one_frame(panels.frame, images.frame, first, second)
-        for pairs, integrals in ((closed, rectangle_pairs), (~closed, _by_quadrature)):
-            some_i, some_j = first[pairs], second[pairs]
-            for start in range(0, some_i.size, _PAIRS):
-                i, j = some_i[start : start + _PAIRS], some_j[start : start + _PAIRS]
-                values = integrals(panels.chosen(i), images.chosen(j))
-                one[i, j] = values
-                one[j, i] = values
-                if progress is not None:
-                    share = int(100 * min(start + _PAIRS, some_i.size) / some_i.size)
-                    progress(100 * done + share, 100 * len(mirrors))
+            near.append(np.stack([rows[i][half], j[half]]))
+        pairs = np.concatenate(near, axis=1)
+        for start in range(0, pairs.shape[1], _PAIRS):
+            i, j = pairs[:, start : start + _PAIRS]
+            values = kernel.near_pairs(panels, images, i, j)
+            one[..., i, j] = values
+            one[..., j, i] = values
+            if progress is not None:
+                share = int(100 * min(start + _PAIRS, pairs.shape[1]) / pairs.shape[1])
+                progress(100 * done + share, 100 * len(mirrors))
         matrix += mirror.sign * one
-    return matrix / (4.0 * np.pi)
+    return np.asarray(matrix / (4.0 * np.pi))
 
 
-@one_blas_thread
-def layer_potential(points: Array, panels: Panels, density: Array) -> Array:
-    """Return the potential of densities on panels.
+def pairs_by_points(
+    first: Panels, second: Panels, over_panel: Callable[[Array, Array], Numbers], orders: Orders
+) -> Numbers:
+    """Integrate over pairs of any panels: exactly over the larger, by Gauss points over the other.
 
     Parameters
     ----------
-    points : ndarray, shape (n, 3)
-        µm.
-    panels : Panels
-    density : ndarray, shape (len(panels),)
+    first, second : Panels, n each
+    over_panel : callable
+        Returns the integral over panels (..., 4, 3), as seen from points (..., 3).
+    orders : sequence of (int, float)
 
     Returns
     -------
-    ndarray, shape (n,)
-        ∫ density/(4πR).
-    """
-    result = np.empty(len(points))
-    traces = np.trace(panels.moments, axis1=1, axis2=2)
-    for start in range(0, len(points), 4 * _ROWS):
-        some = points[start : start + 4 * _ROWS]
-        offsets = some[:, None] - panels.centres
-        square = np.einsum("nmd,nmd->nm", offsets, offsets)
-        near = square < (FAR * panels.radii) ** 2
-        inverse = 1.0 / np.sqrt(np.where(near, np.inf, square))
-        spread = np.einsum("nmd,mde,nme->nm", offsets, panels.moments, offsets, optimize=True)
-        integrals = inverse + 0.5 * inverse**3 * (3.0 * spread * inverse**2 - traces)
-        integrals *= panels.areas
-        i, j = np.nonzero(near)
-        integrals[i, j] = potential(some[i], panels.corners[j])
-        result[start : start + len(some)] = integrals @ density
-    return result / (4.0 * np.pi)
-
-
-def _in_one_frame(
-    frame: tuple[Index, Array], other: tuple[Index, Array], first: Index, second: Index
-) -> NDArray[np.bool_]:
-    """Whether pairs of panels are rectangles with sides along the same three axes."""
-    (axis, angle), (other_axis, other_angle) = frame, other
-    between = np.abs(angle[first] - other_angle[second])
-    same = np.minimum(between, np.pi / 2 - between) < _SAME_ANGLE
-    return (axis[first] >= 0) & (other_axis[second] >= 0) & same
-
-
-def _by_quadrature(first: Panels, second: Panels) -> Array:
-    """Integrate 1/R over pairs of any panels.
-
-    In closed form over the larger of the two and by Gauss points over the other.
+    ndarray, shape (..., n)
     """
     gaps = np.linalg.norm(first.centres - second.centres, axis=1) / (first.radii + second.radii)
     smaller = (first.radii <= second.radii)[:, None, None]
     under = Panels(np.where(smaller, first.corners, second.corners))
     source = np.where(smaller, second.corners, first.corners)
-    result = np.empty(len(first))
-    which = np.searchsorted([farthest for _, farthest in ORDERS], gaps, side="right")
-    for number, (order, _) in enumerate(ORDERS):
+    which = np.searchsorted([farthest for _, farthest in orders], gaps, side="right")
+    found, places = [], []
+    for number, (order, _) in enumerate(orders):
         here = np.flatnonzero(which == number)
         for pairs in np.array_split(here, 1 + here.size * order**2 // _POINTS):
             points, weights = under.chosen(pairs).points(order)
-            values = potential(points, source[pairs, None])
-            result[pairs] = np.einsum("nq,nq->n", weights, values)
-    return result
+            values = over_panel(points, source[pairs, None])
+            found.append(np.einsum("nq,...nq->...n", weights, values))
+            places.append(pairs)
+    return np.concatenate(found, axis=-1)[..., np.argsort(np.concatenate(places))]

@@ -2,7 +2,7 @@
 
 Air at rest lets heat through (`hotlever.air.operator`): what leaves a body is Y(0) θ. Where θ
 changes as exp(st) it is Y(s) θ, of the single layer with the kernel exp(−qR)/(4πR), q² = s/α
-(`hotlever.air.screened_layer`): for a sphere of radius a, 4πa(1 + qa). Air without an end answers
+(`hotlever.air.screened`): for a sphere of radius a, 4πa(1 + qa). Air without an end answers
 along a cut of the complex plane::
 
     Y(s) − Y(0) = ∫ s/(s + p) Im Y(−p + i0)/π dp/p

@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiLineString, Polygon
 
-from hotlever.air.covering import GRID, cover, divided, parts, rings, turns
+from hotlever.air.panelling import GRID, divided, panelled, parts, rings, turns
 from hotlever.air.panels import PanelOptions, Panels
 from hotlever.probe.layout import Layout
 from hotlever.types import Array, Index
@@ -53,7 +53,7 @@ class LeverSurface:
 def lever_surface(
     layout: Layout, options: PanelOptions | None = None, *, mirrored: bool = True
 ) -> LeverSurface:
-    """Cover a lever with panels.
+    """Panel the surface of a lever.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ class _Outline:
         most = np.log(max(2.0, 2.0 * self._largest / self._edge)) / self._growth
         depths = self._edge / self._growth * np.expm1(self._growth * np.arange(1.0, most + 1.0))
         exposed = shapely.line_merge(MultiLineString([edge.tolist() for edge in self._edges]))
-        return cover(self._shape, exposed, depths, self.size)
+        return panelled(self._shape, exposed, depths, self.size)
 
     def divided_edges(self) -> list[Array]:
         """Return the breaks (k, 2) between panels along every exposed edge."""

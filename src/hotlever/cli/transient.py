@@ -82,8 +82,12 @@ def spectrum_command(
 ) -> None:
     """Show impedance and thermal response to small signals at a bias, or harmonics."""
     from hotlever.datasets import csv_text, write_dataset
-    from hotlever.lever.transient.sinusoidal import HARMONIC_COLUMNS, harmonics
-    from hotlever.lever.transient.small_signals import SPECTRUM_COLUMNS, spectrum
+    from hotlever.lever.transient.frequency_domain import (
+        HARMONIC_COLUMNS,
+        SPECTRUM_COLUMNS,
+        harmonics,
+        spectrum,
+    )
 
     swing = None if amplitude is None else bias_setting(amplitude, "--amplitude")
     volts, frequencies = bias_setting(bias, "--bias"), parse_frequencies(frequency)

@@ -230,7 +230,11 @@ class Lever:
             if failure is not None and np.isnan(u):
                 failure.partial = states
                 raise failure
-            states.append(self._state_at(branch, u, value))
+            try:
+                states.append(self._state_at(branch, u, value))
+            except ComputationError as error:
+                error.partial = states
+                raise
             if progress is not None:
                 progress(len(states), values.size)
         return states

@@ -107,10 +107,13 @@ def temperature_slices(state: State) -> xr.Dataset:
     -------
     xarray.Dataset
         ``temperature`` (slice, z, place) at ``along_um`` and ``z_um``; bias, tip and base
-        temperature as attributes. ``along_um`` is x or y, as ``axis`` says, or the distance from
-        the origin along or across a lever that is turned on the wafer.
+        temperature as attributes, with the heat that leaves the lever and that arrives at infinity.
+        ``along_um`` is x or y, as ``axis`` says, or the distance from the origin along or across a
+        lever that is turned on the wafer.
     """
-    layout = _solid(state).solid.layout
+    lever = _solid(state)
+    coefficients, heat = lever.in_the_air(state)
+    layout = lever.solid.layout
     tip = np.array(layout.tip)
     directions = lever_axes(layout)
     as_drawn = np.allclose(directions, np.eye(2), rtol=0, atol=1e-9)
@@ -144,6 +147,8 @@ def temperature_slices(state: State) -> xr.Dataset:
         bias_V=state.bias_V,
         tip_K=state.tip_K,
         base_K=state.lever.circuit.base_temperature_K,
+        air_heat_mW=float(heat.sum()),
+        heat_at_infinity_mW=lever.space.air.operator.at_infinity(coefficients),
     )
 
 

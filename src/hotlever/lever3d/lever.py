@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from functools import cached_property
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -16,10 +15,12 @@ from skfem.element import ElementTetP2
 
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
+from hotlever.lever.branch import Branch
 from hotlever.lever.dataset import at_bias, checked_bias
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever, State
+from hotlever.lever.ramp import Reading
 from hotlever.lever3d.still_air import OpenAir, ngsolve
 from hotlever.probe import Probe
 from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid, middle_and_reach
@@ -64,18 +65,18 @@ class SolidLever(Lever):
         sphere_radius_um: float | None = None,
         air_order: int = 3,
     ) -> None:
-        self._options, self._sphere_radius_um, self._air_order = mesh, sphere_radius_um, air_order
+        self._options: dict[str, Any] = {
+            "mesh": mesh,
+            "sphere_radius_um": sphere_radius_um,
+            "air_order": air_order,
+        }
         self.probe = Probe.coerce(probe)
-        self.space = self._meshed()
+        self.space = self._meshed(**self._options)
         self._prepare()
 
-    def _prepare(self) -> None:
-        super()._prepare()
-        # a copy for another probe has a flat lever of its own
-        for name in ("_flat", "_from_flat"):
-            vars(self).pop(name, None)
-
-    def _meshed(self) -> FullSpace:
+    def _meshed(
+        self, mesh: SolidMeshOptions | None, sphere_radius_um: float | None, air_order: int
+    ) -> FullSpace:
         """Mesh the silicon, and the air around it if there is any: one mesh for both."""
         in_air = self.medium == "air"
         if in_air:
@@ -92,45 +93,29 @@ class SolidLever(Lever):
                 "[layers]: the full 3-D simulation knows one material across the thickness, "
                 "expected a lever without films"
             )
-        radius = self._sphere_radius_um or max(SPHERE_RADIUS, _ROOM * middle_and_reach(layout)[1])
+        radius = sphere_radius_um or max(SPHERE_RADIUS, _ROOM * middle_and_reach(layout)[1])
         sphere, wiring = radius if in_air else None, self.probe.wiring
-        solid = mesh_solid(layout, self._options, sphere_radius_um=sphere, wiring=wiring)
+        solid = mesh_solid(layout, mesh, sphere_radius_um=sphere, wiring=wiring)
         elements = FiniteElements(solid.elements, ElementTetP2(), 4)
         space = FullSpace(solid, elements, wiring)
         if not in_air:
             return space
-        air = OpenAir(solid.netgen, solid.centre, radius, order=self._air_order)
+        air = OpenAir(solid.netgen, solid.centre, radius, order=air_order)
         space = space.in_air_at_nodes(air, surface_nodes(space.elements, air))
-        return space.in_gas(self.probe.surroundings.gas_conductivity)
+        return self._surrounded(space)
 
     def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
-        """Return the space in the probe's surroundings; air needs a mesh of its own."""
-        return self._meshed()
+        """Return the space in the probe's gas: in free space the air is the same at any base."""
+        return space.in_gas(self.probe.surroundings.gas_conductivity)
 
-    def solve(self, bias: ArrayLike, progress: Progress | None = None) -> list[State]:
-        """Find the states that a slow ramp of the bias takes; see `Lever.solve`."""
-        values = checked_bias(bias, self.circuit)
-        try:
-            guesses = self._flat.solve(values)
-        except ComputationError as error:
-            error.partial = self._from_guesses(values, error.partial, progress)
-            raise
-        return self._from_guesses(values, guesses, progress)
-
-    def _from_guesses(
-        self, values: Array, guesses: Sequence[State], progress: Progress | None
-    ) -> list[State]:
-        """Solve at some biases, as many as there are states of the flat lever."""
-        states: list[State] = []
-        for value, guess in zip(values.tolist(), guesses, strict=False):
-            try:
-                states.append(self._kept(value) or self._solved(value, guess))
-            except ComputationError as error:
-                error.partial = states
-                raise
-            if progress is not None:
-                progress(len(states), values.size)
-        return states
+    def with_probe(self, probe: Probe) -> Lever:
+        """Return the lever of a probe of the same shape and tip; another medium is meshed anew."""
+        if probe.surroundings.medium != self.medium:
+            return SolidLever(probe, **self._options)
+        other = super().with_probe(probe)
+        assert isinstance(other, SolidLever)
+        other._flat = self._flat.with_probe(probe)
+        return other
 
     def sweep(
         self,
@@ -139,22 +124,25 @@ class SolidLever(Lever):
         sensitivities: bool = False,
         progress: Progress | None = None,
     ) -> xr.Dataset:
-        """Solve the lever at each of some biases; see `Lever.sweep`."""
-        if sensitivities:
-            raise InputError("sensitivities are known of the flat lever only")
-        values = checked_bias(bias, self.circuit)
+        """Solve the lever at each of some biases; see `Lever.sweep`.
+
+        Sensitivities are those of the flat lever.
+        """
+        values, failure = checked_bias(bias, self.circuit), None
         try:
             states = self.solve(values, progress)
         except ComputationError as error:
-            error.partial = self._table(values, error.partial)
-            raise
-        return self._table(values, states)
-
-    def _table(self, values: Array, states: Sequence[State]) -> xr.Dataset:
-        """Return what is observed of states, with the notes on jumps of the flat lever's ramp."""
-        reading = self._flat.branch_to(float(values.max())).read(self.circuit, values)
-        data = self.dataset(states, reading.notes(values))
-        return at_bias(data, values[: len(states)])
+            states, failure = error.partial or [], error
+        solved = values[: len(states)]
+        notes = self._flat.branch_to(float(values.max())).read(self.circuit, values).notes(values)
+        data = at_bias(self.dataset(states, notes), solved)
+        if sensitivities:
+            flat = self._flat.sweep(solved, sensitivities=True)
+            data = data.assign(sensitivity=flat.sensitivity)
+        if failure is not None:
+            failure.partial = data
+            raise failure
+        return data
 
     # --- from the flat lever ----------------------------------------------------------------------
 
@@ -172,31 +160,30 @@ class SolidLever(Lever):
             (shares.ravel(), (rows, flat.dofs[element].ravel())), shape=(len(element), flat.size)
         )
 
-    def _solved(self, bias: float, flat: State) -> State:
-        """Solve at a bias from the flat lever's state, and keep the result."""
+    def _read(
+        self, bias: Array, progress: Progress | None = None
+    ) -> tuple[Branch, Reading, ComputationError | None]:
+        """Return the branch of the flat lever; see `Lever`."""
+        return self._flat._read(bias, progress)
+
+    def _state_at(self, branch: Branch, u: float, bias: float) -> State:
+        """Return a state from the cache, or solve it from that of the flat lever."""
+        facts: dict[str, Any] = {"probe": self.probe.sections(), "bias_V": bias}
+        facts["nodes"] = self.space.elements.nodes
+        if self.medium == "air":
+            air = self.space.air.operator
+            facts["air"] = [air.radius_um, air.order, air.size]
+        file = cache_file("states", facts)
+        x = stored(file, lambda arrays: arrays["x"])
+        if x is not None and len(x) == self.space.size + 1:
+            return State(self, x)
+        flat = self._flat._state_at(branch, u, bias)
         T, V = (self._from_flat @ values for values in flat.nodal)
         base = self.circuit.base_temperature_K
         guess = self.space.from_nodal(T - base, V, flat.lever_V)[:, None]
-        branch = self._flat.branch_to(bias)
-        u = branch.read(self.circuit, np.array([bias])).u
-        state = self.polished(guess, bias, branch.parametrisation.constraint(u))
-        store_arrays(self._file(bias), {"x": state.x})
+        state = self.polished(guess, bias, branch.parametrisation.constraint(np.array([u])))
+        store_arrays(file, {"x": state.x})
         return state
-
-    def _kept(self, bias: float) -> State | None:
-        """Return the state at a bias that was solved before; None if there is none."""
-        x = stored(self._file(bias), lambda arrays: arrays["x"])
-        return None if x is None or len(x) != self.space.size + 1 else State(self, x)
-
-    def _file(self, bias: float) -> Path | None:
-        air = None if self.medium == "vacuum" else self.space.air.operator
-        facts = {
-            "probe": self.probe.sections(),
-            "nodes": self.space.elements.nodes,
-            "air": None if air is None else [air.radius_um, air.order, air.size],
-            "bias_V": bias,
-        }
-        return cache_file("states", facts)
 
     # --- what only a solid has --------------------------------------------------------------------
 

@@ -10,8 +10,8 @@ import numpy as np
 from hotlever import figures
 from hotlever.lever import Lever
 from hotlever.lever.transient import pulse, rise_times, simulate, spectrum, step, time_constants
+from hotlever.lever.transient.frequency_domain import harmonics
 from hotlever.lever.transient.modes import Source
-from hotlever.lever.transient.sinusoidal import harmonics
 from hotlever.materials.parameters import sentence
 from hotlever.report.page import Page
 from hotlever.steps import each

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError
-from hotlever.lever.transient.runge_kutta import ARK436L2SA, StepController, Stepper
+from hotlever.lever.transient.runge_kutta import StepController, Stepper
+from hotlever.lever.transient.tableau import ARK436L2SA
 
 TIMES, STAGES, EMBEDDED = ARK436L2SA.times, ARK436L2SA.stages, ARK436L2SA.embedded
 WEIGHTS = ARK436L2SA.weights

@@ -8,7 +8,7 @@ import pytest
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.transient import sine, spectrum
 from hotlever.lever.transient.cyclic import cyclic_steady_state
-from hotlever.lever.transient.sinusoidal import HARMONIC_COLUMNS, harmonics
+from hotlever.lever.transient.frequency_domain import HARMONIC_COLUMNS, harmonics
 
 
 def test_a_weak_first_harmonic_is_the_small_signal(coarse):

@@ -10,7 +10,7 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.lever.transient import simulate, sine
-from hotlever.lever.transient.small_signals import SPECTRUM_COLUMNS, spectrum
+from hotlever.lever.transient.frequency_domain import SPECTRUM_COLUMNS, spectrum
 
 
 def impedance(data):

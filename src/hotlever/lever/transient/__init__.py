@@ -1,8 +1,8 @@
 """Levers in time: wave forms, what a lever shows under them, and its time constants."""
 
+from hotlever.lever.transient.frequency_domain import spectrum
 from hotlever.lever.transient.history import history_csv, integrate, write_history
 from hotlever.lever.transient.modes import rise_times, time_constants, with_times
-from hotlever.lever.transient.small_signals import spectrum
 from hotlever.lever.transient.trains import simulate
 from hotlever.lever.transient.waveform import (
     Waveform,

@@ -11,11 +11,7 @@ import numpy as np
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.laws import Conductivities
 from hotlever.lever.lever import State
-from hotlever.lever.reduced.space import (
-    ReducedSpace,
-    empirical_cubature,
-    proper_orthogonal_modes,
-)
+from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
 from hotlever.lever.space import Space
 from hotlever.materials import Kind
 from hotlever.probe import Circuit
@@ -65,25 +61,21 @@ def space_of_modes(lever: Lever, snapshots: Array, origin: Array | None = None) 
 
     Where an origin (size + 1, 1) is given, differences from it count as much as it does itself.
     """
-    full, x = lever.space, snapshots
-    hot = full.is_temperature[:-1]
+    full, hot = lever.space, lever.space.is_temperature
     first, _ = lever.equations.cold()
-    lift = first[:-1, 0] / first[-1, 0]
-    free = (x[:-1] - np.outer(lift, x[-1])).T
-    own = None if origin is None else (origin[:-1, 0] - lift * origin[-1, 0])
-    modes: list[Array] = []
-    for rows in (hot, ~hot):
-        vectors = np.where(rows, free, 0.0)
-        if own is not None:
-            here = np.where(rows, own, 0.0)
-            away = vectors - here
-            size = np.linalg.norm(away, axis=1).max()
-            vectors = np.vstack([away / size, here / max(float(np.linalg.norm(here)), 1e-300)])
-        modes.append(proper_orthogonal_modes(vectors, least=_LEAST_MODE))
+    lift = np.where(hot[:, None], 0.0, first / first[-1])
+    vectors = snapshots
+    if origin is not None:
+        own, away = (x - lift * x[-1:] for x in (origin, snapshots - origin))
+        vectors = np.hstack([away, own])
+        for rows in (hot, ~hot):
+            size = max(float(np.linalg.norm(own[rows])), 1e-300)
+            vectors[rows, -1] /= size
+            vectors[rows, :-1] /= np.linalg.norm(away[rows], axis=0).max()
     # a lever that cools is hottest elsewhere
-    hottest = np.where(hot[:, None], x[:-1], 0.0)
+    hottest = np.where(hot[:-1, None], snapshots[:-1], 0.0)
     hottest = np.unique(np.argsort(-hottest, axis=0)[:_HOT])
-    return ReducedSpace(full, modes[0], modes[1], lift, hottest)
+    return ReducedSpace.of_snapshots(full, lift[:-1, 0], vectors, least=_LEAST_MODE, hot=hottest)
 
 
 def on_all_nodes(lever: Lever, state: State) -> State:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hotlever.air.integrals import far_pairs, potential, rectangle_pairs
+from hotlever.air.laplace import Laplace, far_pairs, potential, rectangle_pairs
 from hotlever.air.panels import Mirror, Panels, mirror_group
 from hotlever.air.single_layer import single_layer_matrix
 
@@ -87,7 +87,10 @@ def test_quadrature_and_closed_form_agree_in_the_matrix():
     tilted = Panels(panels.corners @ turn.T)
     assert (panels.frame[0] == 2).all()
     assert (tilted.frame[0] == -1).all()
-    exact, quadrature = single_layer_matrix(panels), single_layer_matrix(tilted)
+    exact, quadrature = (
+        single_layer_matrix(panels, Laplace()),
+        single_layer_matrix(tilted, Laplace()),
+    )
     assert np.abs(quadrature / exact - 1).max() < 2e-3  # six Gauss points each way
     heats = [panels.areas @ np.linalg.solve(layer, panels.areas) for layer in (exact, quadrature)]
     assert heats[1] == pytest.approx(heats[0], rel=1e-4)
@@ -104,8 +107,8 @@ def test_rectangles_turned_in_the_plane_are_still_in_one_frame(angle):
     turned = Panels(panels.corners @ turn.T)
     assert (panels.frame[0] == [2, 1, 0]).all()
     assert (turned.frame[0] >= 0).all()
-    exact = single_layer_matrix(panels)
-    np.testing.assert_allclose(single_layer_matrix(turned), exact, rtol=1e-10)
+    exact = single_layer_matrix(panels, Laplace())
+    np.testing.assert_allclose(single_layer_matrix(turned, Laplace()), exact, rtol=1e-10)
 
 
 def test_what_is_no_rectangle_has_no_frame():
@@ -126,8 +129,10 @@ def test_trapezoids_and_triangles_by_gauss_points():
         [[1.3, 0, 0], [2, 0, 0], [2, 1, 0], [2, 1, 0]],
         [[1.3, 0, 0], [2, 1, 0], [0.8, 1, 0], [0.8, 1, 0]],
     ]
-    matrix = single_layer_matrix(Panels(np.concatenate([np.array(corners), other.corners])))
-    exact = single_layer_matrix(Panels(np.concatenate([whole.corners, other.corners])))
+    matrix = single_layer_matrix(
+        Panels(np.concatenate([np.array(corners), other.corners])), Laplace()
+    )
+    exact = single_layer_matrix(Panels(np.concatenate([whole.corners, other.corners])), Laplace())
     assert matrix[:3, :3].sum() == pytest.approx(exact[0, 0], rel=1e-3)
     assert matrix[:3, 3].sum() == pytest.approx(exact[0, 1], rel=1e-4)
 

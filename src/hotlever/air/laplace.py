@@ -1,4 +1,4 @@
-"""Integrals of 1/R over flat panels, in closed form.
+"""The kernel 1/R of still air: its integrals over flat panels, in closed form.
 
 `potential` integrates over one polygon (Wilton et al., IEEE Trans. Antennas Propag. 32, 276
 (1984), doi:10.1109/TAP.1984.1143304); `rectangle_pairs` over two axis-parallel rectangles (the
@@ -12,10 +12,43 @@ from __future__ import annotations
 import numpy as np
 
 from hotlever.air.panels import Panels
-from hotlever.types import Array
+from hotlever.air.single_layer import pairs_by_points
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array, Index
 
 #: Stands for zero below a fraction whose factor vanishes there.
 _TINY = 1e-150
+#: Pairs whose centroids are this many times the sum of their radii apart are far.
+FAR = 3.0
+#: For near pairs that have no closed form, see `hotlever.air.single_layer.Orders`.
+ORDERS = ((8, 0.5), (6, 1.0), (4, 1.5), (3, 2.0), (2, np.inf))
+#: Rectangles turned by less (rad) against each other are parallel.
+_SAME_ANGLE = 2e-6
+#: Points at which potentials are found at once.
+_ROWS = 128
+
+
+class Laplace:
+    """The kernel 1/R; see `hotlever.air.single_layer.Kernel`."""
+
+    shape: tuple[int, ...] = ()
+    dtype, far = np.float64, FAR
+
+    def far_pairs(self, first: Panels, second: Panels, offsets: Array) -> Array:
+        """Return ∫∫ 1/R over distant pairs; see `far_pairs`."""
+        return far_pairs(first, second, offsets)
+
+    def near_pairs(self, first: Panels, second: Panels, i: Index, j: Index) -> Array:
+        """Return ∫∫ 1/R over pairs: closed for rectangles in one frame, else by points."""
+        (axis, angle), (other_axis, other_angle) = first.frame, second.frame
+        between = np.abs(angle[i] - other_angle[j])
+        parallel = np.minimum(between, np.pi / 2 - between) < _SAME_ANGLE
+        closed = (axis[i] >= 0) & (other_axis[j] >= 0) & parallel
+        result = np.empty(len(i))
+        result[closed] = rectangle_pairs(first.chosen(i[closed]), second.chosen(j[closed]))
+        others = first.chosen(i[~closed]), second.chosen(j[~closed])
+        result[~closed] = pairs_by_points(*others, potential, ORDERS)
+        return result
 
 
 def potential(points: Array, corners: Array) -> Array:
@@ -182,3 +215,36 @@ def far_pairs(first: Panels, second: Panels, offsets: Array) -> Array:
     correction = 0.5 * (3.0 * spread * inverse**2 - traces) * inverse**2
     expanded: Array = np.outer(first.areas, second.areas) * inverse * (1.0 + correction)
     return expanded
+
+
+@one_blas_thread
+def layer_potential(points: Array, panels: Panels, density: Array) -> Array:
+    """Return the potential of densities on panels.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        µm.
+    panels : Panels
+    density : ndarray, shape (len(panels),)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        ∫ density/(4πR).
+    """
+    result = np.empty(len(points))
+    traces = np.trace(panels.moments, axis1=1, axis2=2)
+    for start in range(0, len(points), _ROWS):
+        some = points[start : start + _ROWS]
+        offsets = some[:, None] - panels.centres
+        square = np.einsum("nmd,nmd->nm", offsets, offsets)
+        near = square < (FAR * panels.radii) ** 2
+        inverse = 1.0 / np.sqrt(np.where(near, np.inf, square))
+        spread = np.einsum("nmd,mde,nme->nm", offsets, panels.moments, offsets, optimize=True)
+        integrals = inverse + 0.5 * inverse**3 * (3.0 * spread * inverse**2 - traces)
+        integrals *= panels.areas
+        i, j = np.nonzero(near)
+        integrals[i, j] = potential(some[i], panels.corners[j])
+        result[start : start + len(some)] = integrals @ density
+    return result / (4.0 * np.pi)

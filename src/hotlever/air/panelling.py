@@ -1,4 +1,4 @@
-"""A plane outline of any shape cut into flat panels: strips along its edges, pieces inside.
+"""The panelling of a plane outline of any shape: strips along its edges, pieces inside.
 
 Strips lie between curves at fixed depths below the exposed edges. Cuts from corner to corner of
 these curves make faces of them, one or two to an edge, and each face is divided along its longest
@@ -41,7 +41,7 @@ _IN_LINE = 1e-6
 _SAMPLES = 129
 
 
-def cover(shape: Polygon, exposed: BaseGeometry, depths: Array, size: Size) -> Array:
+def panelled(shape: Polygon, exposed: BaseGeometry, depths: Array, size: Size) -> Array:
     """Cut a polygon into convex panels.
 
     Parameters
