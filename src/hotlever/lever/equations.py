@@ -23,6 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from hotlever.lever.laws import GAS, LawsAtPoints, square
+from hotlever.lever.newton import refined
 from hotlever.lever.space import (
     LEVER,
     TIP,
@@ -40,8 +41,8 @@ SHOWN = ("lever_V", "current_mA", "reader_V")
 #: Parameters that are of no law: one moves all temperatures, the other is of the air.
 BASE, GAP = "base_temperature_K", "surface_gap_um"
 
-#: Error (relative) to which derivatives are solved, and the most rounds of refinement.
-_EXACT, _MOST_ROUNDS = 1e-6, 6
+#: Error (relative) to which derivatives are solved.
+_EXACT = 1e-6
 
 
 class LeverEquations(LawsAtPoints):
@@ -168,18 +169,16 @@ class LeverEquations(LawsAtPoints):
         `flux_changes`.
         """
         states = np.arange(x.shape[1])
+
+        def missing(change: Array) -> Array:
+            left = right_hand_side - self.balance_change(x, change)
+            left[-1] = right_hand_side[-1] - constraint.of(self.space, change)
+            return left
+
         scale = self.scale.reshape(-1, *(1,) * (right_hand_side.ndim - 1))
-        change = factors.solve(right_hand_side, states)
-        for _ in range(_MOST_ROUNDS):
-            rest = right_hand_side - self.balance_change(x, change)
-            rest[-1] = right_hand_side[-1] - constraint.of(self.space, change)
-            correction = factors.solve(rest, states)
-            change = change + correction
-            ratio = _length(correction / scale) / _length(change / scale)
-            # the next correction would be smaller by the same ratio once more
-            if not np.any(ratio**2 > _EXACT):
-                break
-        return change
+        return refined(
+            lambda right: factors.solve(right, states), missing, right_hand_side, scale, _EXACT
+        )
 
     def along(self, x: Array, factors: Factors, constraint: Constraint = TIP) -> Array:
         """Return the derivative of states by the tip temperature (K) or another constraint."""
@@ -249,11 +248,6 @@ class LeverEquations(LawsAtPoints):
             # the nodes of a contact share one unknown
             np.add.at(gradient[..., 2], unknowns, weights[:, None])
         return gradient
-
-
-def _length(columns: Array) -> Array:
-    """Return the largest entry of each column; never zero."""
-    return np.maximum(np.abs(columns).max(axis=0), 1e-300)
 
 
 def steps_of(equations: LeverEquations) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,6 +11,9 @@ import numpy as np
 from hotlever.errors import NewtonError
 from hotlever.lever.space import Factors
 from hotlever.types import Array, Index
+
+#: Rounds of iterative refinement, at most.
+_MOST_ROUNDS = 12
 
 
 @dataclass(frozen=True)
@@ -113,3 +117,36 @@ def find_roots(
 
 def _length(columns: Array) -> Array:
     return np.asarray(np.abs(columns).max(axis=0))
+
+
+def refined(
+    solve: Callable[[Array], Array],
+    missing: Callable[[Array], Array],
+    right_hand_side: Array,
+    scale: Array,
+    accuracy: float,
+) -> Array:
+    """Solve a linear system with factors of one nearby; what they lack is removed by refinement.
+
+    Parameters
+    ----------
+    solve : callable
+        Solves with the factors.
+    missing : callable
+        Returns the right-hand side less the system's own matrix times a solution.
+    right_hand_side : ndarray, shape (unknowns, ...)
+    scale : ndarray, shape (unknowns, ...)
+        Size of one unit of each unknown.
+    accuracy : float
+        Relative, of the largest entry of each column.
+    """
+    solution = solve(right_hand_side)
+    for _ in range(_MOST_ROUNDS):
+        correction = solve(missing(solution))
+        solution = solution + correction
+        sizes = (np.abs(some / scale).max(axis=0) for some in (correction, solution))
+        ratio = np.divide(*(np.maximum(size, 1e-300) for size in sizes))
+        # the next correction would be smaller by the same ratio once more
+        if not np.any(ratio**2 > accuracy):
+            break
+    return solution

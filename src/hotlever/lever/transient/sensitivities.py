@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from hotlever.datasets import OBSERVABLES, labelled
 from hotlever.errors import HistoryEndError, InputError, unknown_name
 from hotlever.lever.dataset import probe_attributes
+from hotlever.lever.newton import refined
 from hotlever.lever.transient.history import checked_times, time_steps
 from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import INSTANT_RATE, METHOD, LinearSolver, Step
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
 #: Parameters that move a mesh, an air operator or all temperatures: their derivatives in time are
 #: not known.
 _UNKNOWN = ("base_temperature_K", "surface_gap_um")
-#: Error (relative) to which derivatives are solved with factors of a state nearby, and rounds.
-_EXACT, _MOST_ROUNDS = 1e-8, 12
+#: Error (relative) to which derivatives are solved.
+_EXACT = 1e-8
 
 
 def derivable(probe: Probe, name: str) -> bool:
@@ -185,16 +186,14 @@ class _Along:
     def _solved(
         self, problem: TransientProblem, x: Array, right: Array, rate: float, factors: LinearSolver
     ) -> Array:
-        """Solve with factors of a state nearby; what they lack is removed by refinement."""
-        scale = problem.scale[..., None]
-        changes = factors.solve(right)
-        for _ in range(_MOST_ROUNDS):
-            correction = factors.solve(right - problem.change(x, changes, rate))
-            changes = changes + correction
-            size = np.abs(changes / scale).max(axis=(0, 1))
-            if (np.abs(correction / scale).max(axis=(0, 1)) <= _EXACT * size).all():
-                break
-        return changes
+        """Solve with factors of a state nearby."""
+        return refined(
+            factors.solve,
+            lambda changes: right - problem.change(x, changes, rate),
+            right,
+            problem.scale[..., None],
+            _EXACT,
+        )
 
     # --- what is seen -----------------------------------------------------------------------------
 
