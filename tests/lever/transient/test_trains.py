@@ -66,6 +66,14 @@ def test_what_melts_or_is_short_is_followed_in_full(coarse):
     assert not simulate(coarse, pulse(9.0, 4.0, 20.0, 30), at=[4.0]).attrs["notes"]
 
 
+@pytest.mark.slow
+def test_a_train_from_a_warm_lever_is_not_that_of_a_cold_one(coarse):
+    (warm,) = coarse.solve([5.0])
+    found = simulate(coarse, TRAIN, at=[0.0, 400.0], start=warm)
+    assert found.tip_K.values[0] == pytest.approx(warm.tip_K)
+    assert "modes" not in found.attrs["notes"]
+
+
 def test_laws_that_are_looked_up_are_the_laws(coarse):
     snapshots = []
     integrate(coarse, step(8.0), 50.0, callback=lambda t, state: snapshots.append(state.x))

@@ -89,26 +89,26 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
     tip = np.zeros_like(x)
     unknowns, weights = equations.space.tip
     tip[unknowns, 0] = weights
-    answers, tests, one = [], [], np.arange(1)
+    answers, tests, single = [], [], np.arange(1)
     for rate in _RATES:
         factors = equations.factorised(x, LEVER, float(rate))
-        answers.append(factors.solve(unit, one))
-        answers.append(factors.solve(equations.storage_change(x, answers[-1]), one))
-        tests += [factors.solve(column, one, transposed=True) for column in (current, tip)]
+        answers.append(factors.solve(unit, single))
+        answers.append(factors.solve(equations.storage_change(x, answers[-1]), single))
+        tests += [factors.solve(column, single, transposed=True) for column in (current, tip)]
     trial, test = (np.linalg.qr(np.hstack(columns))[0] for columns in (answers, tests))
     many = np.repeat(x, trial.shape[1], axis=1)
-    rest = equations.balance_change(many, trial)
-    rest[-1] = trial[-1]
+    residual = equations.balance_change(many, trial)
+    residual[-1] = trial[-1]
     moving = test.T @ equations.storage_change(many, trial)
     turns = 2e-6j * np.pi * frequency
-    system = turns[:, None, None] * moving + test.T @ rest
+    system = turns[:, None, None] * moving + test.T @ residual
     air = equations.heat_in_air
     before, after = test.T @ air.coordinates.T, air.coordinates @ trial
     system = system + np.array([before @ air.taken_up(turn) @ after for turn in turns])
     right = np.broadcast_to(test.T @ unit, (frequency.size, trial.shape[1], 1))
     # rational Krylov spaces are nearly dependent: least squares instead of elimination
     shares = np.stack(
-        [np.linalg.lstsq(one, by, rcond=1e-13)[0] for one, by in zip(system, right, strict=True)]
+        [np.linalg.lstsq(a, b, rcond=1e-13)[0] for a, b in zip(system, right, strict=True)]
     )[..., 0]
     scale = shares @ trial[-1]
     by_V = {
@@ -208,16 +208,16 @@ def harmonics(
     equations = LeverEquations(space, lever.probe.kinds, lever.circuit)
     start = space.coordinates(rest.x)
     balance = HarmonicBalance(equations, lever.circuit, start, offset_V, amplitude_V)
-    found = []
-    for done, one in enumerate(frequency.tolist(), start=1):
-        found.append(balance.solved(one))
+    answers = []
+    for done, hertz in enumerate(frequency.tolist(), start=1):
+        answers.append(balance.solved(hertz))
         if progress is not None:
             progress(done, frequency.size)
-    lever_V, mean = np.array([one[0] for one in found]), [one[1] for one in found]
+    lever_V, mean = np.array([volts for volts, _ in answers]), [kelvin for _, kelvin in answers]
     columns: dict[str, ArrayLike] = {"frequency_Hz": frequency, "mean_tip_K": mean}
-    for place, name in enumerate(HARMONICS):
-        columns[f"{name}_harmonic_V"] = np.abs(lever_V[:, place])
-        columns[f"{name}_harmonic_deg"] = np.degrees(np.unwrap(np.angle(lever_V[:, place])))
+    for number, name in enumerate(HARMONICS):
+        columns[f"{name}_harmonic_V"] = np.abs(lever_V[:, number])
+        columns[f"{name}_harmonic_deg"] = np.degrees(np.unwrap(np.angle(lever_V[:, number])))
     shown = {"bias_V": offset_V, "amplitude_V": amplitude_V}
     return labelled(columns, "frequency", {"frequency": frequency}, **shown)
 
@@ -300,22 +300,22 @@ class HarmonicBalance:
         """Return the inverses of the equations linearised about a state, for each harmonic."""
         unit = np.eye(len(x))
         many = np.repeat(x, len(x), axis=1)
-        rest = self._equations.balance_change(many, unit)
-        rest[-1] = self._circuit.bias(unit[-1], rest[-1])
+        residual = self._equations.balance_change(many, unit)
+        residual[-1] = self._circuit.bias(unit[-1], residual[-1])
         moving = self._equations.storage_change(many, unit)
-        return np.linalg.inv(turns[:, None, None] * moving + rest + of_air)
+        return np.linalg.inv(turns[:, None, None] * moving + residual + of_air)
 
 
-def _steps(lever: Lever, rest: State, amplitude: float) -> Array:
+def _steps(lever: Lever, start: State, amplitude: float) -> Array:
     """Return states of a lever at rest whose bias is stepped up, and down."""
-    until = _SETTLED * abs(float(slowest_modes(rest)[0][0]))
-    states = [rest.x]
-    for bias in (rest.bias_V + amplitude, rest.bias_V - amplitude):
+    until = _SETTLED * abs(float(slowest_modes(start)[0][0]))
+    states = [start.x]
+    for bias in (start.bias_V + amplitude, start.bias_V - amplitude):
         integrate(
             lever,
             step(bias),
             until,
-            start=rest,
+            start=start,
             tolerance_K=1e-2,
             per_step=2,
             callback=lambda t, state: states.append(state.x),

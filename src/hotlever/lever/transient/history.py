@@ -254,8 +254,8 @@ def _melts(step: Step, values: Array, slopes: Array, limit_K: float) -> float | 
         return None
 
     def above(t: float) -> float:
-        found = hermite(step.start, step.end, values[row], slopes[row], t)
-        return float(found[0]) - limit_K
+        (highest_K,) = hermite(step.start, step.end, values[row], slopes[row], t)
+        return float(highest_K) - limit_K
 
     return float(brentq(above, step.start, step.end)) if above(step.start) < 0 else step.start
 

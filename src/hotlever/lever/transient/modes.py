@@ -87,14 +87,14 @@ def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tupl
     constants, changes = _modes(equations, x, factors, count)
     if not (air := equations.heat_in_air).size:
         return constants, changes
-    for place in range(count):
+    for mode in range(count):
         # what goes along with the lever depends on how fast it goes
         for _ in range(_MOST_ROUNDS):
-            rate, last = 1.0 / abs(constants[place]), constants[place]
+            rate, last = 1.0 / abs(constants[mode]), constants[mode]
             bound = air.bound(rate) if last > 0.0 else air.taken_up(rate) / rate
-            found, moved = _modes(equations, x, factors, count, air.coordinates, bound)
-            constants[place], changes[:, place] = found[place], moved[:, place]
-            if abs(constants[place] / last - 1.0) < _STEADY:
+            times, moved = _modes(equations, x, factors, count, air.coordinates, bound)
+            constants[mode], changes[:, mode] = times[mode], moved[:, mode]
+            if abs(constants[mode] / last - 1.0) < _STEADY:
                 break
     return constants, changes
 
@@ -150,10 +150,10 @@ def time_constants(
     [21.0, 72.0]
     """
     states = lever.solve(bias)
-    found = np.array([slowest_modes(state, source, count)[0] for state in states])
+    constants = np.array([slowest_modes(state, source, count)[0] for state in states])
     return labelled(
         {
-            "time_constant_us": (("bias", "mode"), found),
+            "time_constant_us": (("bias", "mode"), constants),
             "tip_K": [state.tip_K for state in states],
         },
         coordinates={"bias": np.atleast_1d(bias), "mode": np.arange(1, count + 1)},
@@ -183,19 +183,19 @@ def with_times(
         ``heating_us`` and ``cooling_us``: from 10 to 90 % of the way from the colder of its ends to
         its hottest tip, NaN where there is no such time.
     """
-    found: dict[str, Any] = {}
+    attributes: dict[str, Any] = {}
     if resolved and history.time.size > 1:
         time, tip = history.time.values, history.tip_K.values
         low, high = min(tip[0], tip[-1]), tip.max()
-        found["tip_highest_K"], found["tip_highest_at_us"] = high, time[tip.argmax()]
-        found["tip_mean_K"] = np.trapezoid(tip, time) / (time[-1] - time[0])
-        found["heating_us"], found["cooling_us"] = (
+        attributes["tip_highest_K"], attributes["tip_highest_at_us"] = high, time[tip.argmax()]
+        attributes["tip_mean_K"] = np.trapezoid(tip, time) / (time[-1] - time[0])
+        attributes["heating_us"], attributes["cooling_us"] = (
             _swing(time, (tip - low) / (high - low)) if high > low else (np.nan, np.nan)
         )
     for name, state in (("start", start), ("end", end)):
         with suppress(ComputationError):  # none are known, such as where silicon melts
-            found[f"time_constants_us_at_{name}"] = slowest_modes(state)[0]
-    return history.assign_attrs(found)
+            attributes[f"time_constants_us_at_{name}"] = slowest_modes(state)[0]
+    return history.assign_attrs(attributes)
 
 
 def _swing(time: Array, share: Array) -> tuple[float, float]:
@@ -235,7 +235,7 @@ def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
     """
     states = lever.solve(bias)
     base, columns = lever.circuit.base_temperature_K, np.empty((3, len(states)))
-    for place, state in enumerate(states):
+    for row, state in enumerate(states):
         until = 20.0 * float(slowest_modes(state)[0][0])
         rise = state.tip_K - base
 
@@ -245,7 +245,7 @@ def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
 
         heating, _ = _swing(*shares(step(state.bias_V)))
         _, cooling = _swing(*shares(switched_off(state.bias_V)))
-        columns[:, place] = state.tip_K, heating, cooling
+        columns[:, row] = state.tip_K, heating, cooling
     names = ("tip_K", "heating_us", "cooling_us")
     return labelled(
         dict(zip(names, columns, strict=True)), coordinates={"bias": np.atleast_1d(bias)}

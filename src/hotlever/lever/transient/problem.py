@@ -136,26 +136,28 @@ class TransientProblem:
     def residual_change(self, x: Array, changes: Array) -> Array:
         """Return how `residual` changes with the unknowns (rows, 1, k), to first order."""
         (lever, _), (moved, in_air) = self.parts(x), self.parts(changes)
-        rest = self.equations.balance_change(lever, moved)
-        rest[-1] = self._circuit.bias(moved[-1], rest[-1])
+        residual = self.equations.balance_change(lever, moved)
+        residual[-1] = self._circuit.bias(moved[-1], residual[-1])
         lag = self._air.rates * (in_air[:, 0] - self._air.follows(moved[:, 0]))
-        return np.concatenate([rest, lag[:, None]])
+        return np.concatenate([residual, lag[:, None]])
 
     def by_parameter(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
         """Return how `storage` and `residual` change with parameters, each (rows, 1, k)."""
         lever, in_air = self.parts(x)
         stored = self.equations.storage_by_parameter(lever, names)
-        rest = self.equations.by_parameter(lever, names)
+        residual = self.equations.by_parameter(lever, names)
         current = self.equations.balance(lever)[-1]
-        for place, name in enumerate(names):
-            by = rest[-1, :, place]
-            rest[-1, :, place] = self._circuit.bias(0.0, by) + self._circuit.bias_by(name, current)
+        for column, name in enumerate(names):
+            by = residual[-1, :, column]
+            residual[-1, :, column] = self._circuit.bias(0.0, by) + self._circuit.bias_by(
+                name, current
+            )
         lag = np.zeros((len(in_air), 1, len(names)))
-        for place in (place for place, name in enumerate(names) if name == GAS):
+        for column in (column for column, name in enumerate(names) if name == GAS):
             # stores in a gas that conducts better follow faster
             away = self._air.rates * (in_air - self._air.follows(lever))
-            lag[..., place] = away / self.equations.space.air.gas_conductivity
-        return np.concatenate([stored, np.zeros_like(lag)]), np.concatenate([rest, lag])
+            lag[..., column] = away / self.equations.space.air.gas_conductivity
+        return np.concatenate([stored, np.zeros_like(lag)]), np.concatenate([residual, lag])
 
     def factorised(self, x: Array, rate: float) -> InCircuit | WithStores:
         """Return the factorised Jacobian of ``rate × storage + residual``."""

@@ -113,9 +113,9 @@ class TabulatedEquations(LeverEquations):
     def _look_up(self, T: Array) -> tuple[Array, Array]:
         """Return κ, σ and the heat (3, points, n), and their slopes."""
         if self._found is None or self._found[0] is not T:
-            place = (T - _COLDEST) * (1.0 / _PIECE)
-            piece = place.clip(0.0, self._last).astype(np.intp)
-            off = place - piece
+            position = (T - _COLDEST) * (1.0 / _PIECE)
+            piece = position.clip(0.0, self._last).astype(np.intp)
+            off = position - piece
             rows = self._table.take(self._first + piece, axis=0)
             # arrays without gaps are twice as fast
             value, slope, curvature = rows.transpose(2, 3, 0, 1).copy()
@@ -154,13 +154,13 @@ def _integrands(lever: Lever, space: ReducedSpace, x: Array) -> Iterator[Array]:
     power = float(np.max(-fluxes.heat_source.T @ weights))
     heat, volt = float(np.max(stored.T @ weights)), float(np.abs(x[-1]).max())
     ends = full.end_test
-    for place in range(x.shape[1]):
-        source, flux = fluxes.heat_source[:, place], fluxes.heat[..., place]
-        held = stored[:, place] / heat
+    for state in range(x.shape[1]):
+        source, flux = fluxes.heat_source[:, state], fluxes.heat[..., state]
+        held = stored[:, state] / heat
         yield T[0].T * (source / power)
         yield np.einsum("dqm,dq->mq", T[1:], flux / power)
         yield T[0].T * held
-        yield np.einsum("dqm,dq->mq", V, fluxes.charge[..., place] * (volt / power))
+        yield np.einsum("dqm,dq->mq", V, fluxes.charge[..., state] * (volt / power))
         # what the heat balance is told by
         at_ends = source * ends[0] + np.einsum("dq,dq->q", ends[1:], flux)
         yield np.stack([held, held * ends[0], at_ends / power])

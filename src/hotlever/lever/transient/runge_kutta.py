@@ -206,7 +206,7 @@ class Stepper:
         speed = max(self._problem.norm(here.slope), 1e-300)
         self.length = first or CONTROLLER.first * self._tolerance / speed
         while here.t < end:
-            stop = min((one for one in stops if here.t < one < end), default=end)
+            stop = min((time for time in stops if here.t < time < end), default=end)
             then = _next(here.t, min(self.length, longest), stop)
             try:
                 step, there, error = self._step(here, then)
@@ -243,12 +243,14 @@ class Stepper:
         states[:, :1], flows[:, :1] = here.x, here.flow
         for stage in range(1, len(METHOD.times)):
             before, now = slice(stage), slice(stage, stage + 1)
-            known = here.stored + flows[:, before] @ (length * METHOD.stages[stage, before, None])
+            explicit = here.stored + flows[:, before] @ (
+                length * METHOD.stages[stage, before, None]
+            )
             guess = states[:, before] @ by_stage[stage, before, None]
             guess += length * by_slope[stage] * here.slope
             t = here.t + METHOD.times[stage] * length
-            root = self._root(t, guess, known, rate, root, self._newton[stage])
-            states[:, now], flows[:, now] = root.x, rate * (root.stored - known)
+            root = self._root(t, guess, explicit, rate, root, self._newton[stage])
+            states[:, now], flows[:, now] = root.x, rate * (root.stored - explicit)
         assert root is not None
         slope = METHOD.end_slope(states, here.slope[:, 0], length)[:, None]
         monitored = np.column_stack([here.monitored, problem.monitored(states[:, 1:])])
@@ -276,12 +278,12 @@ class Stepper:
         self,
         t: float,
         x: Array,
-        known: Array,
+        explicit: Array,
         rate: float,
         near: _Root | None,
         tolerance: float,
     ) -> _Root:
-        """Solve ``rate × (stored - known) + rest = 0`` near `x`, by Newton's method.
+        """Solve ``rate × (stored - explicit) + residual = 0`` near `x`, by Newton's method.
 
         What is left after a correction is taken to be a share of it: that which it is of the one
         before, and at first the largest that it was with the same factors, those of a root nearby.
@@ -297,7 +299,7 @@ class Stepper:
         factors, most = (None, _LEFT) if near is None else (near.factors, near.left)
         for _ in range(_MOST_CORRECTIONS):
             stored = problem.storage(x)
-            residual = problem.residual(t, x) + rate * (stored - known)
+            residual = problem.residual(t, x) + rate * (stored - explicit)
             if factors is None:
                 factors = problem.factorised(x, rate)
             change = -factors.solve(residual)

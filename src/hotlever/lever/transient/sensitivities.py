@@ -91,10 +91,10 @@ def with_sensitivities(
         raise InputError(f"found a wave form that begins at {waveform.before_V:g} V, expected 0 V")
     if not names:
         raise InputError("found no parameter, expected one by which there are derivatives")
-    known = parameters_of(lever.probe, anywhere=True)
+    declared = parameters_of(lever.probe, anywhere=True)
     for name in names:
-        if name not in known:
-            raise unknown_name("parameter", name, known)
+        if name not in declared:
+            raise unknown_name("parameter", name, declared)
         if not derivable(lever.probe, name):
             raise InputError(
                 f"no derivatives in time by {name} are known, expected parameters of materials, "
@@ -160,11 +160,11 @@ class _Along:
 
     def _settle(self, problem: TransientProblem, x: Array) -> None:
         """Fulfil the algebraic rows, nothing that is stored being changed."""
-        stored, rest = problem.by_parameter(x, self._names)
-        known = INSTANT_RATE * (self._stored - stored) - rest
+        stored, residual = problem.by_parameter(x, self._names)
+        explicit = INSTANT_RATE * (self._stored - stored) - residual
         factors = problem.factorised(x, INSTANT_RATE)
-        self._changes = self._solved(problem, x, known, INSTANT_RATE, factors)
-        self._flow = -problem.change(x, self._changes, 0.0) - rest
+        self._changes = self._solved(problem, x, explicit, INSTANT_RATE, factors)
+        self._flow = -problem.change(x, self._changes, 0.0) - residual
         self._stored = problem.storage_change(x, self._changes) + stored
 
     def _over(self, problem: TransientProblem, step: Step) -> None:
@@ -175,12 +175,12 @@ class _Along:
         changes = self._changes
         for stage in range(1, len(METHOD.times)):
             x = step.stages[:, [stage]]
-            known = begin + length * np.tensordot(METHOD.stages[stage, :stage], flows, axes=1)
+            explicit = begin + length * np.tensordot(METHOD.stages[stage, :stage], flows, axes=1)
             by_stored, by_rest = problem.by_parameter(x, self._names)
-            right = rate * (known - by_stored) - by_rest
+            right = rate * (explicit - by_stored) - by_rest
             changes = self._solved(problem, x, right, rate, step.factors)
             stored = problem.storage_change(x, changes) + by_stored
-            flows.append(rate * (stored - known))
+            flows.append(rate * (stored - explicit))
         self._changes, self._stored, self._flow = changes, stored, flows[-1]
 
     def _solved(

@@ -50,9 +50,9 @@ class Tableau:
         so at any rate; what changes steadily is met exactly. Stages are of order two, and a
         polynomial through them would be a hundred times as far off.
         """
-        count, one = len(self.times), np.ones((len(self.times), 1))
+        count, ones = len(self.times), np.ones((len(self.times), 1))
         z = -np.linspace(0.0, _FASTEST, 200)
-        values = np.linalg.solve(np.eye(count) - z[:, None, None] * self.stages, one)[..., 0]
+        values = np.linalg.solve(np.eye(count) - z[:, None, None] * self.stages, ones)[..., 0]
         # what decays fast has mostly done so when steps become long
         counted = np.exp(z) / (0.1 - z)
         constant, straight = np.append(np.ones(count), 0.0), np.append(self.times, 1.0)
@@ -60,8 +60,8 @@ class Tableau:
         rows = np.vstack([modes, _EXACTLY * constant, _EXACTLY * straight])
         weights = np.zeros((count, count + 1))
         for stage in range(1, count):
-            known = [*range(stage), count]
-            weights[stage, known] = np.linalg.lstsq(rows[:, known], rows[:, stage])[0]
+            earlier = [*range(stage), count]
+            weights[stage, earlier] = np.linalg.lstsq(rows[:, earlier], rows[:, stage])[0]
         return weights[:, :-1], weights[:, -1]
 
     @cached_property

@@ -54,6 +54,7 @@ def simulate(
     at: ArrayLike | None = None,
     *,
     tolerance_K: float = 0.1,
+    start: State | None = None,
     callback: Callback | None = None,
     **options: Any,
 ) -> xr.Dataset:
@@ -74,13 +75,14 @@ def simulate(
     if at is not None and until is None:
         end = float(checked_times(at)[-1])
     often = waveform.count >= FEWEST and end < np.inf
-    # modes are of levers that only the swept supply drives
-    if period is not None and often and FEWEST * period <= end and not lever.space.wired:
+    # modes are of levers that only the swept supply drives, from cold
+    cold = start is None and not lever.space.wired
+    if period is not None and often and FEWEST * period <= end and cold:
         try:
             return _on_modes(lever, waveform, period, end, at, tolerance_K, callback, **options)
         except ComputationError:
             pass  # it melts, or is like no train that modes are good for
-    options |= {"tolerance_K": tolerance_K, "callback": callback}
+    options |= {"tolerance_K": tolerance_K, "start": start, "callback": callback}
     return integrate(lever, waveform, until, at, **options)
 
 

@@ -90,14 +90,14 @@ class Waveform(ABC):
 
     def bias(self, times: Array) -> Array:
         """Return the bias (V) at times (µs, rising); where it jumps that before, but at 0."""
-        found = np.full(times.shape, self.before_V)
+        volts = np.full(times.shape, self.before_V)
         for piece in self.pieces(math.inf):
             if piece.start > times[-1]:
                 break
             behind = times > piece.start if piece.start > 0.0 else times >= 0.0
             here = behind & (times <= piece.end)
-            found[here] = [piece.bias(t) for t in times[here].tolist()]
-        return found
+            volts[here] = [piece.bias(t) for t in times[here].tolist()]
+        return volts
 
 
 @dataclass(frozen=True)
@@ -261,16 +261,16 @@ def read_waveform(path: str | os.PathLike[str]) -> Waveform:
     table = read_table(path, expected)
     headings = [name_and_unit(heading) for heading in table.names]
     columns = []
-    for known, inside, what in ((_TIME, "us", "time"), (_BIAS, "V", "bias")):
-        place = next((k for k, (name, _) in enumerate(headings) if known.fullmatch(name)), None)
-        if place is None:
-            found = shown(",".join(table.names))
+    for pattern, inside, what in ((_TIME, "us", "time"), (_BIAS, "V", "bias")):
+        column = next((k for k, (name, _) in enumerate(headings) if pattern.fullmatch(name)), None)
+        if column is None:
+            header = shown(",".join(table.names))
             raise InputError(
-                f"{table.where(-1)}: no {what} column in '{found}', expected {expected}"
+                f"{table.where(-1)}: no {what} column in '{header}', expected {expected}"
             )
         where = f"{table.where(-1)}: unit of the {what}"
-        unit = headings[place][1] or ""
-        columns.append(setting(f"1{unit}", inside, where) * table.numbers(place, what))
+        unit = headings[column][1] or ""
+        columns.append(setting(f"1{unit}", inside, where) * table.numbers(column, what))
     times, volts = columns
     times = times - times[0]
     for wrong, meant in (
