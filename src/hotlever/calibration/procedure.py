@@ -96,7 +96,7 @@ def calibrate(
     whole = given_measurement(measurement, origin.circuit)
     measured = averaged(whole, robust=True)
     measured.need_rest("a calibration")
-    more = note_on_averages(whole, measured)
+    notes = note_on_averages(whole, measured)
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
         if samples:
             raise InputError("the paper's rule has no posterior; expected a probe or a fit")
@@ -107,16 +107,16 @@ def calibrate(
             )
         # a power law holds for vacuum, whatever the lever is in
         anywhere = measured if law is None else replace(measured, medium=None)
-        probe, notes = with_measured_circuit(origin, anywhere, "vacuum")
+        probe, of_circuit = with_measured_circuit(origin, anywhere, "vacuum")
         probe.circuit.need_cold_start("a power law")
         result = calibrated_by_knee(measured, probe, law, route)
-        return replace(result, notes=[*notes, *more, *result.notes])
+        return replace(result, notes=[*of_circuit, *notes, *result.notes])
     if pulse is not None:
         origin.circuit.need_cold_start("a calibration for pulses")
 
     def within(medium: str | None) -> tuple[Estimate, Calibration]:
         """Calibrate the lever in a medium."""
-        probe, notes = with_measured_circuit(origin, measured, medium)
+        probe, of_circuit = with_measured_circuit(origin, measured, medium)
         causes = Diagnosis(measured, probe, priors)
         check_plausible(measured, probe, causes, known_beforehand(probe, priors))
         try:
@@ -127,16 +127,15 @@ def calibrate(
         if result.reason and result.converged:
             cause = causes.named(fit is not None)
             result = replace(result, reason=f"{result.reason}; {cause}")
-        return estimate, replace(result, notes=list(dict.fromkeys([*notes, *result.notes])))
+        return estimate, replace(result, notes=list(dict.fromkeys([*of_circuit, *result.notes])))
 
     estimate, result = in_medium(medium, within, _in_either)
-    result = replace(result, notes=[*more, *result.notes])
-    if pulse is None:
-        return result
-    if not result.describes_data:
-        said = "the pulse was not followed, since it would be that of another lever"
-        return replace(result, notes=[*result.notes, said])
-    return replace(result, pulse=pulse_calibration(estimate, pulse, progress))
+    notes += result.notes
+    if pulse is not None and result.describes_data:
+        result = replace(result, pulse=pulse_calibration(estimate, pulse, progress))
+    elif pulse is not None:
+        notes.append("the pulse was not followed, since it would be that of another lever")
+    return replace(result, notes=notes)
 
 
 def _in_either(result: Calibration, other: Calibration) -> Calibration:
