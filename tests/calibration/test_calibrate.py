@@ -88,8 +88,8 @@ def test_the_knee_is_that_of_the_estimated_lever(calibrated, reference):
 
 def test_the_budget_adds_up_and_every_source_counts(calibrated):
     budget = calibrated.table.budget_K
-    known = {"measurement", "electronics", "base temperature", "geometry", "material", "model"}
-    assert set(budget.source.values) == known
+    sources = {"measurement", "electronics", "base temperature", "geometry", "material", "model"}
+    assert set(budget.source.values) == sources
     together = np.sqrt((budget**2).sum("source"))
     np.testing.assert_allclose(calibrated.table.tip_stderr_K, together)
     assert (budget.max("bias") > 0.1).all()
@@ -99,8 +99,8 @@ def test_the_budget_adds_up_and_every_source_counts(calibrated):
 
 
 def test_priors_say_what_was_known_and_what_the_data_made_of_it(calibrated):
-    known = default_priors(Probe.reference())
-    assert set(calibrated.priors) == {*known, "current_scale"}
+    priors = default_priors(Probe.reference())
+    assert set(calibrated.priors) == {*priors, "current_scale"}
     use = calibrated.priors["n_d"]
     assert (use.value, use.spread) == (5.75e17, pytest.approx(0.15 * 5.75e17))
     assert use.posterior_spread < use.spread
@@ -135,22 +135,22 @@ def test_another_lever_is_within_a_few_stated_errors(shape):
     )
     lever = Lever(true)
     data = measurement_of(measured_curve(lever.branch(), rng))
-    found = calibrate(data, probe=nominal)
-    error = np.abs(found.table.tip_K - lever.sweep(found.table.bias_V.values).tip_K)
-    assert float((error / found.table.tip_stderr_K).max()) < 3.0
+    calibration = calibrate(data, probe=nominal)
+    error = np.abs(calibration.table.tip_K - lever.sweep(calibration.table.bias_V.values).tip_K)
+    assert float((error / calibration.table.tip_stderr_K).max()) < 3.0
     assert float(error.max()) < 40.0
 
 
 def test_no_knee_is_needed(reference):
     """Below it the band is as narrow as ever, and nothing is said of what is above."""
     curve = measured_curve(reference, np.random.default_rng(2), to_V=7.0)
-    found = calibrate(measurement_of(curve))
-    table = found.table
+    calibration = calibrate(measurement_of(curve))
+    table = calibration.table
     error = np.abs(table.tip_K - reference.tip_temperature(table.power_mW))
     assert np.all(error < 4 * table.tip_stderr_K + 0.2)
     assert table.bias_V.max() == pytest.approx(7.0, abs=0.02)
-    assert abs(found.knee.power_mW - reference.knee.power_mW) < 0.1
-    assert not found.content()["knee"]["measured"]
+    assert abs(calibration.knee.power_mW - reference.knee.power_mW) < 0.1
+    assert not calibration.content()["knee"]["measured"]
 
 
 def test_a_power_law_is_used_by_the_paper_s_rule(calibrated, lever_3):
@@ -221,8 +221,8 @@ def test_too_few_posterior_samples_of_a_usual_lever_leave_its_limits(calibrated)
     assert any("too few posterior samples" in note for note in sampled.notes)
     np.testing.assert_allclose(sampled.table.tip_K, calibrated.table.tip_K, atol=0.01)
     for name in ("tip_low_K", "tip_high_K"):
-        found, usual = (one.table[name] - one.table.tip_K for one in (sampled, calibrated))
-        np.testing.assert_allclose(found, usual)
+        limits, usual = (each.table[name] - each.table.tip_K for each in (sampled, calibrated))
+        np.testing.assert_allclose(limits, usual)
 
 
 def test_a_scaled_model_is_the_paper_s_rule(reference):
@@ -248,8 +248,8 @@ def test_a_calibration_file_is_read_back_whole(calibrated, tmp_path):
 
 def test_a_fit_as_object_or_file_and_data_as_object_or_file_are_one(shared_fit, example):
     by_path = calibrate(example, fit=shared_fit)
-    one = read_fit(shared_fit)
-    by_object = calibrate(one.measurement, fit=one)
+    fitted = read_fit(shared_fit)
+    by_object = calibrate(fitted.measurement, fit=fitted)
     np.testing.assert_allclose(by_path.table.tip_K, by_object.table.tip_K)
 
 
@@ -294,8 +294,8 @@ def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
     content = json.loads((tmp_path / "cal.json").read_text())
     assert content["k"] == pytest.approx(1.0, abs=1e-6)
     # the data of the fit are those calibrated, and know the material
-    known = {"measurement", "electronics", "base temperature", "geometry", "material", "model"}
-    assert set(content["uncertainty_budget_K"]) == known
+    sources = {"measurement", "electronics", "base temperature", "geometry", "material", "model"}
+    assert set(content["uncertainty_budget_K"]) == sources
     assert content["priors"]["heater_length_um"]["spread"] == pytest.approx(0.04)
     assert content["tip_temperature_uncertainty_K"] < 40
     assert (tmp_path / "t.csv").read_text().startswith("bias_V,lever_V,current_mA,power_mW,tip_K")
@@ -334,15 +334,15 @@ def test_a_file_without_current_is_refused(run, tmp_path):
 def test_a_lever_in_air_is_estimated_in_air(lever, reference):
     air = lever.in_medium("air").branch()
     curve = measurement_of(measured_curve(air, np.random.default_rng(5), to_V=12.0))
-    found = calibrate(curve, medium="air")
-    assert found.k == pytest.approx(air.knee.power_mW / reference.knee.power_mW, rel=0.04)
-    error = np.abs(found.table.tip_K - air.tip_temperature(found.table.power_mW))
-    assert float((error / found.table.tip_stderr_K).max()) < 3.0
-    assert "air" in found.table.source.values
+    calibration = calibrate(curve, medium="air")
+    assert calibration.k == pytest.approx(air.knee.power_mW / reference.knee.power_mW, rel=0.04)
+    error = np.abs(calibration.table.tip_K - air.tip_temperature(calibration.table.power_mW))
+    assert float((error / calibration.table.tip_stderr_K).max()) < 3.0
+    assert "air" in calibration.table.source.values
     # the paper's rule for the same data
     by_rule = calibrate(replace(curve, medium="air"), medium="vacuum")
     assert by_rule.table.budget_K.sel(source="constant k").max() > 10.0
-    assert by_rule.k == pytest.approx(found.k, rel=0.05)
+    assert by_rule.k == pytest.approx(calibration.k, rel=0.05)
 
 
 def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(in_air, reference):
@@ -351,8 +351,8 @@ def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(in_air, re
     vacuum = measurement_of(measured_curve(reference, rng))
     air = in_air.branch()
     other = replace(measurement_of(measured_curve(air, rng, to_V=12.0)), medium="air")
-    found = fit(vacuum, Probe.reference(), fixed={"p": None})
-    both = calibrate(other, fit=found)
+    fitted = fit(vacuum, Probe.reference(), fixed={"p": None})
+    both = calibrate(other, fit=fitted)
     assert both.medium == "air"
     assert {"fit", "measurement", "air"} <= set(both.table.source.values.tolist())
     error = np.abs(both.table.tip_K - air.tip_temperature(both.table.power_mW))
@@ -362,12 +362,12 @@ def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(in_air, re
 
 def test_what_was_known_before_a_fit_is_not_what_it_found(shared_fit):
     """The published levers, the probe file, what the fit was asked and what is asked now."""
-    one = read_fit(shared_fit)
-    usual = _before(one, None)
+    fitted = read_fit(shared_fit)
+    usual = _before(fitted, None)
     assert usual["n_d"] == published_material()["n_d"]
     stated = {"n_d": "3e17 ± 10%", "p": "2.7 ± 1%"}
-    probe = one.probe.model_copy(update={"prior": PriorTexts.from_values(stated, "here")})
-    of_file = _before(replace(one, probe=probe), None)
+    probe = fitted.probe.model_copy(update={"prior": PriorTexts.from_values(stated, "here")})
+    of_file = _before(replace(fitted, probe=probe), None)
     assert (of_file["n_d"], of_file["p"]) == (Prior(3e17, 0.1), Prior(2.7, 0.01))
-    assert _before(replace(one, probe=probe), {"p": "2.8 ± 1%"})["p"] == Prior(2.8, 0.01)
-    assert _before(one, {}) == {}
+    assert _before(replace(fitted, probe=probe), {"p": "2.8 ± 1%"})["p"] == Prior(2.8, 0.01)
+    assert _before(fitted, {}) == {}

@@ -95,8 +95,8 @@ def test_another_levers_resistance_is_refused(measured):
 @pytest.mark.slow
 def test_priors_and_a_curve_alone_tell_the_temperature(measured, truth):
     nothing = np.full(truth.bias.size, np.nan)
-    found = calibrate(replace(measured, tip_K=nothing), probe=PROBE)
+    estimated = calibrate(replace(measured, tip_K=nothing), probe=PROBE)
     bias = truth.bias_V.values
-    off = read(found, "tip_K", bias) - truth.tip_K.values
-    assert np.abs(off / read(found, "tip_stderr_K", bias)).max() < 3.0
-    assert {"material", "geometry", "electronics"} <= set(found.table.source.values.tolist())
+    off = read(estimated, "tip_K", bias) - truth.tip_K.values
+    assert np.abs(off / read(estimated, "tip_stderr_K", bias)).max() < 3.0
+    assert {"material", "geometry", "electronics"} <= set(estimated.table.source.values.tolist())

@@ -45,12 +45,12 @@ def test_errors_hold_both_media_where_the_data_do_not_tell(cold, reference):
 
 
 def test_a_fit_in_either_medium_is_one_in_the_better(cold):
-    known = {"n_d": "3.3e17 ± 15%"}
-    either = fit(cold, medium="unknown", usual_priors=True, priors=known)
-    own = fit(cold, medium=either.medium, usual_priors=True, priors=known)
+    priors = {"n_d": "3.3e17 ± 15%"}
+    either = fit(cold, medium="unknown", usual_priors=True, priors=priors)
+    own = fit(cold, medium=either.medium, usual_priors=True, priors=priors)
     assert either.options.medium == either.medium
-    assert {name: one.value for name, one in either.parameters.items()} == {
-        name: one.value for name, one in own.parameters.items()
+    assert {name: parameter.value for name, parameter in either.parameters.items()} == {
+        name: parameter.value for name, parameter in own.parameters.items()
     }
     assert np.all(either.band.tip_stderr_K >= own.band.tip_stderr_K)
     assert either.band.tip_stderr_K[-1] > 1.05 * own.band.tip_stderr_K[-1]
@@ -59,11 +59,11 @@ def test_a_fit_in_either_medium_is_one_in_the_better(cold):
 @pytest.mark.slow
 def test_what_describes_the_data_is_the_answer(reference):
     measured = measurement_of(measured_curve(reference, np.random.default_rng(0)))
-    found = calibrate(replace(measured, medium=None), medium="unknown")
-    assert found.describes_data
-    assert found.medium == "vacuum"
-    assert "in air a lever does not describe the data" in found.notes[0]
-    assert "medium" not in found.table.source.values
+    calibration = calibrate(replace(measured, medium=None), medium="unknown")
+    assert calibration.describes_data
+    assert calibration.medium == "vacuum"
+    assert "in air a lever does not describe the data" in calibration.notes[0]
+    assert "medium" not in calibration.table.source.values
 
 
 def answers(of: dict[str, tuple[str, float] | Exception]) -> Any:

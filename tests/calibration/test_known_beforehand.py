@@ -20,10 +20,10 @@ def test_priors_are_about_the_circuit_of_the_measurement(reference):
     circuit = Circuit(series_resistance_ohm=3000.0)
     curve = measured_curve(reference, np.random.default_rng(7), circuit=circuit, to_V=7.5)
     data = replace(measurement_of(curve), series_resistance_ohm=3000.0)
-    found = calibrate(data, priors={"dimensions": "± 2%"})
-    assert found.describes_data
-    assert found.priors["series_resistance_ohm"].value == 3000.0
-    assert found.priors["length_um"].spread == pytest.approx(0.02 * 54.4)
+    calibration = calibrate(data, priors={"dimensions": "± 2%"})
+    assert calibration.describes_data
+    assert calibration.priors["series_resistance_ohm"].value == 3000.0
+    assert calibration.priors["length_um"].spread == pytest.approx(0.02 * 54.4)
     own = fit(data, priors={"series_resistance_ohm": "± 0.1%", "n_d": "± 15%"})
     assert own.parameters["series_resistance_ohm"].value == pytest.approx(3000.0, rel=5e-3)
 
@@ -32,12 +32,16 @@ def test_edges_that_are_off_together_are_known_by_one_prior():
     """Each dimension by itself would have to be many times its tolerance away."""
     true = Lever(Probe.reference().with_(edge_bias_um=-0.12))
     curve = measured_curve(true.branch(), np.random.default_rng(0))
-    found = calibrate(measurement_of(curve), priors={"dimensions": "± 1%", "edge_bias_um": "± 0.1"})
-    use = found.priors["edge_bias_um"]
+    calibration = calibrate(
+        measurement_of(curve), priors={"dimensions": "± 1%", "edge_bias_um": "± 0.1"}
+    )
+    use = calibration.priors["edge_bias_um"]
     assert use.posterior_value == pytest.approx(-0.12, abs=2 * use.posterior_spread)
     assert use.posterior_spread < 0.7 * use.spread
-    error = np.abs(found.table.tip_K - true.branch().tip_temperature(found.table.power_mW))
-    assert float((error / found.table.tip_stderr_K).max()) < 2.0
+    error = np.abs(
+        calibration.table.tip_K - true.branch().tip_temperature(calibration.table.power_mW)
+    )
+    assert float((error / calibration.table.tip_stderr_K).max()) < 2.0
 
 
 def test_doping_known_to_a_factor_is_calibrated_and_written_with_its_distribution(run, tmp_path):
@@ -58,6 +62,6 @@ def test_doping_known_to_a_factor_is_calibrated_and_written_with_its_distributio
     assert use.moved == pytest.approx(1.0, abs=0.3)
     if use.moved > 1.0:
         assert f"n_d by {use.moved:+.1f} σ" in out
-    found = read_calibration(tmp_path / "cal.json").table
-    error = np.abs(found.tip_K - true.tip_temperature(found.power_mW))
-    assert float((error / found.tip_stderr_K).max()) < 3.0
+    table = read_calibration(tmp_path / "cal.json").table
+    error = np.abs(table.tip_K - true.tip_temperature(table.power_mW))
+    assert float((error / table.tip_stderr_K).max()) < 3.0

@@ -50,9 +50,9 @@ def numbers(content: Any, key: str) -> list[Any]:
     """Return the values of all entries of a name."""
     if isinstance(content, dict):
         here = [content[key]] if key in content else []
-        return here + [one for value in content.values() for one in numbers(value, key)]
+        return here + [number for value in content.values() for number in numbers(value, key)]
     if isinstance(content, list):
-        return [one for value in content for one in numbers(value, key)]
+        return [number for value in content for number in numbers(value, key)]
     return []
 
 
@@ -62,10 +62,10 @@ def test_files_have_no_errors(folder):
     assert content["reason"]
     errors = (*ERRORS, "k_stderr", "posterior_spread", "power_mW_stderr")
     for key in (*errors, "tip_temperature_uncertainty_K"):
-        found = numbers(content, key)
-        assert found, key
-        assert set(found) == {None}, key
-    assert {one for part in content["budget_K"].values() for one in part} == {None}
+        values = numbers(content, key)
+        assert values, key
+        assert set(values) == {None}, key
+    assert {error for part in content["budget_K"].values() for error in part} == {None}
     assert set(content["uncertainty_budget_K"].values()) == {None}
     # of the nearest lever
     assert all(row["tip_K"] > 290 for row in content["table"])

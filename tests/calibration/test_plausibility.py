@@ -103,9 +103,9 @@ def test_a_hot_plate_that_was_not_stated_is_noticed():
     """No parameter by itself is far from its prior, but no base is so warm."""
     warm = Lever(Probe.reference().with_(base_temperature_K=353.0)).branch()
     wrong = shown(measured_curve(warm, np.random.default_rng(0)))
-    found = calibrate(wrong, probe=Probe.reference())
-    assert "would have to be another" in found.reason
-    assert "is the base temperature rather about 353 K?" in found.reason
+    calibration = calibrate(wrong, probe=Probe.reference())
+    assert "would have to be another" in calibration.reason
+    assert "is the base temperature rather about 353 K?" in calibration.reason
 
 
 def test_temperatures_in_degrees_celsius_are_refused(curve):

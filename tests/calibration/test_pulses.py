@@ -64,8 +64,8 @@ def test_sources_add_up_and_a_cold_tip_is_as_sure_as_the_base(calibrated):
     together = np.sqrt((table.budget_K**2).sum("source"))
     np.testing.assert_allclose(table.peak_stderr_K, together)
     assert {"geometry", "material", "heat capacity", "model"} <= set(table.source.values.tolist())
-    known = calibrated.priors["base_temperature_K"].posterior_spread
-    assert table.peak_stderr_K[0].item() == pytest.approx(known, rel=0.2)
+    of_base = calibrated.priors["base_temperature_K"].posterior_spread
+    assert table.peak_stderr_K[0].item() == pytest.approx(of_base, rel=0.2)
 
 
 def test_more_heat_capacity_is_a_slower_lever(coarse, monkeypatch):
@@ -73,7 +73,7 @@ def test_more_heat_capacity_is_a_slower_lever(coarse, monkeypatch):
     other = Lever(coarse.probe, COARSE)
     held = other.equations.heat_density
     monkeypatch.setattr(
-        other.equations, "heat_density", lambda T: tuple(1.03 * one for one in held(T))
+        other.equations, "heat_density", lambda T: tuple(1.03 * value for value in held(T))
     )
     slower = simulate(other, pulse(8.0, 5.0), at=[5.0], tolerance_K=1e-3).tip_K.item()
     assert slower == pytest.approx(usual, abs=2e-3)

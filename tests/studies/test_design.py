@@ -24,22 +24,22 @@ def start() -> Design:
 
 def test_in_vacuum_the_thickness_scales_the_power_and_nothing_else(start):
     """Sheets of any thickness have the same fields; powers and currents scale with it."""
-    found = sensitivities(start, ["thickness_um"], air=False)
-    row = found.sel(name="thickness_um")
+    slopes = sensitivities(start, ["thickness_um"], air=False)
+    row = slopes.sel(name="thickness_um")
     assert row.value == 0.4
     assert row.by_knee_K.item() == pytest.approx(0.0, abs=1e-6)
     assert row.by_knee_V.item() == pytest.approx(0.0, abs=1e-6)
     assert row.by_knee_mW.item() == pytest.approx(1.0, abs=1e-6)
     assert row.by_cold_ohm.item() == pytest.approx(-1.0, abs=2e-3)
     assert row.by_tip_K < 0
-    assert np.isnan(found.k)
+    assert np.isnan(slopes.k)
 
 
 def test_the_design_s_knee_is_the_lever_s(start, reference):
-    found = quantities(start.probe, 2.0, air=False)
-    assert found["knee_K"] == pytest.approx(reference.knee.tip_K, abs=0.3)
-    assert found["knee_mW"] == pytest.approx(reference.knee.power_mW, rel=1e-3)
-    assert found["tip_K"] == pytest.approx(reference.tip_temperature(2.0).item(), abs=0.3)
+    values = quantities(start.probe, 2.0, air=False)
+    assert values["knee_K"] == pytest.approx(reference.knee.tip_K, abs=0.3)
+    assert values["knee_mW"] == pytest.approx(reference.knee.power_mW, rel=1e-3)
+    assert values["tip_K"] == pytest.approx(reference.tip_temperature(2.0).item(), abs=0.3)
 
 
 def test_a_sweep_of_the_heater_s_length(start):

@@ -33,9 +33,9 @@ def test_near_planes_give_the_plate_capacitor_with_its_edge(h):
 
 
 def test_the_loss_falls_with_distance_between_its_limits():
-    found = loss_between_planes(np.geomspace(0.05, 50.0, 12))
-    assert np.all(np.diff(found.loss) < 0)
-    assert np.all(found.loss > np.maximum(found.near, found.far))
+    limits = loss_between_planes(np.geomspace(0.05, 50.0, 12))
+    assert np.all(np.diff(limits.loss) < 0)
+    assert np.all(limits.loss > np.maximum(limits.near, limits.far))
 
 
 def test_distances_that_cannot_be_resolved_are_refused():

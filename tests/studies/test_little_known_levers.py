@@ -69,22 +69,22 @@ def test_every_shape_has_its_turn_and_nominal_levers_differ(some):
 def test_levers_scatter_about_what_their_owners_know_as_the_priors_say():
     rng, away = np.random.default_rng(1), []
     nominal = little_known_levers._nominal(rng, "u-shape")
-    known = default_priors(nominal)
-    assert known["delta"].spread == 0.35
-    assert known["thickness_um"].spread == 0.20
-    assert known["length_um"].spread == 0.12
-    assert known["n_d"].spread in (0.6, pytest.approx(np.log(2.5)))
+    priors = default_priors(nominal)
+    assert priors["delta"].spread == 0.35
+    assert priors["thickness_um"].spread == 0.20
+    assert priors["length_um"].spread == 0.12
+    assert priors["n_d"].spread in (0.6, pytest.approx(np.log(2.5)))
     while len(away) < 200:
         try:
             true = little_known_levers._drawn(rng, nominal)
         except little_known_levers.HotleverError:
             continue
         assert true.prior is None
-        values = true.values(list(known)).tolist()
-        away.append([one.deviation(v) for one, v in zip(known.values(), values, strict=True)])
+        values = true.values(list(priors)).tolist()
+        away.append([prior.deviation(v) for prior, v in zip(priors.values(), values, strict=True)])
     # levers that cannot be drawn are left out, so that the scatter is somewhat smaller
     spread = np.std(away, axis=0)
-    assert np.all((spread > 0.75) & (spread < 1.2)), dict(zip(known, spread, strict=True))
+    assert np.all((spread > 0.75) & (spread < 1.2)), dict(zip(priors, spread, strict=True))
 
 
 def test_owners_state_priors_as_probe_files_do(some, tmp_path):

@@ -14,19 +14,19 @@ from hotlever.studies.raman_check import conclusion, paper_check
 def test_papers_check_of_its_linear_law():
     check = paper_check()
     # our reference page, found independently: 50 to 100 K too hot at 1050 to 1150 K
-    for one in check.error.transpose("line", "temperature_K"):
-        low, high = one.interp(temperature_K=[1050.0, HOTTEST_TIP_K]).values
+    for error in check.error.transpose("line", "temperature_K"):
+        low, high = error.interp(temperature_K=[1050.0, HOTTEST_TIP_K]).values
         assert 40.0 < low < 75.0
         assert 75.0 < high < 105.0
     law = published_raman_calibration().linear
-    for place in range(2):
-        one = check.isel(line=place)
-        shift, _ = anharmonic.shift(one.true_at_knee.item(), 293.0)
-        if place == 0:
+    for number in range(2):
+        line = check.isel(line=number)
+        shift, _ = anharmonic.shift(line.true_at_knee.item(), 293.0)
+        if number == 0:
             assert law.temperature(shift, 293.0) == pytest.approx(943.0, abs=0.05)
-        assert one.discrepancy.item() == pytest.approx(one.true_at_knee.item() - 893.0)
-        assert one.explained.item() == pytest.approx((943.0 - one.true_at_knee.item()) / 50.0)
-        assert 0.3 < one.explained.item() < 0.6
+        assert line.discrepancy.item() == pytest.approx(line.true_at_knee.item() - 893.0)
+        assert line.explained.item() == pytest.approx((943.0 - line.true_at_knee.item()) / 50.0)
+        assert 0.3 < line.explained.item() < 0.6
     assert "of the 50 K discrepancy remain" in conclusion(check)
 
 

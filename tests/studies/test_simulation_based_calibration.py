@@ -52,7 +52,9 @@ def test_a_departure_that_is_left_out_changes_nothing_else():
         )[0]
         for name in ("tip", "drawing")
     }
-    assert all(one.material == everything.material != nominal.material for one in probes.values())
+    assert all(
+        probe.material == everything.material != nominal.material for probe in probes.values()
+    )
     assert everything.tip is not None
     assert probes["tip"].tip is None
     assert probes["tip"].shape == everything.shape != nominal.shape
@@ -104,10 +106,10 @@ def test_another_mobility_changes_the_lever_and_nobody_else_s():
 
 def test_raman_temperatures_have_the_errors_that_they_state(solved_once):
     data, tip = data_of(0, [], "raman"), solved_once.tip_K.values
-    known = np.isfinite(data.tip_K)
-    assert known.sum() == study.RAMAN_POINTS
-    assert np.all(np.abs(data.tip_K - tip)[known] < 4 * data.tip_error_K[known])
-    assert tip[known].min() > 390
+    measured = np.isfinite(data.tip_K)
+    assert measured.sum() == study.RAMAN_POINTS
+    assert np.all(np.abs(data.tip_K - tip)[measured] < 4 * data.tip_error_K[measured])
+    assert tip[measured].min() > 390
 
 
 def test_a_reader_is_measured_where_there_is_one():
@@ -116,15 +118,15 @@ def test_a_reader_is_measured_where_there_is_one():
 
 
 def test_a_lever_like_the_model_is_calibrated_within_the_stated_error():
-    found = judge(0, departures=["mesh"])
-    assert found.refused == ""
-    hot = found.tip_K.values > study.HOT
-    estimate = found.off_K.sel(way=ESTIMATE).values
+    judged = judge(0, departures=["mesh"])
+    assert judged.refused == ""
+    hot = judged.tip_K.values > study.HOT
+    estimate = judged.off_K.sel(way=ESTIMATE).values
     assert np.array_equal(np.isfinite(estimate), hot)
-    assert np.nanmax(np.abs(estimate / found.stated_K.values)) < 3.0
-    largest = np.abs(found.off_K).max("row")
+    assert np.nanmax(np.abs(estimate / judged.stated_K.values)) < 3.0
+    largest = np.abs(judged.off_K).max("row")
     assert largest.sel(way=ESTIMATE) < largest.sel(way="knee at T_i")
-    assert not found.other_law
+    assert not judged.other_law
 
 
 def test_a_lever_without_an_answer_is_kept_with_the_reason(monkeypatch):
@@ -132,9 +134,9 @@ def test_a_lever_without_an_answer_is_kept_with_the_reason(monkeypatch):
         raise study.HotleverError("no lever like this")
 
     monkeypatch.setattr(study, "calibrate", refuse)
-    found = judge(0, departures=["mesh"])
-    assert found.refused == "no lever like this"
-    assert found.off_K.isnull().all()
+    judged = judge(0, departures=["mesh"])
+    assert judged.refused == "no lever like this"
+    assert judged.off_K.isnull().all()
 
 
 def test_a_summary_counts_what_the_bands_hold():
