@@ -14,6 +14,9 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, Field
 
 from hotlever.errors import InputError
 from hotlever.files import Outputs, kept_before_writing, output_folder, whole_file
@@ -25,6 +28,20 @@ _SCHEMA = 1
 #: Changes that are kept, and bytes of all that was there before them; the oldest go first.
 _MOST, _MOST_BYTES = 200, 2**29
 _UNDONE, _AGAIN = "undone: ", "done again: "
+
+
+class _Head(BaseModel):
+    """The first line of the list of a change."""
+
+    schema_: Literal[1] = Field(alias="schema")
+    what: str
+
+
+class _Entry(BaseModel):
+    """A file of a change; names of ours are numbers: another would lead out of the folder."""
+
+    file: str
+    before: Annotated[str, Field(pattern=r"^[0-9]+$")] | None
 
 
 @dataclass
@@ -54,20 +71,13 @@ class Change:
     def from_folder(cls, folder: Path) -> Change | None:
         """Read a change; None if the folder holds none that can be understood."""
         try:
-            lines = (folder / _LIST).read_text(encoding="utf-8").splitlines()
-            head, *entries = map(json.loads, lines)
-            if head["schema"] != _SCHEMA or not folder.name.isdecimal():
-                return None
-            change = cls(folder, str(head["what"]))
-            for entry in entries:
-                kept = entry["before"]
-                # names of ours are numbers: another would lead out of the folder
-                if kept is not None and not str(kept).isdecimal():
-                    return None
-                change.before[str(entry["file"])] = kept
-        except (OSError, ValueError, LookupError, TypeError, RecursionError):
+            head, *entries = (folder / _LIST).read_text(encoding="utf-8").splitlines()
+            change = cls(folder, _Head.model_validate_json(head).what)
+            for entry in map(_Entry.model_validate_json, entries):
+                change.before[entry.file] = entry.before
+        except (OSError, ValueError):
             return None
-        return change
+        return change if folder.name.isdecimal() else None
 
     def add(self, name: str, path: Path) -> None:
         """Keep the version that is there of a file, if this change has none of it yet."""

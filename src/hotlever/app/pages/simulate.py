@@ -11,7 +11,7 @@ from hotlever.app.jobs import Task
 from hotlever.app.pages.frame import ErrorBanner, two_columns
 from hotlever.app.pages.page import Page, Work, outputs
 from hotlever.app.pages.pulses import Pulses, in_python, settings, stem
-from hotlever.app.pages.sliders import LiveLever, Sliders
+from hotlever.app.pages.sliders import LiveView, Sliders
 from hotlever.app.session import Session
 
 #: Biases of a sweep that is written.
@@ -34,7 +34,7 @@ class SimulatePage(Page):
                 view = ui.toggle(_VIEWS, value=self.chosen["view"])
                 view.props('aria-label="What is shown"').on_value_change(self._view)
                 with ui.column().classes("w-full gap-3") as rest:
-                    self._lever = LiveLever(self)
+                    self._live = LiveView(self)
                     with ui.card().classes("w-full").props("flat bordered"):
                         ui.label("Take it with you").classes("text-bold")
                         self.kind_buttons(lambda kind: self.run(self._sweep(kind)))
@@ -64,7 +64,7 @@ class SimulatePage(Page):
         ui.run_javascript("setTimeout(() => window.dispatchEvent(new Event('resize')))")
 
     def _moved(self) -> None:
-        self._lever.follow(self._sliders.free)
+        self._live.follow(self._sliders.free)
         self.show_command()
         self._pulses.show_command()
 

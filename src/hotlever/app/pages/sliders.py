@@ -147,7 +147,7 @@ class Sliders:
         self._moved()
 
 
-class LiveLever:
+class LiveView:
     """What the lever that is chosen shows at the bias that is chosen."""
 
     def __init__(self, page: Page) -> None:
