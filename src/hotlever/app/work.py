@@ -20,8 +20,9 @@ from hotlever.lever import Lever
 from hotlever.lever.transient.waveform_texts import waveform_from_text
 from hotlever.measurement import parse_columns
 from hotlever.raman.thermometry import Listener, set_up
-from hotlever.tasks import fitting, simulating, spectra
+from hotlever.tasks import fitting, simulating, spectra, sweeping
 from hotlever.tasks.calibrating import Tables, calibrate_file
+from hotlever.tasks.files import Files
 from hotlever.tasks.importing import propose_probe
 from hotlever.tasks.probes import make_lever, read_probe
 from hotlever.tasks.texts import parse_timing
@@ -99,7 +100,7 @@ def _sweep(reporter: Report, probe: Path | None = None, *, bias: str, **asked: A
     first, last, count = bias.split(":")
     biases = np.linspace(float(first), float(last), int(count))
     lever, outputs, files = _lever(reporter, probe, **asked)
-    simulating.sweep(reporter, lever, biases, outputs, files)
+    sweeping.sweep(reporter, lever, biases, outputs, files)
 
 
 def _pulse(
@@ -127,11 +128,11 @@ def _lever(
     set: Sequence[str] | None = None,
     medium: str | None = None,
     **files: Path,
-) -> tuple[Lever, Outputs, simulating.Files]:
+) -> tuple[Lever, Outputs, Files]:
     """Return the lever that is simulated, and what is written of it."""
     read = read_probe(reporter, probe, set)
     read = read if medium is None else read.in_medium(medium)
-    return make_lever(reporter, read), Outputs(probe), simulating.Files(**files)
+    return make_lever(reporter, read), Outputs(probe), Files(**files)
 
 
 def _raman(

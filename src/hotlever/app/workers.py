@@ -37,7 +37,8 @@ _TIDY_S = 0.6
 _REST_S = 1.0
 #: Modules that a process imports before it is asked for anything, so that it then answers at once.
 _READY = (
-    *("hotlever.tasks.fitting", "hotlever.tasks.calibrating", "hotlever.tasks.simulating"),
+    *("hotlever.tasks.fitting", "hotlever.tasks.calibrating"),
+    *("hotlever.tasks.simulating", "hotlever.tasks.sweeping"),
     *("hotlever.figures", "hotlever.lever", "hotlever.report.fit_pages", "hotlever.raman"),
 )
 _LOST = (

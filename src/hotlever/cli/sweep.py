@@ -17,6 +17,7 @@ from hotlever.cli.options import (
     with_groups,
 )
 from hotlever.errors import unknown_name
+from hotlever.tasks.files import Files
 
 if TYPE_CHECKING:
     from hotlever.lever import Lever
@@ -39,7 +40,7 @@ def sweep_command(
     fields: File = Option(None, help="Write the fields at each bias as VTU to this folder."),
 ) -> None:
     """Solve a lever over a range of bias."""
-    from hotlever.tasks.simulating import Files, sweep
+    from hotlever.tasks.sweeping import sweep
 
     if model not in MODELS:
         raise unknown_name("value", model, MODELS, "--model")

@@ -20,7 +20,7 @@ from hotlever.cli.options import (
 )
 from hotlever.errors import InputError
 from hotlever.files import Outputs
-from hotlever.tasks.files import draw
+from hotlever.tasks.files import Files, draw
 from hotlever.units import bias_setting, setting
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def pulse_command(
     ),
 ) -> None:
     """Follow a lever in time: steps, pulses, ramps, sines, or what a file says."""
-    from hotlever.tasks.simulating import Files, simulate_in_time
+    from hotlever.tasks.simulating import simulate_in_time
 
     if report is not None:
         others = {"--until": until, "--at": at, "--output": table.output, "--plot": table.plot}

@@ -1,13 +1,21 @@
-"""Figures that tasks write, if they are asked for."""
+"""Files that tasks write, as far as they are asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+class Files(NamedTuple):
+    """What is written: a table (CSV or NetCDF), a figure, and a folder of fields (VTU)."""
+
+    output: Path | None = None
+    plot: Path | None = None
+    fields: Path | None = None
 
 
 def draw(path: Path | None, figure: Callable[[Any], Figure]) -> None:
