@@ -9,5 +9,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 # Told the steps done and their number.
 Progress = Callable[[int, int], None]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hotlever.datasets import MEASURANDS
 from hotlever.errors import InputError, shown
@@ -14,7 +13,7 @@ from hotlever.measurement.data import LEVER, MEASURED, TIME
 from hotlever.measurement.settings import Settings
 from hotlever.probe import Circuit
 from hotlever.tables import Table
-from hotlever.types import Array
+from hotlever.types import Array, Mask
 from hotlever.units import plausible
 
 
@@ -62,7 +61,7 @@ class Contents:
         """Return a cell as it stands in the file, to quote it."""
         return shown(self.table.rows[row][self.columns[symbol].index])
 
-    def refuse(self, rows: NDArray[np.bool_], expected: str, *symbols: str) -> None:
+    def refuse(self, rows: Mask, expected: str, *symbols: str) -> None:
         """Refuse the first of some rows, (n,) of bool, for what its cells of `symbols` hold.
 
         Raises
@@ -79,7 +78,7 @@ class Contents:
         """Note what concerns the whole file."""
         self.notes.append(f"{self.table.path}: {text}")
 
-    def note_rows(self, rows: NDArray[np.bool_], text: str) -> None:
+    def note_rows(self, rows: Mask, text: str) -> None:
         """Note what is odd about some rows, (n,) of bool, if there are any."""
         if rows.any():
             others = f", and in {rows.sum() - 1} more rows" if rows.sum() > 1 else ""
@@ -98,7 +97,7 @@ _LEVER_KOHM = (0.1, 60.0)
 _COLDEST_BASE_K = 250.0
 
 
-def colder_than_base(tip_K: Array, error_K: Array, base_K: float) -> NDArray[np.bool_]:
+def colder_than_base(tip_K: Array, error_K: Array, base_K: float) -> Mask:
     """Return where a tip seems colder than its base by more than an offset or noise explain."""
     margin = np.maximum(_COLDER_K, _COLDER_ERRORS * np.nan_to_num(error_K))
     return np.asarray(tip_K < base_K - margin)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hotlever.datasets import MEASURANDS, OBSERVABLES, labelled
 from hotlever.errors import InputError, unknown_name
@@ -15,7 +15,7 @@ from hotlever.lever.transient.history import checked_times
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.surroundings import Medium
-from hotlever.types import Array
+from hotlever.types import Array, Mask
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -197,7 +197,7 @@ class Measurement:
         values = getattr(self, MEASURANDS["d" + OBSERVABLES[name].symbol].name)
         return np.full(self.bias_V.shape, np.nan) if values is None else values
 
-    def part(self, rows: NDArray[np.bool_]) -> Measurement:
+    def part(self, rows: Mask) -> Measurement:
         """Return some rows, (n,) of bool, as a measurement."""
         arrays = {name: v for name, v in vars(self).items() if isinstance(v, np.ndarray)}
         columns: Any = {name: values[rows] for name, values in arrays.items()}

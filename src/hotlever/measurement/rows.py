@@ -14,11 +14,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hotlever.datasets import OBSERVABLES
 from hotlever.measurement.data import MEASURED, Measurement
-from hotlever.types import Array
+from hotlever.types import Array, Index, Mask
 
 #: A turn is where the bias goes back by more than this part of its range.
 _BACK = 0.1
@@ -184,7 +183,7 @@ def note_on_averages(whole: Measurement, used: Measurement) -> list[str]:
     ]
 
 
-def _steps(bias: Array) -> NDArray[np.intp]:
+def _steps(bias: Array) -> Index:
     """Return for each row the number of its bias, or of its step if there are too many biases."""
     levels, step = np.unique(bias, return_inverse=True)
     if levels.size <= STEPS:
@@ -193,7 +192,7 @@ def _steps(bias: Array) -> NDArray[np.intp]:
     return np.minimum((bias - levels[0]) / width, STEPS - 1).astype(np.intp)
 
 
-def _far_off(values: Array, step: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _far_off(values: Array, step: Index) -> Mask:
     """Return which data are far off the others of their step."""
     finite = np.isfinite(values)
     data, (steps, group) = values[finite], np.unique(step[finite], return_inverse=True)

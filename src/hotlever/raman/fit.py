@@ -17,7 +17,6 @@ from scipy.ndimage import gaussian_filter1d, median_filter
 
 from hotlever.raman import lineshape, noise
 from hotlever.raman.lineshape import At, Problem, Solution, width_of
-from hotlever.raman.noise import Mask
 from hotlever.raman.peak import (
     LINE_RANGE,
     MIN_SAMPLES,
@@ -28,7 +27,7 @@ from hotlever.raman.peak import (
     in_window,
     observed_width,
 )
-from hotlever.types import Array
+from hotlever.types import Array, Mask
 
 DETECTION_SIGMAS = 5.0  #: a line's area must exceed its standard error so many times
 MISFIT_LIMIT = 1.6  #: from this ratio on the residuals are flagged as more than noise

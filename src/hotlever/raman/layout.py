@@ -9,7 +9,6 @@ import re
 from itertools import combinations, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hotlever.blocks import Block
 from hotlever.errors import InputError, shown
@@ -20,10 +19,8 @@ from hotlever.raman.spectrum import (
     temperature_in_metadata,
     temperature_in_name,
 )
-from hotlever.types import Array
+from hotlever.types import Array, Index
 from hotlever.units import quantity
-
-Rows = NDArray[np.intp]
 
 _MAP_COLUMNS = 40  # from so many on, rows may be spectra
 _SHIFT_UNITS = ("", "cm-1", "cm^-1", "cm⁻¹", "1/cm")
@@ -127,7 +124,7 @@ def _labelled(
     return Spectrum(x, y, f"{label} {heading}".strip(), temperature=temperature)
 
 
-def _groups(x: Array, values: Array, others: list[int]) -> list[Rows]:
+def _groups(x: Array, values: Array, others: list[int]) -> list[Index]:
     """Rows of each spectrum: the axis begins again, or positions take turns along it."""
     begun = _begun_again(x)
     if len(begun) > 1 or x.size < _TURNS * np.unique(x).size:
@@ -147,7 +144,7 @@ def _groups(x: Array, values: Array, others: list[int]) -> list[Rows]:
     return begun
 
 
-def _begun_again(x: Array) -> list[Rows]:
+def _begun_again(x: Array) -> list[Index]:
     """Rows between the places where an axis begins again; windows that overlap stay together."""
     finite = np.flatnonzero(np.isfinite(x))
     steps = np.diff(x[finite])

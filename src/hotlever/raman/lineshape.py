@@ -26,11 +26,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import leastsq
 from scipy.special import wofz
 
-from hotlever.raman.noise import Mask
-from hotlever.types import Array
+from hotlever.types import Array, Mask
 
 SIGMA_PER_FWHM = 1.0 / (2.0 * math.sqrt(2.0 * math.log(2.0)))
 
@@ -171,6 +169,8 @@ class Problem:
 
     def solve(self, start: Array, variance: Array, use: Mask) -> Array:
         """Weighted least squares from a start, where the parameters stay that are not free."""
+        from scipy.optimize import leastsq  # takes a third of a second
+
         free = list(self.free)
 
         def all_of(some: Array) -> Array:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import find_objects, label, maximum_filter1d, median_filter
 
-from hotlever.types import Array
-
-Mask = NDArray[np.bool_]
+from hotlever.types import Array, Mask
 
 SPIKE_SIGMAS = 6.0  #: a cosmic ray stands this many standard deviations above the fit
 #: How far the true line may differ from the line model, as a part of the line's height, before

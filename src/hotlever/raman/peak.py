@@ -10,8 +10,7 @@ import numpy as np
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.raman import lineshape
-from hotlever.raman.noise import Mask
-from hotlever.types import Array
+from hotlever.types import Array, Mask
 
 LineShape = Literal["lorentzian", "voigt", "fano"]
 
