@@ -238,8 +238,8 @@ class Diagnosis:
         if hypothesis.free:
             value += float(end.x[-1])
         if hypothesis.parameter:
-            place = curve.names.index(hypothesis.parameter)
-            value = float(curve.probe.values([hypothesis.parameter])[0] * np.exp(away[place]))
+            number = curve.names.index(hypothesis.parameter)
+            value = float(curve.probe.values(curve.names)[number] * np.exp(away[number]))
         unknowns = hypothesis.free + bool(hypothesis.parameter)
         squares = 2.0 * float(end.cost) + _UNKNOWN * unknowns
         return _Explanation(hypothesis, curve, squares, value, away)

@@ -145,10 +145,10 @@ def chosen_options(options: FitOptions | None, choices: dict[str, Any]) -> FitOp
     InputError
         If there is no such option; the text gives the nearest one.
     """
-    known = list(FitOptions.__dataclass_fields__)
+    names = list(FitOptions.__dataclass_fields__)
     for name in choices:
-        if name not in known:
-            raise unknown_name("option", name, known, "fit")
+        if name not in names:
+            raise unknown_name("option", name, names, "fit")
     return replace(options or FitOptions(), **choices)
 
 

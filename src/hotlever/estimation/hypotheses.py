@@ -78,10 +78,11 @@ def hypotheses_of(rows: MeasuredRows, probe: Probe, names: Sequence[str]) -> lis
     ]
 
 
-def _of_units() -> list[Hypothesis]:
-    def current(rows: MeasuredRows, factor: float) -> MeasuredRows:
-        return replace(rows, current_mA=factor * rows.current_mA)
+def _divided_current(rows: MeasuredRows, factor: float) -> MeasuredRows:
+    return replace(rows, current_mA=rows.current_mA / factor)
 
+
+def _of_units() -> list[Hypothesis]:
     def bias(rows: MeasuredRows, factor: float) -> MeasuredRows:
         return replace(rows, bias_V=factor * rows.bias_V)
 
@@ -99,8 +100,8 @@ def _of_units() -> list[Hypothesis]:
         )
     )
     return [
-        Hypothesis(lambda _: small, current, starts=(1e3,)),
-        Hypothesis(lambda _: large, current, starts=(1e-3,)),
+        Hypothesis(lambda _: small, _divided_current, starts=(1e-3,)),
+        Hypothesis(lambda _: large, _divided_current, starts=(1e3,)),
         Hypothesis(lambda _: "is the bias given in mV?", bias, starts=(1e-3,)),
         Hypothesis(lambda _: "are bias and current swapped?", swapped),
         Hypothesis(lambda _: "is V_b the lever's own voltage, not the bias?", of_the_lever),
@@ -110,9 +111,6 @@ def _of_units() -> list[Hypothesis]:
 def _of_the_meter(rows: MeasuredRows) -> list[Hypothesis]:
     largest, along = float(rows.current_mA.max()), np.linspace(0.0, 1.0, rows.bias_V.size)
 
-    def scaled(rows: MeasuredRows, more: float) -> MeasuredRows:
-        return replace(rows, current_mA=rows.current_mA / (1.0 + more))
-
     def raised(pattern: Array | float, rows: MeasuredRows, share: float) -> MeasuredRows:
         return replace(rows, current_mA=rows.current_mA - share * largest * pattern)
 
@@ -121,13 +119,14 @@ def _of_the_meter(rows: MeasuredRows) -> list[Hypothesis]:
             f"{question} by {share:+.1%} of its largest value?" if abs(share) < _OF_THE_ZERO else ""
         )
 
-    def times(more: float) -> str:
-        known = 1.0 / _FACTOR < 1.0 + more < _FACTOR  # or else it is another unit
-        return f"is the current {1.0 + more:.3g} times what it should be?" if known else ""
+    def times(factor: float) -> str:
+        # or else it is another unit
+        of_a_range = 1.0 / _FACTOR < factor < _FACTOR
+        return f"is the current {factor:.3g} times what it should be?" if of_a_range else ""
 
     zero, drift = "is the zero of the current off", "does the zero of the current drift"
     return [
-        Hypothesis(times, scaled, free=True, far_fetched=True),
+        Hypothesis(times, _divided_current, starts=(1.0,), free=True, far_fetched=True),
         Hypothesis(asks(zero), partial(raised, 1.0), free=True),
         Hypothesis(asks(drift), partial(raised, along), free=True),
     ]
@@ -151,15 +150,15 @@ def _of_the_resistor(rows: MeasuredRows) -> Hypothesis:
 
 
 def _of_the_rows(rows: MeasuredRows) -> list[Hypothesis]:
-    bias, current, place = rows.bias_V, rows.current_mA, np.arange(rows.bias_V.size)
-    found = []
+    bias, current, number = rows.bias_V, rows.current_mA, np.arange(rows.bias_V.size)
+    clipped = []
     level = current >= current.max() * (1.0 - _LEVEL)
     if level.sum() >= _LEVEL_ROWS and (~level).sum() >= _BELOW:
         text = f"is the current clipped at {current.max():.3g} mA, by the range of its meter?"
-        found.append(Hypothesis(lambda _: text, lambda rows, _: replace(rows, kept=~level)))
+        clipped.append(Hypothesis(lambda _: text, lambda rows, _: replace(rows, kept=~level)))
 
     def part(first: bool, rows: MeasuredRows, cut: float) -> MeasuredRows:
-        return replace(rows, kept=(place < cut) == first)
+        return replace(rows, kept=(number < cut) == first)
 
     def asks(cut: float) -> str:
         return (
@@ -168,16 +167,16 @@ def _of_the_rows(rows: MeasuredRows) -> list[Hypothesis]:
 
     # where the bias goes back, or else at some quarter
     back = (np.flatnonzero(np.diff(bias) < 0)[:1] + 1).tolist()
-    cuts = [*back, *(quarter * place.size // 4 for quarter in (1, 2, 3))]
+    cuts = [*back, *(quarter * number.size // 4 for quarter in (1, 2, 3))]
     both = (Hypothesis(asks, partial(part, first), starts=cuts) for first in (True, False))
-    return [*found, *both]
+    return [*clipped, *both]
 
 
 def _of_the_lever(probe: Probe) -> list[Hypothesis]:
     medium, base = probe.surroundings.medium, probe.circuit.base_temperature_K
     other = "air" if medium == "vacuum" else "vacuum"
     usual = Probe.reference().shape, Probe.u_shape().shape
-    shape = next(one for one in usual if one.shape != probe.shape.shape)
+    shape = next(each for each in usual if each.shape != probe.shape.shape)
     return [
         Hypothesis(
             lambda _: f"is the lever in {other}, not in {medium}?",
@@ -197,11 +196,11 @@ def _of_the_lever(probe: Probe) -> list[Hypothesis]:
 
 def _of_a_parameter(probe: Probe, name: str) -> Hypothesis:
     (stated,) = probe.values([name]).tolist()
-    known, whose = parameter_named(name), "doping" if name == "n_d" else "drawing"
+    parameter, whose = parameter_named(name), "doping" if name == "n_d" else "drawing"
     return Hypothesis(
         lambda value: (
-            f"is the {whose} another, with {known.symbol} rather {value:.3g} than {stated:.3g} "
-            f"{known.unit}?"
+            f"is the {whose} another, with {parameter.symbol} rather {value:.3g} than {stated:.3g} "
+            f"{parameter.unit}?"
         ),
         parameter=name,
     )

@@ -199,8 +199,8 @@ def estimate(
             f"{'times' if in_time else 'biases'}"
         )
     density = PriorDensity.of_priors(priors)
-    known = zip(density.names, density.values.tolist(), strict=True)
-    start = options.held(probe.replace(dict(known)))
+    likeliest = zip(density.names, density.values.tolist(), strict=True)
+    start = options.held(probe.replace(dict(likeliest)))
     search = Search(
         residuals, start, options.varied, options.robust, density.beside(before), progress, seen
     )

@@ -11,7 +11,7 @@ from hotlever.types import Array
 #: Data are not described where they differ from the model by more than this share of the largest
 #: (rms), and neighbours together: the product of two is this share of the square, of white noise 0.
 #: Neither are they where so many neighbours differ by three times as much in their median.
-_SCATTER, _TOGETHER, _RUN = 0.004, 0.4, 4
+USUAL_SCATTER, _TOGETHER, _RUN = 0.004, 0.4, 4
 #: Of noisier data so many neighbours differ by chance by up to so many times their scatter.
 _NOISY_RUN = 2.5
 #: The share for fits whose weights are no errors, which hold dimensions and whatever else is fixed.
@@ -21,13 +21,9 @@ _HELD_SCATTER = 0.01
 _NEIGHBOURS, _FAR = 3, 8.0
 #: Fewer rows tell nothing of their neighbours.
 _ROWS = 7
-#: A point is named as suspicious beyond this many standard deviations, and so many of those
+#: A datum is named as an outlier beyond this many standard deviations, and so many of those
 #: furthest off.
-_SUSPICIOUS, _NAMED = 8.0, 10
-
-
-#: What a caption calls the usual scatter.
-USUAL_SCATTER = _SCATTER
+_OUTLYING, _NAMED = 8.0, 10
 
 
 def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
@@ -36,7 +32,7 @@ def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
     Tip temperatures are left out: a thermometer's scale may be off by more than its readings
     scatter.
     """
-    scatter = _SCATTER if residuals.errors.known else _HELD_SCATTER
+    scatter = USUAL_SCATTER if residuals.errors.measured else _HELD_SCATTER
     difference = residuals.difference(values) / residuals.largest
     in_order = np.argsort(residuals.along, kind="stable")
     for name, whole, down in zip(
@@ -62,7 +58,7 @@ def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
             )
         # noise alone has runs too
         noise = noise_about_neighbours(whole[ordered])
-        if runs.max() > max(3.0 * _SCATTER, _NOISY_RUN * noise):
+        if runs.max() > max(3.0 * USUAL_SCATTER, _NOISY_RUN * noise):
             run = residuals.along[ordered[np.argmax(runs) + np.arange(_RUN)]]
             return (
                 f"{name} differs by {runs.max():.1%} of its largest value in neighbouring rows, "
@@ -92,12 +88,12 @@ def outlier_notes(residuals: Residuals, values: Array, robust: bool) -> list[str
     """Name the points that lie far outside the scatter of the others."""
     advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
     size = np.abs(residuals.deviations(values))
-    odd = np.argwhere(size > _SUSPICIOUS)
-    worst = np.sort(np.argsort(-size[tuple(odd.T)], kind="stable")[:_NAMED])
+    outliers = np.argwhere(size > _OUTLYING)
+    worst = np.sort(np.argsort(-size[tuple(outliers.T)], kind="stable")[:_NAMED])
     named = [
-        f"{residuals.observables[row]} at {residuals.along[place]:g} {residuals.unit} is "
-        f"{size[row, place]:.0f} standard deviations from the fit; {advice}"
-        for row, place in odd[worst].tolist()
+        f"{residuals.observables[row]} at {residuals.along[column]:g} {residuals.unit} is "
+        f"{size[row, column]:.0f} standard deviations from the fit; {advice}"
+        for row, column in outliers[worst].tolist()
     ]
-    more = len(odd) - len(named)
+    more = len(outliers) - len(named)
     return [*named, f"{more} more data are as far from the fit"] if more else named

@@ -105,7 +105,7 @@ class DataErrors:
         The standard errors.
     down : ndarray, shape (observables, n)
         By how much a robust fit has lessened the weight of each datum: one where it has not.
-    known : bool
+    measured : bool
         Whether errors were measured.
     without : ndarray of bool, shape (observables,)
         Observables that are to take their scatter for their error.
@@ -121,7 +121,7 @@ class DataErrors:
     ) -> None:
         self.present, self.largest, self._root = present, largest, root
         self._order = np.argsort(along, kind="stable")
-        self.known, self.without = measured is not None, np.zeros(len(present), dtype=bool)
+        self.measured, self.without = measured is not None, np.zeros(len(present), dtype=bool)
         self.scale = np.broadcast_to(largest / root, present.shape)
         if measured is not None:
             self.without = np.all(np.isnan(measured), axis=1)
@@ -155,7 +155,7 @@ class DataErrors:
         scatter = 1.4826 * np.nanmedian(np.abs(difference), axis=1, keepdims=True)
         # data without noise have no scatter to measure against
         least = np.broadcast_to(1e-4 * self.largest, difference.shape)
-        if self.known:
+        if self.measured:
             least = np.where(self.without[:, None], least, self.scale * self._root)
         return np.nan_to_num(difference / np.maximum(scatter, least))
 
@@ -242,7 +242,7 @@ class DataErrors:
 
     def reduced_chi_square(self, difference: Array, varied: int) -> float | None:
         """Return that of the observables with measurement errors; None without."""
-        if not self.known or self.without.all():
+        if not self.measured or self.without.all():
             return None
         weighted = (difference / self.scale)[~self.without]
         count = np.isfinite(weighted).sum()

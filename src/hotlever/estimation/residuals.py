@@ -236,10 +236,10 @@ class Drift:
         self._present, self._names = present, tuple(observables)
         order = np.linspace(-1.0, 1.0, present.shape[1])
         self._columns = np.zeros((*present.shape, 2 * len(self._names)))
-        for place, name in enumerate(self._names):
+        for row, name in enumerate(self._names):
             if name in ZEROED:
-                self._columns[place, :, 2 * place] = 1.0
-                self._columns[place, :, 2 * place + 1] = order
+                self._columns[row, :, 2 * row] = 1.0
+                self._columns[row, :, 2 * row + 1] = order
         kept = np.any(self._columns, axis=(0, 1))
         self._columns = self._columns[:, :, kept]
 

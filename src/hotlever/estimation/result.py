@@ -67,8 +67,8 @@ class FittedParameter:
 
     def __str__(self) -> str:
         """Return the value with its error, as far as there is one, and its unit."""
-        known = value_with_error(self.value, self.stderr)
-        return known if self.unit == "1" else f"{known} {self.unit}"
+        text = value_with_error(self.value, self.stderr)
+        return text if self.unit == "1" else f"{text} {self.unit}"
 
 
 @dataclass(frozen=True)
@@ -226,8 +226,10 @@ class Fit(Outcome):
 
     def residuals(self) -> Residuals:
         """Return the data with the fit's own weights, to be compared with predictions."""
-        known, base = self.stated_priors, self.probe.circuit.base_temperature_K
-        common = errors_of_scales(self.measurement, self.observables, known, base) if known else []
+        priors, base = self.stated_priors, self.probe.circuit.base_temperature_K
+        common = []
+        if priors:
+            common = errors_of_scales(self.measurement, self.observables, priors, base)
         return Residuals(
             self.measurement,
             self.observables,
