@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hotlever.materials import LOW_DOPED
 from hotlever.probe import Layout, Region, Taper, Terminal
 
 
@@ -13,7 +14,8 @@ def plate(outline, thickness, holes=()) -> Layout:
     """A plate of one region whose leg end lies far away."""
     outline, *holes = (tuple((float(x), float(y)) for x, y in ring) for ring in (outline, *holes))
     middle = tuple(np.mean(outline, axis=0).tolist())
-    region = Region("plate", "heater", outline, Taper(middle, (1.0, 0.0), 1.0), tuple(holes))
+    taper = Taper(middle, (1.0, 0.0), 1.0)
+    region = Region("plate", "heater", outline, taper, tuple(holes), material=LOW_DOPED)
     return Layout((region,), (Terminal("supply", (1e3, 0.0), (1e3, 1.0)),), middle, thickness)
 
 

@@ -14,7 +14,7 @@ from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.parametrisation import state_at_bias
-from hotlever.materials import Kind, Material
+from hotlever.materials import HIGH_DOPED, LOW_DOPED, Kind, Material
 from hotlever.probe import Circuit, Layout, ProbeMesh, Region, Taper, Terminal
 from hotlever.probe.layout import Film
 
@@ -35,7 +35,10 @@ def bare_equations(
 
     A stack gives materials and thicknesses (µm) by name, the body first.
     """
-    region = Region("all", "heater", ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), taper)
+    region = Region(
+        *("all", "heater", ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), taper),
+        material=HIGH_DOPED if taper is None else LOW_DOPED,
+    )
     kinds, thickness = material.kinds, 0.4
     if stack is not None:
         (body, (_, thickness)), *films = stack.items()

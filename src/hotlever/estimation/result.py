@@ -203,7 +203,7 @@ class Fit(Outcome):
         silicon, slope = self.probe.heater_silicon, np.zeros(len(self.names))
         if silicon is None:
             return float("nan")
-        material = self.probe.layout().heater.stack[0].material
+        material = self.probe.layout().heater.material
         for own in ("n_d", "p"):
             name, value = full_name(material, own), getattr(silicon, own)
             if name in self.names:

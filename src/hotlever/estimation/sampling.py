@@ -260,7 +260,7 @@ def _dataset(fit: Fit, chains: Chains, values_of: Callable[[Array], Array]) -> x
     ensembles, walkers, draws, _ = chains.points.shape
     values = values_of(chains.points)
     columns = {name: values[..., number] for number, name in enumerate(fit.names)}
-    silicon, material = fit.probe.heater_silicon, fit.probe.layout().heater.stack[0].material
+    silicon, material = fit.probe.heater_silicon, fit.probe.layout().heater.material
     if silicon is not None:
         owned = {full_name(material, own): own for own in ("n_d", "p")}
         sampled = {owned[name]: column for name, column in columns.items() if name in owned}

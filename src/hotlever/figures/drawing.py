@@ -79,7 +79,7 @@ def _shown_as(region: Region) -> tuple[str, str]:
     if region.taper is not None:
         name = "heater" if heats else "reader"
         return VERMILION if heats else SKY, f"{name} (low-doped)"
-    material = region.stack[0].material
+    material = region.material
     label = "high-doped silicon" if material == HIGH_DOPED else material
     return (VERMILION, f"heater ({label})") if heats else ("0.82", label)
 

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from hotlever.errors import InputError
-from hotlever.materials import HIGH_DOPED, LOW_DOPED
+from hotlever.materials import HIGH_DOPED
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
@@ -82,15 +82,14 @@ class Film:
 class Region:
     """A polygon, with holes or without, of one stack of materials.
 
-    The outline runs counter-clockwise, holes clockwise. Attributes that are left out are those of
-    the silicon of ``[material]`` alone.
+    The outline runs counter-clockwise, holes clockwise.
 
     Attributes
     ----------
     taper : Taper or BorderTaper, optional
         Where the doping is low and tapered.
-    material : str, optional
-        Of the body; left out: low-doped silicon where there is a taper, high-doped elsewhere.
+    material : str
+        Of the body, by its name in the probe.
     dopant_from : str
         The material beside it from which dopant diffuses into it, where there is a taper.
     films : tuple of Film
@@ -104,7 +103,7 @@ class Region:
     outline: tuple[Point, ...]
     taper: Taper | BorderTaper | None = None
     holes: tuple[tuple[Point, ...], ...] = ()
-    material: str | None = None
+    material: str = HIGH_DOPED
     dopant_from: str = HIGH_DOPED
     films: tuple[Film, ...] = ()
     insulates: bool = False
@@ -112,8 +111,7 @@ class Region:
     @property
     def stack(self) -> tuple[Film, ...]:
         """What it is made of, the body first."""
-        body = LOW_DOPED if self.taper is not None else HIGH_DOPED
-        return (Film(self.material or body), *self.films)
+        return (Film(self.material), *self.films)
 
     @property
     def rings(self) -> tuple[tuple[Point, ...], ...]:

@@ -83,9 +83,7 @@ def usual_parameters(probe: ProbeParts) -> tuple[str, ...]:
     >>> usual_parameters(Probe.reference())
     ('c_kappa', 'delta', 'n_d', 'p', 'a0', 'a1')
     """
-    tapered = {
-        region.stack[0].material for region in probe.layout().regions if region.taper is not None
-    }
+    tapered = {region.material for region in probe.layout().regions if region.taper is not None}
     usual = [
         full_name(material, own)
         for material, kind in _kinds(probe)

@@ -66,7 +66,7 @@ class ProbeParts(Record):
     @model_validator(mode="after")
     def _low_doped_parts_are_the_lower(self) -> Self:
         for region in self.layout().regions:
-            low, high = region.stack[0].material, region.dopant_from
+            low, high = region.material, region.dopant_from
             of_low, of_high = self.kinds[low], self.kinds[high]
             if (
                 region.taper is not None
@@ -123,7 +123,7 @@ class ProbeParts(Record):
     @property
     def heater_silicon(self) -> LowDopedSilicon | None:
         """The low-doped silicon of the heater; None if it is of another material."""
-        kind = self.kinds[self.layout().heater.stack[0].material]
+        kind = self.kinds[self.layout().heater.material]
         return kind if isinstance(kind, LowDopedSilicon) else None
 
     @property

@@ -8,10 +8,12 @@ drawing (`hotlever.probe.drawing.shape`).
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from hotlever.materials import LOW_DOPED
 from hotlever.probe.layout import Layout, Part, Region, Taper, Terminal, rectangle
 from hotlever.records import Record
 
@@ -223,17 +225,22 @@ class ThreeLeg(Parametric):
         reader_middle = (here._reader_centre, -(inner + outer) / 2)
         reader_taper = Taper(reader_middle, along_x, here.reader_length_um)
 
-        def right_leg(name: str, x0: float, x1: float, taper: Taper | None = None) -> Region:
-            return Region(name, "reader branch", rectangle(x0, -outer, x1, -inner), taper)
+        def right_leg(name: str, x0: float, x1: float) -> Region:
+            return Region(name, "reader branch", rectangle(x0, -outer, x1, -inner))
 
+        heater_outline = rectangle(heater_from, -heater, front, heater)
         return Layout(
             regions=(
                 Region("centre leg", "leg 1", rectangle(0, -centre, heater_from, centre)),
-                Region("heater", "heater", rectangle(heater_from, -heater, front, heater), taper),
+                Region("heater", "heater", heater_outline, taper, material=LOW_DOPED),
                 Region("bridge", "leg 2", rectangle(front, -outer, here.length_um, outer)),
                 Region("left leg", "leg 2", rectangle(0, inner, front, outer)),
                 right_leg("right leg", 0, reader_from),
-                right_leg("reader", reader_from, reader_to, reader_taper),
+                replace(
+                    right_leg("reader", reader_from, reader_to),
+                    taper=reader_taper,
+                    material=LOW_DOPED,
+                ),
                 right_leg("right leg front", reader_to, front),
             ),
             terminals=(
@@ -330,7 +337,7 @@ class UShape(Parametric):
         return Layout(
             regions=(
                 *side("right", "leg 1", -1),
-                Region("heater", "heater", across, taper),
+                Region("heater", "heater", across, taper, material=LOW_DOPED),
                 *side("left", "leg 2", +1),
             ),
             terminals=(

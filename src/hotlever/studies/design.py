@@ -102,7 +102,7 @@ class Design:
     def _is_annealed(self) -> bool:
         """Whether dopant of the silicon of ``[material]`` diffuses anywhere."""
         return any(
-            region.taper is not None and region.stack[0].material == LOW_DOPED
+            region.taper is not None and region.material == LOW_DOPED
             for region in self.probe.layout().regions
         )
 
