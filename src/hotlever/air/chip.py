@@ -31,7 +31,7 @@ class BaseLine:
 
     Attributes
     ----------
-    place : ndarray, shape (2,)
+    origin : ndarray, shape (2,)
         A point on it (µm).
     along : ndarray, shape (2,)
         Unit vector normal to it, towards the lever: the lever's direction.
@@ -39,7 +39,7 @@ class BaseLine:
         Unit vector on it, to the left of `along`.
     """
 
-    place: Array
+    origin: Array
     along: Array
     across: Array
 
@@ -58,15 +58,15 @@ class BaseLine:
         InputError
             If leg ends are not on one line, or the lever is on both sides of it.
         """
-        ends = [one for one in layout.terminals if one.name in ("supply", "ground")]
-        points = np.array([place for one in ends for place in (one.start, one.end)])
-        place = points[0]
-        away = np.linalg.norm(points - place, axis=1)
-        x, y = (points[away.argmax()] - place) / away.max()
+        ends = [terminal for terminal in layout.terminals if terminal.name in ("supply", "ground")]
+        points = np.array([point for terminal in ends for point in (terminal.start, terminal.end)])
+        origin = points[0]
+        away = np.linalg.norm(points - origin, axis=1)
+        x, y = (points[away.argmax()] - origin) / away.max()
         along = np.array([y, -x])
-        if (np.array(layout.tip) - place) @ along < 0:
+        if (np.array(layout.tip) - origin) @ along < 0:
             along = -along
-        line = cls(place, along, np.array([-along[1], along[0]]))
+        line = cls(origin, along, np.array([-along[1], along[0]]))
         off = np.abs(line.seen(points)[:, 0])
         if off.max() > _OFF_LINE:
             x, y = points[off.argmax()]
@@ -86,11 +86,11 @@ class BaseLine:
 
     def seen(self, places: Array) -> Array:
         """Return places (n, 2) by their distances along the lever and across it (µm)."""
-        return (places - self.place) @ np.stack([self.along, self.across], axis=1)
+        return (places - self.origin) @ np.stack([self.along, self.across], axis=1)
 
     def placed(self, corners: Array) -> Array:
         """Return points (..., 3), given along, across and up, in space."""
-        level = corners[..., :1] * self.along + corners[..., 1:2] * self.across + self.place
+        level = corners[..., :1] * self.along + corners[..., 1:2] * self.across + self.origin
         return np.concatenate([level, corners[..., 2:]], axis=-1)
 
 

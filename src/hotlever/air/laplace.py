@@ -94,7 +94,7 @@ def _solid_angle(to_corner: Array, distance: Array) -> Array:
     first, angle = to_corner[..., 0, :], np.zeros(to_corner.shape[:-2])
     for k in range(1, to_corner.shape[-2] - 1):
         second, third = to_corner[..., k, :], to_corner[..., k + 1, :]
-        a, b, c = (distance[..., one] for one in (0, k, k + 1))
+        a, b, c = (distance[..., corner] for corner in (0, k, k + 1))
         volume = np.einsum("...d,...d->...", first, np.cross(second, third))
         rest = (
             a * b * c
@@ -133,18 +133,18 @@ def rectangle_pairs(first: Panels, second: Panels) -> Array:
         high.append(turned.max(axis=1))
     # differences of the coordinates: high − low, low − low, high − high, low − high
     differences = np.stack([high[0] - low[1], low[0] - low[1], high[0] - high[1], low[0] - high[1]])
-    for one in range(3):
-        for other in range(3):
-            pairs = (axis == one) & (other_axis == other)
+    for normal in range(3):
+        for other_normal in range(3):
+            pairs = (axis == normal) & (other_axis == other_normal)
             d = differences[:, pairs]
-            if one == other:
-                u, v = (axis for axis in range(3) if axis != one)
-                result[pairs] = _parallel(d[:, :, u], d[:, :, v], d[0, :, one])
+            if normal == other_normal:
+                u, v = (axis for axis in range(3) if axis != normal)
+                result[pairs] = _parallel(d[:, :, u], d[:, :, v], d[0, :, normal])
             else:
-                shared = 3 - one - other
+                shared = 3 - normal - other_normal
                 # along the normal of one rectangle only the other extends
                 result[pairs] = _perpendicular(
-                    d[:, :, shared], d[[0, 1], :, other], d[[0, 2], :, one]
+                    d[:, :, shared], d[[0, 1], :, other_normal], d[[0, 2], :, normal]
                 )
     return result
 

@@ -97,9 +97,9 @@ def air_operator(
         "options": asdict(options),
     }
     path = cache_file("air", facts)
-    known = stored(path, lambda a: AirOperator(a["sites"], a["matrix"], float(a["filling"])))
-    if known is not None:
-        return known
+    kept = stored(path, lambda a: AirOperator(a["sites"], a["matrix"], float(a["filling"])))
+    if kept is not None:
+        return kept
     operator = PanelledAir(layout, surroundings, base_temperature_K, options, progress).operator()
     store_arrays(path, {name: np.asarray(value) for name, value in vars(operator).items()})
     return operator
@@ -152,7 +152,9 @@ class PanelledAir:
 
         self.surface = lever_surface(layout, options, mirrored=surroundings.symmetric)
         chip = [chip_panels(layout, options.refinement)] if surroundings.chip else []
-        self.panels = Panels(np.concatenate([one.corners for one in (self.surface.panels, *chip)]))
+        self.panels = Panels(
+            np.concatenate([panels.corners for panels in (self.surface.panels, *chip)])
+        )
         most = int(_MOST_PANELS * options.refinement**2)
         if len(self.panels) > most:
             raise ComputationError(
@@ -215,8 +217,8 @@ class PanelledAir:
         for screened in single_layer_matrix(self.panels, Screened(q), self.mirrors):
             flux = np.linalg.solve(self._layer + screened, moments.astype(screened.dtype))
             heat.append(self._halves * (moments.T @ flux))
-        found = np.array(heat)
-        return np.asarray(0.5 * (found + found.swapaxes(1, 2)))
+        heats = np.array(heat)
+        return np.asarray(0.5 * (heats + heats.swapaxes(1, 2)))
 
     def theta(self, points: Array, flux: Array) -> Array:
         """Return θ (mW/µm) of the air at some points (n, 3), for the flux from every panel."""

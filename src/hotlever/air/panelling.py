@@ -84,10 +84,10 @@ def divided(at: Array, size: Array) -> Array:
 
 def parts(shape: BaseGeometry, kind: str = "Polygon") -> list[BaseGeometry]:
     """Return the simple parts of one kind that a geometry is made of."""
-    found = shapely.get_parts(shape)
-    if any(one.geom_type == "GeometryCollection" for one in found):
-        found = shapely.get_parts(found)
-    return [one for one in found if one.geom_type == kind and not one.is_empty]
+    simple = shapely.get_parts(shape)
+    if any(part.geom_type == "GeometryCollection" for part in simple):
+        simple = shapely.get_parts(simple)
+    return [part for part in simple if part.geom_type == kind and not part.is_empty]
 
 
 def rings(shape: Polygon) -> list[Array]:
@@ -118,9 +118,9 @@ def _faces(shape: Polygon, exposed: BaseGeometry, depths: Array) -> list[Polygon
         inner = inner.simplify(_OFF_CURVE * (depth - above) if last else 10 * GRID)
         if inner.is_empty:
             break
-        for one in parts(inner):
-            lines.append(one.boundary)
-            lines += _mitres(one, shape, layer, depth - above)
+        for part in parts(inner):
+            lines.append(part.boundary)
+            lines += _mitres(part, shape, layer, depth - above)
         above = depth
     return _cut_by(shape, lines)
 
@@ -229,12 +229,12 @@ def _divided(piece: Polygon, size: Size) -> list[Polygon]:
 def _between(ring: Array, left: float, right: float) -> tuple[float, float]:
     """Return the least and the greatest ordinate of a convex ring between two abscissas."""
     start, end = ring, np.roll(ring, -1, axis=0)
-    found = [ring[(ring[:, 0] >= left) & (ring[:, 0] <= right), 1]]
+    ordinates = [ring[(ring[:, 0] >= left) & (ring[:, 0] <= right), 1]]
     for at in (left, right):
         crossing = (start[:, 0] - at) * (end[:, 0] - at) < 0
         share = (at - start[crossing, 0]) / (end[crossing, 0] - start[crossing, 0])
-        found.append(start[crossing, 1] + share * (end[crossing, 1] - start[crossing, 1]))
-    values = np.concatenate(found)
+        ordinates.append(start[crossing, 1] + share * (end[crossing, 1] - start[crossing, 1]))
+    values = np.concatenate(ordinates)
     return float(values.min()), float(values.max())
 
 
@@ -247,7 +247,7 @@ def _quadrilaterals(cell: Polygon) -> list[Array]:
         return []
     if (turns(ring) < 0).any() or cell.interiors:
         triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(cell))
-        return [np.array(one.exterior.coords)[[0, 1, 2, 2]] for one in triangles]
+        return [np.array(triangle.exterior.coords)[[0, 1, 2, 2]] for triangle in triangles]
     return [
         ring[[0, first, first + 1, min(first + 2, len(ring) - 1)]]
         for first in range(1, len(ring) - 1, 2)

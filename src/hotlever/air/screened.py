@@ -85,9 +85,9 @@ def screened_potential(points: Array, corners: Array, q: Numbers) -> Numbers:
     nodes, weights = np.polynomial.legendre.leggauss(_ALONG)
     total = np.zeros((len(q), *to_corner.shape[:-2]), dtype=q.dtype)
     last = corners.shape[-2] - 1
-    for one in range(last + 1):
-        start = to_corner[..., one, :]
-        edge = to_corner[..., 0 if one == last else one + 1, :] - start
+    for corner in range(last + 1):
+        start = to_corner[..., corner, :]
+        edge = to_corner[..., 0 if corner == last else corner + 1, :] - start
         length = np.maximum(np.linalg.norm(edge, axis=-1), 1e-12)
         edge = edge / length[..., None]
         # from the foot of the point: away from the edge's line, and along it

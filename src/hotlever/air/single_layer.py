@@ -83,13 +83,13 @@ def single_layer_matrix(
     matrix = np.zeros((*kernel.shape, count, count), dtype=kernel.dtype)
     for done, mirror in enumerate(mirrors):
         images = panels.reflected(mirror)
-        one = np.empty_like(matrix)
+        image = np.empty_like(matrix)
         near = []
         for start in range(0, count, _ROWS):
             rows = np.arange(start, min(start + _ROWS, count))
             some = panels.chosen(rows)
             offsets = some.centres[:, None] - images.centres
-            one[..., rows, :] = kernel.far_pairs(some, images, offsets)
+            image[..., rows, :] = kernel.far_pairs(some, images, offsets)
             reach = kernel.far * (some.radii[:, None] + images.radii)
             i, j = np.nonzero(np.einsum("nmd,nmd->nm", offsets, offsets) < reach**2)
             half = rows[i] <= j
@@ -98,12 +98,12 @@ def single_layer_matrix(
         for start in range(0, pairs.shape[1], _PAIRS):
             i, j = pairs[:, start : start + _PAIRS]
             values = kernel.near_pairs(panels, images, i, j)
-            one[..., i, j] = values
-            one[..., j, i] = values
+            image[..., i, j] = values
+            image[..., j, i] = values
             if progress is not None:
                 share = int(100 * min(start + _PAIRS, pairs.shape[1]) / pairs.shape[1])
                 progress(100 * done + share, 100 * len(mirrors))
-        matrix += mirror.sign * one
+        matrix += mirror.sign * image
     return np.asarray(matrix / (4.0 * np.pi))
 
 
@@ -128,12 +128,12 @@ def pairs_by_points(
     under = Panels(np.where(smaller, first.corners, second.corners))
     source = np.where(smaller, second.corners, first.corners)
     which = np.searchsorted([farthest for _, farthest in orders], gaps, side="right")
-    found, places = [], []
+    integrals, numbers = [], []
     for number, (order, _) in enumerate(orders):
         here = np.flatnonzero(which == number)
         for pairs in np.array_split(here, 1 + here.size * order**2 // _POINTS):
             points, weights = under.chosen(pairs).points(order)
             values = over_panel(points, source[pairs, None])
-            found.append(np.einsum("nq,...nq->...n", weights, values))
-            places.append(pairs)
-    return np.concatenate(found, axis=-1)[..., np.argsort(np.concatenate(places))]
+            integrals.append(np.einsum("nq,...nq->...n", weights, values))
+            numbers.append(pairs)
+    return np.concatenate(integrals, axis=-1)[..., np.argsort(np.concatenate(numbers))]

@@ -76,14 +76,14 @@ def stores_of(panelled: PanelledAir, shapes: Array, inside: Array, length_um: fl
     """
     waves: Array = _LOWEST / length_um * np.power(2.0, np.arange(_DOUBLED + 1))
     still, some = panelled.admittances(np.array([1e-9, _READ_OFF]) * waves[-1], shapes)
-    found = panelled.admittances(1j * waves, shapes)
+    on_cut = panelled.admittances(1j * waves, shapes)
     rates = np.square(waves)
-    conductances = np.log(4.0) / np.pi * np.array([_positive(one) for one in found.imag])
+    conductances = np.log(4.0) / np.pi * np.array([_positive(matrix) for matrix in on_cut.imag])
     # all that is slower goes as √p, and adds up as a geometric series
     conductances[0] *= 2.0
     at = (_READ_OFF * waves[-1]) ** 2
     slower = np.tensordot(at / (at + rates), conductances, axes=1)
-    bound = (still - found.real) / rates[:, None, None]
+    bound = (still - on_cut.real) / rates[:, None, None]
     return AirStores(
         rates, conductances, _positive((some - still - slower) / at - inside), bound - inside
     )
@@ -159,8 +159,8 @@ class HeatInAir:
         def seen(matrices: Array) -> Array:
             return np.asarray(shares.T @ matrices @ shares)
 
-        one = self.stores
-        stores = AirStores(one.rates, seen(one.conductances), seen(one.volume), seen(one.bound))
+        own = self.stores
+        stores = AirStores(own.rates, seen(own.conductances), seen(own.volume), seen(own.bound))
         reduced = replace(
             self,
             stores=stores,

@@ -87,7 +87,7 @@ class _Outline:
         fine = 1.0 / options.refinement
         self._growth, self._from_heater = fine * _GROWTH, fine * _FROM_HEATER
         self._edge = fine * options.edge * layout.thickness_um
-        first = next(one for one in layout.terminals if one.name == "supply")
+        first = next(terminal for terminal in layout.terminals if terminal.name == "supply")
         self._origin = np.array(first.start)
         x, y = (self._origin - first.end) / np.linalg.norm(self._origin - first.end)
         self._axes = np.array([[x, y], [-y, x]])
@@ -118,17 +118,19 @@ class _Outline:
 
     def _exposed(self, layout: Layout) -> tuple[list[Array], Array]:
         """Return the edges that no terminal holds, and the sharp corners between two of them."""
-        ends = [LineString(self._seen([one.start, one.end])) for one in layout.terminals]
+        ends = [
+            LineString(self._seen([terminal.start, terminal.end])) for terminal in layout.terminals
+        ]
         off = _ON_LINE + shapely.hausdorff_distance(self._shape, self._exact)
         held = shapely.union_all(ends).buffer(off, cap_style="flat")
         edges, corners = [], []
         for ring in rings(self._shape):
             free = [
-                [one for one in parts(LineString(pair).difference(held), "LineString")
-                 if one.length > _SHORTEST]
+                [line for line in parts(LineString(pair).difference(held), "LineString")
+                 if line.length > _SHORTEST]
                 for pair in zip(ring, np.roll(ring, -1, axis=0), strict=True)
             ]  # fmt: skip
-            edges += [np.array(one.coords) for some in free for one in some]
+            edges += [np.array(line.coords) for some in free for line in some]
             exposed = np.array([bool(some) for some in free])
             corners.append(ring[(np.abs(turns(ring)) > _SHARP) & exposed & np.roll(exposed, 1)])
         return edges, np.concatenate(corners)

@@ -171,7 +171,7 @@ def heat_by_region(state: State) -> dict[str, float]:
     facets = mesh.boundary_facets()
     a, b, c = np.moveaxis(mesh.p[:, mesh.facets[:, facets]], 1, 0)
     area = np.linalg.norm(np.cross((b - a).T, (c - a).T), axis=1) / 2
-    names = [one.name for one in lever.solid.layout.regions]
+    names = [region.name for region in lever.solid.layout.regions]
     region = lever.solid.region[mesh.f2t[0, facets]]
     nodes = np.concatenate(
         [basis.nodal_dofs[0, mesh.facets[:, facets]], basis.edge_dofs[0, mesh.f2e[:, facets]]]
