@@ -89,7 +89,7 @@ def _calibrate(
     medium: str | None = None,
     **files: Path,
 ) -> None:
-    outputs = Outputs(data, probe, fit, power_law)
+    outputs = _outputs([data, probe, fit, power_law], **files)
     like = read_probe(reporter, probe) if fit is None else None
     read = data, parse_columns(column), like, fit, power_law, prior
     timing = None if pulse is None else parse_timing(pulse)
@@ -130,9 +130,19 @@ def _lever(
     **files: Path,
 ) -> tuple[Lever, Outputs, Files]:
     """Return the lever that is simulated, and what is written of it."""
+    outputs = _outputs([probe], **files)
     read = read_probe(reporter, probe, set)
     read = read if medium is None else read.in_medium(medium)
-    return make_lever(reporter, read), Outputs(probe), Files(**files)
+    return make_lever(reporter, read), outputs, Files(**files)
+
+
+def _outputs(inputs: Sequence[Path | None], fields: Path | None = None, **files: Path) -> Outputs:
+    """Return the outputs of a task, that can be written: files, and a folder of fields."""
+    outputs = Outputs(*inputs)
+    for path in files.values():
+        outputs.file(path)
+    outputs.folder(fields)
+    return outputs
 
 
 def _raman(
@@ -144,7 +154,7 @@ def _raman(
     law: str = "anharmonic",
     **files: Path,
 ) -> None:
-    outputs = Outputs(folder, calibration, calibrate_from, corrections)
+    outputs = _outputs([folder, calibration, calibrate_from, corrections], **files)
     thermometer = set_up(
         calibration=None if calibration is None else str(calibration),
         calibrate_from=None if calibrate_from is None else [calibrate_from],
@@ -156,7 +166,8 @@ def _raman(
 
 
 def _import(reporter: Report, drawing: Path, output: Path, plot: Path) -> None:
-    propose_probe(reporter, drawing, None, None, Outputs(drawing), output, plot)
+    outputs = _outputs([drawing], output=output, plot=plot)
+    propose_probe(reporter, drawing, None, None, outputs, output, plot)
 
 
 #: Samples of a posterior, as the command line has them.
