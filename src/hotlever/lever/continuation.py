@@ -44,10 +44,13 @@ _LOOKED_AT = 20
 #: Points of Gauss's rule and rounds by which the length of a piece of the curve is found.
 _GAUSS, _ROUNDS = np.polynomial.legendre.leggauss(5), 6
 
+#: Whether a branch is long enough.
+Enough = Callable[[Branch], bool | np.bool_]
+
 
 def continued(
     equations: LeverEquations,
-    enough: Callable[[Branch], bool],
+    enough: Enough,
     start: Branch | None = None,
     seen: Callable[[Branch], None] = lambda branch: None,
 ) -> Branch:
@@ -61,7 +64,7 @@ def continued(
         If a state was not found; ``partial`` holds the branch up to there.
     """
 
-    def far_enough(branch: Branch) -> bool:
+    def far_enough(branch: Branch) -> bool | np.bool_:
         seen(branch)
         return enough(branch)
 
@@ -90,7 +93,7 @@ class Continuation(ABC):
         self._equations, self._step = equations, step
         self._branch = self._beginning() if start is None else start
 
-    def until(self, enough: Callable[[Branch], bool]) -> Branch:
+    def until(self, enough: Enough) -> Branch:
         """Go on until the branch is long enough, or something melts.
 
         Raises

@@ -14,7 +14,9 @@ from numpy.typing import ArrayLike
 from hotlever.datasets import OBSERVABLES, QUANTITIES, csv_text, labelled, quantity, write_dataset
 from hotlever.errors import InputError
 from hotlever.files import read_text
-from hotlever.lever.balances import BALANCES, balance_names
+from hotlever.lever.balances import BALANCES, balance_columns, balance_names, balance_slopes
+from hotlever.lever.branch import Branch
+from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.materials import Kind
 from hotlever.materials.sections import LAWS, own_laws
 from hotlever.probe import Circuit, Probe
@@ -37,20 +39,47 @@ _MORE = (
 )
 
 
-def sweep_dataset(
+def dataset_of_states(
+    probe: Probe, equations: LeverEquations, x: Array, notes: Sequence[str] = ()
+) -> xr.Dataset:
+    """Return what is observed of solved states (size + 1, n) of a probe's lever."""
+    base = equations.base_temperature_K
+    shown = dict(zip(SHOWN, equations.observed(x), strict=True))
+    shown["tip_K"] = base + equations.space.tip_rise(x)
+    shown["max_K"] = base + equations.highest_rise(x)
+    return _dataset(probe, equations, shown, balance_columns(equations, x), notes)
+
+
+def dataset_of_branch(
     probe: Probe,
-    made_of: Mapping[str, Kind],
+    branch: Branch,
+    u: Array,
+    notes: Sequence[str] = (),
+    sensitivities: Array | None = None,
+) -> xr.Dataset:
+    """Return what is observed of a probe's lever at some places u (n,) of its branch.
+
+    Sensitivities, (3, n, p), are of `OBSERVABLES` by what a fit usually varies.
+    """
+    equations, shown = branch.equations, branch.shown(u)
+    shown["tip_K"] = branch.tip_K(u)
+    shown["max_K"] = branch.base_temperature_K + branch.highest_rise_at(u)
+    balances = branch.through(
+        balance_columns(equations, branch.x), balance_slopes(equations, branch.x, branch.slopes)
+    )
+    return _dataset(probe, equations, shown, balances(u), notes, sensitivities)
+
+
+def _dataset(
+    probe: Probe,
+    equations: LeverEquations,
     shown: Mapping[str, Array],
     balances: Array,
     notes: Sequence[str],
     sensitivities: Array | None = None,
 ) -> xr.Dataset:
-    """Return what is observed of n states of a probe's lever, whose materials may be other ones.
-
-    Shown are ``lever_V``, ``current_mA``, ``reader_V``, ``tip_K`` and ``max_K``; the balances,
-    (n, k), are `balance_columns`; sensitivities, (3, n, p), are of `OBSERVABLES` by what a fit
-    usually varies.
-    """
+    """Return what is observed of n states, of which the balances (n, k) are `balance_columns`."""
+    made_of = equations.made_of
     names = balance_names(probe.wiring)
     columns = {**shown, **dict(zip(names, balances.T, strict=True))}
     at_terminals = names[len(BALANCES) :]

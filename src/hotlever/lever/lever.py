@@ -3,32 +3,30 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.air.operator import air_operator, change_with_gap
 from hotlever.air.panels import PanelOptions
 from hotlever.errors import ComputationError, InputError
-from hotlever.lever.around import AroundLever
-from hotlever.lever.balances import balance_columns, balance_slopes
-from hotlever.lever.branch import Branch, Reach
-from hotlever.lever.continuation import continued
-from hotlever.lever.dataset import at_bias, checked_bias, sweep_dataset
-from hotlever.lever.equations import SHOWN, LeverEquations
+from hotlever.lever.branch import TIP_RISE, Branch, Reach
+from hotlever.lever.continuation import Enough, continued
+from hotlever.lever.dataset import at_bias, checked_bias, dataset_of_branch, dataset_of_states
+from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.meshing import chosen_space, flat_space
 from hotlever.lever.parametrisation import state_at_bias
 from hotlever.lever.ramp import Reading
 from hotlever.lever.sensitivities import sensitivities_of
 from hotlever.lever.space import TIP, Constraint
+from hotlever.lever.surroundings import surrounded
 from hotlever.materials import Material
-from hotlever.probe import Circuit, Layout, MeshOptions, Probe
+from hotlever.probe import Circuit, MeshOptions, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
@@ -94,23 +92,7 @@ class Lever:
 
     def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
         """Return a space in the probe's surroundings."""
-        if self.medium == "vacuum":
-            return space.in_vacuum()
-        base, around = self.circuit.base_temperature_K, self.probe.surroundings
-        air = air_operator(self._plate, around, base, self.panels, progress)
-        lever = AroundLever(space, self._plate, around, base)
-        return space.in_air(air, lever).in_gas(around.gas_conductivity)
-
-    def air_by_inverse_gap(self) -> Array:
-        """Return how the operator of the air changes with the inverse of the gap, in µm²."""
-        around = self._plate, self.probe.surroundings, self.circuit.base_temperature_K
-        return change_with_gap(self.space.air.operator, *around, self.panels)
-
-    @property
-    def _plate(self) -> Layout:
-        """The lever as the air sees it: as thick everywhere as where most lies on one another."""
-        layout = self.probe.layout()
-        return replace(layout, thickness_um=layout.thickest_um)
+        return surrounded(space, self.probe, self.panels, progress)
 
     @property
     def panels(self) -> PanelOptions:
@@ -168,13 +150,10 @@ class Lever:
         ComputationError
             If a state was not found.
         """
-        return self._followed(
-            lambda branch: bool(branch.tip_K(branch.u[-1]) >= hottest_K), progress
-        )
+        rise = hottest_K - self.circuit.base_temperature_K
+        return self._followed(lambda branch: branch.values[-1, TIP_RISE] >= rise, progress)
 
-    def _followed(
-        self, enough: Callable[[Branch], bool], progress: Progress | None = None
-    ) -> Branch:
+    def _followed(self, enough: Enough, progress: Progress | None = None) -> Branch:
         """Return a branch that is long enough, going on from the one at hand."""
 
         def told(branch: Branch) -> None:
@@ -198,7 +177,7 @@ class Lever:
     @one_blas_thread
     def branch_past_knee(self) -> Branch:
         """Return a branch that reaches beyond its knee, or ends below because silicon melts."""
-        return self._followed(lambda branch: bool(np.any(np.diff(branch.values[:-1, 0]) < 0)))
+        return self._followed(lambda branch: np.any(np.diff(branch.values[:-1, 0]) < 0))
 
     @one_blas_thread
     def solve(self, bias: ArrayLike, progress: Progress | None = None) -> list[State]:
@@ -263,8 +242,8 @@ class Lever:
     @one_blas_thread
     def polished(self, guess: Array, bias: float, constraint: Constraint = TIP) -> State:
         """Solve at a bias (V) from a nearby state, (size + 1, 1); see `state_at_bias`."""
-        if bias == 0.0 and self.circuit.starts_cold:
-            return State(self, np.zeros_like(guess))
+        if bias == 0.0 and not guess.any():
+            return State(self, guess)  # without power nothing leads along the branch
         return State(self, state_at_bias(self.equations, self.circuit, bias, guess, constraint))
 
     @one_blas_thread
@@ -314,7 +293,8 @@ class Lever:
         u, slopes = reading.u[reached], None
         if sensitivities:
             slopes = sensitivities_of(branch, u, self.circuit, usual_parameters(self.probe))
-        data = self._dataset(branch, u, reading.notes(values[reached]), slopes)
+        notes = reading.notes(values[reached])
+        data = dataset_of_branch(self.probe, branch, u, notes, slopes)
         data = at_bias(data, values[reached])
         if failure is not None:
             failure.partial = data
@@ -324,28 +304,11 @@ class Lever:
     @one_blas_thread
     def dataset(self, states: Sequence[State], notes: Sequence[str] = ()) -> xr.Dataset:
         """Return what is observed of solved states, as `sweep` does."""
-        space, equations = self.space, self.equations
-        x = np.concatenate([np.zeros((space.size + 1, 0)), *(state.x for state in states)], axis=1)
-        base = self.circuit.base_temperature_K
-        shown = dict(zip(SHOWN, equations.observed(x), strict=True))
-        shown |= {"tip_K": base + space.tip_rise(x), "max_K": base + equations.highest_rise(x)}
-        balances = balance_columns(equations, x)
-        return sweep_dataset(self.probe, equations.made_of, shown, balances, notes)
+        nothing = np.zeros((self.space.size + 1, 0))
+        x = np.concatenate([nothing, *(state.x for state in states)], axis=1)
+        return dataset_of_states(self.probe, self.equations, x, notes)
 
     @one_blas_thread
-    def _dataset(
-        self, branch: Branch, u: Array, notes: Sequence[str], slopes: Array | None = None
-    ) -> xr.Dataset:
-        """Return what is observed at some places of the branch, perhaps with its sensitivities."""
-        equations, base = self.equations, self.circuit.base_temperature_K
-        shown = branch.shown(u)
-        shown |= {"tip_K": branch.tip_K(u), "max_K": base + branch.highest_rise_at(u)}
-        balances = branch.through(
-            balance_columns(equations, branch.x),
-            balance_slopes(equations, branch.x, branch.slopes),
-        )(u)
-        return sweep_dataset(self.probe, equations.made_of, shown, balances, notes, slopes)
-
     def knee(self) -> xr.Dataset:
         """Return the knee of the I-V curve, dV_l/dI_h = 0, as a sweep of one state.
 
@@ -361,7 +324,7 @@ class Lever:
         if branch.knee_u is None:
             end = f"{self.equations.limit[1]}, with the tip at {branch.hottest_K:.0f} K"
             raise ComputationError(f"V_l rises until {end}: there is no knee")
-        return self._dataset(branch, np.array([branch.knee_u]), [])
+        return dataset_of_branch(self.probe, branch, np.array([branch.knee_u]))
 
 
 @dataclass(frozen=True)

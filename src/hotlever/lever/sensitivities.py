@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hotlever.lever.branch import TIP_RISE, Branch
-from hotlever.lever.continuation import continued
+from hotlever.lever.continuation import Enough, continued
 from hotlever.lever.curve import spline_through
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.space import TIP, Constraint, Factors
@@ -163,7 +163,7 @@ class Linearised:
         probe: Probe,
         names: tuple[str, ...],
         branch: Branch,
-        enough: Callable[[Branch], bool],
+        enough: Enough,
         derivatives: LeverEquations | None = None,
         factors: Factors | None = None,
     ) -> Linearised:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from copy import copy
+from functools import cached_property
 
 from hotlever.air.coupling import AirLoss
+from hotlever.air.operator import change_with_gap
 from hotlever.lever.branch import Branch, Reach
 from hotlever.lever.continuation import continued
 from hotlever.lever.equations import GAP, LeverEquations
@@ -14,6 +16,7 @@ from hotlever.lever.motion import motion_of
 from hotlever.lever.newton import NewtonOptions
 from hotlever.lever.parametrisation import solve_at
 from hotlever.lever.sensitivities import Linearised
+from hotlever.lever.surroundings import plate_of
 from hotlever.probe import Probe
 from hotlever.probe.moving import MovingMesh
 from hotlever.probe.parameters import dimensions_of, usual_parameters
@@ -36,12 +39,18 @@ class SimilarLevers:
     def __init__(self, lever: Lever) -> None:
         self._lever = lever
         self._moving = MovingMesh(lever.space.mesh, lever.probe)
-        self._by_inverse_gap: Array | None = None
 
     @property
     def drawn(self) -> Probe:
         """The probe whose drawing has the mesh."""
         return self._lever.probe
+
+    @cached_property
+    def _by_inverse_gap(self) -> Array:
+        """How the operator of the air changes with the inverse of the gap, in µm²."""
+        drawn, lever = self.drawn, self._lever
+        around = plate_of(drawn), drawn.surroundings, drawn.circuit.base_temperature_K
+        return change_with_gap(lever.space.air.operator, *around, lever.panels)
 
     def lever(self, probe: Probe) -> Lever:
         """Return the lever of a similar probe, on the same mesh moved."""
@@ -57,8 +66,7 @@ class SimilarLevers:
     def _space(self, probe: Probe, names: tuple[str, ...] = ()) -> FullSpace:
         """Return mesh, operators and air of a similar probe, for derivatives by some names."""
         space = self._lever.space
-        own = self._lever.probe
-        if (probe.shape, probe.tip) != (own.shape, own.tip):
+        if (probe.shape, probe.tip) != (self.drawn.shape, self.drawn.tip):
             space = FullSpace(self._moving.mesh_of(probe), wiring=space.wiring)
         space = copy(space)
         # air takes up from a place nearly what it took before the place moved a little
@@ -70,10 +78,8 @@ class SimilarLevers:
         air, around = self._lever.space.air, probe.surroundings
         if around.gas_conductivity != air.gas_conductivity:
             air = air.in_gas(around.gas_conductivity)
-        own = self._lever.probe.surroundings.surface_gap_um
+        own = self.drawn.surroundings.surface_gap_um
         if own is not None and (GAP in names or around.surface_gap_um != own):
-            if self._by_inverse_gap is None:
-                self._by_inverse_gap = self._lever.air_by_inverse_gap()
             air = copy(air)
             air.by_inverse_gap, air.gap_um = self._by_inverse_gap, own
             air = air.in_gap(around.surface_gap_um)

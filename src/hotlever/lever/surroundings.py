@@ -1,54 +1,59 @@
-"""The heat that the air around a lever takes up in time: made once it is asked for, and cached."""
+"""A lever in the surroundings of its probe: what the air takes, and what it takes up in time.
+
+The latter is made once it is asked for, and cached.
+"""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from functools import cache, lru_cache
 
 import numpy as np
 from scipy.sparse import diags
 from scipy.sparse.linalg import eigsh
 
-from hotlever.air.operator import PanelledAir
+from hotlever.air.operator import PanelledAir, air_operator
 from hotlever.air.panels import PanelOptions
 from hotlever.air.stores import AirStores, HeatInAir, stores_of
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.space import PER_CM3_TO_NANO_PER_UM3, PER_CM_TO_MILLI_PER_UM
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
-from hotlever.probe import Layout
+from hotlever.probe import Layout, Probe
 from hotlever.probe.surroundings import Surroundings
 from hotlever.threads import one_blas_thread
-from hotlever.types import Array
+from hotlever.types import Array, Progress
 
 #: Modes of the lever, and how fine the panels are: twice as many change a history by less than
 #: what its steps are off by.
 _MODES, _PANELS = 48, PanelOptions(refinement=0.5)
 
 
-class AroundLever:
-    """Makes the heat in the air around a lever once it is asked for.
+def plate_of(probe: Probe) -> Layout:
+    """Return a lever as the air sees it: as thick everywhere as where most lies on one another."""
+    layout = probe.layout()
+    return replace(layout, thickness_um=layout.thickest_um)
 
-    See `hotlever.air.stores`.
-    """
 
-    def __init__(
-        self,
-        space: FullSpace,
-        layout: Layout,
-        surroundings: Surroundings,
-        base_temperature_K: float,
-    ) -> None:
-        self._given = space, layout, surroundings, base_temperature_K
-        self._made: dict[float, HeatInAir] = {}
+def surrounded(
+    space: FullSpace, probe: Probe, panels: PanelOptions, progress: Progress | None = None
+) -> FullSpace:
+    """Return a space in the surroundings of its probe; all but the air is shared."""
+    around, base = probe.surroundings, probe.circuit.base_temperature_K
+    if around.medium == "vacuum":
+        return space.in_vacuum()
+    plate = plate_of(probe)
 
-    def __call__(self, gas_conductivity: float) -> HeatInAir:
-        """Return the heat in a gas that conducts so many times as well as air."""
-        if 1.0 not in self._made:
-            self._made[1.0] = taken_up_around(*self._given)
-        if gas_conductivity not in self._made:
-            self._made = {1.0: self._made[1.0]}
-            self._made[gas_conductivity] = self._made[1.0].in_gas(gas_conductivity)
-        return self._made[gas_conductivity]
+    @cache
+    def stores() -> HeatInAir:
+        return taken_up_around(space, plate, around, base)
+
+    @lru_cache(maxsize=1)
+    def stores_in_gas(conductivity: float) -> HeatInAir:
+        return stores().in_gas(conductivity)
+
+    air = air_operator(plate, around, base, panels, progress)
+    return space.in_air(air, stores_in_gas).in_gas(around.gas_conductivity)
 
 
 @one_blas_thread
