@@ -67,8 +67,6 @@ class Lever:
     ([0.949, 0.927], 547)
     """
 
-    space: FullSpace
-
     @one_blas_thread
     def __init__(
         self,
