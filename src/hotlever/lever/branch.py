@@ -25,7 +25,7 @@ from hotlever.lever.by_power import ByPower
 from hotlever.lever.curve import piecewise
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.newton import NewtonResult
-from hotlever.lever.parametrisation import UNIT_K, UNIT_V, Natural, Parametrisation, PseudoArclength
+from hotlever.lever.parametrisation import NATURAL, UNIT_K, UNIT_V, Parametrisation, PseudoArclength
 from hotlever.lever.ramp import Reading, slow_ramp
 from hotlever.lever.solved_states import SolvedStates
 from hotlever.probe.circuit import Circuit
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 _NO_BIAS = 1e-9
 #: Where a branch's values have the rise of the tip.
 TIP_RISE = len(SHOWN)
-#: The places of a lever that starts cold.
-_NATURAL = Natural()
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,7 @@ class Branch(SolvedStates):
         equations: LeverEquations,
         u: Array,
         roots: NewtonResult,
-        places: Parametrisation = _NATURAL,
+        places: Parametrisation = NATURAL,
     ) -> Branch:
         """Return the branch of states that were found at some places u, and differentiate them."""
         along = equations.along(roots.x, roots.factors, places.constraint(u))
@@ -97,7 +95,7 @@ class Branch(SolvedStates):
         equations: LeverEquations,
         u: Array,
         roots: NewtonResult,
-        places: Parametrisation = _NATURAL,
+        places: Parametrisation = NATURAL,
     ) -> Branch:
         """Return the same, beginning without power if the lever starts cold."""
         branch = cls.of_roots(equations, u, roots, places)
@@ -116,7 +114,7 @@ class Branch(SolvedStates):
     def parametrisation(self) -> Parametrisation:
         """What a place on the branch of a similar lever has in common with one on this."""
         if self.equations.circuit.starts_cold:
-            return _NATURAL
+            return NATURAL
         return self.places or PseudoArclength(self.path)
 
     @cached_property

@@ -248,7 +248,7 @@ class ArclengthContinuation(Continuation):
         space, at = equations.space, np.array([u])
         origin = in_plane(space, branch.x[:, -1:])[0]
         lines = PseudoArclength.across_tangent(float(branch.u[-1]), origin, tangent)
-        roots = solve_at(equations, at, guess, _OPTIONS, parametrisation=lines)
+        roots = solve_at(equations, at, guess, _OPTIONS, places=lines)
         slope = equations.along(roots.x, roots.factors, lines.constraint(at))
         # by the length of the curve, not by that of its tangent
         slope = slope / np.linalg.norm(in_plane(space, slope))
@@ -321,5 +321,5 @@ def at_places_of(similar: Branch, branch: Branch) -> Branch:
     u = np.linspace(branch.u[0], branch.u[-1], _LOOKED_AT * branch.u.size)
     away = branch.path(u) - similar.path(similar.u)[:, None]
     nearest = branch.states(u[np.argmin((away**2).sum(axis=-1), axis=1)])
-    roots = solve_at(equations, similar.u, nearest, _OPTIONS, parametrisation=places)
+    roots = solve_at(equations, similar.u, nearest, _OPTIONS, places=places)
     return Branch.whole(equations, similar.u, roots, places)

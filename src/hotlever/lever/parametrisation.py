@@ -65,6 +65,10 @@ class Natural:
         return np.asarray(2.0 * u)
 
 
+#: It has no state of its own.
+NATURAL = Natural()
+
+
 class PseudoArclength:
     """Lines across a curve in the plane of tip and lever voltage.
 
@@ -124,18 +128,17 @@ def solve_at(
     guess: Array,
     options: NewtonOptions,
     factors: Factors | None = None,
-    parametrisation: Parametrisation | None = None,
+    places: Parametrisation = NATURAL,
 ) -> NewtonResult:
     """Find the states at some places u, (size + 1, n), from guesses of them.
 
-    The factors may be those of states nearby; the parametrisation is the natural one by default.
+    The factors may be those of states nearby.
 
     Raises
     ------
     NewtonError
         If a state was not found.
     """
-    places = parametrisation or Natural()
     problem = Constrained(equations, places.constraint(u), places.values(u))
     return find_roots(problem, guess, options, factors)
 

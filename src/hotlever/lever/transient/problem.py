@@ -1,7 +1,7 @@
 """A lever in its circuit under a bias that changes in time, as a problem to step.
 
 Heat is stored; potentials and the circuit follow at once. The same equations as at rest, with the
-rise of the enthalpy in the heat balance and, in place of the pin, the circuit::
+rise of the enthalpy in the heat balance and, in place of the constraint, the circuit::
 
     V_l + R_s I_h = V_b(t)
 
@@ -38,13 +38,13 @@ _ONE: Index = np.arange(1)
 class InCircuit:
     """A factorised Jacobian with the row of the circuit last, made of one with that of V_l.
 
-    The row of the circuit is dense. It differs from the pin by a matrix of rank one, and Sherman
+    The row of the circuit is dense. It differs from the constraint by a matrix of rank one, and Sherman
     and Morrison's formula takes it in.
 
     Parameters
     ----------
     factors : Factors
-        Of one state, pinned by its lever voltage.
+        Of one state, whose constraint is its lever voltage.
     bias_by : ndarray, shape (size + 1, 1)
         Derivative of the bias by the unknowns.
     """
