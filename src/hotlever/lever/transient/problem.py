@@ -38,8 +38,8 @@ _ONE: Index = np.arange(1)
 class InCircuit:
     """A factorised Jacobian with the row of the circuit last, made of one with that of V_l.
 
-    The row of the circuit is dense. It differs from the constraint by a matrix of rank one, and Sherman
-    and Morrison's formula takes it in.
+    The row of the circuit is dense. It differs from the constraint by a matrix of rank one, and
+    Sherman and Morrison's formula takes it in.
 
     Parameters
     ----------
