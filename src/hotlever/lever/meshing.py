@@ -20,7 +20,6 @@ from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.materials import Kind
 from hotlever.probe import Circuit, Layout, MeshOptions, Probe, Wiring, mesh_layout
-from hotlever.probe.circuit import Contact
 from hotlever.types import Array, Index
 
 #: Energy (relative) by which quadratic elements may differ from cubic ones: with that, currents
@@ -39,22 +38,18 @@ def flat_space(layout: Layout, mesh: MeshOptions, wiring: Wiring) -> FullSpace:
 
 def chosen_space(probe: Probe) -> FullSpace:
     """Return mesh and operators of a probe in vacuum, fine enough for its shape and materials."""
-    held, kinds = tuple(probe.circuit.contacts.items()), tuple(probe.made_of.items())
-    base = probe.circuit.base_temperature_K
-    return _chosen(probe.layout(), probe.wiring, held, kinds, base)
+    # what is behind the swept supply does not matter
+    circuit = probe.circuit.model_copy(update={"series_resistance_ohm": 0.0})
+    return _chosen(probe.layout(), probe.wiring, circuit, tuple(probe.made_of.items()))
 
 
 @lru_cache(maxsize=4)
 def _chosen(
     layout: Layout,
     wiring: Wiring,
-    held: tuple[tuple[str, Contact], ...],
+    circuit: Circuit,
     kinds: tuple[tuple[str, Kind], ...],
-    base_temperature_K: float,
 ) -> FullSpace:
-    circuit = Circuit(
-        swept=wiring.swept, contacts=dict(held), base_temperature_K=base_temperature_K
-    )
     space = flat_space(layout, MeshOptions(), wiring)
     for _ in range(_MOST_ROUNDS):
         by_element = energy_between_degrees(space, dict(kinds), circuit)
