@@ -125,26 +125,23 @@ class FilmLaws:
         """Add the film to sheet conductivities at temperatures (K), (points of the space, n)."""
         film, points = self.film, self.film.points
         sheet, T = PER_CM_TO_MILLI_PER_UM * film.counted_um, T[points]
-        kappa, kappa_by = self.kind.thermal_conductivity(T, film.thickness_um)
-        total.kappa[points] += sheet * kappa
-        conducts = self.kind.conducts
-        if conducts:
-            sigma, sigma_by = self.kind.electrical_conductivity(T, self.doping)
-            total.sigma[points] += sheet * sigma
-        for name in names:
-            own = self.own.get(name)
-            if own in kappa_by:
-                total.kappa_by[name][points] += sheet * kappa_by[own]
-            if conducts and own in sigma_by:
-                total.sigma_by[name][points] += sheet * sigma_by[own]
-            if conducts and "n" in sigma_by and name in self.doping_by:
-                total.sigma_by[name][points] += sheet * (sigma_by["n"] * self.doping_by[name])
-            if name in self.thickening:
-                more = PER_CM_TO_MILLI_PER_UM * self.thickening[name]
-                by_thickness = film.thickness_um * kappa_by.get("thickness_um", 0.0)
-                total.kappa_by[name][points] += more * (kappa + by_thickness)
-                if conducts:
-                    total.sigma_by[name][points] += more * sigma
+        thermal = self.kind.thermal_conductivity(T, film.thickness_um)
+        electrical = self.kind.electrical_conductivity(T, self.doping)
+        for (value, by), sum_of, sum_by in (
+            (thermal, total.kappa, total.kappa_by),
+            (electrical, total.sigma, total.sigma_by),
+        ):
+            sum_of[points] += sheet * value
+            for name in names:
+                own = self.own.get(name)
+                if own in by:
+                    sum_by[name][points] += sheet * by[own]
+                if "n" in by and name in self.doping_by:
+                    sum_by[name][points] += sheet * (by["n"] * self.doping_by[name])
+                if name in self.thickening:
+                    more = PER_CM_TO_MILLI_PER_UM * self.thickening[name]
+                    by_thickness = film.thickness_um * by.get("thickness_um", 0.0)
+                    sum_by[name][points] += more * (value + by_thickness)
 
 
 class LawsAtPoints:
