@@ -164,6 +164,7 @@ class LawsAtPoints:
 
     Attributes
     ----------
+    films : list of FilmLaws
     scale, step_limit : ndarray, shape (size + 1, 1)
         For Newton's method: the size of one unit of each unknown, by which kelvin and volts
         compare, and the largest step.
@@ -183,7 +184,7 @@ class LawsAtPoints:
         for name, kind in self.made_of.items():
             if reason := kind.impossible(self.base_temperature_K):
                 raise ComputationError(f"{name}: {reason}")
-        self._films = [
+        self.films = [
             FilmLaws(film, materials, number, self.motions)
             for number, film in enumerate(space.films)
         ]
@@ -204,7 +205,7 @@ class LawsAtPoints:
     def conductivities(self, T: Array, names: Sequence[str] = ("T",)) -> Conductivities:
         """Evaluate κ and σ at temperatures (K), (points, n), with some of their derivatives."""
         total = Conductivities.zero(T.shape, names)
-        for film in self._films:
+        for film in self.films:
             film.add_to(total, T, names)
         if self.space.air.filling:
             self._take_off_air(total, T, names)
@@ -291,7 +292,7 @@ class LawsAtPoints:
     def _enthalpy(self, T: Array) -> tuple[Array, Array]:
         """Return the enthalpy (nJ/µm²) at temperatures (K), (points, n), and its slope by T."""
         held, by_T = np.zeros(T.shape), np.zeros(T.shape)
-        for film in self._films:
+        for film in self.films:
             points, sheet = film.film.points, PER_CM3_TO_NANO_PER_UM3 * film.film.counted_um
             enthalpy, by = film.kind.enthalpy(T[points])
             held[points] += sheet * enthalpy
@@ -301,7 +302,7 @@ class LawsAtPoints:
     def _enthalpy_by(self, T: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of the enthalpy by parameters, (points, n, k)."""
         changes = np.zeros((*T.shape, len(names)))
-        for film in self._films:
+        for film in self.films:
             points, sheet = film.film.points, PER_CM3_TO_NANO_PER_UM3 * film.film.counted_um
             _, by = film.kind.enthalpy(T[points])
             for number, name in enumerate(names):
