@@ -75,9 +75,9 @@ class AirFields:
         heat = self._air.operator.matrix @ self._theta(state)
         sites, regions = self._air.operator.sites, self._lever.space.mesh.layout.regions
         places = shapely.points(sites)
-        away = [shapely.distance(places, Polygon(one.outline, one.holes)) for one in regions]
+        away = [shapely.distance(places, Polygon(part.outline, part.holes)) for part in regions]
         region = np.argmin(away, axis=0)
-        return {one.name: float(heat[region == k].sum()) for k, one in enumerate(regions)}
+        return {part.name: float(heat[region == k].sum()) for k, part in enumerate(regions)}
 
     def shares(self, states: Sequence[State]) -> xr.Dataset:
         """Return the heat that each region loses to the air in some states.
@@ -87,16 +87,16 @@ class AirFields:
         xarray.Dataset
             ``air_heat_mW`` on (region, bias), with ``bias_V``, ``tip_K`` and ``power_mW``.
         """
-        found = [self.heat_by_region(state) for state in states]
+        by_region = [self.heat_by_region(state) for state in states]
         sweep = self._lever.dataset(states)
-        table = np.array([list(one.values()) for one in found]).T
+        table = np.array([list(heat.values()) for heat in by_region]).T
         return labelled(
             {
                 "tip_K": sweep.tip_K.values,
                 "power_mW": sweep.power_mW.values,
                 "air_heat_mW": (("region", "bias"), table),
             },
-            coordinates={"bias": sweep.bias.values, "region": list(found[0])},
+            coordinates={"bias": sweep.bias.values, "region": list(by_region[0])},
         )
 
     def write_vtu(self, state: State, path: str | os.PathLike[str]) -> None:

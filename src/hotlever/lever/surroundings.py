@@ -85,17 +85,17 @@ def taken_up_around(
     }
     path = cache_file("stores", facts)
     names = tuple(AirStores.__dataclass_fields__)
-    known = stored(path, lambda a: (a["modes"], AirStores(**{name: a[name] for name in names})))
-    if known is None:
+    kept = stored(path, lambda a: (a["modes"], AirStores(**{name: a[name] for name in names})))
+    if kept is None:
         modes = conduction_modes(space, _MODES)
         panelled = PanelledAir(layout, surroundings, base_temperature_K, _PANELS)
         sites = panelled.surface.sites
         # the modes are orthonormal over the lever's area
         inside = layout.thickness_um * np.eye(_MODES)
         length = float(np.ptp(layout.corners, axis=0).max())
-        known = modes, stores_of(panelled, space.rise_at(sites, modes), inside, length)
-        store_arrays(path, {"modes": modes, **vars(known[1])})
-    modes, stores = known
+        kept = modes, stores_of(panelled, space.rise_at(sites, modes), inside, length)
+        store_arrays(path, {"modes": modes, **vars(kept[1])})
+    modes, stores = kept
     ends = space.end_test[0]
     at_points = space.weights * space.temperature.at_points(modes)[0]
     mass = space.temperature.tested(
@@ -125,7 +125,7 @@ def conduction_modes(space: FullSpace, count: int) -> Array:
     value, *slopes = (maps[kind * points : (kind + 1) * points] for kind in range(kinds))
     mass = (value.T @ weights @ value).tocsc()
     stiffness = sum(slope.T @ weights @ slope for slope in slopes).tocsc()
-    _, found = eigsh(stiffness, count, mass, sigma=0.0, v0=np.ones(hot.size))
+    _, shapes = eigsh(stiffness, count, mass, sigma=0.0, v0=np.ones(hot.size))
     modes = np.zeros((space.size + 1, count))
-    modes[hot] = found
+    modes[hot] = shapes
     return modes
