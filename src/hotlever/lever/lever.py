@@ -113,8 +113,6 @@ class Lever:
             f"{self.space.mesh.elements.nelements} elements, {self.space.size} unknowns>"
         )
 
-    # --- the same lever otherwise -------------------------------------------------------------
-
     def with_material(self, material: Material) -> Lever:
         """Return the same lever of another material; mesh, operators and air are shared."""
         return self.with_probe(self.probe.model_copy(update={"material": material}))
@@ -129,15 +127,11 @@ class Lever:
             raise InputError("another shape, tip or wiring needs a new Lever")
         other = copy(self)
         other.probe = probe
-        same_air = probe.surroundings == self.probe.surroundings and (
-            probe.circuit.base_temperature_K == self.circuit.base_temperature_K
-        )
-        if not same_air:
+        around, base = probe.surroundings, probe.circuit.base_temperature_K
+        if (around, base) != (self.probe.surroundings, self.circuit.base_temperature_K):
             other.space = other._surrounded(self.space)
         other._prepare()
         return other
-
-    # --- solving ----------------------------------------------------------------------------------
 
     @one_blas_thread
     def branch(self, hottest_K: float = HOTTEST, progress: Progress | None = None) -> Branch:
