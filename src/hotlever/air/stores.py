@@ -213,7 +213,7 @@ class HeatInAir:
         """Return temperatures (size, n) by store and mode, (stores, m, n)."""
         return in_air.reshape(len(self._rates), len(self.coordinates), in_air.shape[1])
 
-    def settled(self, before: Array, after: Array, period: float) -> Array:
+    def cyclic(self, before: Array, after: Array, period: float) -> Array:
         """Return what temperatures in the air (size, 1) tend to, were each period (µs) the same.
 
         Given are those before and after one period.

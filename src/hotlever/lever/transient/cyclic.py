@@ -167,7 +167,7 @@ def _with_steady_air(cycle: Cycle, period: float) -> State:
     """
     begin, end = cycle.start.unknowns, cycle.end.unknowns
     own, air = len(cycle.end.x), cycle.end.lever.equations.heat_in_air
-    return State(cycle.end.lever, end[:own], air.settled(begin[own:], end[own:], period))
+    return State(cycle.end.lever, end[:own], air.cyclic(begin[own:], end[own:], period))
 
 
 def _extrapolated(starts: list[State], lever: Lever) -> State:

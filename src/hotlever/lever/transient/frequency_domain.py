@@ -154,8 +154,8 @@ HARMONIC_COLUMNS = (
 )
 #: Times of a period; corrections at most, and how small (relative) the last one is.
 _TIMES, _MOST, _ACCURATE = 16, 200, 1e-9
-#: Slowest time constants that steps are followed for.
-_SETTLED = 12.0
+#: Slowest time constants that steps are simulated for.
+_TIME_CONSTANTS = 12.0
 
 
 @one_blas_thread
@@ -308,7 +308,7 @@ class HarmonicBalance:
 
 def _steps(lever: Lever, start: State, amplitude: float) -> Array:
     """Return states of a lever at rest whose bias is stepped up, and down."""
-    until = _SETTLED * abs(float(slowest_modes(start)[0][0]))
+    until = _TIME_CONSTANTS * abs(float(slowest_modes(start)[0][0]))
     states = [start.x]
     for bias in (start.bias_V + amplitude, start.bias_V - amplitude):
         integrate(

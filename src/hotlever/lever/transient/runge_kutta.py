@@ -22,7 +22,7 @@ from hotlever.types import Array
 INSTANT_RATE = 1e9
 #: Newton's method stops at this share of the tolerance: a larger one would cost the balance of what
 #: is stored. But in the first stage, which has no weight in a step; and before the first step.
-_NEWTON_SHARE, _FIRST_SHARE, _SETTLED = 1e-4, 0.1, 1e-9
+_NEWTON_SHARE, _FIRST_SHARE, _CONSISTENT = 1e-4, 0.1, 1e-9
 #: As a rule less than this share of a correction is left by it; from another share on new factors
 #: are cheaper; and the most corrections.
 _LEFT, _SLOW, _MOST_CORRECTIONS = 0.005, 0.5, 12
@@ -202,7 +202,7 @@ class Stepper:
         ComputationError
             If no step is short enough.
         """
-        here = self._settled(start, x)
+        here = self._consistent(start, x)
         speed = max(self._problem.norm(here.slope), 1e-300)
         self.length = first or CONTROLLER.first * self._tolerance / speed
         while here.t < end:
@@ -222,10 +222,10 @@ class Stepper:
             if self.length < _SHORTEST * max(abs(here.t), 1.0):
                 raise ComputationError(f"no step in time is short enough at {here.t:.6g} µs")
 
-    def _settled(self, t: float, x: Array) -> _Reached:
+    def _consistent(self, t: float, x: Array) -> _Reached:
         """Fulfil the algebraic rows, nothing that is stored being changed; and find the slopes."""
         problem, rate = self._problem, INSTANT_RATE
-        root = self._root(t, x, problem.storage(x), rate, None, _SETTLED)
+        root = self._root(t, x, problem.storage(x), rate, None, _CONSISTENT)
         x = root.x
         slope = -rate * root.factors.solve(problem.residual(t + 1.0 / rate, x))
         flow, stored = -problem.residual(t, x), problem.storage(x)

@@ -152,13 +152,13 @@ class _Along:
             if self.time is None:
                 # cold, whatever the parameters are
                 self._stored = np.zeros((*x.shape, len(self._names)))
-            self._settle(problem, x)
+            self._make_consistent(problem, x)
             if self.time is None:
                 self.slopes_at_start = self.slopes(x)
         self._over(problem, step)
         self.time = step.end
 
-    def _settle(self, problem: TransientProblem, x: Array) -> None:
+    def _make_consistent(self, problem: TransientProblem, x: Array) -> None:
         """Fulfil the algebraic rows, nothing that is stored being changed."""
         stored, residual = problem.by_parameter(x, self._names)
         explicit = INSTANT_RATE * (self._stored - stored) - residual

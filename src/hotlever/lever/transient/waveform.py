@@ -22,7 +22,7 @@ from hotlever.units import MOST_BIAS, name_and_unit, setting
 
 #: Times (µs) and numbers of pulses that a wave form may have at most.
 LONGEST, MOST_PULSES = 1e12, 100_000
-#: What a wave form is followed for beyond its last corner (µs), if nobody says; and periods.
+#: What a wave form is simulated for beyond its last corner (µs), if nobody says; and periods.
 _AFTERWARDS, _PERIODS = 100.0, 10
 #: After a step it takes so long (µs) until next to nothing changes.
 _SETTLING = 1000.0
@@ -82,7 +82,7 @@ class Waveform(ABC):
     @property
     @abstractmethod
     def usual_end(self) -> float:
-        """Time (µs) for which it is followed if nobody says."""
+        """Time (µs) for which it is simulated if nobody says."""
 
     @abstractmethod
     def pieces(self, until: float) -> Iterator[Piece]:
@@ -119,7 +119,7 @@ class Polyline(Waveform):
 
     @property
     def usual_end(self) -> float:
-        """Time (µs) for which it is followed if nobody says."""
+        """Time (µs) for which it is simulated if nobody says."""
         return self.end
 
     def pieces(self, until: float) -> Iterator[Piece]:
