@@ -102,7 +102,7 @@ def test_posterior_and_profile_work_for_what_varies(of_film):
         one = found.parameters[name]
         assert abs(one.value - value) < 5.0 * one.stderr
     data = sample_posterior(found, samples=400, processes=1)
-    assert data.attrs["rough_error_K"] < 0.5
+    assert data.attrs["surrogate_error_K"] < 0.5
     assert list(data.quantity.values) == found.names
     for name in found.names:
         one = found.parameters[name]

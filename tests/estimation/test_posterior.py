@@ -211,7 +211,7 @@ def test_the_posterior_of_a_fit_with_priors_agrees_with_its_covariance(informed)
         assert posterior[name].mean().item() == pytest.approx(known.value, abs=0.4 * known.stderr)
         assert posterior[name].std().item() == pytest.approx(known.stderr, rel=0.3)
         assert {"units", "long_name"} <= set(posterior[name].attrs)
-    assert posterior.attrs["rough_error_K"] < 10.0
+    assert posterior.attrs["surrogate_error_K"] < 10.0
     band = predictive_band(informed, posterior, bias=BIAS, samples=100)
     low, _, _, _, high = band.tip_K.values
     said = informed.band.tip_stderr_K.values

@@ -49,7 +49,7 @@ def drawn(fitted, shift=0.0, widen=1.0, rhat=1.0, effective=2000.0, **others) ->
             "acceptance_fraction": ((), 0.5),
         },
         coords={"quantity": list(draws)},
-        attrs={"seed": 0, "noise": "common", "rough_error_K": 0.0},
+        attrs={"seed": 0, "noise": "common", "surrogate_error_K": 0.0},
     )
 
 

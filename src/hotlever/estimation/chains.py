@@ -137,7 +137,7 @@ def sample(
     approximation : Gaussian
         Where the walkers start, and what is proposed.
     samples, walkers, processes, seed, progress
-        See `hotlever.estimation.posterior.sample_posterior`.
+        See `hotlever.estimation.sampling.sample_posterior`.
 
     Raises
     ------

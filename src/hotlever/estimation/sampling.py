@@ -216,7 +216,7 @@ def sample_posterior(
         ``inversion_temperature`` and ``log_probability``; on ``quantity`` (all of these but the
         last): ``effective_sample_size``, ``rhat``; ``acceptance_fraction``; the coordinate
         ``ensemble`` of each chain. Attributes give the fixed parameters, the seed, the noise, and
-        by how much the surrogate may be wrong at the outermost samples (``rough_error_K``).
+        by how much the surrogate may be wrong at the outermost samples (``surrogate_error_K``).
 
     Raises
     ------
@@ -245,7 +245,7 @@ def sample_posterior(
     data = _dataset(fit, chains, objective.coordinates.values)
     points = chains.points.reshape(-1, density.optimum.size)
     error = max(lever.error_K(objective.at(middle, points[row])) for row in _outermost(points))
-    data.attrs |= {"seed": seed, "noise": noise, "rough_error_K": error}
+    data.attrs |= {"seed": seed, "noise": noise, "surrogate_error_K": error}
     return data
 
 

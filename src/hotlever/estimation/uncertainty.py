@@ -28,7 +28,7 @@ _AT_BOUND, _NEAR, _AS_WIDE = 0.025, 0.02, 0.7
 #: It is said to be as known before from this share of its prior's spread on.
 _AS_KNOWN = 0.9
 #: The lever that is sampled is said to be off from this error on (K).
-_ROUGH_ERROR_K = 1.0
+_SURROGATE_ERROR_K = 1.0
 #: Intervals are said to differ from those of the standard error by more than this share of it.
 _DIFFERENT = 0.5
 
@@ -72,8 +72,8 @@ class Uncertainty:
         texts = []
         if self.posterior is not None:
             texts += _unsettled(self.posterior)
-            error = self.posterior.attrs["rough_error_K"]
-            if error > _ROUGH_ERROR_K:
+            error = self.posterior.attrs["surrogate_error_K"]
+            if error > _SURROGATE_ERROR_K:
                 texts.append(
                     f"the lever that was sampled is off by up to {error:.1f} K at the outermost "
                     "samples of the posterior"

@@ -169,7 +169,7 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
     Parameters
     ----------
     band : xarray.Dataset
-        `Fit.band`, or from `hotlever.estimation.posterior.predictive_band`.
+        `Fit.band`, or from `hotlever.estimation.sampling.predictive_band`.
     measured : xarray.Dataset, optional
         From `Measurement.dataset`; drawn as points.
     """
@@ -270,7 +270,7 @@ def posterior_corner(posterior: xr.Dataset, optimum: Mapping[str, float] | None 
     Parameters
     ----------
     posterior : xarray.Dataset
-        From `hotlever.estimation.posterior.sample_posterior`.
+        From `hotlever.estimation.sampling.sample_posterior`.
     optimum : mapping of str to float, optional
         Value of each quantity to mark.
     """
