@@ -8,6 +8,7 @@ far, what the full lever did there joins the snapshots, and the train is simulat
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -104,18 +105,27 @@ def _on_modes(
         If there are none.
     """
     snapshots: list[Array] = []
+    over_periods = partial(
+        integrate, waveform=waveform, until=_PERIODS * period, tolerance_K=tolerance_K
+    )
 
     def integrated(start: State | None) -> xr.Dataset:
         """Integrate the full lever over some periods, and keep its states."""
-        return integrate(
-            lever,
-            waveform,
-            _PERIODS * period,
-            start=start,
-            tolerance_K=tolerance_K,
-            per_step=_PER_STEP,
-            callback=lambda t, state: snapshots.append(state.x),
-        )
+
+        def keep(t: float, state: State) -> None:
+            snapshots.append(state.x)
+
+        return over_periods(lever, start=start, per_step=_PER_STEP, callback=keep)
+
+    def departure(full: xr.Dataset, start: State) -> float:
+        """Estimate how far (K) the reduced lever departs from the full one in the long run."""
+        times = full.time.values
+        reduced = over_periods(start.lever, at=times, start=start)
+        away = np.abs(full.tip_K.values - reduced.tip_K.values)
+        first, second = away[times <= period], away[times > period]
+        # what is carried on to a later period decays, at a rate that the ends of two tell
+        ratio = min(max(second[-1] / max(first[-1], 1e-12) - 1.0, 0.0), _LARGEST_RATIO)
+        return float(away.max() + first[-1] * ratio / (1.0 - ratio))
 
     first = integrated(None)
     asked = None if at is None else checked_times(at)
@@ -124,8 +134,8 @@ def _on_modes(
         train = Train(reduced, waveform, period, end, asked, tolerance_K, **options)
         late = train.start(train.whole - _PERIODS)
         away = max(
-            _departure(first, train.start(0), waveform, period, tolerance_K),
-            _departure(integrated(on_all_nodes(lever, late)), late, waveform, period, tolerance_K),
+            departure(first, train.start(0)),
+            departure(integrated(on_all_nodes(lever, late)), late),
         )
         if away < tolerance_K:
             break
@@ -143,21 +153,6 @@ def _on_modes(
         note += f"; from period {train.cyclic_from + 1} on all are alike"
     history.attrs["notes"] = "\n".join(filter(None, [history.attrs["notes"], note]))
     return history
-
-
-def _departure(
-    full: xr.Dataset, start: State, waveform: Waveform, period: float, tolerance_K: float
-) -> float:
-    """Estimate how far (K) the reduced lever departs from the full one in the long run."""
-    times = full.time.values
-    reduced = integrate(
-        start.lever, waveform, _PERIODS * period, times, start=start, tolerance_K=tolerance_K
-    )
-    away = np.abs(full.tip_K.values - reduced.tip_K.values)
-    first, second = away[times <= period], away[times > period]
-    # what is carried on to a later period decays, at a rate that the ends of two tell
-    ratio = min(max(second[-1] / max(first[-1], 1e-12) - 1.0, 0.0), _LARGEST_RATIO)
-    return float(away.max() + first[-1] * ratio / (1.0 - ratio))
 
 
 class Train:
