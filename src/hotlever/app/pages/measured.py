@@ -221,24 +221,31 @@ class MeasuredPage(Page):
         with self._result:
             await self.show(name)
             if turn == self._shows:
-                await self._show_blocks(name)
+                await _ResultBlocks(self, self.kind, name).show()
 
-    async def _show_blocks(self, name: str) -> None:
-        """Show the page of a result in the element that is open, as it is drawn."""
+
+class _ResultBlocks:
+    """The page of a result, a fit or a calibration, in the element that is open."""
+
+    def __init__(self, page: Page, kind: str, name: str) -> None:
+        self._page, self._kind, self._name = page, kind, name
+
+    async def show(self) -> None:
+        """Show it as it is drawn."""
         shown = ui.row().classes("w-full gap-3 items-start")
         waiting = ui.spinner(size="lg")
 
         def hear(kind: str, block: dict[str, Any]) -> None:
             if kind == "block" and not shown.is_deleted:
                 with shown:
-                    self._show_block(name, block)
+                    self._show_block(block)
 
-        with self.banner.caught():
-            await self.session.ask("full", "showing:page", self.kind, name, heard=hear)
+        with self._page.banner.caught():
+            await self._page.session.ask("full", "showing:page", self._kind, self._name, heard=hear)
         if not waiting.is_deleted:
             waiting.delete()
 
-    def _show_block(self, name: str, block: dict[str, Any]) -> None:
+    def _show_block(self, block: dict[str, Any]) -> None:
         if block["kind"] == "heading":
             ui.label(block["text"]).classes("w-full text-lg text-bold")
         elif block["kind"] == "text":
@@ -253,14 +260,15 @@ class MeasuredPage(Page):
                 with ui.row().classes("items-center w-full no-wrap"):
                     caption(block["caption"]).classes("remark caption col")
                     for suffix in FIGURE_FILES:
-                        give = partial(self._give_figure, name, block["name"], suffix)
+                        give = partial(self._give_figure, block["name"], suffix)
                         label = f"{block['name']} as {suffix[1:].upper()}"
                         flat_button(suffix[1:].upper(), give, label=label).props("size=sm")
 
-    async def _give_figure(self, name: str, shown: str, suffix: str) -> None:
-        with self.banner.caught():
-            drawn = self.session.ask("full", "showing:drawn", self.kind, name, shown, suffix)
-            await hand_over(drawn, f"{Path(name).name.split('.')[0]}-{shown}{suffix}")
+    async def _give_figure(self, shown: str, suffix: str) -> None:
+        with self._page.banner.caught():
+            asked = self._kind, self._name, shown, suffix
+            drawn = self._page.session.ask("full", "showing:drawn", *asked)
+            await hand_over(drawn, f"{Path(self._name).name.split('.')[0]}-{shown}{suffix}")
 
 
 def _lines(text: str | None) -> list[str]:
