@@ -17,7 +17,8 @@ from hotlever.raman.peak import WINDOW, in_window
 from hotlever.raman.reading import read_file, spectrum_files
 from hotlever.raman.series import Line
 from hotlever.raman.spectrum import Spectrum
-from hotlever.raman.thermometry import Thermometry, set_up
+from hotlever.tasks.reporter import Silence
+from hotlever.tasks.thermometry import Thermometry, set_up
 from hotlever.types import Array
 
 #: Points of the fitted curve.
@@ -105,10 +106,10 @@ def _setup(folder: Path, asked: dict[str, Any]) -> tuple[Thermometry, str]:
     elif asked["calibrate_from"]:
         calibrated = {"calibrate_from": [folder / asked["calibrate_from"]]}
     try:
-        return set_up(**calibrated, **options), ""
+        return set_up(Silence(), **calibrated, **options), ""
     except HotleverError as error:
         doubt = f"no temperature: {str(error).replace(f'{folder}/', '')}"
-    return set_up(**options), doubt
+    return set_up(Silence(), **options), doubt
 
 
 def _spectrum(folder: Path, name: str) -> Spectrum:

@@ -19,13 +19,13 @@ from hotlever.files import Outputs
 from hotlever.lever import Lever
 from hotlever.lever.transient.waveform_texts import waveform_from_text
 from hotlever.measurement import parse_columns
-from hotlever.raman.thermometry import Listener, set_up
 from hotlever.tasks import fitting, simulating, spectra, sweeping
 from hotlever.tasks.calibrating import Tables, calibrate_file
 from hotlever.tasks.files import Files
 from hotlever.tasks.importing import propose_probe
 from hotlever.tasks.probes import make_lever, read_probe
 from hotlever.tasks.texts import parse_timing
+from hotlever.tasks.thermometry import set_up
 from hotlever.units import setting
 
 
@@ -156,11 +156,11 @@ def _raman(
 ) -> None:
     outputs = _outputs([folder, calibration, calibrate_from, corrections], **files)
     thermometer = set_up(
+        reporter,
         calibration=None if calibration is None else str(calibration),
         calibrate_from=None if calibrate_from is None else [calibrate_from],
         corrections=corrections,
         law=law,
-        listener=Listener(reporter.note, reporter.progress),
     )
     spectra.measure_spectra(thermometer, [folder], outputs, spectra.Files(**files))
 

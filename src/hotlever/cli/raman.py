@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer.core
 from typer import Argument, Option
 
+from hotlever.cli import output as terminal
 from hotlever.cli.commands import app
 from hotlever.cli.options import File, with_groups
-from hotlever.cli.output import give, note, progress, tell
+from hotlever.cli.output import give, note, tell
 from hotlever.errors import InputError
 from hotlever.files import FIGURE_TYPES, Outputs, json_text, write_text
 from hotlever.tasks.files import draw
 
 if TYPE_CHECKING:
-    from hotlever.raman.thermometry import Thermometry
+    from hotlever.tasks.thermometry import Thermometry
 
 CalibrationOption = Annotated[
     str | None,
@@ -32,7 +33,7 @@ CalibrationOption = Annotated[
 
 @dataclass
 class ThermometerOptions:
-    """What `set_up` of `hotlever.raman.thermometry` takes."""
+    """What `set_up` of `hotlever.tasks.thermometry` takes."""
 
     calibration: CalibrationOption = None
     calibrate_from: list[Path] | None = Option(
@@ -82,9 +83,9 @@ class ThermometerOptions:
 
     def set_up(self) -> Thermometry:
         """Set the thermometer up; what is noticed goes to standard error."""
-        from hotlever.raman import thermometry
+        from hotlever.tasks.thermometry import set_up
 
-        return thermometry.set_up(**vars(self), listener=thermometry.Listener(note, progress))
+        return set_up(terminal, **vars(self))
 
 
 class SeveralFiles(typer.core.TyperCommand):
@@ -209,8 +210,8 @@ def raman_check_command(
     output: File = Option(None, "--output", "-o", metavar="FILE.json", help="The numbers."),
 ) -> None:
     """How far the paper's linear law is off above 900 K, and what that does to the knee."""
-    from hotlever.raman.thermometry import calibration_named
     from hotlever.studies.raman_check import conclusion, paper_check
+    from hotlever.tasks.thermometry import calibration_named
 
     outputs = Outputs(calibration)
     outputs.file(plot, *FIGURE_TYPES)

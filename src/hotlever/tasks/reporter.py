@@ -3,13 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Protocol
 
 from hotlever.types import Progress
 
 
-class Reporter(Protocol):
+class Listener(Protocol):
+    """Who hears what was noticed, and how far the work is."""
+
+    def note(self, *texts: str) -> None:
+        """Say what should be known beside the result."""
+
+    def progress(self, label: str) -> AbstractContextManager[Progress]:
+        """Show how far the block is, which calls (steps done, steps in all)."""
+
+
+class Silence:
+    """A listener where nobody hears."""
+
+    def note(self, *texts: str) -> None:
+        """Say nothing."""
+
+    def progress(self, label: str) -> AbstractContextManager[Progress]:
+        """Show nothing."""
+        return nullcontext(lambda done, total: None)
+
+
+class Reporter(Listener, Protocol):
     """The terminal (`hotlever.cli.output`), or a page of the app."""
 
     def give(self, result: str) -> None:
@@ -17,9 +38,6 @@ class Reporter(Protocol):
 
     def tell(self, text: str) -> None:
         """Say something in one line."""
-
-    def note(self, *texts: str) -> None:
-        """Say what should be known beside the result."""
 
     def fail(self, message: str) -> None:
         """Say what went wrong with a part of the work."""
@@ -29,9 +47,6 @@ class Reporter(Protocol):
 
     def show(self, what: str, content: Any) -> None:
         """Show what can be drawn on the way to the result, as the ``curve`` of a fit."""
-
-    def progress(self, label: str) -> AbstractContextManager[Progress]:
-        """Show how far the block is, which calls (steps done, steps in all)."""
 
     def progress_bars(self, *labels: str) -> AbstractContextManager[tuple[Progress, ...]]:
         """Show how far several parts of the work are, each from its first call on."""

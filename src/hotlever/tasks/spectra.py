@@ -9,8 +9,8 @@ from typing import NamedTuple
 from hotlever.errors import InputError
 from hotlever.files import Outputs, write_text
 from hotlever.raman.series import to_csv
-from hotlever.raman.thermometry import Thermometry
 from hotlever.tasks.files import draw
+from hotlever.tasks.thermometry import Thermometry
 
 
 class Files(NamedTuple):

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -22,7 +21,7 @@ from hotlever.raman.reading import read_spectra
 from hotlever.raman.series import Line, measure, read_lines
 from hotlever.raman.spectrum import Spectrum, file_and_label
 from hotlever.raman.thermometer import Law, Thermometer, laser_heating
-from hotlever.types import Progress
+from hotlever.tasks.reporter import Listener
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,48 +32,6 @@ _MOST_NOTES = 20
 
 
 @dataclass(frozen=True)
-class Listener:
-    """Who is told what was noticed, and how far the work is; by default nobody."""
-
-    note: Callable[[str], None] = lambda text: None
-    progress: Callable[[str], AbstractContextManager[Progress | None]] = lambda label: nullcontext()
-
-    def notes(self, texts: Sequence[str]) -> None:
-        """Tell the first of many notes, and how many more there are."""
-        for text in texts[:_MOST_NOTES]:
-            self.note(text)
-        if len(texts) > _MOST_NOTES:
-            self.note(f"{len(texts) - _MOST_NOTES} more such notes")
-
-    def read(self, paths: Sequence[Path]) -> list[Spectrum]:
-        """Read spectra; what a folder holds beside them is noted."""
-        skipped: list[str] = []
-        with self.progress("reading") as update:
-            spectra = read_spectra(paths, skipped, update)
-        self.notes([f"passed over {line}" for line in skipped])
-        names = {(spectrum.folder, spectrum.name) for spectrum in spectra}
-        files = Counter((folder, file_and_label(name)[0]) for folder, name in names)
-        several = {name: count for (_, name), count in sorted(files.items()) if count > 1}
-        self.notes([f"{name}: {count} spectra in one file" for name, count in several.items()])
-        return spectra
-
-    def measure(
-        self,
-        spectra: Sequence[Spectrum],
-        options: PeakOptions,
-        corrections: Mapping[str, Correction],
-        label: str,
-    ) -> list[Line]:
-        """Fit the lines of spectra; those of many that have none are noted."""
-        with self.progress(label) as update:
-            lines = measure(spectra, options, update, corrections)
-        if len(lines) > 1:
-            without = [line.spectrum.name for line in lines if line.used and line.peak is None]
-            self.notes([f"{name}: no silicon line" for name in without])
-        return lines
-
-
-@dataclass(frozen=True)
 class Thermometry:
     """How spectra are measured: the line's shape, and a thermometer if there is a calibration.
 
@@ -82,6 +39,7 @@ class Thermometry:
     the thermometer was set up from.
     """
 
+    listener: Listener
     options: PeakOptions
     calibration: RamanCalibration | None = None
     thermometer: Thermometer | None = None
@@ -89,7 +47,6 @@ class Thermometry:
     spectra: Sequence[Spectrum] = ()
     corrections: Mapping[str, Correction] = field(default_factory=dict)
     corrected_by: str = ""  #: name of the table
-    listener: Listener = Listener()
 
     def measure(self, paths: Sequence[Path]) -> tuple[list[Line], xr.Dataset]:
         """Read and fit spectra; return their lines and the table of `read_lines`.
@@ -99,13 +56,12 @@ class Thermometry:
         InputError
             If one cannot be read, none is left to use, or none has a silicon line.
         """
-        spectra = self.listener.read(paths)
+        spectra = _read(self.listener, paths)
         table = self.corrected_by
         elsewhere = check_corrections(self.corrections, [*self.spectra, *spectra], table)
-        self.listener.notes(
-            [f"{table}: passed over {name}, of no folder read here" for name in elsewhere]
-        )
-        lines = self.listener.measure(spectra, self.options, self.corrections, "spectra")
+        stray = [f"{table}: passed over {name}, of no folder read here" for name in elsewhere]
+        _note_some(self.listener, stray)
+        lines = _measure(self.listener, spectra, self.options, self.corrections, "spectra")
         used = [line for line in lines if line.used]
         if not used:
             raise InputError(f"{table}: leaves out every spectrum, expected some to use")
@@ -113,6 +69,44 @@ class Thermometry:
             which = "this spectrum" if len(used) == 1 else f"any of {len(used)} spectra"
             raise InputError(f"{paths[0]}: no silicon line in {which}, expected one near 520 cm⁻¹")
         return lines, read_lines(lines, self.thermometer)
+
+
+def _note_some(listener: Listener, texts: Sequence[str]) -> None:
+    """Tell the first of many notes, and how many more there are."""
+    listener.note(*texts[:_MOST_NOTES])
+    if len(texts) > _MOST_NOTES:
+        listener.note(f"{len(texts) - _MOST_NOTES} more such notes")
+
+
+def _read(listener: Listener, paths: Sequence[Path]) -> list[Spectrum]:
+    """Read spectra; what a folder holds beside them is noted."""
+    skipped: list[str] = []
+    with listener.progress("reading") as update:
+        spectra = read_spectra(paths, skipped, update)
+    _note_some(listener, [f"passed over {line}" for line in skipped])
+    names = {(spectrum.folder, spectrum.name) for spectrum in spectra}
+    files = Counter((folder, file_and_label(name)[0]) for folder, name in names)
+    several = {name: count for (_, name), count in sorted(files.items()) if count > 1}
+    _note_some(
+        listener, [f"{name}: {count} spectra in one file" for name, count in several.items()]
+    )
+    return spectra
+
+
+def _measure(
+    listener: Listener,
+    spectra: Sequence[Spectrum],
+    options: PeakOptions,
+    corrections: Mapping[str, Correction],
+    label: str,
+) -> list[Line]:
+    """Fit the lines of spectra; those of many that have none are noted."""
+    with listener.progress(label) as update:
+        lines = measure(spectra, options, update, corrections)
+    if len(lines) > 1:
+        without = [line.spectrum.name for line in lines if line.used and line.peak is None]
+        _note_some(listener, [f"{name}: no silicon line" for name in without])
+    return lines
 
 
 def calibration_named(name: str | None) -> RamanCalibration | None:
@@ -123,6 +117,7 @@ def calibration_named(name: str | None) -> RamanCalibration | None:
 
 
 def set_up(
+    listener: Listener,
     *,
     calibration: str | None = None,
     calibrate_from: Sequence[Path] | None = None,
@@ -135,12 +130,12 @@ def set_up(
     laser_power: float | None = None,
     thermal_resistance: float | None = None,
     stress: float = 0.0,
-    listener: Listener = Listener(),
 ) -> Thermometry:
     """Set up a thermometer, or only the fit of the line if no calibration is named.
 
     Parameters
     ----------
+    listener : Listener
     calibration : str, optional
         A calibration file, or ``published``, which needs a `reference`.
     calibrate_from, reference : sequence of path, optional
@@ -157,7 +152,6 @@ def set_up(
         mW and K/mW.
     stress : float
         Not known, MPa.
-    listener : Listener
 
     Raises
     ------
@@ -185,7 +179,7 @@ def set_up(
     spectra: list[Spectrum] = []
     if calibrate_from:
         table = series.read_temperatures(temperatures) if temperatures else None
-        spectra = listener.read(calibrate_from)
+        spectra = _read(listener, calibrate_from)
         source = ", ".join(path.name or str(path) for path in calibrate_from)
         with listener.progress("hot plate") as update:
             chosen, hot_plate = series.calibrate_from(
@@ -197,9 +191,7 @@ def set_up(
         for name, value in unused.items():
             if value:
                 raise InputError(f"{name} needs --calibration or --calibrate-from")
-        return Thermometry(
-            options, corrections=by_hand, corrected_by=str(corrections), listener=listener
-        )
+        return Thermometry(listener, options, corrections=by_hand, corrected_by=str(corrections))
     if chosen.reference_cm is None and not reference:
         raise InputError(
             "--calibration published: give --reference, a spectrum of your instrument at room "
@@ -210,12 +202,12 @@ def set_up(
     chosen_law: Any = law
     thermometer = Thermometer(chosen, chosen_law, start, 0.0, heating, stress)
     if reference:
-        lines = listener.measure(listener.read(reference), options, by_hand, "reference")
+        lines = _measure(listener, _read(listener, reference), options, by_hand, "reference")
         peaks = [(line.peak, line.spectrum.temperature) for line in lines if line.peak]
         thermometer = thermometer.with_reference(peaks)
         spectra += [line.spectrum for line in lines]
     return Thermometry(
-        options, chosen, thermometer, hot_plate, spectra, by_hand, str(corrections), listener
+        listener, options, chosen, thermometer, hot_plate, spectra, by_hand, str(corrections)
     )
 
 
