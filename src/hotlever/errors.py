@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 #: Characters that an error quotes of what was found.
@@ -57,6 +57,22 @@ class HistoryEndError(ComputationError):
     def __init__(self, message: str, time_reached: float, partial: Any = None) -> None:
         super().__init__(message, partial)
         self.time_reached = time_reached
+
+
+def as_far_as_possible(work: Callable[[], Any]) -> tuple[Any, ComputationError | None]:
+    """Return what a computation gives; if it fails, what it reached, and the failure.
+
+    Raises
+    ------
+    ComputationError
+        If it reached nothing.
+    """
+    try:
+        return work(), None
+    except ComputationError as error:
+        if error.partial is None:
+            raise
+        return error.partial, error
 
 
 def quoted(found: object) -> str:

@@ -16,10 +16,10 @@ from hotlever.cli.options import (
     PriorOption,
     check_medium,
     column_files,
-    load_probe,
 )
 from hotlever.errors import InputError
 from hotlever.files import FIGURE_TYPES, Outputs
+from hotlever.tasks.probes import read_probe
 from hotlever.tasks.texts import parse_timing
 
 
@@ -67,7 +67,7 @@ def calibrate_command(
         terminal,
         data,
         columns,
-        load_probe(probe_file) if fit_file is None else None,
+        read_probe(terminal, probe_file) if fit_file is None else None,
         fit_file,
         power_law,
         prior,

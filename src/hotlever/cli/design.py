@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typer import Option
 
+from hotlever.cli import output as terminal
 from hotlever.cli.commands import app
 from hotlever.cli.options import (
     File,
     PlotFile,
     ProbeFile,
     check_number,
-    load_probe,
     parse_vary,
 )
-from hotlever.cli.output import give, note, progress
 from hotlever.errors import InputError
 from hotlever.files import FIGURE_TYPES, Outputs, write_text
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.tasks.files import draw
+from hotlever.tasks.probes import read_probe
 
 
 @app.command("design")
@@ -50,23 +50,25 @@ def design_command(
     check_number("--annealing-min", annealing_min, 1e-3, 1e5)
     if vary is None and (plot is not None or output is not None):
         raise InputError("a file or a figure needs a sweep: --vary NAME=START:STOP:COUNT")
-    start = study.Design(load_probe(probe_file), annealing_K, annealing_min)
+    start = study.Design(read_probe(terminal, probe_file), annealing_K, annealing_min)
     if vary is None:
-        with progress("design") as update:
+        with terminal.progress("design") as update:
             sensitivities = study.sensitivities(start, power_mW=power, air=air, progress=update)
-        give(study.sensitivity_text(sensitivities) + "\n")
+        terminal.give(study.sensitivity_text(sensitivities) + "\n")
         if start.probe.shape.shape == DRAWING:
             names = ", ".join(start.numbers)
-            note(f"a drawing has no dimensions but these; --vary NAME=START:STOP:COUNT of {names}")
+            terminal.note(
+                f"a drawing has no dimensions but these; --vary NAME=START:STOP:COUNT of {names}"
+            )
         return
     name, values = parse_vary(vary)
     start.value(name)
-    with progress("design") as update:
+    with terminal.progress("design") as update:
         data = study.vary(start, name, values, power_mW=power, air=air, progress=update)
-    note(*study.knee_notes(data))
+    terminal.note(*study.knee_notes(data))
     with outputs.together():
         if output is not None:
             write_text(output, study.design_csv(data))
         draw(plot, lambda figures: figures.design_sweep(data))
     if output is None:
-        give(study.design_csv(data))
+        terminal.give(study.design_csv(data))

@@ -19,11 +19,11 @@ from hotlever.cli.options import (
     PriorOption,
     check_number,
     column_files,
-    load_probe,
     with_groups,
 )
 from hotlever.errors import InputError
 from hotlever.files import Outputs
+from hotlever.tasks.probes import read_probe
 
 
 @dataclass
@@ -122,7 +122,7 @@ def fit_command(
         raise InputError(f"{next(iter(drive.options))}: expected a single data file")
     if not several and scheduler is not None:
         raise InputError("--scheduler: expected several data files")
-    probe = load_probe(files.probe_file)
+    probe = read_probe(terminal, files.probe_file)
     options = fit_options(probe, **vars(model))
     columns = parse_columns(files.column or [])
     to = Destination(files.outputs(drive.waveform), files.output, files.report)

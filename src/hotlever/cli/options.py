@@ -17,11 +17,11 @@ from typer import Argument, Option
 from hotlever.cli import output as terminal
 from hotlever.errors import InputError, quoted, shown
 from hotlever.files import FIGURE_TYPES, Outputs
+from hotlever.tasks.probes import read_probe
 from hotlever.tasks.texts import parse_number
 from hotlever.units import LEAST_BIAS, MOST_BIAS, setting
 
 if TYPE_CHECKING:
-    from hotlever.lever import Lever
     from hotlever.lever.transient import Waveform
     from hotlever.probe import Circuit, Probe
     from hotlever.types import Array
@@ -100,7 +100,7 @@ class LeverOptions:
     def probe(self) -> Probe:
         """Read the probe; what should be known of its shape is told."""
         check_medium(self.medium)
-        probe = load_probe(self.probe_file, self.settings)
+        probe = read_probe(terminal, self.probe_file, self.settings)
         return probe if self.medium is None else probe.in_medium(self.medium)
 
 
@@ -165,23 +165,6 @@ class Drive:
             text, kind = self.options[name], name.removeprefix("--")
             return waveform_from_text(kind, text, self.period, self.count, mark="--")
         return None
-
-
-def load_probe(path: Path | None, settings: list[str] | None = None) -> Probe:
-    """Read a probe file, or take the reference probe, and change some of its values.
-
-    What should be known of its shape is told.
-    """
-    from hotlever.tasks.probes import read_probe
-
-    return read_probe(terminal, path, settings)
-
-
-def make_lever(probe: Probe) -> Lever:
-    """Mesh a probe, and make the air around it."""
-    from hotlever.tasks import probes
-
-    return probes.make_lever(terminal, probe)
 
 
 # --- checks ---------------------------------------------------------------------------------------

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 from typer import Argument, Option
 
 from hotlever.cli import output as terminal
 from hotlever.cli.commands import Commands, app
-from hotlever.cli.options import File, PlotFile, ProbeFile, load_probe
-from hotlever.cli.output import give
+from hotlever.cli.options import File, PlotFile, ProbeFile
 from hotlever.errors import unknown_name
 from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.tasks.files import draw
-
-if TYPE_CHECKING:
-    from hotlever.probe import Layout, Probe, ProbeMesh
+from hotlever.tasks.probes import read_probe
 
 probe_app = typer.Typer(
     cls=Commands, help="Write, describe, draw and import probes.", rich_markup_mode=None
@@ -40,7 +36,7 @@ def new(
         raise unknown_name("shape", shape, _NEW)
     probe = getattr(Probe, _NEW[shape])()
     if output is None:
-        give(probe.to_toml())
+        terminal.give(probe.to_toml())
     else:
         probe.to_file(output)
 
@@ -54,11 +50,12 @@ def show(
     """Draw and describe a probe."""
     from hotlever.lever.meshing import chosen_space
     from hotlever.probe.drawing.outlines import DrawingError
+    from hotlever.probe.summary import probe_text
 
     outputs = Outputs(probe_file)
     outputs.file(plot, *FIGURE_TYPES)
     try:
-        probe = load_probe(probe_file)
+        probe = read_probe(terminal, probe_file)
     except DrawingError as error:
         fault = error
         with outputs.together():
@@ -71,13 +68,12 @@ def show(
         raise
     name = "reference probe" if probe_file is None else probe_file.name
     layout, triangles = probe.layout(), chosen_space(probe).mesh
-    lines = _described(probe, triangles, name)
     with outputs.together():
         draw(
             plot,
             lambda figures: figures.probe_drawing(layout, name, mesh=triangles if mesh else None),
         )
-    give("\n".join([*lines, ""]))
+    terminal.give(probe_text(probe, triangles, name))
 
 
 @probe_app.command("import")
@@ -104,68 +100,3 @@ def import_command(
     outputs.file(output, ".toml")
     outputs.file(plot, *FIGURE_TYPES)
     propose_probe(terminal, drawing, cell, name, outputs, output, plot)
-
-
-def _described(probe: Probe, mesh: ProbeMesh, name: str) -> list[str]:
-    circuit, silicon, layout = probe.circuit, probe.heater_silicon, mesh.layout
-    x, y = layout.tip
-    values = {key: getattr(probe.shape, key) for key in probe.shape.description()}
-    dimensions = [
-        f"  {key:<22} {values[key]:>8{'g' if isinstance(values[key], float) else ''}}  {text}"
-        for key, text in probe.shape.description().items()
-        if isinstance(values[key], float | str)
-    ]
-    if probe.shape.shape == "drawing":
-        dimensions += [f"  {text}" for text in _regions(layout)]
-    return [
-        f"{name}: {probe.shape.shape}, {layout.thickness_um:g} µm thick",
-        *dimensions,
-        f"  tip at ({x:g}, {y:g}) µm; terminals {', '.join(layout.terminal_names)}",
-        f"circuit: series resistance {circuit.series_resistance_ohm:g} ohm, "
-        f"base temperature {circuit.base_temperature_K:g} K",
-        *(f"  {name}: {contact}" for name, contact in circuit.contacts.items()),
-        *_materials(probe),
-        *(
-            []
-            if silicon is None
-            else [f"inversion temperature of the heater: {silicon.inversion_temperature():.1f} K"]
-        ),
-        f"mesh: {mesh.elements.nelements} triangles",
-    ]
-
-
-def _materials(probe: Probe) -> list[str]:
-    """Return the values of what a probe is made of, a line for each material."""
-    plain = {"material": probe.material} if probe.has_plain_silicon else {}
-    lines = []
-    for name, material in {**plain, **probe.materials}.items():
-        values = [
-            f"{key} {value:g}" if isinstance(value, float) else str(value)
-            for key, value in material
-            if value is not None and key != "preset"
-        ]
-        lines.append(f"{name}: {', '.join(values)}")
-    return lines
-
-
-def _regions(layout: Layout) -> list[str]:
-    """Return what the regions of a drawing are."""
-    from hotlever.probe.layout import Taper
-
-    plain = {"high-doped", "low-doped"}
-    lines = []
-    for region in layout.regions:
-        stack = [
-            film.material + (f" {film.thickness_um:g} µm" if film.thickness_um else "")
-            for film in region.stack
-        ]
-        kind = "high-doped" if plain.issuperset(stack) else " under ".join(stack)
-        own = "low-doped" if plain.issuperset(stack) else f"{kind}, low-doped"
-        if isinstance(region.taper, Taper):
-            kind = f"{own} strip, {region.taper.length_um:.4g} µm from border to border"
-        elif region.taper is not None:
-            borders = len(region.taper.borders)
-            kind = f"{own}, doping by the distance to {borders} border{'s' * (borders > 1)}"
-        part = "insulates" if region.insulates else region.part
-        lines.append(f"{region.name}: {part}, {region.area:.4g} µm², {kind}")
-    return lines

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from typer import Option
 
 from hotlever.cli import output as terminal
@@ -12,18 +10,11 @@ from hotlever.cli.options import (
     File,
     LeverOptions,
     TableOptions,
-    make_lever,
     parse_bias,
     with_groups,
 )
-from hotlever.errors import unknown_name
 from hotlever.tasks.files import Files
-
-if TYPE_CHECKING:
-    from hotlever.lever import Lever
-    from hotlever.probe import Probe
-
-MODELS = ("flat", "full-3d")
+from hotlever.tasks.probes import make_lever
 
 
 @app.command("sweep")
@@ -42,18 +33,9 @@ def sweep_command(
     """Solve a lever over a range of bias."""
     from hotlever.tasks.sweeping import sweep
 
-    if model not in MODELS:
-        raise unknown_name("value", model, MODELS, "--model")
     outputs = table.outputs(options.probe_file)
     outputs.folder(fields)
     probe = options.probe()
     biases = parse_bias(bias, probe.circuit)
-    lever = make_lever(probe) if model == "flat" else _solid_lever(probe)
+    lever = make_lever(terminal, probe, model)
     sweep(terminal, lever, biases, outputs, Files(table.output, table.plot, fields))
-
-
-def _solid_lever(probe: Probe) -> Lever:
-    from hotlever.lever3d import SolidLever
-
-    with terminal.progress("mesh and air"):
-        return SolidLever(probe)

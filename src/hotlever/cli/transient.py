@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from typer import Option
 
@@ -14,17 +13,14 @@ from hotlever.cli.options import (
     File,
     LeverOptions,
     TableOptions,
-    make_lever,
     parse_frequencies,
     with_groups,
 )
 from hotlever.errors import InputError
 from hotlever.files import Outputs
 from hotlever.tasks.files import Files, draw
+from hotlever.tasks.probes import make_lever
 from hotlever.units import bias_setting, setting
-
-if TYPE_CHECKING:
-    pass
 
 #: Times that may be asked for.
 MOST_TIMES = 10_000
@@ -62,7 +58,7 @@ def pulse_command(
         raise InputError(f"--at: found {len(times)} times, expected at most {MOST_TIMES}")
     outputs = table.outputs(options.probe_file, drive.waveform)
     outputs.folder(fields)
-    lever = make_lever(options.probe())
+    lever = make_lever(terminal, options.probe())
     files = Files(table.output, table.plot, fields)
     simulate_in_time(terminal, lever, waveform, end, times, outputs, files)
 
@@ -92,7 +88,7 @@ def spectrum_command(
     swing = None if amplitude is None else bias_setting(amplitude, "--amplitude")
     volts, frequencies = bias_setting(bias, "--bias"), parse_frequencies(frequency)
     outputs = table.outputs(options.probe_file)
-    lever = make_lever(options.probe())
+    lever = make_lever(terminal, options.probe())
     with terminal.progress("spectrum") as update:
         if swing is None:
             (state,) = lever.solve([volts], update)
@@ -117,7 +113,7 @@ def _report(folder: Path, options: LeverOptions) -> None:
 
     outputs = Outputs(options.probe_file)
     outputs.folder(folder)
-    lever = make_lever(options.probe())
+    lever = make_lever(terminal, options.probe())
     with terminal.progress("sections") as update:
         page = transient_page(lever, update)
     with outputs.together():

@@ -1,10 +1,16 @@
-"""Fields of a solved state as they are drawn and saved: on a fine triangulation, on a line."""
+"""Fields of a solved state as they are drawn and saved: on a fine triangulation, on a line.
+
+`write_fields` writes those of any lever: another kind of lever than `Lever` registers how its own
+are written.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import singledispatch
+from pathlib import Path
 from xml.etree import ElementTree
 
 import meshio
@@ -15,6 +21,7 @@ from skfem import MeshTri
 
 from hotlever.datasets import labelled
 from hotlever.files import whole_file, write_text
+from hotlever.lever.air_fields import AirFields
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
@@ -144,6 +151,49 @@ def write_vtu(fields: FieldMap, path: str | os.PathLike[str]) -> None:
     )
     with whole_file(path) as temporary:
         mesh.write(temporary, file_format="vtu")
+
+
+# Draws a dataset of temperatures on slices to a file.
+DrawSlices = Callable[[xr.Dataset, Path], None]
+
+
+@singledispatch
+def write_fields(
+    lever: Lever, states: Sequence[State], folder: Path, draw_slices: DrawSlices
+) -> None:
+    """Write the fields of states to a folder as VTU, with those of the air where there is some.
+
+    Parameters
+    ----------
+    lever : Lever
+    states : sequence of State
+    folder : Path
+        The files are named by the bias.
+    draw_slices : callable
+        Called with temperatures on slices through the air and the file to draw them to, if the
+        lever knows the temperature all around it.
+    """
+    mapper, air = FieldMapper(lever), AirFields(lever) if lever.medium == "air" else None
+    for state in states:
+        write_vtu(mapper.map(state), fields_file(folder, state, ".vtu"))
+        if air is not None:
+            air.write_vtu(state, fields_file(folder, state, "_air.vtu"))
+
+
+def fields_file(folder: Path, state: State, suffix: str) -> Path:
+    """Return the file of a state's fields, named by its bias."""
+    return folder / f"bias_{state.bias_V:08.4f}V{suffix}"
+
+
+def write_fields_in_time(
+    lever: Lever, times: Sequence[float], states: Sequence[State], folder: Path
+) -> None:
+    """Write the fields of states at some times (µs) to a folder as VTU, with their index."""
+    mapper = FieldMapper(lever)
+    names = [f"fields_{index:04d}.vtu" for index in range(len(states))]
+    for name, state in zip(names, states, strict=True):
+        write_vtu(mapper.map(state), folder / name)
+    write_pvd(times, names, folder / "fields.pvd")
 
 
 def write_pvd(times: Sequence[float], names: Sequence[str], path: str | os.PathLike[str]) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hotlever.air.panels import PanelOptions
-from hotlever.errors import ComputationError, InputError
+from hotlever.errors import ComputationError, InputError, as_far_as_possible
 from hotlever.lever.branch import TIP_RISE, Branch, Reach
 from hotlever.lever.continuation import Enough, continued
 from hotlever.lever.dataset import at_bias, checked_bias, dataset_of_branch, dataset_of_states
@@ -219,14 +219,8 @@ class Lever:
         self, bias: Array, progress: Progress | None = None
     ) -> tuple[Branch, Reading, ComputationError | None]:
         """Return the branch, where a ramp finds it, and why it does not have all the biases."""
-        failure: ComputationError | None = None
-        try:
-            below = min(float(bias.min()), 0.0) or None
-            branch = self.branch_to(float(bias.max()), progress, below)
-        except ComputationError as error:
-            if error.partial is None:
-                raise
-            branch, failure = error.partial, error
+        below, above = min(float(bias.min()), 0.0) or None, float(bias.max())
+        branch, failure = as_far_as_possible(lambda: self.branch_to(above, progress, below))
         reading = branch.read(self.circuit, bias)
         missing = np.isnan(reading.u).any()
         return branch, reading, (failure or branch.ended(reading)) if missing else None

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from pathlib import Path
 
 import meshio
 import numpy as np
@@ -12,6 +14,7 @@ from hotlever.air.chip import lever_axes
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file
+from hotlever.lever.fields import DrawSlices, fields_file, write_fields
 from hotlever.lever.lever import State
 from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
 from hotlever.lever3d.lever import SolidLever, surface_nodes
@@ -22,6 +25,15 @@ from hotlever.types import Array
 
 #: Points along each side of a slice.
 _SLICE_POINTS = 161
+
+
+@write_fields.register
+def _(lever: SolidLever, states: Sequence[State], folder: Path, draw_slices: DrawSlices) -> None:
+    """Write lever and air in one file for each state, and in air slices through both."""
+    for state in states:
+        write_solid_vtu(state, fields_file(folder, state, ".vtu"))
+        if lever.medium == "air":
+            draw_slices(temperature_slices(state), fields_file(folder, state, ".png"))
 
 
 def write_solid_vtu(state: State, path: str | os.PathLike[str]) -> None:

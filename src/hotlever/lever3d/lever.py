@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 from skfem.element import ElementTetP2
 
 from hotlever.cache import cache_file, store_arrays, stored
-from hotlever.errors import ComputationError, InputError
+from hotlever.errors import ComputationError, InputError, as_far_as_possible
 from hotlever.lever.branch import Branch
 from hotlever.lever.dataset import at_bias, checked_bias
 from hotlever.lever.elements import FiniteElements
@@ -128,11 +128,8 @@ class SolidLever(Lever):
 
         Sensitivities are those of the flat lever.
         """
-        values, failure = checked_bias(bias, self.circuit), None
-        try:
-            states = self.solve(values, progress)
-        except ComputationError as error:
-            states, failure = error.partial or [], error
+        values = checked_bias(bias, self.circuit)
+        states, failure = as_far_as_possible(lambda: self.solve(values, progress))
         solved = values[: len(states)]
         notes = self._flat.branch_to(float(values.max())).read(self.circuit, values).notes(values)
         data = at_bias(self.dataset(states, notes), solved)

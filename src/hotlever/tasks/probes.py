@@ -6,12 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hotlever.probe import Probe
+from hotlever.errors import unknown_name
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.texts import parse_settings
 
 if TYPE_CHECKING:
     from hotlever.lever import Lever
+    from hotlever.probe import Probe
+
+#: A lever in its plane, or of its true thickness with the air around it.
+MODELS = ("flat", "full-3d")
 
 
 def read_probe(
@@ -21,14 +25,29 @@ def read_probe(
 
     What should be known of its shape is told.
     """
+    from hotlever.probe import Probe
+
     probe = Probe.reference() if path is None else Probe.from_file(path)
     probe = probe.with_(**parse_settings(settings, probe)) if settings else probe
     reporter.note(*probe.shape.notes())
     return probe
 
 
-def make_lever(reporter: Reporter, probe: Probe) -> Lever:
-    """Mesh a probe, and make the air around it."""
+def make_lever(reporter: Reporter, probe: Probe, model: str = "flat") -> Lever:
+    """Mesh a probe, and make the air around it, for one of `MODELS`.
+
+    Raises
+    ------
+    InputError
+        If there is no such model.
+    """
+    if model not in MODELS:
+        raise unknown_name("value", model, MODELS, "--model")
+    if model == "full-3d":
+        from hotlever.lever3d import SolidLever
+
+        with reporter.progress("mesh and air"):
+            return SolidLever(probe)
     from hotlever.lever import Lever
 
     with reporter.progress("air") as update:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from itertools import count as count_up
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
@@ -12,7 +11,7 @@ import xarray as xr
 from hotlever.errors import HistoryEndError
 from hotlever.files import Outputs, output_folder
 from hotlever.lever import Lever, State
-from hotlever.lever.fields import FieldMapper, write_pvd, write_vtu
+from hotlever.lever.fields import write_fields_in_time
 from hotlever.lever.transient import (
     Waveform,
     history_csv,
@@ -46,7 +45,8 @@ def simulate_in_time(
     failure: HistoryEndError | None = None
     # figures and rise times are of smooth curves, the table of the steps alone
     per_step = _CURVE if times is None else 1
-    states: list[tuple[float, State]] = []
+    kept_at: list[float] = []
+    states: list[State] = []
     ends: list[State] = []
     told = count_up()
     with reporter.progress("pulse") as update:
@@ -54,7 +54,8 @@ def simulate_in_time(
         def keep(t: float, state: State) -> None:
             ends[1:] = [state]
             if next(told) % per_step == 0 and files.fields is not None:
-                states.append((t, state))
+                kept_at.append(t)
+                states.append(state)
 
         options: Any = {"per_step": per_step, "progress": update, "callback": keep}
         try:
@@ -72,7 +73,7 @@ def simulate_in_time(
         if data.sizes["time"]:
             draw(files.plot, lambda figures: figures.history_overview(curve))
         if files.fields is not None:
-            _write_fields_in_time(lever, states, output_folder(files.fields))
+            write_fields_in_time(lever, kept_at, states, output_folder(files.fields))
     if files.output is None:
         reporter.give(history_csv(data))
     if failure is not None:
@@ -98,12 +99,3 @@ def _times(data: xr.Dataset) -> list[list[str]]:
             listed = ", ".join(f"{time:.3g}" for time in constants)
             rows.append([f"time constants at the {name}", f"{listed} µs"])
     return rows
-
-
-def _write_fields_in_time(lever: Lever, states: list[tuple[float, State]], folder: Path) -> None:
-    """Write the fields of states in time to a folder, with their index."""
-    mapper = FieldMapper(lever)
-    names = [f"fields_{index:04d}.vtu" for index in range(len(states))]
-    for name, (_, state) in zip(names, states, strict=True):
-        write_vtu(mapper.map(state), folder / name)
-    write_pvd([t for t, _ in states], names, folder / "fields.pvd")

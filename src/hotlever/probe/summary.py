@@ -1,0 +1,73 @@
+"""A probe in words: its shape, circuit and materials."""
+
+from __future__ import annotations
+
+from hotlever.probe.layout import Layout, Taper
+from hotlever.probe.mesh import ProbeMesh
+from hotlever.probe.probe import Probe
+from hotlever.probe.shapes import DRAWING
+
+
+def probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
+    """Return a probe in words, with the number of triangles of its mesh; `name` heads them."""
+    circuit, silicon, layout = probe.circuit, probe.heater_silicon, mesh.layout
+    x, y = layout.tip
+    values = {key: getattr(probe.shape, key) for key in probe.shape.description()}
+    dimensions = [
+        f"  {key:<22} {values[key]:>8{'g' if isinstance(values[key], float) else ''}}  {text}"
+        for key, text in probe.shape.description().items()
+        if isinstance(values[key], float | str)
+    ]
+    if probe.shape.shape == DRAWING:
+        dimensions += [f"  {text}" for text in _regions(layout)]
+    lines = [
+        f"{name}: {probe.shape.shape}, {layout.thickness_um:g} µm thick",
+        *dimensions,
+        f"  tip at ({x:g}, {y:g}) µm; terminals {', '.join(layout.terminal_names)}",
+        f"circuit: series resistance {circuit.series_resistance_ohm:g} ohm, "
+        f"base temperature {circuit.base_temperature_K:g} K",
+        *(f"  {name}: {contact}" for name, contact in circuit.contacts.items()),
+        *_materials(probe),
+        *(
+            []
+            if silicon is None
+            else [f"inversion temperature of the heater: {silicon.inversion_temperature():.1f} K"]
+        ),
+        f"mesh: {mesh.elements.nelements} triangles",
+    ]
+    return "\n".join([*lines, ""])
+
+
+def _materials(probe: Probe) -> list[str]:
+    """Return the values of what a probe is made of, a line for each material."""
+    plain = {"material": probe.material} if probe.has_plain_silicon else {}
+    lines = []
+    for name, material in {**plain, **probe.materials}.items():
+        values = [
+            f"{key} {value:g}" if isinstance(value, float) else str(value)
+            for key, value in material
+            if value is not None and key != "preset"
+        ]
+        lines.append(f"{name}: {', '.join(values)}")
+    return lines
+
+
+def _regions(layout: Layout) -> list[str]:
+    """Return what the regions of a drawing are."""
+    plain = {"high-doped", "low-doped"}
+    lines = []
+    for region in layout.regions:
+        stack = [
+            film.material + (f" {film.thickness_um:g} µm" if film.thickness_um else "")
+            for film in region.stack
+        ]
+        kind = "high-doped" if plain.issuperset(stack) else " under ".join(stack)
+        own = "low-doped" if plain.issuperset(stack) else f"{kind}, low-doped"
+        if isinstance(region.taper, Taper):
+            kind = f"{own} strip, {region.taper.length_um:.4g} µm from border to border"
+        elif region.taper is not None:
+            borders = len(region.taper.borders)
+            kind = f"{own}, doping by the distance to {borders} border{'s' * (borders > 1)}"
+        part = "insulates" if region.insulates else region.part
+        lines.append(f"{region.name}: {part}, {region.area:.4g} µm², {kind}")
+    return lines
