@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -29,6 +31,14 @@ def test_power_leaves_by_the_leg_ends_and_into_the_air(in_air):
     vacuum = in_air.in_medium("vacuum").sweep([1.0, *BIAS])
     assert (vacuum.air_heat_mW == 0).all()
     assert (vacuum.tip_K > sweep.tip_K).all()
+
+
+@pytest.mark.parametrize("medium", ["vacuum", "air"])
+def test_a_lever_can_be_sent_to_another_process(coarse, medium):
+    lever = coarse.in_medium(medium)
+    sent = pickle.loads(pickle.dumps(lever))
+    assert (sent.sweep(BIAS).tip_K == lever.sweep(BIAS).tip_K).all()
+    assert sent.space.air.stores.size == lever.space.air.stores.size
 
 
 @pytest.mark.parametrize("name", ["c_kappa", "n_d", "a1"])

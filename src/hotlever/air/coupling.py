@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,10 @@ from hotlever.types import Array, Index
 #: beside that of a kept Jacobian, and both are removed by the next step.
 _TOLERANCE = 1e-5
 _MOST_DIRECTIONS, _MOST_RESTARTS = 200, 5
+
+
+def _nothing_around(nothing: HeatInAir, _: float) -> HeatInAir:
+    return nothing
 
 
 class AirLoss:
@@ -53,7 +57,7 @@ class AirLoss:
         Of the gas, over that of air.
     around : callable
         Makes what a gas of some conductivity takes up in time, once it is asked for; nothing, if
-        it is not replaced.
+        it is not replaced. It can be pickled, as a lever can.
     gap_um : float
         To a surface below; NaN without one.
     by_inverse_gap : ndarray, shape (sites, sites)
@@ -68,8 +72,7 @@ class AirLoss:
         self, operator: Any, unknowns: Index, shares: Array, slots: Index, size: int
     ) -> None:
         self._take(operator)
-        nothing = HeatInAir.nothing(size)
-        self.around = lambda gas_conductivity: nothing
+        self.around = partial(_nothing_around, HeatInAir.nothing(size))
         held = unknowns < 0
         self._held = np.where(held, shares, 0.0).sum(axis=1)
         rows = np.broadcast_to(np.arange(len(unknowns))[:, None], unknowns.shape)

@@ -6,7 +6,7 @@ The latter is made once it is asked for, and cached.
 from __future__ import annotations
 
 from dataclasses import asdict, replace
-from functools import cache, lru_cache
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import diags
@@ -44,16 +44,44 @@ def surrounded(
         return space.in_vacuum()
     plate = plate_of(probe)
 
-    @cache
-    def stores() -> HeatInAir:
-        return taken_up_around(space, plate, around, base)
-
-    @lru_cache(maxsize=1)
-    def stores_in_gas(conductivity: float) -> HeatInAir:
-        return stores().in_gas(conductivity)
-
+    stores = StoresAround(space, plate, around, base)
     air = air_operator(plate, around, base, panels, progress)
-    return space.in_air(air, stores_in_gas).in_gas(around.gas_conductivity)
+    return space.in_air(air, stores).in_gas(around.gas_conductivity)
+
+
+class StoresAround:
+    """Makes what the air around a lever takes up in time, once it is asked for.
+
+    Parameters
+    ----------
+    space : FullSpace
+        In air.
+    layout : Layout
+        As the air sees it.
+    surroundings : Surroundings
+    base_temperature_K : float
+    """
+
+    def __init__(
+        self,
+        space: FullSpace,
+        layout: Layout,
+        surroundings: Surroundings,
+        base_temperature_K: float,
+    ) -> None:
+        self._given = space, layout, surroundings, base_temperature_K
+        self._last: tuple[float, HeatInAir] | None = None
+
+    def __call__(self, gas_conductivity: float) -> HeatInAir:
+        """Return the heat in a gas that conducts so many times as well as air."""
+        # an answer in time asks again and again for that of one gas
+        if self._last is None or self._last[0] != gas_conductivity:
+            self._last = gas_conductivity, self._in_air.in_gas(gas_conductivity)
+        return self._last[1]
+
+    @cached_property
+    def _in_air(self) -> HeatInAir:
+        return taken_up_around(*self._given)
 
 
 @one_blas_thread
