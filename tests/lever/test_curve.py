@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.interpolate import PPoly
 
-from hotlever.lever.curve import hermite_weights, smooth_curve, spline_through
+from hotlever.lever.curve import Piecewise, hermite_weights, smooth_curve, spline_through
 
 
 @pytest.mark.parametrize("degree", range(6))
@@ -53,3 +54,26 @@ def test_what_is_missing_stays_missing():
     found = spline_through(u, values)(0.25)
     assert found[0] == pytest.approx(0.0625)
     assert np.isnan(found[1])
+
+
+def test_polynomials_between_nodes_are_those_of_scipy():
+    random = np.random.default_rng(0)
+    nodes, places = np.array([0.0, 0.3, 1.0, 2.5]), np.linspace(-0.5, 3.0, 50)
+    coefficients = random.normal(size=(6, 3, 2))
+    ours, theirs = Piecewise(coefficients, nodes), PPoly(coefficients, nodes)
+    for derivative in range(3):
+        np.testing.assert_allclose(ours(places, derivative), theirs(places, derivative), rtol=1e-10)
+    np.testing.assert_allclose(ours.derivative()(places), theirs.derivative()(places), rtol=1e-10)
+    assert ours(1.0).shape == (2,)
+
+
+def test_roots_are_those_of_scipy():
+    """Of a smooth curve: one at a node, and one at which it only touches zero."""
+    u = np.linspace(0.0, 3.0, 13)
+    curve = smooth_curve(u, np.cos(np.pi * u), -np.pi * np.sin(np.pi * u))
+    np.testing.assert_allclose(curve.roots(), [0.5, 1.5, 2.5], atol=1e-12)
+    theirs = PPoly(curve.c, curve.x).derivative().roots(extrapolate=False)
+    np.testing.assert_allclose(curve.derivative().roots(), np.unique(theirs.round(9)), atol=2e-9)
+    np.testing.assert_allclose(curve.derivative().roots(), [0.0, 1.0, 2.0, 3.0], atol=1e-9)
+    positive = smooth_curve(u, np.ones_like(u), np.zeros_like(u))
+    assert positive.roots().size == 0

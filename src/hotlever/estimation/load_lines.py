@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from hotlever.lever.branch import Branch
-from hotlever.lever.curve import crossing, piecewise, spline_through
+from hotlever.lever.curve import Piecewise, crossing, spline_through
 from hotlever.lever.sensitivities import at_fixed_bias
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array, Index
@@ -104,7 +104,7 @@ class Rows:
         curve = branch.bias_by_u(circuit)
         cold = branch.equations.circuit.starts_cold
         start = 0.0 if cold else float(branch.u[0])
-        level = np.sort(curve.derivative().roots(extrapolate=False))
+        level = np.sort(curve.derivative().roots())
         ends = [start, *level[(level > start) & (level < branch.end_u)].tolist(), branch.end_u]
         # a cold lever is told apart from itself by the size of the bias only, and has none without
         bias = np.abs(self.bias_V) if cold else self.bias_V
@@ -118,7 +118,7 @@ class Rows:
             if not here.size:
                 continue
             sign = 1.0 if last >= first else -1.0
-            at = crossing(piecewise(sign * curve.c, curve.x), low, high, sign * bias[here])
+            at = crossing(Piecewise(sign * curve.c, curve.x), low, high, sign * bias[here])
             away = self._distance(shown_at(branch, branch.equations.circuit, at), here)
             nearer = away < distance[here]
             u[here[nearer]], distance[here[nearer]] = at[nearer], away[nearer]

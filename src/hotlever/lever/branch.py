@@ -15,14 +15,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hotlever.errors import BranchEndError
 from hotlever.lever.by_power import ByPower
-from hotlever.lever.curve import piecewise
+from hotlever.lever.curve import Piecewise
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.newton import NewtonResult
 from hotlever.lever.parametrisation import NATURAL, UNIT_K, UNIT_V, Parametrisation, PseudoArclength
@@ -30,9 +29,6 @@ from hotlever.lever.ramp import Reading, slow_ramp
 from hotlever.lever.solved_states import SolvedStates
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
 
 #: A bias (V) that is none.
 _NO_BIAS = 1e-9
@@ -106,7 +102,7 @@ class Branch(SolvedStates):
     # --- the curves -------------------------------------------------------------------------------
 
     @cached_property
-    def curve(self) -> PPoly:
+    def curve(self) -> Piecewise:
         """V_l (V), I_h (mA), V_r (V) and the rise of the tip (K) by u."""
         return self.through(self.values, self.value_slopes)
 
@@ -118,10 +114,10 @@ class Branch(SolvedStates):
         return self.places or PseudoArclength(self.path)
 
     @cached_property
-    def path(self) -> PPoly:
+    def path(self) -> Piecewise:
         """Tip and lever voltage by u, in the units of `hotlever.lever.parametrisation.in_plane`."""
         own = self.curve.c[..., [TIP_RISE, 0]] / np.array([UNIT_K, UNIT_V])
-        return piecewise(own, self.curve.x)
+        return Piecewise(own, self.curve.x)
 
     @property
     def base_temperature_K(self) -> float:
@@ -200,7 +196,7 @@ class Branch(SolvedStates):
     @cached_property
     def knee_u(self) -> float | None:
         """Where the knee is."""
-        lever_V = piecewise(self.curve.c[..., 0], self.curve.x)
+        lever_V = Piecewise(self.curve.c[..., 0], self.curve.x)
         falling = [u for u in self.turns(lever_V).tolist() if lever_V(u, 2) < 0]
         return falling[0] if falling else None
 
@@ -236,9 +232,9 @@ class Branch(SolvedStates):
         reading = self.read(circuit, np.array([bias_V]))
         return bias_V if np.isfinite(reading.u[0]) else reading.last_V
 
-    def bias_by_u(self, circuit: Circuit) -> PPoly:
+    def bias_by_u(self, circuit: Circuit) -> Piecewise:
         """Return the bias (V) along the branch in a circuit."""
-        return piecewise(circuit.bias(self.curve.c[..., 0], self.curve.c[..., 1]), self.curve.x)
+        return Piecewise(circuit.bias(self.curve.c[..., 0], self.curve.c[..., 1]), self.curve.x)
 
     def _ramp(self, circuit: Circuit, bias: Array) -> Reading:
         """Find the states that a slow ramp takes from zero upwards."""
@@ -248,12 +244,12 @@ class Branch(SolvedStates):
         ends = [start, *turns[turns > start].tolist(), self.end_u]
         return slow_ramp(curve, ends, bias, self.tip_K)
 
-    def _without_bias(self, curve: PPoly) -> float:
+    def _without_bias(self, curve: Piecewise) -> float:
         """Return where a curve of the bias by u is zero: near where it was followed from."""
         if abs(float(curve(0.0))) < _NO_BIAS:
             return 0.0
         # a similar lever has no bias elsewhere
-        roots = curve.roots(extrapolate=False)
+        roots = curve.roots()
         return float(roots[np.argmin(np.abs(roots))]) if roots.size else float(self.u[0])
 
     def ended(self, reading: Reading) -> BranchEndError:

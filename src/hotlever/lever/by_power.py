@@ -8,16 +8,12 @@ power belongs to several temperatures.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hotlever.lever.curve import crossing, piecewise, smooth_curve
+from hotlever.lever.curve import Piecewise, crossing, smooth_curve
 from hotlever.lever.solved_states import SolvedStates
 from hotlever.types import Array
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
 
 
 class ByPower:
@@ -26,21 +22,21 @@ class ByPower:
     Parameters
     ----------
     states : SolvedStates
-    curve : PPoly
+    curve : Piecewise
         V_l (V) and I_h (mA) by u, and what else they show.
     """
 
-    def __init__(self, states: SolvedStates, curve: PPoly) -> None:
+    def __init__(self, states: SolvedStates, curve: Piecewise) -> None:
         self._states, self._curve = states, curve
 
     @cached_property
-    def _power(self) -> PPoly:
+    def _power(self) -> Piecewise:
         """P_l (mW) by u."""
         lever, current = (self._curve.c[..., column] for column in (0, 1))
         product = np.zeros((len(lever) + len(current) - 1, lever.shape[1]))
         for power, row in enumerate(lever):
             product[power : power + len(current)] += row * current
-        return piecewise(product, self._curve.x)
+        return Piecewise(product, self._curve.x)
 
     @cached_property
     def turn_u(self) -> float | None:
@@ -77,7 +73,7 @@ class ByPower:
         return np.asarray(self._by_root(root) * self._by_root(root, 1) / root)
 
     @cached_property
-    def _by_root(self) -> PPoly:
+    def _by_root(self) -> Piecewise:
         """u by the root of the power, which is nearly a straight line."""
         states = self._states
         values, slopes = states.values, states.value_slopes

@@ -2,30 +2,80 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hotlever.types import Array
 
 if TYPE_CHECKING:
-    from scipy.interpolate import BSpline, PPoly
+    from scipy.interpolate import BSpline
 
 #: Points between two nodes at which a value is first looked for, and steps of Newton's method from
 #: there.
 _SAMPLES, _NEWTON_STEPS = 8, 6
+#: Part of the distance between two nodes by which a root may be off.
+_ROUNDING = 1e-10
 
 
-def piecewise(coefficients: Array, u: Array) -> PPoly:
-    """Return the polynomials between nodes, (degree + 1, k - 1, ...), the highest power first."""
-    # takes as long to import as all of the lever, and is first needed once something is solved
-    from scipy.interpolate import PPoly
+@dataclass(frozen=True)
+class Piecewise:
+    """Polynomials between nodes; the outer ones go on beyond the ends.
 
-    return PPoly(coefficients, u)
+    Like `scipy.interpolate.PPoly`, whose import takes longer than that of all levers.
+
+    Attributes
+    ----------
+    c : ndarray, shape (degree + 1, k - 1, ...)
+        Coefficients of the distance from the node before, the highest power first.
+    x : ndarray, shape (k,)
+        Nodes, rising.
+
+    Examples
+    --------
+    >>> halves = Piecewise(np.array([[1.0, -1.0], [0.0, 1.0]]), np.array([0.0, 1.0, 3.0]))
+    >>> halves([0.5, 1.5, 4.0]).tolist(), halves(2.5, 1).item(), halves.roots().tolist()
+    ([0.5, 0.5, -2.0], -1.0, [0.0, 2.0])
+    """
+
+    c: Array
+    x: Array
+
+    def __call__(self, u: ArrayLike, derivative: int = 0) -> Array:
+        """Return values or a derivative at some places: their shape, and that of a value."""
+        if derivative:
+            return self.derivative()(u, derivative - 1)
+        u = np.asarray(u, dtype=float)
+        before = np.clip(np.searchsorted(self.x, u, side="right") - 1, 0, self.x.size - 2)
+        away = (u - self.x[before]).reshape((*u.shape, *(1,) * (self.c.ndim - 2)))
+        values = self.c[0][before]
+        for coefficients in self.c[1:]:
+            values = values * away + coefficients[before]
+        return np.asarray(values)
+
+    def derivative(self) -> Piecewise:
+        """Return the first derivative."""
+        powers = np.arange(len(self.c) - 1, 0, -1).reshape(-1, *(1,) * (self.c.ndim - 1))
+        return Piecewise(self.c[:-1] * powers, self.x)
+
+    def roots(self) -> Array:
+        """Return where a single quantity is zero between the first and the last node, rising."""
+        roots = []
+        for coefficients, left, width in zip(self.c.T, self.x, np.diff(self.x), strict=False):
+            away = np.roots(coefficients)
+            real = away.real[np.abs(away.imag) <= _ROUNDING * width]
+            inside = (real >= -_ROUNDING * width) & (real <= width * (1 + _ROUNDING))
+            roots.append(left + real[inside])
+        rising = np.unique(np.clip(np.concatenate(roots), self.x[0], self.x[-1]))
+        # one at a node belongs to the polynomials on both sides of it
+        again = np.diff(rising, prepend=-np.inf) <= 2 * _ROUNDING * np.ptp(self.x)
+        return np.asarray(rising[~again])
 
 
-def smooth_curve(u: Array, values: Array, slopes: Array, steps: Array | tuple = ()) -> PPoly:
+def smooth_curve(u: Array, values: Array, slopes: Array, steps: Array | tuple = ()) -> Piecewise:
     """Return the curve through values and slopes: of fifth degree, twice differentiable.
 
     The second derivative at a node is that of the polynomial through its own and both
@@ -50,7 +100,7 @@ def smooth_curve(u: Array, values: Array, slopes: Array, steps: Array | tuple = 
     pieces = [
         _coefficients(u[a : b + 1], values[a : b + 1], slopes[a : b + 1]) for a, b in pairwise(ends)
     ]
-    return piecewise(np.concatenate(pieces, axis=1), u)
+    return Piecewise(np.concatenate(pieces, axis=1), u)
 
 
 def _coefficients(u: Array, values: Array, slopes: Array) -> Array:
@@ -82,7 +132,7 @@ def spline_through(u: Array, values: Array, most: int = 3) -> BSpline:
 
     What is NaN, as the reader voltage of a lever without a reader, stays so.
     """
-    from scipy.interpolate import make_interp_spline  # see `piecewise`
+    from scipy.interpolate import make_interp_spline  # for the same reason as above
 
     missing = np.isnan(values).any(axis=0)
     spline: BSpline = make_interp_spline(u, np.where(missing, 0.0, values), min(most, u.size - 1))
@@ -113,7 +163,7 @@ def hermite_weights(nodes: Array, at: Array, derivative: int = 0) -> Array:
     return np.asarray(weights / width**derivative)
 
 
-def crossing(curve: PPoly, low: float, high: float, values: Array) -> Array:
+def crossing(curve: Piecewise, low: float, high: float, values: Array) -> Array:
     """Return where a curve that rises from `low` to `high` has some values, or begins above."""
     at = _samples(curve, low, high)
     heights = np.maximum.accumulate(curve(at))
@@ -126,7 +176,7 @@ def crossing(curve: PPoly, low: float, high: float, values: Array) -> Array:
     return np.where(values <= heights[0], low, u)
 
 
-def _samples(curve: PPoly, low: float, high: float) -> Array:
+def _samples(curve: Piecewise, low: float, high: float) -> Array:
     """Return points between which a curve is smooth enough for a few steps of Newton's method."""
     inner = curve.x[(curve.x > low) & (curve.x < high)]
     ends = np.concatenate([[low], inner, [high]])

@@ -9,20 +9,17 @@ of a similar lever, so that the states of both can be compared.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from hotlever.errors import NewtonError
-from hotlever.lever.curve import piecewise
+from hotlever.lever.curve import Piecewise
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
 from hotlever.lever.space import TIP, Constraint, Factors, Space
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array, Index
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
 
 #: Units in which changes of the tip (K) and of the lever voltage (V) compare.
 UNIT_K, UNIT_V = 60.0, 1.0
@@ -74,17 +71,17 @@ class PseudoArclength:
 
     Parameters
     ----------
-    curve : PPoly
+    curve : Piecewise
         Both by u, see `in_plane`.
     """
 
-    def __init__(self, curve: PPoly) -> None:
+    def __init__(self, curve: Piecewise) -> None:
         self._curve = curve
 
     @classmethod
     def across_tangent(cls, u: float, origin: Array, tangent: Array) -> PseudoArclength:
         """Return the lines across a straight line, given by where it is at u and its tangent."""
-        return cls(piecewise(np.stack([tangent, origin])[:, None], np.array([u, u + 1.0])))
+        return cls(Piecewise(np.stack([tangent, origin])[:, None], np.array([u, u + 1.0])))
 
     def constraint(self, u: Array) -> Constraint:
         """See `Parametrisation`."""

@@ -8,15 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hotlever.lever.curve import crossing
+from hotlever.lever.curve import Piecewise, crossing
 from hotlever.types import Array
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
 
 
 @dataclass(frozen=True)
@@ -56,13 +52,13 @@ class Reading:
 
 
 def slow_ramp(
-    curve: PPoly, ends: list[float], bias: Array, tip_K: Callable[[float], Array]
+    curve: Piecewise, ends: list[float], bias: Array, tip_K: Callable[[float], Array]
 ) -> Reading:
     """Find the states that a slow ramp takes from zero upwards.
 
     Parameters
     ----------
-    curve : PPoly
+    curve : Piecewise
         The bias (V) by u.
     ends : list of float
         Where the ramp begins, each u at which the curve is level, and where the branch ends.

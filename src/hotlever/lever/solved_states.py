@@ -10,16 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
-from hotlever.lever.curve import smooth_curve
+from hotlever.lever.curve import Piecewise, smooth_curve
 from hotlever.lever.equations import SHOWN, LeverEquations, steps_of
 from hotlever.types import Array
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
 
 #: Places along a branch that are looked at together.
 _AT_ONCE = 64
@@ -103,10 +100,10 @@ class SolvedStates:
         return np.asarray(self._curve(u)).T
 
     @cached_property
-    def _curve(self) -> PPoly:
+    def _curve(self) -> Piecewise:
         return self.through(self.x.T, self.slopes.T)
 
-    def through(self, values: Array, slopes: Array) -> PPoly:
+    def through(self, values: Array, slopes: Array) -> Piecewise:
         """Return the curve through some quantities of the states and their slopes, (k, ...)."""
         return smooth_curve(self.u, values, slopes, self.steps)
 
@@ -137,9 +134,9 @@ class SolvedStates:
         """Where the states end: at the last one, or where something begins to melt."""
         return self._where_it_reaches(self.melting_rise) if self.melts else float(self.u[-1])
 
-    def turns(self, quantity: PPoly) -> Array:
+    def turns(self, quantity: Piecewise) -> Array:
         """Return u where a curve over u is level, up to the end."""
-        level = np.sort(quantity.derivative().roots(extrapolate=False))
+        level = np.sort(quantity.derivative().roots())
         return level[(level > 0) & (level < self.end_u)]
 
     def highest_rise_at(self, u: Array) -> Array:
