@@ -89,7 +89,7 @@ def test_keys_follow_the_code(folder, monkeypatch):
         ("materials/silicon.py", True),
         ("lever/transient/modes.py", True),
         ("spieser2017.py", True),
-        ("cli/sweep.py", False),
+        ("cli/levers.py", False),
         ("figures/air.py", False),
     ],
 )

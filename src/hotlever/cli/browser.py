@@ -10,9 +10,9 @@ import typer
 from typer import Argument, Option
 
 from hotlever.cli.commands import app
-from hotlever.cli.options import check_number
 from hotlever.cli.output import fail, tell
 from hotlever.errors import InputError
+from hotlever.tasks.texts import check_number
 from hotlever.unforeseen import unforeseen_error
 
 #: Where a password may stand, that would be seen by others on the command line.

@@ -21,18 +21,18 @@ from hotlever.errors import InputError, unknown_name
 _MODULES = {
     "app": "browser",
     "cache": "cache",
-    "calibrate": "calibrate",
+    "calibrate": "estimate",
     "design": "design",
-    "fit": "fit",
+    "fit": "estimate",
     "join": "raman",
     "materials": "materials",
     "probe": "probe",
-    "pulse": "transient",
+    "pulse": "levers",
     "raman": "raman",
     "raman-check": "raman",
     "reproduce": "reproduce",
-    "spectrum": "transient",
-    "sweep": "sweep",
+    "spectrum": "levers",
+    "sweep": "levers",
 }
 
 

@@ -10,14 +10,13 @@ from hotlever.cli.options import (
     File,
     PlotFile,
     ProbeFile,
-    check_number,
-    parse_vary,
 )
 from hotlever.errors import InputError
 from hotlever.files import FIGURE_TYPES, Outputs, write_text
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import read_probe
+from hotlever.tasks.texts import check_number, parse_vary
 
 
 @app.command("design")

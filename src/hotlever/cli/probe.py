@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import typer
-from typer import Argument, Option
+from typer import Option
 
 from hotlever.cli import output as terminal
 from hotlever.cli.commands import Commands, app
-from hotlever.cli.options import File, PlotFile, ProbeFile
+from hotlever.cli.options import File, PlotFile, ProbeFile, command
 from hotlever.errors import unknown_name
 from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import read_probe
+from hotlever.tasks.requests import ImportRequest
 
 probe_app = typer.Typer(
     cls=Commands, help="Write, describe, draw and import probes.", rich_markup_mode=None
@@ -76,27 +75,9 @@ def show(
     terminal.give(probe_text(probe, triangles, name))
 
 
-@probe_app.command("import")
-def import_command(
-    drawing: Path = Argument(metavar="DRAWING", help="GDSII, OASIS or DXF file."),
-    output: File = Option(
-        None, "-o", "--output", help="Probe file to write; standard output if left out."
-    ),
-    cell: str | None = Option(None, help="Of GDSII or OASIS; the top cell if left out."),
-    unit: str | None = Option(
-        None, help="Of the drawing's numbers, as mm; what the file says if left out."
-    ),
-    plot: PlotFile = None,
-) -> None:
+@command("import", ImportRequest, probe_app)
+def import_command(request: ImportRequest) -> None:
     """Say what a drawing holds, and propose a probe file for it."""
-    from hotlever.probe.drawing.sheet import UNITS
     from hotlever.tasks.importing import propose_probe
 
-    name = None if unit is None else unit.replace("µ", "u").replace("μ", "u")
-    if name is not None and name not in UNITS:
-        raise unknown_name("unit", name, UNITS, "--unit")
-
-    outputs = Outputs(drawing)
-    outputs.file(output, ".toml")
-    outputs.file(plot, *FIGURE_TYPES)
-    propose_probe(terminal, drawing, cell, name, outputs, output, plot)
+    propose_probe(terminal, request)

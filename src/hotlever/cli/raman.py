@@ -3,89 +3,25 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Any
 
 import typer.core
-from typer import Argument, Option
 
 from hotlever.cli import output as terminal
-from hotlever.cli.commands import app
-from hotlever.cli.options import File, with_groups
+from hotlever.cli.options import command
 from hotlever.cli.output import give, note, tell
 from hotlever.errors import InputError
 from hotlever.files import FIGURE_TYPES, Outputs, json_text, write_text
 from hotlever.tasks.files import draw
-
-if TYPE_CHECKING:
-    from hotlever.tasks.thermometry import Thermometry
-
-CalibrationOption = Annotated[
-    str | None,
-    Option(
-        metavar="CAL.json",
-        help="A calibration that --save-calibration wrote, or 'published' for the published "
-        "laws (then --reference is needed).",
-    ),
-]
-
-
-@dataclass
-class ThermometerOptions:
-    """What `set_up` of `hotlever.tasks.thermometry` takes."""
-
-    calibration: CalibrationOption = None
-    calibrate_from: list[Path] | None = Option(
-        None, metavar="FILE_OR_DIR...", help="Hot-plate spectra to calibrate from; one or more."
-    )
-    temperatures: File = Option(
-        None,
-        metavar="TABLE.csv",
-        help="Hot-plate temperatures: file name, temperature. Left out: header or file name.",
-    )
-    corrections: File = Option(
-        None,
-        metavar="TABLE.csv",
-        help="By hand: file, start_cm-1 of the line, from_cm-1 and to_cm-1 of what is fitted, use.",
-    )
-    reference: list[Path] | None = Option(
-        None,
-        metavar="FILE_OR_DIR",
-        help="Spectrum at room temperature on the instrument as it is now; may be repeated.",
-    )
-    law: str = Option("anharmonic", metavar="linear|anharmonic", help="Calibration law.")
-    shape: str | None = Option(
-        None,
-        metavar="lorentzian|voigt|fano",
-        help="Line shape; left out: that of the calibration, else lorentzian.",
-    )
-    resolution: float | None = Option(
-        None,
-        metavar="CM-1",
-        help="FWHM of the spectrometer's response, for voigt; left out: fitted.",
-    )
-    laser_power: float | None = Option(
-        None, metavar="MW", help="Laser power on the lever, for its heating."
-    )
-    thermal_resistance: float | None = Option(
-        None, metavar="K/MW", help="Thermal resistance of the lever, K per mW of heat."
-    )
-    stress: float = Option(
-        0.0, metavar="MPA", help="Unknown stress in the silicon; enters the error."
-    )
-
-    @property
-    def files(self) -> list[Path | str | None]:
-        """The files that it reads."""
-        several = [*(self.calibrate_from or []), *(self.reference or [])]
-        return [*several, self.temperatures, self.calibration, self.corrections]
-
-    def set_up(self) -> Thermometry:
-        """Set the thermometer up; what is noticed goes to standard error."""
-        from hotlever.tasks.thermometry import set_up
-
-        return set_up(terminal, **vars(self))
+from hotlever.tasks.measured_requests import (
+    RamanRequest,
+    ThermometerRequest,
+    calibration_option,
+    spectra_argument,
+)
+from hotlever.tasks.requests import File, argument, option
 
 
 class SeveralFiles(typer.core.TyperCommand):
@@ -142,43 +78,25 @@ def spread_option(args: list[str], option: str, takes_value: set[str]) -> list[s
     return out
 
 
-Spectra = Annotated[
-    list[Path], Argument(metavar="FILE_OR_DIR...", help="Spectra, or folders of spectra.")
-]
-
-
-@app.command("raman", cls=SeveralFiles)
-@with_groups
-def raman_command(
-    spectra: Spectra,
-    thermometer: ThermometerOptions,
-    save_calibration: File = Option(
-        None, metavar="CAL.json", help="Write the calibration to this file."
-    ),
-    output: File = Option(None, "--output", "-o", metavar="FILE.csv", help="Left out: print."),
-    plot: File = Option(
-        None, metavar="FILE.png|.svg|.pdf", help="Figure of spectra and calibration."
-    ),
-) -> None:
+@command("raman", RamanRequest, cls=SeveralFiles)
+def raman_command(request: RamanRequest) -> None:
     """Find the silicon line in Raman spectra and, calibrated, the temperature."""
-    from hotlever.tasks.spectra import Files, measure_spectra
+    from hotlever.tasks.spectra import measure_spectra
 
-    outputs = Outputs(*spectra, *thermometer.files)
-    outputs.file(plot, *FIGURE_TYPES)
-    outputs.file(save_calibration)
-    outputs.file(output)
-    files = Files(output, plot, save_calibration)
-    _answer(measure_spectra(thermometer.set_up(), spectra, outputs, files), output)
+    _answer(measure_spectra(terminal, request), request.output)
 
 
-@app.command("join", cls=SeveralFiles)
-@with_groups
-def join_command(
-    bias_log: Annotated[Path, Argument(metavar="BIAS_LOG.csv", help="The bias sweep.")],
-    spectra: Spectra,
-    thermometer: ThermometerOptions,
-    output: File = Option(None, "--output", "-o", metavar="DATA.csv", help="Left out: print."),
-) -> None:
+@dataclass(kw_only=True)
+class JoinRequest(ThermometerRequest):
+    """One measurement file of a bias log and spectra."""
+
+    bias_log: Path = argument(MISSING, metavar="BIAS_LOG.csv", help="The bias sweep.")
+    spectra: list[Path] = spectra_argument()
+    output: File = option(None, "--output", "-o", metavar="DATA.csv", help="Left out: print.")
+
+
+@command("join", JoinRequest, cls=SeveralFiles)
+def join_command(request: JoinRequest) -> None:
     """Join a bias log with tip spectra into the file that `hotlever fit` takes.
 
     A spectrum belongs to the row that names it in a 'file' column, or has the bias in its name
@@ -186,10 +104,11 @@ def join_command(
     """
     from hotlever.raman.bias_log import join, read_bias_log
 
-    outputs = Outputs(bias_log, *spectra, *thermometer.files)
+    bias_log, spectra, output = request.bias_log, request.spectra, request.output
+    outputs = Outputs(bias_log, *spectra, *request.files)
     outputs.file(output)
     log = read_bias_log(bias_log)
-    setup = thermometer.set_up()
+    setup = request.set_up(terminal)
     if setup.thermometer is None:
         raise InputError("join needs temperatures: give --calibration or --calibrate-from")
     _, table = setup.measure(spectra)
@@ -203,16 +122,22 @@ def join_command(
     _answer(text, output)
 
 
-@app.command("raman-check")
-def raman_check_command(
-    calibration: CalibrationOption = None,
-    plot: File = Option(None, metavar="FILE.png|.svg|.pdf", help="The check as a figure."),
-    output: File = Option(None, "--output", "-o", metavar="FILE.json", help="The numbers."),
-) -> None:
+@dataclass(kw_only=True)
+class CheckRequest:
+    """The Raman law above 900 K."""
+
+    calibration: str | None = calibration_option()
+    plot: File = option(None, metavar="FILE.png|.svg|.pdf", help="The check as a figure.")
+    output: File = option(None, "--output", "-o", metavar="FILE.json", help="The numbers.")
+
+
+@command("raman-check", CheckRequest)
+def raman_check_command(request: CheckRequest) -> None:
     """How far the paper's linear law is off above 900 K, and what that does to the knee."""
     from hotlever.studies.raman_check import conclusion, paper_check
     from hotlever.tasks.thermometry import calibration_named
 
+    calibration, plot, output = request.calibration, request.plot, request.output
     outputs = Outputs(calibration)
     outputs.file(plot, *FIGURE_TYPES)
     outputs.file(output)

@@ -2,51 +2,34 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any, NamedTuple
-
 from hotlever.calibration.power_law import read_power_law
 from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.summary import calibration_text
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import read_fit, read_measurement
-from hotlever.files import Outputs, write_text
-from hotlever.probe import Probe
+from hotlever.files import write_text
 from hotlever.tasks.files import draw
+from hotlever.tasks.measured_requests import CalibrateRequest
+from hotlever.tasks.probes import read_probe
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.texts import parse_priors
+from hotlever.tasks.texts import parse_priors, parse_timing
 
 
-class Tables(NamedTuple):
-    """Files that a calibration is written to."""
-
-    output: Path | None
-    table: Path | None
-    plot: Path | None = None
-
-
-def calibrate_file(
-    reporter: Reporter,
-    data: Path,
-    columns: dict[str, str],
-    probe: Probe | None,
-    fit_file: Path | None,
-    power_law: Path | None,
-    prior: list[str] | None,
-    outputs: Outputs,
-    to: Tables,
-    **asked: Any,
-) -> None:
-    """Calibrate a lever; `asked` are options of `hotlever.calibration.procedure.calibrate`.
+def calibrate_file(reporter: Reporter, request: CalibrateRequest) -> None:
+    """Calibrate a lever.
 
     Raises
     ------
     ComputationError
         If no lever shows these data; what the search ended at is written.
     """
-    fit = None if fit_file is None else read_fit(fit_file)
-    like = probe or (Probe.reference() if fit is None else fit.probe)
-    priors = parse_priors(prior, like)
+    request.check()
+    data, law = request.data, request.power_law
+    timing = None if request.pulse is None else parse_timing(request.pulse)
+    columns, outputs = request.columns, request.outputs()
+    fit = None if request.fit is None else read_fit(request.fit)
+    like = read_probe(reporter, request.probe) if fit is None else fit.probe
+    priors = parse_priors(request.prior, like)
     measurement = read_measurement(data, columns, like.circuit)
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes)
@@ -55,20 +38,22 @@ def calibrate_file(
     with reporter.progress("calibrate") as update:
         result = calibrate(
             measurement,
-            probe=like if fit is None and power_law is None else None,
+            probe=like if fit is None and law is None else None,
             fit=fit,
-            law=None if power_law is None else read_power_law(power_law),
+            law=None if law is None else read_power_law(law),
             priors=priors,
             progress=update,
-            **asked,
+            medium=request.medium,
+            pulse=timing,
+            samples=request.samples if request.posterior else 0,
         )
     reporter.note(*result.notes)
     with outputs.together():
-        if to.output is not None:
-            result.write(to.output)
-        if to.table is not None:
-            write_text(to.table, result.table_csv())
-        draw(to.plot, lambda figures: figures.calibration_curves(result))
+        if request.output is not None:
+            result.write(request.output)
+        if request.table is not None:
+            write_text(request.table, result.table_csv())
+        draw(request.plot, lambda figures: figures.calibration_curves(result))
     reporter.give(calibration_text(result) + "\n")
     if not result.describes_data:
         raise ComputationError(f"{data}: {result.doubt}")

@@ -1,21 +1,13 @@
-"""Files that tasks write, as far as they are asked for."""
+"""Figures that tasks draw, as far as they are asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-class Files(NamedTuple):
-    """What is written: a table (CSV or NetCDF), a figure, and a folder of fields (VTU)."""
-
-    output: Path | None = None
-    plot: Path | None = None
-    fields: Path | None = None
 
 
 def draw(path: Path | None, figure: Callable[[Any], Figure]) -> None:

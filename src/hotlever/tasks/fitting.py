@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation import FitOptions, Measurement, fit, read_measurement
@@ -14,11 +13,11 @@ from hotlever.estimation.experiment import Prediction
 from hotlever.estimation.levers import compare_levers, levers_csv, levers_text
 from hotlever.estimation.summary import fit_text
 from hotlever.estimation.uncertainty import Uncertainty, examine
-from hotlever.files import Outputs, write_text
-from hotlever.lever.transient import Waveform
+from hotlever.files import write_text
 from hotlever.probe import Probe
+from hotlever.tasks.measured_requests import FitRequest
+from hotlever.tasks.probes import read_probe
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.texts import USUAL, parse_number, parse_pairs, parse_priors
 
 #: Points of a curve that is shown while the fit goes on.
 _DRAWN = 200
@@ -26,61 +25,37 @@ _DRAWN = 200
 LEVERS_TABLE = "levers.csv"
 
 
-class Destination(NamedTuple):
-    """Where fits are written to: a file or a folder, and the folder of a page."""
-
-    outputs: Outputs
-    output: Path | None
-    report: Path | None
-
-
-def fit_options(
-    probe: Probe,
-    observables: str | None = None,
-    fix: Sequence[str] | None = None,
-    free: str | None = None,
-    prior: Sequence[str] | None = None,
-    **others: Any,
-) -> FitOptions:
-    """Return what a fit is asked, of what was typed."""
-    usual = USUAL in (prior or [])
-    given = parse_priors(prior, probe)
-    stated = probe.stated_priors
-    return FitOptions(
-        observables=None if observables is None else observables.split(","),
-        fixed={
-            name: parse_number(text, f"--fix {name}") if text else None
-            for name, text in parse_pairs("--fix", fix, bare=True).items()
-        },
-        priors=stated if given is None else {**stated, **given} if given or usual else {},
-        usual_priors=usual,
-        free=() if free is None else tuple(name.strip() for name in free.split(",")),
-        **others,
-    )
-
-
-def fit_one(
-    reporter: Reporter,
-    data: Path,
-    columns: dict[str, str],
-    waveform: Waveform | None,
-    probe: Probe,
-    options: FitOptions,
-    examined: dict[str, Any],
-    to: Destination,
-) -> None:
-    """Fit one lever; `examined` are the options of `hotlever.estimation.uncertainty.examine`.
+def fit_files(reporter: Reporter, request: FitRequest) -> int:
+    """Fit one lever or many; return the exit status.
 
     Raises
     ------
     ComputationError
-        If no lever shows these data; what the search ended at is written.
+        If no lever shows the data of a single one; what the search ended at is written.
     """
-    to.outputs.file(to.output)
-    to.outputs.folder(to.report)
+    request.check()
+    probe = read_probe(reporter, request.probe)
+    options, columns = request.options(probe), request.columns
+    if len(request.data) > 1:
+        return _fit_several(reporter, request, probe, options, columns).exit_status
+    _fit_one(reporter, request, probe, options, columns)
+    return 0
+
+
+def _fit_one(
+    reporter: Reporter,
+    request: FitRequest,
+    probe: Probe,
+    options: FitOptions,
+    columns: dict[str, str],
+) -> None:
+    outputs, (data,), waveform = request.outputs(), request.data, request.read_waveform()
+    samples = request.samples if request.posterior else None
+    outputs.file(request.output)
+    outputs.folder(request.report)
     measurement = read_measurement(data, columns, probe.circuit, waveform)
-    if examined["samples"] or examined["profiles"]:
-        measurement.need_rest("--posterior" if examined["samples"] else "--profiles")
+    if samples or request.profiles:
+        measurement.need_rest("--posterior" if samples else "--profiles")
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes)
     with reporter.progress("fit") as update:
@@ -90,26 +65,27 @@ def fit_one(
     texts = [fit_text(result)]
     uncertainty: Uncertainty | None = None
     failure: HotleverError | KeyboardInterrupt | None = None
-    if not result.describes_data and (examined["samples"] or examined["profiles"]):
+    if not result.describes_data and (samples or request.profiles):
         reporter.note("no posterior and no profiles of a lever that does not show these data")
-    elif examined["samples"] or examined["profiles"]:
+    elif samples or request.profiles:
         try:
             labels = "profiles", "posterior", "band"
             with reporter.progress_bars(*labels) as (profiling, sampling, banding):
                 bars: Any = {"profiling": profiling, "sampling": sampling, "banding": banding}
-                uncertainty = examine(result, **examined, **bars)
+                asked: Any = {"profiles": request.profiles, "processes": request.processes}
+                uncertainty = examine(result, samples=samples, **asked, **bars)
             reporter.note(*uncertainty.statements())
             texts.append(uncertainty.text())
         except (HotleverError, KeyboardInterrupt) as error:
             # the fit is there; what ends this is said when it is written
             failure = error
-    with to.outputs.together():
-        if to.output is not None:
-            write_text(to.output, (uncertainty or result).to_json())
-        if to.report is not None:
+    with outputs.together():
+        if request.output is not None:
+            write_text(request.output, (uncertainty or result).to_json())
+        if request.report is not None:
             from hotlever.report.fit_pages import fit_page
 
-            texts.append(f"report: {fit_page(result, uncertainty).write(to.report)}")
+            texts.append(f"report: {fit_page(result, uncertainty).write(request.report)}")
     reporter.give("\n".join([*texts, ""]))
     if failure is not None:
         raise failure
@@ -125,21 +101,19 @@ def _show_curve(reporter: Reporter, prediction: Prediction) -> None:
     reporter.show("curve", {name: values[some].tolist() for name, values in columns.items()})
 
 
-def fit_several(
+def _fit_several(
     reporter: Reporter,
-    data: Sequence[Path],
-    columns: dict[str, str],
+    request: FitRequest,
     probe: Probe,
     options: FitOptions,
-    to: Destination,
-    **where: Any,
+    columns: dict[str, str],
 ) -> Batch:
-    """Fit many levers in parallel, and compare them; the same again goes on where it was stopped.
+    """Fit many levers in parallel, and compare them.
 
-    `where` are the options ``processes`` and ``scheduler`` of `hotlever.estimation.batch.fit_many`.
+    The same again goes on where it was stopped.
     """
-    outputs, output, report = to
-    scheduler = where.get("scheduler")
+    data, output, report = request.data, request.output, request.report
+    outputs, scheduler = request.outputs(), request.scheduler
     if scheduler is not None and _is_open(scheduler):
         reporter.note(
             f"--scheduler {scheduler}: without TLS whoever reaches this address can have its "
@@ -168,6 +142,7 @@ def fit_several(
             reporter.tell(f"{name}: {rows}; {columns_read}")
             reporter.note(*measurement.notes)
 
+        where: Any = {"processes": request.processes, "scheduler": scheduler}
         bars: Any = {"reading": read, "reducing": reducing, "progress": update}
         try:
             batch = fit_many(data, folder, probe, options, columns=columns, **where, **bars)

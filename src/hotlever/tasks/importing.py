@@ -4,32 +4,27 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hotlever.files import Outputs, write_text
+from hotlever.files import write_text
 from hotlever.probe.drawing.outlines import DrawingError
 from hotlever.probe.importing import import_drawing
 from hotlever.tasks.files import draw
 from hotlever.tasks.reporter import Reporter
+from hotlever.tasks.requests import ImportRequest
 
 
-def propose_probe(
-    reporter: Reporter,
-    drawing: Path,
-    cell: str | None,
-    unit: str | None,
-    outputs: Outputs,
-    output: Path | None,
-    plot: Path | None,
-) -> None:
+def propose_probe(reporter: Reporter, request: ImportRequest) -> None:
     """Say what a drawing holds, and propose a probe file for it."""
+    drawing, output, unit = request.drawing, request.output, request.known_unit
+    outputs = request.outputs()
     folder = Path() if output is None else output.parent
-    proposed = import_drawing(drawing, cell, folder, unit)
+    proposed = import_drawing(drawing, request.cell, folder, unit)
     fault = proposed.fault
     place = fault.place if isinstance(fault, DrawingError) else None
     with outputs.together():
         if output is not None:
             write_text(output, proposed.text)
         draw(
-            plot,
+            request.plot,
             lambda figures: figures.outlines_drawing(
                 proposed.outlines,
                 drawing.name,

@@ -4,44 +4,46 @@ from __future__ import annotations
 
 import math
 from itertools import count as count_up
+from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from hotlever.errors import HistoryEndError
 from hotlever.files import Outputs, output_folder
-from hotlever.lever import Lever, State
+from hotlever.lever import State
 from hotlever.lever.fields import write_fields_in_time
 from hotlever.lever.transient import (
-    Waveform,
     history_csv,
     simulate,
     with_times,
     write_history,
 )
-from hotlever.tasks.files import Files, draw
+from hotlever.tasks.files import draw
+from hotlever.tasks.probes import make_lever
 from hotlever.tasks.reporter import Reporter
+from hotlever.tasks.requests import PulseRequest
 
 #: Points of a curve for each step of the solver.
 _CURVE = 8
 
 
-def simulate_in_time(
-    reporter: Reporter,
-    lever: Lever,
-    waveform: Waveform,
-    until: float | None,
-    times: list[float] | None,
-    outputs: Outputs,
-    files: Files,
-) -> None:
-    """Solve a lever in time, up to a time and at some times (µs) if these are given.
+def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
+    """Solve a lever in time, or write the page of it.
 
     Raises
     ------
     HistoryEndError
         If it has no state any more; what was reached is written.
     """
+    if request.report is not None:
+        request.need_no_waveform()
+        _write_page(reporter, request, request.report)
+        return
+    waveform, until, times = request.required_waveform(), request.end_us, request.times_us
+    outputs = request.outputs(request.probe, request.waveform)
+    outputs.folder(request.fields)
+    lever = make_lever(reporter, request.read_probe(reporter))
     failure: HistoryEndError | None = None
     # figures and rise times are of smooth curves, the table of the steps alone
     per_step = _CURVE if times is None else 1
@@ -53,7 +55,7 @@ def simulate_in_time(
 
         def keep(t: float, state: State) -> None:
             ends[1:] = [state]
-            if next(told) % per_step == 0 and files.fields is not None:
+            if next(told) % per_step == 0 and request.fields is not None:
                 kept_at.append(t)
                 states.append(state)
 
@@ -68,16 +70,30 @@ def simulate_in_time(
     reporter.note(*filter(None, data.attrs["notes"].split("\n")))
     reporter.tell_table(_times(data))
     with outputs.together():
-        if files.output is not None:
-            write_history(data, files.output)
+        if request.output is not None:
+            write_history(data, request.output)
         if data.sizes["time"]:
-            draw(files.plot, lambda figures: figures.history_overview(curve))
-        if files.fields is not None:
-            write_fields_in_time(lever, kept_at, states, output_folder(files.fields))
-    if files.output is None:
+            draw(request.plot, lambda figures: figures.history_overview(curve))
+        if request.fields is not None:
+            write_fields_in_time(lever, kept_at, states, output_folder(request.fields))
+    if request.output is None:
         reporter.give(history_csv(data))
     if failure is not None:
         raise failure
+
+
+def _write_page(reporter: Reporter, request: PulseRequest, folder: Path) -> None:
+    """Write the page of a lever in time."""
+    from hotlever.report.transient_pages import transient_page
+
+    outputs = Outputs(request.probe)
+    outputs.folder(folder)
+    lever = make_lever(reporter, request.read_probe(reporter))
+    with reporter.progress("sections") as update:
+        page = transient_page(lever, update)
+    with outputs.together():
+        written = page.write(folder)
+    reporter.give(f"{written}\n")
 
 
 def _times(data: xr.Dataset) -> list[list[str]]:

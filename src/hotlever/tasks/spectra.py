@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-from typing import NamedTuple
-
 from hotlever.errors import InputError
-from hotlever.files import Outputs, write_text
+from hotlever.files import write_text
 from hotlever.raman.series import to_csv
 from hotlever.tasks.files import draw
-from hotlever.tasks.thermometry import Thermometry
+from hotlever.tasks.measured_requests import RamanRequest
+from hotlever.tasks.reporter import Listener
 
 
-class Files(NamedTuple):
-    """What is written: a table (CSV), a figure, and the calibration (JSON)."""
-
-    output: Path | None = None
-    plot: Path | None = None
-    save_calibration: Path | None = None
-
-
-def measure_spectra(
-    setup: Thermometry, spectra: Sequence[Path], outputs: Outputs, files: Files
-) -> str:
+def measure_spectra(listener: Listener, request: RamanRequest) -> str:
     """Find the silicon line in spectra and, calibrated, the temperature; return the table.
 
     Raises
@@ -31,18 +18,20 @@ def measure_spectra(
     InputError
         If there is no spectrum with a line, or no calibration to be saved.
     """
-    if files.save_calibration is not None and setup.calibration is None:
+    outputs = request.outputs()
+    setup = request.set_up(listener)
+    if request.save_calibration is not None and setup.calibration is None:
         raise InputError("--save-calibration: there is no calibration; give --calibrate-from")
-    lines, table = setup.measure(spectra)
+    lines, table = setup.measure(request.spectra)
     text = to_csv(table)
     with outputs.together():
         if len(lines) == 1 and setup.calibration is None:
-            draw(files.plot, lambda figures: figures.one_spectrum(lines[0]))
+            draw(request.plot, lambda figures: figures.one_spectrum(lines[0]))
         else:
             of = setup.calibration, setup.hot_plate
-            draw(files.plot, lambda figures: figures.thermometry(lines, table, *of))
-        if files.save_calibration is not None and setup.calibration is not None:
-            setup.calibration.save(files.save_calibration)
-        if files.output is not None:
-            write_text(files.output, text)
+            draw(request.plot, lambda figures: figures.thermometry(lines, table, *of))
+        if request.save_calibration is not None and setup.calibration is not None:
+            setup.calibration.save(request.save_calibration)
+        if request.output is not None:
+            write_text(request.output, text)
     return text

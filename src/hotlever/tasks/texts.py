@@ -1,18 +1,22 @@
-"""Numbers, values by name, priors and times of pulses as they are typed."""
+"""Numbers, ranges, values by name, priors and times of pulses as they are typed."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, get_args
 
 from hotlever.errors import InputError, quoted, shown
-from hotlever.units import setting
+from hotlever.units import LEAST_BIAS, MOST_BIAS, setting
 
 if TYPE_CHECKING:
     from hotlever.calibration.pulses import PulseTiming
-    from hotlever.probe import Probe
+    from hotlever.probe import Circuit, Probe
+    from hotlever.types import Array
 
+#: A sweep of so many biases takes minutes, as does a design varied so often.
+MOST_BIASES, MOST_DESIGNS = 10_000, 1000
+MOST_FREQUENCIES = 10_000
 #: Of priors: those of a calibration, where none is stated.
 USUAL = "usual"
 
@@ -26,6 +30,14 @@ def parse_number(text: str, where: str) -> float:
     if not math.isfinite(value):
         raise InputError(f"{where}: found {quoted(text)}, expected a number")
     return value
+
+
+def check_number(option: str, value: float | None, least: float, most: float) -> None:
+    """Refuse a number out of bounds."""
+    if value is not None and not least <= value <= most:
+        # what is too long for a float is quoted as it stands
+        text = f"{value:g}" if abs(value) < 1e300 else quoted(value)
+        raise InputError(f"{option} {text}: expected a number from {least:g} to {most:g}")
 
 
 def parse_pairs(
@@ -125,3 +137,90 @@ def parse_timing(text: str) -> PulseTiming:
         return PulseTiming(setting(length, "us", "--pulse"), each)
     except InputError as error:
         raise error if str(error).startswith("--") else InputError(f"--pulse: {error}") from None
+
+
+# --- ranges: START:STOP:COUNT ---------------------------------------------------------------------
+
+
+def parse_bias(text: str, circuit: Circuit | None = None) -> Array:
+    """Parse ``START:STOP:COUNT`` in volts, ends included.
+
+    With held supplies in the circuit the start may be negative.
+
+    Examples
+    --------
+    >>> parse_bias("1:11:3").tolist()
+    [1.0, 6.0, 11.0]
+    """
+    import numpy as np
+
+    where = f"--bias {shown(text)}"
+    start, stop, count = _parse_range(text, where, "such as 1:11:25 (V)", MOST_BIASES)
+    signed = circuit is not None and not circuit.starts_cold
+    if (start < 0 and not signed) or stop < start:
+        raise InputError(f"{where}: expected {'' if signed else '0 <= '}START <= STOP")
+    if (count == 1) != (start == stop):
+        raise InputError(f"{where}: COUNT 1 goes with START = STOP, more with START < STOP")
+    biases = np.linspace(start, stop, count)
+    if biases[biases > 0].min(initial=LEAST_BIAS) < LEAST_BIAS or stop > MOST_BIAS:
+        raise InputError(
+            f"{where}: expected biases of 0, or from {LEAST_BIAS:g} to {MOST_BIAS:g} V"
+        )
+    return biases
+
+
+def parse_frequencies(text: str) -> Array:
+    """Parse ``START:STOP:COUNT`` with units, spaced evenly in the logarithm.
+
+    Examples
+    --------
+    >>> parse_frequencies("1Hz:1kHz:4").round(6).tolist()
+    [1.0, 10.0, 100.0, 1000.0]
+    """
+    import numpy as np
+
+    where = f"--frequency {shown(text)}"
+    start, stop, count = _parse_range(
+        text, where, "such as 1Hz:10MHz:71", MOST_FREQUENCIES, lambda end: setting(end, "Hz", where)
+    )
+    if not 0 < start <= stop or (count == 1) != (start == stop):
+        raise InputError(f"{where}: expected 0 < START < STOP, or START = STOP with COUNT 1")
+    return np.geomspace(start, stop, count)
+
+
+def parse_vary(text: str) -> tuple[str, Array]:
+    """Parse ``NAME=START:STOP:COUNT``, ends included.
+
+    Examples
+    --------
+    >>> name, values = parse_vary("heater_length_um=3:6:4")
+    >>> name, values.tolist()
+    ('heater_length_um', [3.0, 4.0, 5.0, 6.0])
+    """
+    import numpy as np
+
+    where, example = f"--vary {shown(text)}", "such as heater_length_um=3:6:7"
+    name, equals, numbers = text.partition("=")
+    if not equals:
+        raise InputError(f"{where}: expected NAME=START:STOP:COUNT, {example}")
+    start, stop, count = _parse_range(numbers, where, example, MOST_DESIGNS)
+    if count < 2 or start == stop:
+        raise InputError(f"{where}: expected two values or more, {example}")
+    return name.strip(), np.linspace(start, stop, count)
+
+
+def _parse_range(
+    text: str, where: str, example: str, most: int, end: Callable[[str], float] | None = None
+) -> tuple[float, float, int]:
+    """Parse ``START:STOP:COUNT``; the ends are numbers unless parsed in another way."""
+    parts = text.split(":")
+    if len(parts) != 3:
+        raise InputError(f"{where}: expected START:STOP:COUNT, {example}")
+    start, stop = (end(part) if end else parse_number(part, where) for part in parts[:2])
+    # a number of more digits than the limit has is too large without being read
+    readable = parts[2].isdecimal() and len(parts[2]) <= len(str(most))
+    if not readable or not 1 <= int(parts[2]) <= most:
+        raise InputError(
+            f"{where}: COUNT is {quoted(parts[2])}, expected a whole number from 1 to {most}"
+        )
+    return start, stop, int(parts[2])

@@ -108,7 +108,7 @@ class RamanPage(Page):
         asked = self.thermometer()
         options = {
             "calibration": asked["calibration"],
-            "calibrate_from": asked["calibrate_from"],
+            "calibrate_from": [asked["calibrate_from"]] if asked["calibrate_from"] else [],
             "save_calibration": _SAVED if asked["calibrate_from"] else "",
             "law": asked["law"] if asked["law"] != "anharmonic" else "",
             "corrections": asked["corrections"],

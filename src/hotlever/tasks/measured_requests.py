@@ -1,0 +1,277 @@
+"""What is asked of tasks on measurements and spectra; see `hotlever.tasks.requests`."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hotlever.errors import InputError
+from hotlever.files import FIGURE_TYPES, Outputs
+from hotlever.tasks.requests import (
+    DriveRequest,
+    File,
+    argument,
+    check_medium,
+    option,
+    plot_option,
+)
+from hotlever.tasks.texts import USUAL, check_number, parse_number, parse_pairs, parse_priors
+
+if TYPE_CHECKING:
+    from hotlever.estimation import FitOptions
+    from hotlever.probe import Probe
+    from hotlever.tasks.reporter import Listener
+    from hotlever.tasks.thermometry import Thermometry
+
+
+@dataclass(kw_only=True)
+class MeasuredRequest:
+    """What is done with a measurement: how its file is read, and what is known beforehand."""
+
+    column: list[str] | None = option(
+        None,
+        "--column",
+        metavar="'QUANTITY (UNIT)=NAME'",
+        help="Which column of the data is which quantity, as 'I_h (uA)=Current' or by its "
+        "number; or a file of such lines; repeated.",
+    )
+    prior: list[str] | None = option(
+        None,
+        "--prior",
+        metavar="NAME=VALUE±SPREAD",
+        help="What is known beforehand, as n_d=3.3e17±15%, n_d=1e17×/3 (to a factor), "
+        "dimensions=±2%, usual (what a calibration takes) or none; repeated.",
+    )
+    medium: str | None = option(
+        None, help="vacuum, air or unknown (both are tried); what the files say if left out."
+    )
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Names of columns by quantity."""
+        from hotlever.measurement import parse_columns
+
+        return parse_columns(self.column or [])
+
+    @property
+    def column_files(self) -> list[Path]:
+        """The files among the values of ``--column``."""
+        return [Path(text) for text in self.column or [] if "=" not in text]
+
+
+@dataclass(kw_only=True)
+class FitRequest(DriveRequest, MeasuredRequest):
+    """Material parameters from measurements."""
+
+    data: list[Path] = argument(
+        MISSING, metavar="DATA.csv...", help="Measurement files, one for each lever."
+    )
+    probe: File = option(None, help="Probe file; the reference probe if left out.")
+    output: File = option(
+        None, "-o", "--output", help="Fit file (JSON); a folder of them with several data files."
+    )
+    report: File = option(None, help="Write a page with figures to this folder.")
+    observables: str | None = option(
+        None, help="Some of current,reader,tip; all that the file has if left out."
+    )
+    fix: list[str] | None = option(None, metavar="NAME[=VALUE]", help="Hold a parameter.")
+    free: str | None = option(
+        None,
+        metavar="NAME[,...]",
+        help="Vary more than is usual: any parameter of a material, as film.lorenz_ratio, or "
+        "of the probe.",
+    )
+    robust: bool = option(False, "--robust", help="Lessen the weight of points far off the others.")
+    drift: bool = option(
+        False, "--drift", help="Let the zeros of I_h and V_r drift along the file."
+    )
+    weights: str = option(
+        "maximum", help="maximum: of each observable, as in the paper; or errors, as measured."
+    )
+    posterior: bool = option(
+        False, "--posterior", help="Sample the posterior; predict the tip with its band."
+    )
+    samples: int = option(10_000, metavar="N", help="Of the posterior, at least.")
+    profiles: bool = option(False, "--profiles", help="Profile the likelihood of each parameter.")
+    processes: int | None = option(
+        None, metavar="N", help="Local processes; one for each processor if left out."
+    )
+    scheduler: str | None = option(
+        None, metavar="ADDRESS", help="Dask scheduler for several data files, as tls://HOST:8786."
+    )
+
+    def check(self) -> None:
+        """Refuse what does not go together."""
+        several = len(self.data) > 1
+        check_number("--samples", self.samples, 1, 1_000_000)
+        check_number("--processes", self.processes, 1, 256)
+        if self.processes is not None and self.scheduler is not None:
+            raise InputError("--processes and --scheduler: expected one of them, not both")
+        if several and (self.posterior or self.profiles):
+            raise InputError("--posterior and --profiles: expected a single data file")
+        if several and self.drive:
+            raise InputError(f"{next(iter(self.drive))}: expected a single data file")
+        if not several and self.scheduler is not None:
+            raise InputError("--scheduler: expected several data files")
+
+    def outputs(self) -> Outputs:
+        """Return where files are written to, none of which is read."""
+        return Outputs(*self.data, self.probe, *self.column_files, self.waveform)
+
+    def options(self, probe: Probe) -> FitOptions:
+        """Return what the fit of a probe is asked."""
+        from hotlever.estimation import FitOptions
+
+        usual = USUAL in (self.prior or [])
+        given, stated = parse_priors(self.prior, probe), probe.stated_priors
+        choices: dict[str, Any] = {
+            name: getattr(self, name) for name in ("robust", "drift", "weights", "medium")
+        }
+        return FitOptions(
+            observables=None if self.observables is None else self.observables.split(","),
+            fixed={
+                name: parse_number(text, f"--fix {name}") if text else None
+                for name, text in parse_pairs("--fix", self.fix, bare=True).items()
+            },
+            priors=stated if given is None else {**stated, **given} if given or usual else {},
+            usual_priors=usual,
+            free=() if self.free is None else tuple(map(str.strip, self.free.split(","))),
+            **choices,
+        )
+
+
+@dataclass(kw_only=True)
+class CalibrateRequest(MeasuredRequest):
+    """The tip temperature of one lever from its I-V curve."""
+
+    data: Path = argument(MISSING, metavar="IV.csv", help="Measurement file with V_b and I_h.")
+    fit: File = option(None, help="A fit of this lever (hotlever fit -o).")
+    probe: File = option(None, help="Probe like this lever; the reference probe if left out.")
+    power_law: File = option(None, help="Power law in vacuum (JSON), or a calibration file.")
+    pulse: str | None = option(
+        None, metavar="TIME[,PERIOD]", help="Calibrate a pulse too, such as 5us or 5us,100us."
+    )
+    posterior: bool = option(
+        False, "--posterior", help="Take the limits from samples of the posterior."
+    )
+    samples: int = option(4_000, metavar="N", min=1, help="Of the posterior, at least.")
+    output: File = option(None, "-o", "--output", help="Calibration file (JSON).")
+    table: File = option(
+        None, help="Write the table for an instrument, or for its pulses, to this CSV file."
+    )
+    plot: File = plot_option()
+
+    def check(self) -> None:
+        """Refuse what does not go together, and a medium that does not exist."""
+        from hotlever.estimation.options import UNKNOWN_MEDIUM
+
+        sources = {"--fit": self.fit, "--probe": self.probe, "--power-law": self.power_law}
+        several = [name for name, path in sources.items() if path is not None]
+        if len(several) > 1:
+            names = " and ".join(several)
+            raise InputError(f"{names}: expected at most one of {', '.join(sources)}")
+        check_medium(self.medium, UNKNOWN_MEDIUM)
+
+    def outputs(self) -> Outputs:
+        """Check the files that are written, none of which is read."""
+        outputs = Outputs(self.data, self.fit, self.probe, self.power_law, *self.column_files)
+        outputs.file(self.output)
+        outputs.file(self.table, ".csv")
+        outputs.file(self.plot, *FIGURE_TYPES)
+        return outputs
+
+
+def calibration_option() -> Any:
+    """Return the field of a calibration of Raman spectra."""
+    return option(
+        None,
+        metavar="CAL.json",
+        help="A calibration that --save-calibration wrote, or 'published' for the published "
+        "laws (then --reference is needed).",
+    )
+
+
+def spectra_argument() -> Any:
+    """Return the field of the spectra that are measured."""
+    return argument(MISSING, metavar="FILE_OR_DIR...", help="Spectra, or folders of spectra.")
+
+
+@dataclass(kw_only=True)
+class ThermometerRequest:
+    """How the silicon line is found, and what its shift is read with; see `set_up`."""
+
+    calibration: str | None = calibration_option()
+    calibrate_from: list[Path] | None = option(
+        None, metavar="FILE_OR_DIR...", help="Hot-plate spectra to calibrate from; one or more."
+    )
+    temperatures: File = option(
+        None,
+        metavar="TABLE.csv",
+        help="Hot-plate temperatures: file name, temperature. Left out: header or file name.",
+    )
+    corrections: File = option(
+        None,
+        metavar="TABLE.csv",
+        help="By hand: file, start_cm-1 of the line, from_cm-1 and to_cm-1 of what is fitted, use.",
+    )
+    reference: list[Path] | None = option(
+        None,
+        metavar="FILE_OR_DIR",
+        help="Spectrum at room temperature on the instrument as it is now; may be repeated.",
+    )
+    law: str = option("anharmonic", metavar="linear|anharmonic", help="Calibration law.")
+    shape: str | None = option(
+        None,
+        metavar="lorentzian|voigt|fano",
+        help="Line shape; left out: that of the calibration, else lorentzian.",
+    )
+    resolution: float | None = option(
+        None,
+        metavar="CM-1",
+        help="FWHM of the spectrometer's response, for voigt; left out: fitted.",
+    )
+    laser_power: float | None = option(
+        None, metavar="MW", help="Laser power on the lever, for its heating."
+    )
+    thermal_resistance: float | None = option(
+        None, metavar="K/MW", help="Thermal resistance of the lever, K per mW of heat."
+    )
+    stress: float = option(
+        0.0, metavar="MPA", help="Unknown stress in the silicon; enters the error."
+    )
+
+    @property
+    def files(self) -> list[Path | str | None]:
+        """The files that it reads."""
+        several = [*(self.calibrate_from or []), *(self.reference or [])]
+        return [*several, self.temperatures, self.calibration, self.corrections]
+
+    def set_up(self, listener: Listener) -> Thermometry:
+        """Set the thermometer up; what is noticed is told."""
+        from hotlever.tasks.thermometry import set_up
+
+        asked = {field.name: getattr(self, field.name) for field in fields(ThermometerRequest)}
+        return set_up(listener, **asked)
+
+
+@dataclass(kw_only=True)
+class RamanRequest(ThermometerRequest):
+    """The silicon line in spectra, and the temperature."""
+
+    spectra: list[Path] = spectra_argument()
+    save_calibration: File = option(
+        None, metavar="CAL.json", help="Write the calibration to this file."
+    )
+    output: File = option(None, "--output", "-o", metavar="FILE.csv", help="Left out: print.")
+    plot: File = option(
+        None, metavar="FILE.png|.svg|.pdf", help="Figure of spectra and calibration."
+    )
+
+    def outputs(self) -> Outputs:
+        """Check the files that are written, none of which is read."""
+        outputs = Outputs(*self.spectra, *self.files)
+        outputs.file(self.plot, *FIGURE_TYPES)
+        outputs.file(self.save_calibration)
+        outputs.file(self.output)
+        return outputs

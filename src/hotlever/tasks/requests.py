@@ -1,0 +1,214 @@
+"""What is asked of tasks: dataclasses whose fields are options of commands; here on levers.
+
+The command line fills one from what is typed, the app from what is chosen on a page. With each
+field stands what the command line says of it. Requests that share options inherit them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, get_args
+
+from hotlever.errors import InputError, shown, unknown_name
+from hotlever.files import FIGURE_TYPES, Outputs
+from hotlever.tasks.probes import read_probe
+from hotlever.units import setting
+
+if TYPE_CHECKING:
+    from hotlever.lever.transient import Waveform
+    from hotlever.probe import Probe
+    from hotlever.tasks.reporter import Reporter
+
+#: Times that may be asked for.
+MOST_TIMES = 10_000
+
+File = Path | None
+
+
+def option(default: Any, *names: str, **texts: Any) -> Any:
+    """Return a field of a request that is an option, by its own name unless others are given."""
+    return field(default=default, metadata={"names": names, "texts": texts})
+
+
+def argument(default: Any, **texts: Any) -> Any:
+    """Return a field of a request that stands on the command line without a name."""
+    return field(default=default, metadata={"texts": texts})
+
+
+def plot_option() -> Any:
+    """Return the field of a figure that is drawn."""
+    return option(None, help="Draw to this file: .png, .svg or .pdf.")
+
+
+@dataclass(kw_only=True)
+class LeverRequest:
+    """A lever to solve: its probe, with some values changed, and the medium around it."""
+
+    probe: File = argument(
+        None, metavar="[PROBE.toml]", help="Probe file; the reference probe if left out."
+    )
+    medium: str | None = option(None, help="vacuum or air; what the files say if left out.")
+    set: list[str] | None = option(
+        None, "--set", metavar="NAME=VALUE", help="Change a value of the probe file."
+    )
+
+    def read_probe(self, reporter: Reporter) -> Probe:
+        """Read the probe; what should be known of its shape is told."""
+        check_medium(self.medium)
+        probe = read_probe(reporter, self.probe, self.set)
+        return probe if self.medium is None else probe.in_medium(self.medium)
+
+
+@dataclass(kw_only=True)
+class TableRequest:
+    """The files of a computed table, and of its figure."""
+
+    output: File = option(
+        None, "-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."
+    )
+    plot: File = plot_option()
+
+    def outputs(self, *inputs: Path | None) -> Outputs:
+        """Check these files, which are none of the inputs."""
+        outputs = Outputs(*inputs)
+        outputs.file(self.output, ".csv", ".nc")
+        outputs.file(self.plot, *FIGURE_TYPES)
+        return outputs
+
+
+@dataclass(kw_only=True)
+class SweepRequest(TableRequest, LeverRequest):
+    """A lever over a range of bias."""
+
+    bias: str = option("1:11:25", help="START:STOP:COUNT in volts, ends included.")
+    model: str = option(
+        "flat",
+        help="flat: the lever in its plane; full-3d: its true thickness and the air around it "
+        "(minutes; goes on where it was stopped).",
+    )
+    fields: File = option(None, help="Write the fields at each bias as VTU to this folder.")
+
+
+@dataclass(kw_only=True)
+class DriveRequest:
+    """At most one wave form: as a text of some kind, or a table."""
+
+    step: str | None = option(None, metavar="V", help="Switch the bias on, and leave it.")
+    pulse: str | None = option(None, metavar="V,TIME", help="A pulse, such as 10V,5us.")
+    period: str | None = option(None, metavar="TIME", help="Of pulses that are repeated.")
+    count: int | None = option(None, metavar="N", help="Number of pulses.")
+    ramp: str | None = option(None, metavar="V,TIME", help="Raise the bias, such as 8V,50us.")
+    sine: str | None = option(None, metavar="V+V@FREQ", help="Such as 3V+0.5V@20kHz.")
+    waveform: File = option(None, help="A table of times and biases, such as a supply takes.")
+
+    #: Those of which each is a wave form; that of a table comes last.
+    _kinds: ClassVar = ("--step", "--pulse", "--ramp", "--sine", "--waveform")
+
+    @property
+    def drive(self) -> dict[str, Any]:
+        """Those that are given, by name."""
+        values = {field.name: getattr(self, field.name) for field in fields(DriveRequest)}
+        return {f"--{name}": value for name, value in values.items() if value is not None}
+
+    def required_waveform(self) -> Waveform:
+        """Return the wave form as `read_waveform` does, or raise that there is none."""
+        waveform = self.read_waveform()
+        if waveform is None:
+            raise InputError(f"found none: expected one of {', '.join(self._kinds)}")
+        return waveform
+
+    def read_waveform(self) -> Waveform | None:
+        """Return the one wave form that is asked for; None if none is."""
+        from hotlever.lever.transient import read_waveform
+        from hotlever.lever.transient.waveform_texts import waveform_from_text
+
+        names = [name for name in self._kinds if name in self.drive]
+        if len(names) > 1:
+            raise InputError(f"found {', '.join(names)}: expected one of {', '.join(self._kinds)}")
+        for name in ("--period", "--count"):
+            if name in self.drive and self.pulse is None:
+                raise InputError(f"{name}: goes with --pulse")
+        if self.waveform is not None:
+            return read_waveform(self.waveform)
+        for name in names:
+            text, kind = self.drive[name], name.removeprefix("--")
+            return waveform_from_text(kind, text, self.period, self.count, mark="--")
+        return None
+
+
+@dataclass(kw_only=True)
+class PulseRequest(TableRequest, LeverRequest, DriveRequest):
+    """A lever in time."""
+
+    until: str | None = option(None, metavar="TIME", help="When to stop.")
+    at: str | None = option(
+        None, metavar="TIME,...", help="Times to report; where the solver stepped if left out."
+    )
+    fields: File = option(None, help="Write the fields as a series of VTU to this folder.")
+    report: File = option(
+        None, help="Folder for a page of the lever in time; goes without a wave form."
+    )
+
+    def need_no_waveform(self) -> None:
+        """Refuse what does not go with a page, which has wave forms of its own."""
+        others = {"--until": self.until, "--at": self.at, "--output": self.output}
+        others |= {"--plot": self.plot, "--fields": self.fields}
+        for name in (*self.drive, *(name for name, value in others.items() if value)):
+            raise InputError(f"{name}: does not go with --report, which has wave forms of its own")
+
+    @property
+    def end_us(self) -> float | None:
+        """When to stop (µs), if that is asked."""
+        return None if self.until is None else setting(self.until, "us", "--until")
+
+    @property
+    def times_us(self) -> list[float] | None:
+        """Times to report (µs), if these are asked."""
+        if self.at is None:
+            return None
+        times = [setting(time, "us", "--at") for time in self.at.split(",")]
+        if len(times) > MOST_TIMES:
+            raise InputError(f"--at: found {len(times)} times, expected at most {MOST_TIMES}")
+        return times
+
+
+@dataclass(kw_only=True)
+class ImportRequest:
+    """A probe file for a drawing."""
+
+    drawing: Path = argument(MISSING, metavar="DRAWING", help="GDSII, OASIS or DXF file.")
+    output: File = option(
+        None, "-o", "--output", help="Probe file to write; standard output if left out."
+    )
+    cell: str | None = option(None, help="Of GDSII or OASIS; the top cell if left out.")
+    unit: str | None = option(
+        None, help="Of the drawing's numbers, as mm; what the file says if left out."
+    )
+    plot: File = plot_option()
+
+    @property
+    def known_unit(self) -> str | None:
+        """The unit, by a name that drawings are read with."""
+        from hotlever.probe.drawing.sheet import UNITS
+
+        name = None if self.unit is None else self.unit.replace("µ", "u").replace("μ", "u")
+        if name is not None and name not in UNITS:
+            raise unknown_name("unit", name, UNITS, "--unit")
+        return name
+
+    def outputs(self) -> Outputs:
+        """Check the files that are written, none of which is read."""
+        outputs = Outputs(self.drawing)
+        outputs.file(self.output, ".toml")
+        outputs.file(self.plot, *FIGURE_TYPES)
+        return outputs
+
+
+def check_medium(medium: str | None, *more: str) -> None:
+    """Refuse a medium that does not exist."""
+    from hotlever.probe.surroundings import Medium
+
+    media = *get_args(Medium), *more
+    if medium is not None and medium not in media:
+        raise InputError(f"--medium {shown(medium)}: expected {' or '.join(media)}")
