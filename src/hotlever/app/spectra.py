@@ -17,6 +17,7 @@ from hotlever.raman.peak import WINDOW, in_window
 from hotlever.raman.reading import read_file, spectrum_files
 from hotlever.raman.series import Line
 from hotlever.raman.spectrum import Spectrum
+from hotlever.tasks.measured_requests import ThermometerRequest
 from hotlever.tasks.reporter import Silence
 from hotlever.tasks.thermometry import Thermometry, set_up
 from hotlever.types import Array
@@ -106,10 +107,10 @@ def _setup(folder: Path, asked: dict[str, Any]) -> tuple[Thermometry, str]:
     elif asked["calibrate_from"]:
         calibrated = {"calibrate_from": [folder / asked["calibrate_from"]]}
     try:
-        return set_up(Silence(), **calibrated, **options), ""
+        return set_up(Silence(), ThermometerRequest(**calibrated, **options)), ""
     except HotleverError as error:
         doubt = f"no temperature: {str(error).replace(f'{folder}/', '')}"
-    return set_up(Silence(), **options), doubt
+    return set_up(Silence(), ThermometerRequest(**options)), doubt
 
 
 def _spectrum(folder: Path, name: str) -> Spectrum:

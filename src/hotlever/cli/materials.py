@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from hotlever.cli.commands import app
-from hotlever.cli.options import PlotFile
+from hotlever.cli.options import command
 from hotlever.cli.output import give
 from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.tasks.files import draw
+from hotlever.tasks.requests import PlotRequest
 
 
-@app.command("materials")
-def materials_command(plot: PlotFile = None) -> None:
+@command("materials", PlotRequest)
+def materials_command(request: PlotRequest) -> None:
     """List the kinds of material with their parameters, units, bounds, laws and sources."""
     from hotlever.materials.catalogue import curves, listing
 
     outputs = Outputs()
-    outputs.file(plot, *FIGURE_TYPES)
+    outputs.file(request.plot, *FIGURE_TYPES)
     with outputs.together():
-        draw(plot, lambda figures: figures.material_curves(curves()))
+        draw(request.plot, lambda figures: figures.material_curves(curves()))
     give("\n".join([*listing(), ""]))

@@ -5,19 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import MISSING, fields
 from inspect import Parameter, Signature
-from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_type_hints
 
 import typer
 from typer import Argument, Option
 
 from hotlever.cli.commands import app
-
-File = Path | None
-ProbeFile = Annotated[
-    File, Argument(metavar="[PROBE.toml]", help="Probe file; the reference probe if left out.")
-]
-PlotFile = Annotated[File, Option("--plot", help="Draw to this file: .png, .svg or .pdf.")]
 
 Request = TypeVar("Request")
 

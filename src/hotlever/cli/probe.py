@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import typer
 from typer import Option
 
 from hotlever.cli import output as terminal
 from hotlever.cli.commands import Commands, app
-from hotlever.cli.options import File, PlotFile, ProbeFile, command
+from hotlever.cli.options import command
 from hotlever.errors import unknown_name
 from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import read_probe
-from hotlever.tasks.requests import ImportRequest
+from hotlever.tasks.requests import File, ImportRequest, PlotRequest, ProbeRequest, option
 
 probe_app = typer.Typer(
     cls=Commands, help="Write, describe, draw and import probes.", rich_markup_mode=None
@@ -40,17 +42,21 @@ def new(
         probe.to_file(output)
 
 
-@probe_app.command()
-def show(
-    probe_file: ProbeFile = None,
-    plot: PlotFile = None,
-    mesh: bool = Option(False, "--mesh", help="Draw the triangles of the mesh too."),
-) -> None:
+@dataclass(kw_only=True)
+class ShowRequest(PlotRequest, ProbeRequest):
+    """A probe to draw and describe."""
+
+    mesh: bool = option(False, "--mesh", help="Draw the triangles of the mesh too.")
+
+
+@command("show", ShowRequest, probe_app)
+def show(request: ShowRequest) -> None:
     """Draw and describe a probe."""
     from hotlever.lever.meshing import chosen_space
     from hotlever.probe.drawing.outlines import DrawingError
     from hotlever.probe.summary import probe_text
 
+    probe_file, plot = request.probe, request.plot
     outputs = Outputs(probe_file)
     outputs.file(plot, *FIGURE_TYPES)
     try:
@@ -67,11 +73,9 @@ def show(
         raise
     name = "reference probe" if probe_file is None else probe_file.name
     layout, triangles = probe.layout(), chosen_space(probe).mesh
+    drawn = triangles if request.mesh else None
     with outputs.together():
-        draw(
-            plot,
-            lambda figures: figures.probe_drawing(layout, name, mesh=triangles if mesh else None),
-        )
+        draw(plot, lambda figures: figures.probe_drawing(layout, name, mesh=drawn))
     terminal.give(probe_text(probe, triangles, name))
 
 

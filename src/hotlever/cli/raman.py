@@ -103,12 +103,13 @@ def join_command(request: JoinRequest) -> None:
     (tip_5.25V.txt); else spectra and rows are paired in order.
     """
     from hotlever.raman.bias_log import join, read_bias_log
+    from hotlever.tasks.thermometry import set_up
 
     bias_log, spectra, output = request.bias_log, request.spectra, request.output
     outputs = Outputs(bias_log, *spectra, *request.files)
     outputs.file(output)
     log = read_bias_log(bias_log)
-    setup = request.set_up(terminal)
+    setup = set_up(terminal, request)
     if setup.thermometer is None:
         raise InputError("join needs temperatures: give --calibration or --calibrate-from")
     _, table = setup.measure(spectra)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,18 +11,16 @@ from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.tasks.requests import (
     DriveRequest,
     File,
+    PlotRequest,
     argument,
     check_medium,
     option,
-    plot_option,
 )
 from hotlever.tasks.texts import USUAL, check_number, parse_number, parse_pairs, parse_priors
 
 if TYPE_CHECKING:
     from hotlever.estimation import FitOptions
     from hotlever.probe import Probe
-    from hotlever.tasks.reporter import Listener
-    from hotlever.tasks.thermometry import Thermometry
 
 
 @dataclass(kw_only=True)
@@ -142,7 +140,7 @@ class FitRequest(DriveRequest, MeasuredRequest):
 
 
 @dataclass(kw_only=True)
-class CalibrateRequest(MeasuredRequest):
+class CalibrateRequest(PlotRequest, MeasuredRequest):
     """The tip temperature of one lever from its I-V curve."""
 
     data: Path = argument(MISSING, metavar="IV.csv", help="Measurement file with V_b and I_h.")
@@ -160,7 +158,6 @@ class CalibrateRequest(MeasuredRequest):
     table: File = option(
         None, help="Write the table for an instrument, or for its pulses, to this CSV file."
     )
-    plot: File = plot_option()
 
     def check(self) -> None:
         """Refuse what does not go together, and a medium that does not exist."""
@@ -246,13 +243,6 @@ class ThermometerRequest:
         """The files that it reads."""
         several = [*(self.calibrate_from or []), *(self.reference or [])]
         return [*several, self.temperatures, self.calibration, self.corrections]
-
-    def set_up(self, listener: Listener) -> Thermometry:
-        """Set the thermometer up; what is noticed is told."""
-        from hotlever.tasks.thermometry import set_up
-
-        asked = {field.name: getattr(self, field.name) for field in fields(ThermometerRequest)}
-        return set_up(listener, **asked)
 
 
 @dataclass(kw_only=True)

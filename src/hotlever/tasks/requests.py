@@ -36,18 +36,26 @@ def argument(default: Any, **texts: Any) -> Any:
     return field(default=default, metadata={"texts": texts})
 
 
-def plot_option() -> Any:
-    """Return the field of a figure that is drawn."""
-    return option(None, help="Draw to this file: .png, .svg or .pdf.")
+@dataclass(kw_only=True)
+class PlotRequest:
+    """A figure that is drawn."""
+
+    plot: File = option(None, help="Draw to this file: .png, .svg or .pdf.")
 
 
 @dataclass(kw_only=True)
-class LeverRequest:
-    """A lever to solve: its probe, with some values changed, and the medium around it."""
+class ProbeRequest:
+    """A probe as it stands in its file."""
 
     probe: File = argument(
         None, metavar="[PROBE.toml]", help="Probe file; the reference probe if left out."
     )
+
+
+@dataclass(kw_only=True)
+class LeverRequest(ProbeRequest):
+    """A lever to solve: its probe, with some values changed, and the medium around it."""
+
     medium: str | None = option(None, help="vacuum or air; what the files say if left out.")
     set: list[str] | None = option(
         None, "--set", metavar="NAME=VALUE", help="Change a value of the probe file."
@@ -61,13 +69,12 @@ class LeverRequest:
 
 
 @dataclass(kw_only=True)
-class TableRequest:
+class TableRequest(PlotRequest):
     """The files of a computed table, and of its figure."""
 
     output: File = option(
         None, "-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."
     )
-    plot: File = plot_option()
 
     def outputs(self, *inputs: Path | None) -> Outputs:
         """Check these files, which are none of the inputs."""
@@ -174,7 +181,7 @@ class PulseRequest(TableRequest, LeverRequest, DriveRequest):
 
 
 @dataclass(kw_only=True)
-class ImportRequest:
+class ImportRequest(PlotRequest):
     """A probe file for a drawing."""
 
     drawing: Path = argument(MISSING, metavar="DRAWING", help="GDSII, OASIS or DXF file.")
@@ -185,7 +192,6 @@ class ImportRequest:
     unit: str | None = option(
         None, help="Of the drawing's numbers, as mm; what the file says if left out."
     )
-    plot: File = plot_option()
 
     @property
     def known_unit(self) -> str | None:

@@ -8,6 +8,7 @@ from hotlever.raman.series import to_csv
 from hotlever.tasks.files import draw
 from hotlever.tasks.measured_requests import RamanRequest
 from hotlever.tasks.reporter import Listener
+from hotlever.tasks.thermometry import set_up
 
 
 def measure_spectra(listener: Listener, request: RamanRequest) -> str:
@@ -19,7 +20,7 @@ def measure_spectra(listener: Listener, request: RamanRequest) -> str:
         If there is no spectrum with a line, or no calibration to be saved.
     """
     outputs = request.outputs()
-    setup = request.set_up(listener)
+    setup = set_up(listener, request)
     if request.save_calibration is not None and setup.calibration is None:
         raise InputError("--save-calibration: there is no calibration; give --calibrate-from")
     lines, table = setup.measure(request.spectra)

@@ -21,6 +21,7 @@ from hotlever.raman.reading import read_spectra
 from hotlever.raman.series import Line, measure, read_lines
 from hotlever.raman.spectrum import Spectrum, file_and_label
 from hotlever.raman.thermometer import Law, Thermometer, laser_heating
+from hotlever.tasks.measured_requests import ThermometerRequest
 from hotlever.tasks.reporter import Listener
 
 if TYPE_CHECKING:
@@ -116,48 +117,18 @@ def calibration_named(name: str | None) -> RamanCalibration | None:
     return published_raman_calibration() if name == PUBLISHED else read_raman_calibration(name)
 
 
-def set_up(
-    listener: Listener,
-    *,
-    calibration: str | None = None,
-    calibrate_from: Sequence[Path] | None = None,
-    temperatures: Path | None = None,
-    corrections: Path | None = None,
-    reference: Sequence[Path] | None = None,
-    law: str = "anharmonic",
-    shape: str | None = None,
-    resolution: float | None = None,
-    laser_power: float | None = None,
-    thermal_resistance: float | None = None,
-    stress: float = 0.0,
-) -> Thermometry:
+def set_up(listener: Listener, request: ThermometerRequest) -> Thermometry:
     """Set up a thermometer, or only the fit of the line if no calibration is named.
-
-    Parameters
-    ----------
-    listener : Listener
-    calibration : str, optional
-        A calibration file, or ``published``, which needs a `reference`.
-    calibrate_from, reference : sequence of path, optional
-        Spectra of a hot plate, and of the instrument as it is now at room temperature.
-    temperatures, corrections : path, optional
-        Tables: of the hot plate (see `series.read_temperatures`), and by hand
-        (`read_corrections`).
-    law : {'linear', 'anharmonic'}
-    shape : {'lorentzian', 'voigt', 'fano'}, optional
-        That of the calibration, else a Lorentzian, if left out.
-    resolution : float, optional
-        Full width of the spectrometer's response, cm⁻¹.
-    laser_power, thermal_resistance : float, optional
-        mW and K/mW.
-    stress : float
-        Not known, MPa.
 
     Raises
     ------
     InputError
         If a file is at fault, or these do not go together.
     """
+    law, shape, stress = request.law, request.shape, request.stress
+    calibration, calibrate_from = request.calibration, request.calibrate_from
+    temperatures, reference = request.temperatures, request.reference
+    laser_power, thermal_resistance = request.laser_power, request.thermal_resistance
     if law not in get_args(Law):
         raise unknown_name("law", law, get_args(Law))
     if shape not in (None, *get_args(LineShape)):
@@ -173,8 +144,9 @@ def set_up(
         heating = laser_heating(laser_power, thermal_resistance)
         listener.note(f"laser heating is estimated as {heating:.2g} K and enters the error")
     chosen = calibration_named(calibration)
-    options = _options(chosen, shape, resolution, listener)
-    by_hand = read_corrections(corrections) if corrections else {}
+    options = _options(chosen, shape, request.resolution, listener)
+    by_hand = read_corrections(request.corrections) if request.corrections else {}
+    corrected_by = str(request.corrections)
     hot_plate: list[Line] = []
     spectra: list[Spectrum] = []
     if calibrate_from:
@@ -191,7 +163,7 @@ def set_up(
         for name, value in unused.items():
             if value:
                 raise InputError(f"{name} needs --calibration or --calibrate-from")
-        return Thermometry(listener, options, corrections=by_hand, corrected_by=str(corrections))
+        return Thermometry(listener, options, corrections=by_hand, corrected_by=corrected_by)
     if chosen.reference_cm is None and not reference:
         raise InputError(
             "--calibration published: give --reference, a spectrum of your instrument at room "
@@ -207,7 +179,7 @@ def set_up(
         thermometer = thermometer.with_reference(peaks)
         spectra += [line.spectrum for line in lines]
     return Thermometry(
-        listener, options, chosen, thermometer, hot_plate, spectra, by_hand, str(corrections)
+        listener, options, chosen, thermometer, hot_plate, spectra, by_hand, corrected_by
     )
 
 
