@@ -171,7 +171,7 @@ def taylor_order(one: One, start: Linearised, name: str) -> float:
         other = one.solver.linearised(moved, reach, start).branch
         np.testing.assert_allclose(other.u[1 : u.size + 1], u)
         change = (other.values[: u.size + 1] - start.branch.values)[1:, :3].T
-        remainders.append(np.abs(change - step * value * slope[..., 0].T))
+        remainders.append(np.abs(change - step * value * slope[:, :3, 0].T))
     size = np.abs(start.branch.values[1:, :3].T)
     with np.errstate(divide="ignore", invalid="ignore"):
         orders = np.log2(remainders[0] / remainders[1])

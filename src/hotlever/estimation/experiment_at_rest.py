@@ -16,7 +16,7 @@ from scipy.interpolate import BSpline
 from hotlever.estimation.experiment import TIP, Prediction, named
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.surrogate import CurveSurrogate
-from hotlever.lever.branch import Branch, Reach, shifted
+from hotlever.lever.branch import TIP_RISE, Branch, Reach, shifted
 from hotlever.lever.continuation import at_places_of, continued
 from hotlever.lever.curve import spline_through
 from hotlever.lever.equations import LeverEquations
@@ -63,8 +63,8 @@ class PredictionAtRest(Prediction):
 class Correction:
     """What a fast lever lacks, exact to first order at one place among the parameters.
 
-    `values` are those of V_l (V), I_h (mA) and V_r (V), perhaps of the rise of the tip (K) too, by
-    u; `slopes` of their derivatives by the parameters.
+    `values` are those of V_l (V), I_h (mA), V_r (V) and the rise of the tip (K) by u; `slopes` of
+    their derivatives by the parameters.
     """
 
     at: Array
@@ -164,17 +164,17 @@ class ExperimentAtRest:
         fast, probe = at.linearised.branch, at.probe
         equations = self.full.equations(probe, self.names)
         u, x = self._full_states(fast, equations, probe)
-        by_fast = at.linearised.shown_at(u)
-        count = by_fast.shape[1]
-        shown = np.vstack([equations.observed(x), equations.space.tip_rise(x)])[:count]
-        values = shown.T - fast.curve(u)[:, :count]
+        by_fast, places = at.linearised.shown_at(u), fast.parametrisation
+        values = np.zeros(by_fast.shape[:2])
+        values[:, :TIP_RISE] = equations.observed(x).T - fast.curve(u)[:, :TIP_RISE]
+        values[:, TIP_RISE] = places.rise(u, equations.space.tip_rise(x)) - fast.rise(u)
         slopes = np.zeros(by_fast.shape)
         if self.first_order:
-            constraint = fast.parametrisation.constraint(u)
+            constraint = places.constraint(u)
             slopes = by_parameter(equations, x, self.names, constraint=constraint) - by_fast
-        if equations.circuit.starts_cold:
+        if fast.solved.start:
             # without power nothing is lacking
-            u = np.append(0.0, u)
+            u = np.append(fast.u[0], u)
             values, slopes = (np.insert(each, 0, 0.0, axis=0) for each in (values, slopes))
         lacking = spline_through(u, values), spline_through(u, slopes)
         return replace(self, correction=Correction(probe.values(self.names), *lacking))

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from hotlever.lever.branch import Branch
+from hotlever.lever.branch import TIP_RISE, Branch
 from hotlever.lever.curve import Piecewise, crossing, spline_through
 from hotlever.lever.sensitivities import at_fixed_bias
 from hotlever.probe.circuit import Circuit
@@ -72,7 +72,7 @@ class Rows:
         Parameters
         ----------
         branch : Branch
-        by_parameter : ndarray, shape (k, 3 or 4, p)
+        by_parameter : ndarray, shape (k, 4, p)
             How its states change, see `hotlever.lever.sensitivities.by_parameter`.
         circuit : Circuit
         names : sequence of str
@@ -95,7 +95,7 @@ class Rows:
             for row, value in enumerate(values[:2, ends]):
                 slopes[row, ends] = short[ends, None] * by_state[ends, row + 1]
                 slopes[row, ends] -= (value * more)[:, None] * bias_by
-            slopes[2, ends] = of_base + (by_state[ends, 3] if by_state.shape[1] > 3 else 0.0)
+            slopes[2, ends] = of_base + by_state[ends, TIP_RISE]
             values[:2, ends] *= short[ends]
         return values, slopes
 

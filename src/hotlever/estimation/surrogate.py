@@ -12,7 +12,7 @@ import numpy as np
 
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.prior_density import Coordinates
-from hotlever.lever.branch import Branch, shifted
+from hotlever.lever.branch import TIP_RISE, Branch, shifted
 from hotlever.lever.curve import spline_through
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.sensitivities import Linearised
@@ -76,7 +76,7 @@ class CurveSurrogate:
         The parameters.
     branch : Branch
         Of this probe.
-    by_parameter : ndarray, shape (k, 3 or 4, p)
+    by_parameter : ndarray, shape (k, 4, p)
         Its derivatives, see `hotlever.lever.sensitivities.by_parameter`.
     rows : Rows
         What is shown of it.
@@ -93,7 +93,7 @@ class CurveSurrogate:
         self._rates = by_parameter * self._unit
         self._straight = not branch.equations.circuit.starts_cold
         if not self._straight:
-            powers = self._rates[1:] / branch.values[1:, :3, None]
+            powers = self._rates[1:] / branch.values[1:, :, None]
             # without power everything is zero; its ratios are those of a barely warm lever
             self._rates = np.concatenate([powers[:1], powers])
         self._slopes = spline_through(branch.u, self._rates)(branch.u, 1)
@@ -106,9 +106,9 @@ class CurveSurrogate:
         return multiplied(self.branch, np.exp(self._rates @ away), self._slopes @ away)
 
     def powers(self, u: Array) -> Array:
-        """Return with which powers of the parameters V_l, I_h and V_r go at some u, (n, 3, p).
+        """Return with which powers of the parameters V_l, I_h and V_r go at some u, (n, 4, p).
 
-        Of a lever that only the swept supply heats.
+        Of a lever that only the swept supply heats; the rise of its tip does not change.
         """
         return np.asarray(spline_through(self.branch.u, self._rates)(u) * self._origin / self._unit)
 
@@ -117,7 +117,7 @@ class CurveSurrogate:
         branch = self.branch_at(parameters)
         by_parameter = self._rates
         if not self._straight:
-            by_parameter = branch.values[:, :3, None] * self._rates
+            by_parameter = branch.values[:, :, None] * self._rates
         circuit = self.circuit(parameters)
         return self.rows.differentiated(branch, by_parameter / self._unit, circuit, self.names)
 
@@ -171,19 +171,19 @@ class ReducedSurrogate(CurveSurrogate):
             If such a lever has no such states.
         """
         named = zip(self.names, parameters.tolist(), strict=True)
-        ratio = self._on_few_points(self.probe.replace(dict(named))) / self._shown
+        few = self._on_few_points(self.probe.replace(dict(named))) / self._shown
+        ratio = np.ones(self.branch.values.shape)
+        ratio[1:, :TIP_RISE] = few
         # without power the ratio is that of a barely warm lever
-        ratio = np.concatenate([ratio[:1], ratio])
+        ratio[0] = ratio[1]
         growth = spline_through(self.branch.u, ratio)(self.branch.u, 1) / ratio
         return multiplied(self.branch, ratio, growth)
 
 
 def multiplied(branch: Branch, factor: Array, growth: Array) -> Branch:
-    """Return a branch with V_l, I_h and V_r times factors (k, 3).
+    """Return a branch with V_l, I_h, V_r and the rise of the tip times factors (k, 4).
 
     `growth` is the derivative of the factors' logarithms by u.
     """
-    values, slopes = branch.values.copy(), branch.value_slopes.copy()
-    slopes[:, :3] = factor * (slopes[:, :3] + values[:, :3] * growth)
-    values[:, :3] *= factor
-    return replace(branch, values=values, value_slopes=slopes)
+    slopes = factor * (branch.value_slopes + branch.values * growth)
+    return replace(branch, values=branch.values * factor, value_slopes=slopes)

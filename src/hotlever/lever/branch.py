@@ -93,9 +93,9 @@ class Branch(SolvedStates):
         roots: NewtonResult,
         places: Parametrisation = NATURAL,
     ) -> Branch:
-        """Return the same, beginning without power if the lever starts cold."""
+        """Return the same, beginning without power if their places do."""
         branch = cls.of_roots(equations, u, roots, places)
-        if not equations.circuit.starts_cold:
+        if places is not NATURAL:
             return replace(branch, places=places)
         return cls.cold(equations, equations.cold()[0]).followed_by(branch)
 
@@ -132,9 +132,11 @@ class Branch(SolvedStates):
     def tip_K(self, u: ArrayLike) -> Array:
         """Return tip temperatures (K) at some places of the branch."""
         u = np.asarray(u, dtype=float)
-        if self.equations.circuit.starts_cold:
-            return np.asarray(self.base_temperature_K + u**2)
-        return np.asarray(self.base_temperature_K + self.curve(u)[..., TIP_RISE])
+        return self.base_temperature_K + self.rise(u)
+
+    def rise(self, u: Array) -> Array:
+        """Return rises of the tip (K) at some places of the branch."""
+        return self.parametrisation.rise(u, self.curve(u)[..., TIP_RISE])
 
     def u_at(self, tip_K: ArrayLike) -> Array:
         """Return u at tip temperatures (K) of a lever that starts cold; NaN outside the branch."""
@@ -309,12 +311,10 @@ class Reach:
 
 
 def shifted(branch: Branch, changes: Array, slopes: Array) -> Branch:
-    """Return a branch with V_l, I_h and V_r changed by (k, 3); by (k, 4) the rise of the tip too.
+    """Return a branch with V_l, I_h, V_r and the rise of the tip changed by (k, 4).
 
     The slopes are derivatives of the changes by u.
     """
-    columns = slice(changes.shape[1])
-    moved = branch.values.copy(), branch.value_slopes.copy()
-    for curve, change in zip(moved, (changes, slopes), strict=True):
-        curve[:, columns] += change
-    return replace(branch, values=moved[0], value_slopes=moved[1])
+    return replace(
+        branch, values=branch.values + changes, value_slopes=branch.value_slopes + slopes
+    )

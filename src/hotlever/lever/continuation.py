@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from hotlever.errors import ComputationError, NewtonError
-from hotlever.lever.branch import Branch, Reach
+from hotlever.lever.branch import TIP_RISE, Branch, Reach
 from hotlever.lever.curve import hermite_weights
 from hotlever.lever.equations import LeverEquations, steps_of
 from hotlever.lever.newton import NewtonOptions
@@ -113,7 +113,7 @@ class Continuation(ABC):
         return self._branch
 
     def _lost(self, what: str) -> ComputationError:
-        tip = float(self._branch.tip_K(self._branch.u[-1]))
+        tip = self._branch.base_temperature_K + float(self._branch.values[-1, TIP_RISE])
         return ComputationError(f"{what} a tip at {tip:.0f} K", partial=self._branch)
 
     def _next(self, step: float) -> Branch | None:

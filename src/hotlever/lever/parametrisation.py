@@ -45,6 +45,10 @@ class Parametrisation(Protocol):
         """Return how fast the values pass states (size + 1, n), by u, (n,)."""
         ...
 
+    def rise(self, u: Array, of_states: Array) -> Array:
+        """Return the rise of the tip (K) there, by that of the states that were found."""
+        ...
+
 
 class Natural:
     """The places of a lever that starts cold: u = √(T_tip − T_base)."""
@@ -60,6 +64,10 @@ class Natural:
     def rate(self, u: Array, space: Space, x: Array) -> Array:
         """See `Parametrisation`."""
         return np.asarray(2.0 * u)
+
+    def rise(self, u: Array, of_states: Array) -> Array:
+        """See `Parametrisation`; it is what selects the states."""
+        return np.asarray(u**2)
 
 
 #: It has no state of its own.
@@ -98,6 +106,10 @@ class PseudoArclength:
         # the lines turn, so that they pass faster on the outside of a bend than on the inside
         aside = in_plane(space, x) - self._curve(u)
         return np.asarray((along**2 - bend * aside).sum(axis=1))
+
+    def rise(self, u: Array, of_states: Array) -> Array:
+        """See `Parametrisation`."""
+        return of_states
 
 
 class Constrained:

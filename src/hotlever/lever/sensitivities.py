@@ -10,7 +10,7 @@ import numpy as np
 from hotlever.lever.branch import TIP_RISE, Branch
 from hotlever.lever.continuation import Enough, continued
 from hotlever.lever.curve import spline_through
-from hotlever.lever.equations import SHOWN, LeverEquations
+from hotlever.lever.equations import LeverEquations
 from hotlever.lever.space import TIP, Constraint, Factors
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
@@ -28,30 +28,31 @@ def by_parameter(
     factors: Factors | None = None,
     constraint: Constraint = TIP,
 ) -> Array:
-    """Return how V_l, I_h and V_r change with parameters at fixed rises of the tip, (n, 3, k).
+    """Return how V_l, I_h, V_r and the rise of the tip change with parameters, (n, 4, k).
 
-    At another fixed constraint the rise of the tip changes too, (n, 4, k). Beside those of the
+    The constraint is fixed; if it is the rise of the tip, that does not change. Beside those of the
     material the parameters may be dimensions whose motions the equations know. The states have
-    power; factors are those of these very states. Adjoint: one solve for each of these quantities
+    power; factors are those of these very states. Adjoint: one solve for each quantity that changes
     and each state, however many parameters there are.
     """
     factors = factors or equations.factorised(x, constraint)
     direct, of_tip = equations.by_parameter(x, names), equations.tip_by_parameter(x, names)
     missing = -direct
     missing[-1] = -np.reshape(constraint.tip, (-1, 1)) * of_tip
-    gradient = equations.observed_gradient(x)
-    if constraint is not TIP:
+    gradient, moves = equations.observed_gradient(x), constraint is not TIP
+    if moves:
         unknowns, weights = equations.space.tip
         tip = np.zeros((*x.shape, 1))
         tip[unknowns, :, 0] = weights[:, None]
         gradient = np.concatenate([gradient, tip], axis=-1)
     adjoint = factors.solve(gradient, np.arange(x.shape[1]), transposed=True)
-    shown = np.einsum("sno,snk->nok", adjoint, missing)
+    shown = np.zeros((x.shape[1], TIP_RISE + 1, len(names)))
+    shown[:, : gradient.shape[-1]] = np.einsum("sno,snk->nok", adjoint, missing)
     shown[:, 1] += direct[-1]
-    shown[:, len(SHOWN) :] += of_tip[:, None]
+    shown[:, TIP_RISE] += moves * of_tip
     if equations.space.reader is None:
         shown[:, 2] = np.nan
-    return np.asarray(shown)
+    return shown
 
 
 def with_changes(
@@ -65,7 +66,8 @@ def with_changes(
     right_hand_side = -direct
     right_hand_side[-1] = -equations.tip_by_parameter(x, names)
     changes = equations.solve_linear(x, factors, right_hand_side)
-    shown = equations.observed_change(x, changes)
+    shown = np.zeros((TIP_RISE + 1, *changes.shape[1:]))
+    shown[:TIP_RISE] = equations.observed_change(x, changes)
     shown[1] += direct[-1]
     return changes, shown.swapaxes(0, 1)
 
@@ -87,9 +89,8 @@ def at_fixed_bias(
     along : ndarray, shape (n, 4)
         Derivatives by u of what `Branch.curve` has.
     circuit : Circuit
-    shown : ndarray, shape (n, 3, p) or (n, 4, p)
-        Derivatives of V_l, I_h and V_r, and of the rise of the tip unless that is fixed, see
-        `by_parameter`.
+    shown : ndarray, shape (n, 4, p)
+        Derivatives of V_l, I_h, V_r and the rise of the tip, see `by_parameter`.
     of_circuit : ndarray, shape (n, p)
         Derivatives of the bias for a given state, see `Circuit.bias_by`.
     of_base : ndarray, shape (p,)
@@ -101,7 +102,7 @@ def at_fixed_bias(
         In the order of `hotlever.datasets.OBSERVABLES`; mA, V and K per unit of the
         parameter.
     """
-    lever_V, current_mA, reader_V, *tip = np.moveaxis(shown, 1, 0)
+    lever_V, current_mA, reader_V, tip = np.moveaxis(shown, 1, 0)
     by_u = along[:, :, None]
     missing = circuit.bias(lever_V, current_mA) + of_circuit
     moved = -missing / circuit.bias(by_u[:, 0], by_u[:, 1])
@@ -109,19 +110,18 @@ def at_fixed_bias(
         [
             current_mA + by_u[:, 1] * moved,
             reader_V + by_u[:, 2] * moved,
-            of_base + sum(tip) + by_u[:, TIP_RISE] * moved,
+            of_base + tip + by_u[:, TIP_RISE] * moved,
         ]
     )
 
 
 def sensitivities_of(branch: Branch, u: Array, circuit: Circuit, names: Sequence[str]) -> Array:
     """Return the derivatives of `at_fixed_bias` by parameters at any u of a branch."""
-    cold = branch.equations.circuit.starts_cold
-    shown = np.zeros((u.size, len(SHOWN) + (not cold), len(names)))
+    shown = np.zeros((u.size, TIP_RISE + 1, len(names)))
     # without power nothing depends on the material
-    hot = np.flatnonzero(u > 0) if cold else np.arange(u.size)
-    for start in range(0, hot.size, _AT_ONCE):
-        some = hot[start : start + _AT_ONCE]
+    powered = np.flatnonzero(branch.has_power(u))
+    for start in range(0, powered.size, _AT_ONCE):
+        some = powered[start : start + _AT_ONCE]
         constraint = branch.parametrisation.constraint(u[some])
         x = branch.states(u[some])
         shown[some] = by_parameter(branch.equations, x, names, constraint=constraint)
@@ -146,8 +146,8 @@ class Linearised:
         Of all its states that were solved; None if they were not kept.
     changes : ndarray, shape (size + 1, k, p)
         Derivatives of the states by the parameters; empty if they were not asked for.
-    shown : ndarray, shape (k, 3, p) or (k, 4, p)
-        Derivatives of V_l, I_h and V_r, and of the rise of the tip if it is not what is fixed.
+    shown : ndarray, shape (k, 4, p)
+        Derivatives of V_l, I_h, V_r and the rise of the tip.
     """
 
     probe: Probe
@@ -204,7 +204,7 @@ class Linearised:
         return np.where(self.branch.equations.space.is_temperature[:, None], x, factor * x)
 
     def shown_at(self, u: Array) -> Array:
-        """Return the derivatives of ``shown`` at any u, (n, 3, p) or (n, 4, p).
+        """Return the derivatives of ``shown`` at any u, (n, 4, p).
 
         Between the states they are within some 1e-3 of the largest.
         """

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hotlever.lever.curve import Piecewise, smooth_curve
 from hotlever.lever.equations import SHOWN, LeverEquations, steps_of
@@ -116,6 +117,10 @@ class SolvedStates:
     def solved(self) -> slice:
         """The states that were solved: all but the one without power."""
         return slice(0 if self.x[:, 0].any() else 1, None)
+
+    def has_power(self, u: Array) -> NDArray[np.bool_]:
+        """Return which states at some u have power, (n,): only the first one may have none."""
+        return np.asarray((u != self.u[0]) | self.x[:, 0].any())
 
     # --- how hot they get -------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hotlever.lever.branch import Branch
+from hotlever.lever.branch import TIP_RISE, Branch
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import Lever
 from hotlever.lever.parametrisation import Constrained
@@ -53,13 +53,9 @@ def estimated_error(lever: Lever, branch: Branch, u: Array) -> Array:
     first = x - factors.solve(problem.residual(x, every), every)
     second = -factors.solve(problem.residual(first, every), every)
     # third index: what the steps say, and the second step alone
-    away = np.stack(
-        [
-            equations.observed(first + second) - branch.curve(u)[:, :3].T,
-            equations.observed_change(first, second),
-        ],
-        axis=-1,
-    )
-    errors = np.abs(at_fixed_bias(branch.curve(u, 1), lever.circuit, np.swapaxes(away, 0, 1)))
+    away = np.zeros((u.size, TIP_RISE + 1, 2))
+    away[:, :TIP_RISE, 0] = equations.observed(first + second).T - branch.curve(u)[:, :TIP_RISE]
+    away[:, :TIP_RISE, 1] = equations.observed_change(first, second).T
+    errors = np.abs(at_fixed_bias(branch.curve(u, 1), lever.circuit, away))
     both, second_alone = np.moveaxis(errors, 2, 0)
     return np.maximum(_SAFETY * both + second_alone, _FLOOR[:, None])

@@ -195,7 +195,8 @@ def _surface(
         here = np.flatnonzero(np.isin(branch.u.round(9), common.round(9)))
         states, changes = space.coordinates(branch.x), space.coordinates(linearised.changes)
         values.append(np.vstack([states, branch.values[:, :3].T])[:, here].T)
-        together = np.concatenate([changes, linearised.shown.swapaxes(0, 1)])
+        by_shown = linearised.shown[:, : len(SHOWN)].swapaxes(0, 1)
+        together = np.concatenate([changes, by_shown])
         slopes.append(together[:, here][..., columns].swapaxes(0, 1))
     return ResponseSurface.fitted(
         domain,
