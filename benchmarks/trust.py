@@ -19,6 +19,7 @@ from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
 from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
+from hotlever.probe.parameters import usual_parameters
 from problems import BIAS, EXAMPLE, table
 
 #: Noise of a twin: of its own value, or of the largest; K for the temperature.
@@ -89,7 +90,7 @@ def coverage(probe, twins, proportional):
 def coarse(probe, bias):
     """Return the model of a geometry never reduced, whose fits start at the probe's material."""
     coarse, full = (SimilarLevers(Lever(probe, mesh)) for mesh in (COARSE, None))
-    return ExperimentAtRest(coarse, full, bias)
+    return ExperimentAtRest(coarse, full, bias, usual_parameters(probe))
 
 
 def starts(count, model, name):

@@ -16,6 +16,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import given_measurement
 from hotlever.probe import MeshOptions
+from hotlever.probe.parameters import usual_parameters
 
 BIAS = np.array([-7.5, -4.0, 0.0, 1.0, 5.0, 8.0])
 #: Relative steps of the Taylor test.
@@ -80,7 +81,7 @@ def test_the_other_polarity_is_that_of_supplies_reversed(coarse):
 def corrected(probe: Probe, bias: np.ndarray, full: Lever) -> ExperimentAtRest:
     """The lever on a very coarse mesh, corrected by another one."""
     fast = SimilarLevers(Lever(probe, MeshOptions(heater=0.8, corner=0.4, lever=0.35)))
-    return ExperimentAtRest(fast, SimilarLevers(full), bias)
+    return ExperimentAtRest(fast, SimilarLevers(full), bias, usual_parameters(probe))
 
 
 def test_a_fit_finds_what_a_file_of_both_polarities_was_made_with(coarse, tmp_path):

@@ -24,8 +24,7 @@ from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.profile import profile_of_tip
 from hotlever.lever import Branch
 from hotlever.lever.curve import spline_through
-from hotlever.materials import Material
-from hotlever.materials.parameters import own_name
+from hotlever.materials.parameters import is_of_material, own_name
 from hotlever.probe import Circuit
 from hotlever.probe.surroundings import Surroundings
 from hotlever.text import BAND
@@ -159,8 +158,7 @@ def errors_by_source(posterior: Posterior, slopes: Array) -> dict[str, Array]:
 
 
 def _source(name: str) -> str:
-    of_material = "." in name or name in Material.model_fields
-    return OF_THE_MEASUREMENT.get(name, "material" if of_material else "geometry")
+    return OF_THE_MEASUREMENT.get(name, "material" if is_of_material(name) else "geometry")
 
 
 def error_of_model(around: Surroundings, varied: Sequence[str], bias: Array, rise: Array) -> Array:

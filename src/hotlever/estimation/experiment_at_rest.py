@@ -28,7 +28,6 @@ from hotlever.lever.reduced.space import ReducedSpace
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
 from hotlever.lever.sensitivities import Linearised, by_parameter
 from hotlever.lever.similar import SimilarLevers
-from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread
@@ -92,7 +91,7 @@ class ExperimentAtRest:
     fast: BranchSolver
     full: SimilarLevers | None
     bias: Array
-    names: tuple[str, ...] = tuple(PARAMETERS)
+    names: tuple[str, ...]
     first_order: bool = True
     correction: Correction | None = None
     shown: Array | None = None

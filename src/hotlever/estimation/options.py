@@ -9,7 +9,7 @@ from typing import Any, Literal, cast, get_args
 from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS, parameter
-from hotlever.materials.parameters import OF_SILICON
+from hotlever.materials.parameters import is_of_material
 from hotlever.probe import Probe
 from hotlever.probe.parameters import (
     heat_capacities,
@@ -80,7 +80,7 @@ class FitOptions:
 
     def __post_init__(self) -> None:
         for name in self.fixed:
-            if "." not in name and name not in OF_SILICON:
+            if not is_of_material(name):
                 parameter(name)
             for others, what in ((self.priors, "has a prior"), (self.free, "is free")):
                 if name in others:

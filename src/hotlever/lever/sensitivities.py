@@ -12,7 +12,6 @@ from hotlever.lever.continuation import Enough, continued
 from hotlever.lever.curve import spline_through
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.space import TIP, Constraint, Factors
-from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
@@ -24,7 +23,7 @@ _AT_ONCE = 20
 def by_parameter(
     equations: LeverEquations,
     x: Array,
-    names: Sequence[str] = tuple(PARAMETERS),
+    names: Sequence[str],
     factors: Factors | None = None,
     constraint: Constraint = TIP,
 ) -> Array:

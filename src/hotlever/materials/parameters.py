@@ -202,6 +202,17 @@ def own_name(name: str) -> str:
     return name.rpartition(".")[2]
 
 
+def is_of_material(name: str) -> bool:
+    """Return whether a parameter is one of a material, named or that of ``[material]``.
+
+    Examples
+    --------
+    >>> is_of_material("film.tcr"), is_of_material("n_d"), is_of_material("thickness_um")
+    (True, True, False)
+    """
+    return "." in name or name in OF_SILICON
+
+
 def parameter_named(name: str) -> Parameter:
     """Return how a parameter of a material, or any other value of a probe file, is printed.
 
@@ -267,5 +278,4 @@ def sentence(text: str) -> str:
     ('The levers differ.', 'n_d is not determined.')
     """
     first = re.split(r"[^\w.]", text, maxsplit=1)[0]
-    is_name = first in PARAMETERS or "." in first
-    return f"{text if is_name else text[0].upper() + text[1:]}."
+    return f"{text if is_of_material(first) else text[0].upper() + text[1:]}."

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hotlever.lever.equations import SHOWN
-from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.parameters import of_materials, usual_parameters
 from hotlever.probe.priors import default_priors
@@ -89,7 +88,7 @@ class ParameterDomain:
     @property
     def parameters(self) -> tuple[str, ...]:
         """The names, and that of the scale, in the order of a probe."""
-        return tuple(PARAMETERS) if self.scale else self.names
+        return self.names if self.scale is None else (self.scale, *self.names)
 
     @property
     def widths(self) -> dict[str, float]:
@@ -131,7 +130,7 @@ class ParameterDomain:
 
 def is_papers(probe: Probe, names: Collection[str] = ()) -> bool:
     """Whether a probe is of the paper's silicon, and some names are of its six parameters."""
-    return set(names) <= set(PARAMETERS) and not probe.materials and probe.has_plain_silicon
+    return set(names) <= {C_KAPPA, *PAPER} and not probe.materials and probe.has_plain_silicon
 
 
 @dataclass(frozen=True)
