@@ -103,7 +103,7 @@ class Rows:
         """Return the states nearest to what was measured; see `states`."""
         curve = branch.bias_by_u(circuit)
         cold = branch.equations.circuit.starts_cold
-        start = 0.0 if cold else float(branch.u[0])
+        start = float(branch.u[0])
         level = np.sort(curve.derivative().roots())
         ends = [start, *level[(level > start) & (level < branch.end_u)].tolist(), branch.end_u]
         # a cold lever is told apart from itself by the size of the bias only, and has none without

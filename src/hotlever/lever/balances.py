@@ -34,18 +34,13 @@ def balance_names(wiring: Wiring) -> tuple[str, ...]:
 
 def _measured(wiring: Wiring) -> tuple[str, ...]:
     """Return the terminals whose potential follows, without the reader of the paper's circuit."""
-    return tuple(name for name in (*wiring.senses, *wiring.contacts) if name != "reader")
-
-
-def _conducting(wiring: Wiring) -> tuple[str, ...]:
-    """Return the terminals that a current passes, beside the swept supply."""
-    return (*wiring.grounds, *wiring.contacts)
+    return tuple(name for name in wiring.measurable if name != "reader")
 
 
 def _unusual(wiring: Wiring) -> tuple[str, ...]:
     """Return those that a current passes, without the ground of the paper's circuit."""
     usual = "ground" if "ground" in wiring.grounds else None
-    return tuple(name for name in _conducting(wiring) if name != usual)
+    return tuple(name for name in wiring.conducting if name != usual)
 
 
 def balance_columns(equations: LeverEquations, x: Array) -> Array:
@@ -95,7 +90,7 @@ def _balances(equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array)
     joule = [_joule(heat_source, space.parts[part]) for part in ("heater", "leg 1", "leg 2")]
     into = {
         name: np.einsum("dp,dpn->n", space.charge_tests[name], charge)
-        for name in _conducting(space.wiring)
+        for name in space.wiring.conducting
     }
     grounds = [name for name in into if equations.circuit.contact(name).kind == "ground"]
     ground = -sum((into[name] for name in grounds), start=np.zeros_like(end_heat))

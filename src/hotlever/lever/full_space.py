@@ -90,8 +90,8 @@ class FullSpace(Space):
         self.contacts = np.array([self._V[self.contact_nodes[name][0]] for name in self.wired], int)
         self._lay_out_matrix()
         self.air = AirLoss.nothing(self.size + 1)
-        measured = "reader" in (*self.wiring.senses, *self.wired)
-        self.reader = self.potential_at("reader") if measured else None
+        measurable = "reader" in self.wiring.measurable
+        self.reader = self.potential_at("reader") if measurable else None
         sampling, points = self.elements.sampling, self.elements.weights.size
         kinds = 1 + len(self.elements.positions)
         self.temperature = LinearMap(sampling @ self._selection(self._T), kinds)

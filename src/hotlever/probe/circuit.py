@@ -105,6 +105,16 @@ class Wiring:
     contacts: tuple[str, ...]
     senses: tuple[str, ...]
 
+    @property
+    def measurable(self) -> tuple[str, ...]:
+        """Those whose potential follows from the rest."""
+        return (*self.senses, *self.contacts)
+
+    @property
+    def conducting(self) -> tuple[str, ...]:
+        """Those that a current passes, beside the swept supply."""
+        return (*self.grounds, *self.contacts)
+
 
 class Circuit(Record):
     """The measuring circuit (section ``[circuit]`` of a probe file).
