@@ -20,10 +20,9 @@ import numpy as np
 from hotlever.air.operator import PanelledAir
 from hotlever.air.surface import PanelOptions
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.estimation.experiment_at_rest import reduced_experiment
+from hotlever.estimation.experiment_at_rest import experiment_of
 from hotlever.lever import Lever
 from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
-from hotlever.lever.reduced.training import cached_reduction
 from hotlever.probe import Probe
 from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K, K_IN_AIR
@@ -65,10 +64,7 @@ def building():
 def speed(vacuum, air):
     """Print the times of sweeps; return the reduced model in air."""
     levers = {"vacuum": vacuum, "air": air}
-    models = {
-        name: reduced_experiment(lever, cached_reduction(lever), BIAS)
-        for name, lever in levers.items()
-    }
+    models = {name: experiment_of(lever.probe, BIAS, reduce=True) for name, lever in levers.items()}
     material = vacuum.probe.material
     kinds = {
         # made anew each time: a lever keeps its branch

@@ -14,13 +14,14 @@ import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimation import fit, read_measurement
-from hotlever.estimation.experiment_at_rest import full_experiment, reduced_experiment
+from hotlever.estimation.experiment_at_rest import ExperimentAtRest, experiment_of
 from hotlever.estimation.load_lines import Rows, shown_at
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.reduced.error_estimate import estimated_error
 from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
 from hotlever.lever.reduced.training import cached_reduction
+from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
 from problems import (
     BIAS,
@@ -93,7 +94,7 @@ def main():
         warm_fit = processor_seconds(lambda: fit(data), RUNS)
         warm_command = processor_seconds(lambda: fit_command(folder), 3)
     accuracy(lever, reduced, cases)
-    rng, model = np.random.default_rng(5), reduced_experiment(lever, reduced, BIAS)
+    rng, model = np.random.default_rng(5), experiment_of(probe, BIAS, reduce=True)
     anywhere = processor_seconds(
         lambda: model.predict(lever.with_material(random_material(lever, rng)).probe), 25
     )
@@ -106,7 +107,10 @@ def main():
         RUNS,
     )
     full_fit = processor_seconds(
-        lambda: fit(data, model=lambda probe, bias: full_experiment(Lever(probe), bias))
+        lambda: fit(
+            data,
+            model=lambda probe, bias: ExperimentAtRest(SimilarLevers(Lever(probe)), None, bias),
+        )
     )
     problem = peer_problem(probe, lever.space.mesh, degree=3, quadrature=5, bias=BIAS)
     peer = median(solve_with_peer(problem, plain=True)["processor_seconds"] for _ in range(RUNS))

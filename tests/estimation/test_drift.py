@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from test_fit import TRUTH, twin
 
+from experiments import reduced_experiment
 from hotlever.estimation import FitOptions, fit
-from hotlever.estimation.experiment_at_rest import reduced_experiment
 from hotlever.estimation.inverse_problem import estimate
 from hotlever.estimation.residuals import Drift
 

@@ -9,9 +9,9 @@ from importlib.resources import as_file, files
 import numpy as np
 import pytest
 
+from experiments import full_experiment, reduced_experiment
 from hotlever.errors import BranchEndError, ComputationError, InputError
 from hotlever.estimation import Measurement, fit, read_measurement
-from hotlever.estimation.experiment_at_rest import full_experiment, reduced_experiment
 from hotlever.estimation.lack_of_fit import outlier_notes
 from hotlever.estimation.residuals import Residuals
 from hotlever.lever import Lever

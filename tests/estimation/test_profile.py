@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from experiments import full_experiment
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.estimation.profile import profile_likelihood
 from hotlever.lever import Lever
 

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 import hotlever
+from experiments import full_experiment
 from hotlever.calibration import calibrate
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest, full_experiment
+from hotlever.estimation.experiment_at_rest import ExperimentAtRest
 from hotlever.estimation.inverse_problem import estimate
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser

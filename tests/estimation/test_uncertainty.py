@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from experiments import reduced_experiment
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment_at_rest import reduced_experiment
 from hotlever.estimation.uncertainty import Uncertainty
 
 BIAS = np.linspace(2, 11, 8)

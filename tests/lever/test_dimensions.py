@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experiments import full_experiment
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers

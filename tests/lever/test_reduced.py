@@ -8,9 +8,9 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
+from experiments import reduced_experiment
 from hotlever.cache import CACHE_VARIABLE, store_arrays, stored
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment_at_rest import reduced_experiment
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
+from experiments import full_experiment
 from hotlever.estimation import Measurement, fit, read_fit
-from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.estimation.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.measurement.rows import MANY, averaged

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import made_up
+from experiments import full_experiment
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment_at_rest import full_experiment
 from hotlever.estimation.uncertainty import examine
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.reproduce import LONG_SECTIONS, NEVER_SEEN, SECTIONS, inference

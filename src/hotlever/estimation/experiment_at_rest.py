@@ -206,16 +206,6 @@ class ExperimentAtRest:
         return u, solve_at(equations, u, guess, NewtonOptions(tolerance=1e-5)).x
 
 
-def full_experiment(lever: Lever, bias: Array) -> ExperimentAtRest:
-    """Return a lever as forward model, just as it is."""
-    return ExperimentAtRest(SimilarLevers(lever), None, bias, usual_parameters(lever.probe))
-
-
-def reduced_experiment(lever: Lever, reduced: ReducedLever, bias: Array) -> ExperimentAtRest:
-    """Return a reduced lever, corrected by the full one, as forward model."""
-    return ExperimentAtRest(reduced, SimilarLevers(lever), bias, reduced.names)
-
-
 def experiment_of(
     probe: Probe,
     bias: Array,
