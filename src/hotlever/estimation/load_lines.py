@@ -108,7 +108,7 @@ class Rows:
         ends = [start, *level[(level > start) & (level < branch.end_u)].tolist(), branch.end_u]
         # a cold lever is told apart from itself by the size of the bias only, and has none without
         bias = np.abs(self.bias_V) if cold else self.bias_V
-        heated = np.flatnonzero(bias > 0) if cold else np.arange(bias.size)
+        heated = np.flatnonzero(branch.equations.circuit.heats(bias))
         u, distance = np.zeros(bias.shape), np.full(bias.shape, np.inf)
         u[heated] = np.nan
         short = np.ones(bias.shape)

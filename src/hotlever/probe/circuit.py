@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from hotlever.errors import InputError, unknown_name
@@ -290,6 +291,10 @@ class Circuit(Record):
         return not self.end_rises() and not any(
             contact.norton[1] for contact in self.contacts.values()
         )
+
+    def heats(self, bias_V: Array) -> NDArray[np.bool_]:
+        """Return at which biases (V) the lever is heated: at any where others heat it as well."""
+        return (bias_V > 0) | (not self.starts_cold)
 
     @property
     def is_plain(self) -> bool:
