@@ -202,7 +202,6 @@ class Calibration(Outcome):
             table={name: self.table[name].values for name in self.columns},
             budget_K=budget,
             data=MeasurementSection.of(self.measurement),
-            pulse=None if self.pulse is None else self.pulse.section(),
         )
 
     def table_csv(self) -> str:
@@ -228,6 +227,10 @@ def _law(values: dict[str, float], info: ValidationInfo) -> PowerLaw:
 
 
 _Law = Annotated[PowerLaw, stored_as(dict[str, float], _law, PowerLaw.values)]
+_Pulse = Annotated[
+    PulseCalibration,
+    stored_as(PulseSection, PulseSection.calibration, PulseCalibration.section),
+]
 
 
 class CalibrationFile(ResultFile):
@@ -251,7 +254,7 @@ class CalibrationFile(ResultFile):
     table: Columns
     budget_K: dict[str, Vector]
     measured_rms_K: Number = np.nan
-    pulse: PulseSection | None = IF_ANY
+    pulse: _Pulse | None = IF_ANY
 
     @field_serializer("power_law")
     def _with_threshold(self, law: PowerLaw | None) -> dict[str, float] | None:
@@ -273,7 +276,6 @@ class CalibrationFile(ResultFile):
             | {
                 "knee": Knee(**knee),
                 "table": stored_table(self.table, self.budget_K, names),
-                "pulse": None if self.pulse is None else self.pulse.calibration(),
             },
         )
 

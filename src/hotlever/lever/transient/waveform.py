@@ -18,7 +18,7 @@ import numpy as np
 from hotlever.errors import InputError, shown
 from hotlever.tables import read_table
 from hotlever.types import Array
-from hotlever.units import MOST_BIAS, name_and_unit, setting
+from hotlever.units import MOST_BIAS, name_and_unit
 
 #: Times (µs) and numbers of pulses that a wave form may have at most.
 LONGEST, MOST_PULSES = 1e12, 100_000
@@ -259,18 +259,16 @@ def read_waveform(path: str | os.PathLike[str]) -> Waveform:
     """
     expected = "a header row like 'time (us),bias (V)'"
     table = read_table(path, expected)
-    headings = [name_and_unit(heading) for heading in table.names]
+    names = [name_and_unit(heading)[0] for heading in table.names]
     columns = []
     for pattern, inside, what in ((_TIME, "us", "time"), (_BIAS, "V", "bias")):
-        column = next((k for k, (name, _) in enumerate(headings) if pattern.fullmatch(name)), None)
+        column = next((k for k, name in enumerate(names) if pattern.fullmatch(name)), None)
         if column is None:
             header = shown(",".join(table.names))
             raise InputError(
                 f"{table.where(-1)}: no {what} column in '{header}', expected {expected}"
             )
-        where = f"{table.where(-1)}: unit of the {what}"
-        unit = headings[column][1] or ""
-        columns.append(setting(f"1{unit}", inside, where) * table.numbers(column, what))
+        columns.append(table.values(column, inside, what))
     times, volts = columns
     times = times - times[0]
     for wrong, meant in (
