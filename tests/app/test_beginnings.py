@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from nicegui import ui
 from nicegui.testing import User
-from test_pages import Here, Run, drop, shown, until, visit
+from test_app_pages import Here, Run, drop, shown, until, visit
 
 from bad_files import bad_files
 from hotlever.app.jobs import Task

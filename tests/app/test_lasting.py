@@ -14,7 +14,7 @@ import pytest
 from nicegui import ui
 from nicegui.testing import User
 from nicegui.testing.user_interaction import UserInteraction
-from test_pages import drop, shown, until, visit
+from test_app_pages import drop, shown, until, visit
 from test_pages_at_work import done
 
 from hotlever.app import live, showing

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from nicegui import ui
 from nicegui.testing import User
-from test_pages import Here, shown, until, visit
+from test_app_pages import Here, shown, until, visit
 
 from hotlever.app import showing
 from hotlever.app.jobs import Job, Task

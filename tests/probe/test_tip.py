@@ -118,7 +118,7 @@ def test_the_thickening_stands_for_the_cone():
 @pytest.mark.parametrize("probe", [Probe.reference(), Probe.u_shape()], ids=["three", "u"])
 def test_terminals_are_whole_end_faces(probe):
     layout = probe.layout()
-    mesh = mesh_solid(layout, SolidMeshOptions(refinement=0.5))
+    mesh = mesh_solid(layout, SolidMeshOptions(refinement=0.25))
     for terminal in layout.terminals:
         facets = mesh.elements.facets[:, mesh.terminal_facets[terminal.name]]
         a, b, c = np.moveaxis(mesh.elements.p[:, facets], 1, 0)
