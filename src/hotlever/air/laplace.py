@@ -20,7 +20,7 @@ from hotlever.types import Array, Index
 _TINY = 1e-150
 #: Pairs whose centroids are this many times the sum of their radii apart are far.
 FAR = 3.0
-#: For near pairs that have no closed form, see `hotlever.air.single_layer.Orders`.
+#: For near pairs that have no closed form, see ``Orders`` of `hotlever.air.single_layer`.
 ORDERS = ((8, 0.5), (6, 1.0), (4, 1.5), (3, 2.0), (2, np.inf))
 #: Rectangles turned by less (rad) against each other are parallel.
 _SAME_ANGLE = 2e-6
@@ -32,7 +32,7 @@ class Laplace:
     """The kernel 1/R; see `hotlever.air.single_layer.Kernel`."""
 
     shape: tuple[int, ...] = ()
-    dtype, far = np.float64, FAR
+    dtype, far = np.dtype(float), FAR
 
     def far_pairs(self, first: Panels, second: Panels, offsets: Array) -> Array:
         """Return ∫∫ 1/R over distant pairs; see `far_pairs`."""

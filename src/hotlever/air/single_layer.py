@@ -1,9 +1,9 @@
 """The single-layer operator of a surface: densities on its panels to potentials.
 
-Galerkin's method with constant densities: V_ij = Σ_m s_m ∫_i ∫_{m(j)} G(|x − y|)/4π, where m runs
-over the mirrors that stand for symmetry or for isothermal planes, s_m is their sign, and G the
-kernel: 1/R (`hotlever.air.laplace`) or what air adds that takes up heat itself
-(`hotlever.air.screened`). V is symmetric; with 1/R it is positive definite, and for ∇²θ = 0 outside
+Galerkin's method with constant densities: V_ij = Σ_m s_m ∫_i ∫_{m(j)} G(r)/4π, where r is the
+distance, m runs over the mirrors that stand for symmetry or for isothermal planes, s_m is their
+sign, and G the kernel: 1/r (`hotlever.air.laplace`) or what air adds that takes up heat itself
+(`hotlever.air.screened`). V is symmetric; with 1/r it is positive definite, and for ∇²θ = 0 outside
 the surface, θ given on it and no flux at infinity, the heat that leaves panel i is A_i q_i with
 V q = b, b_i = ∫_i θ.
 """

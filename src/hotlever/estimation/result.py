@@ -217,7 +217,7 @@ class Fit(Outcome):
     def model(self, bias: ArrayLike | None = None) -> xr.Dataset:
         """Solve the fitted lever, at the measured biases by default; see `Lever.sweep`.
 
-        Of what was measured in time: follow it at the measured times (`hotlever.simulate`).
+        Of what was measured in time: follow it at the measured times (`simulate`).
         """
         lever, measured = Lever(self.probe), self.measurement
         if bias is None and measured.waveform is not None:

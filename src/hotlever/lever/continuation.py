@@ -44,7 +44,7 @@ _LOOKED_AT = 20
 #: Points of Gauss's rule and rounds by which the length of a piece of the curve is found.
 _GAUSS, _ROUNDS = np.polynomial.legendre.leggauss(5), 6
 
-#: Whether a branch is long enough.
+# Whether a branch is long enough.
 Enough = Callable[[Branch], bool | np.bool_]
 
 

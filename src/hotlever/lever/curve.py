@@ -25,7 +25,7 @@ _ROUNDING = 1e-10
 class Piecewise:
     """Polynomials between nodes; the outer ones go on beyond the ends.
 
-    Like `scipy.interpolate.PPoly`, whose import takes longer than that of all levers.
+    Like ``scipy.interpolate.PPoly``, whose import takes longer than that of all levers.
 
     Attributes
     ----------

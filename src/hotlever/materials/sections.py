@@ -99,7 +99,7 @@ def _preset(name: Any, kind: str, where: str) -> Mapping[str, float]:
 
 
 def own_laws(kinds: Mapping[str, Kind]) -> dict[str, str]:
-    """Return the classes of materials that are of no kind of `KINDS` itself, by material."""
+    """Return the classes of materials that are of no kind of ``KINDS`` itself, by material."""
     return {
         name: f"{type(kind).__module__}.{type(kind).__qualname__}"
         for name, kind in kinds.items()

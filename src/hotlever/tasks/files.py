@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def draw(path: Path | None, figure: Callable[[Any], Figure]) -> None:
     """Draw a figure to a file, if one is asked for.
 
-    `figure` makes it of `hotlever.figures`, whose import nobody else has to wait for.
+    ``figure`` makes it of the figures of the package, whose import nobody else has to wait for.
     """
     if path is not None:
         from hotlever import figures

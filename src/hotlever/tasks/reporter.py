@@ -31,7 +31,7 @@ class Silence:
 
 
 class Reporter(Listener, Protocol):
-    """The terminal (`hotlever.cli.output`), or a page of the app."""
+    """The terminal, or a page of the app."""
 
     def give(self, result: str) -> None:
         """Give the result as text."""

@@ -36,7 +36,7 @@ _MOST_NOTES = 20
 class Thermometry:
     """How spectra are measured: the line's shape, and a thermometer if there is a calibration.
 
-    `hot_plate` is what the calibration was made of, if it was made now; `spectra` are all that
+    ``hot_plate`` is what the calibration was made of, if it was made now; ``spectra`` are all that
     the thermometer was set up from.
     """
 

@@ -147,7 +147,7 @@ class ResponseSurface:
     u : ndarray, shape (k,)
         √(T_tip − T_base) (K^½) of the nodes, the first zero.
     coefficients : ndarray, shape (terms, k, size + 4)
-        For the terms of `_terms`, of the states and of V_l (V), I_h (mA), V_r (V).
+        For the terms of ``_terms``, of the states and of V_l (V), I_h (mA), V_r (V).
     grows : ndarray of bool, shape (size + 4,)
         What grows with the root of the domain's scale: all but temperatures.
     scale : float or ndarray, shape ()
