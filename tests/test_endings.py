@@ -45,6 +45,39 @@ def test_stopped_by_a_signal(tmp_path, number):
     assert (tmp_path / "a.csv").read_text() == "mine"
 
 
+IN_A_DESTRUCTOR = """
+import signal, sys, time
+from hotlever.cli import running
+
+class Short:
+    def __del__(self):
+        signal.raise_signal(signal.SIGTERM)
+
+def work(arguments):
+    Short()
+    time.sleep(30.0)
+    return 0
+
+running._run, sys.argv = work, ["hotlever", "sweep"]
+running.main()
+"""
+
+
+def test_a_signal_that_comes_within_a_destructor_is_not_lost(tmp_path):
+    """Python lets no exception out of one, nor of what it calls back as it imports."""
+    began = time.monotonic()
+    ended = subprocess.run(
+        [sys.executable, "-c", IN_A_DESTRUCTOR],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=as_in_a_terminal,
+    )
+    assert (ended.returncode, ended.stderr) == (1, "hotlever: stopped by the user\n")
+    assert time.monotonic() - began < 20.0
+
+
 def test_an_ignored_signal_stays_ignored(tmp_path):
     with start(
         tmp_path,

@@ -9,6 +9,7 @@ import io
 import os
 import signal
 import sys
+import threading
 import warnings
 from contextlib import suppress
 from types import FrameType
@@ -29,6 +30,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     if arguments is None:
         arguments = sys.argv[1:]
         _keep_to_ourselves()
+        sys.unraisablehook = _stop_again
     for name in _STOPS:
         number = getattr(signal, name, None)
         # nohup, for one, has a command ignore a signal
@@ -58,6 +60,19 @@ class Stopped(KeyboardInterrupt):
 def _stop(number: int, _: FrameType | None) -> NoReturn:
     _received.append(number)
     raise Stopped
+
+
+def _stop_again(ignored: sys.UnraisableHookArgs) -> None:
+    """Stop what was stopped where Python lets no exception out: in a destructor, or as it imports.
+
+    The signal comes again, by another thread, when we are out of there.
+    """
+    if isinstance(ignored.exc_value, Stopped):
+        again = threading.Timer(0.01, os.kill, (os.getpid(), _received[-1]))
+        again.daemon = True
+        again.start()
+    else:
+        sys.__unraisablehook__(ignored)
 
 
 def _keep_to_ourselves() -> None:
