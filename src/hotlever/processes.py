@@ -112,8 +112,13 @@ def run_all(
             except HotleverError:
                 raise
             except Exception as error:
-                result = ComputationError(f"{type(error).__name__}: {error}")
+                result = _as_sent(error)
             yield task[0], result
+
+
+def _as_sent(error: Exception) -> ComputationError:
+    """Return what can be sent of an error that nobody foresaw: its type and words."""
+    return ComputationError(f"{type(error).__name__}: {error}")
 
 
 def guarded(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
@@ -128,7 +133,7 @@ def guarded(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
     except HotleverError as error:
         return ComputationError(str(error))
     except Exception as error:
-        return ComputationError(f"{type(error).__name__}: {error}")
+        return _as_sent(error)
 
 
 @contextmanager
@@ -377,4 +382,4 @@ def _work(pipe: Connection, environment: dict[str, str]) -> None:
             try:
                 send(_DONE, result)
             except (TypeError, ValueError, AttributeError, PicklingError) as error:
-                send(_DONE, ComputationError(f"{type(error).__name__}: {error}"))
+                send(_DONE, _as_sent(error))
