@@ -5,8 +5,9 @@ The latter is made once it is asked for, and cached.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.sparse import diags
@@ -44,7 +45,7 @@ def surrounded(
         return space.in_vacuum()
     plate = plate_of(probe)
 
-    stores = StoresAround(space, plate, around, base)
+    stores = StoresAround(partial(taken_up_around, space, plate, around, base))
     air = air_operator(plate, around, base, panels, progress)
     return space.in_air(air, stores).in_gas(around.gas_conductivity)
 
@@ -54,22 +55,12 @@ class StoresAround:
 
     Parameters
     ----------
-    space : FullSpace
-        In air.
-    layout : Layout
-        As the air sees it.
-    surroundings : Surroundings
-    base_temperature_K : float
+    make : callable
+        Makes the heat in air; what it is can be pickled, as a lever can.
     """
 
-    def __init__(
-        self,
-        space: FullSpace,
-        layout: Layout,
-        surroundings: Surroundings,
-        base_temperature_K: float,
-    ) -> None:
-        self._given = space, layout, surroundings, base_temperature_K
+    def __init__(self, make: Callable[[], HeatInAir]) -> None:
+        self._make = make
         self._last: tuple[float, HeatInAir] | None = None
 
     def __call__(self, gas_conductivity: float) -> HeatInAir:
@@ -81,7 +72,7 @@ class StoresAround:
 
     @cached_property
     def _in_air(self) -> HeatInAir:
-        return taken_up_around(*self._given)
+        return self._make()
 
 
 @one_blas_thread
