@@ -27,7 +27,7 @@ def test_without_power_the_integral_of_kappa_is_linear_between_the_ends():
     )
     equations = LeverEquations(cold.space, cold.materials, circuit)
     rest = without_bias(equations)
-    T, V = cold.space.nodal(rest[:, 0], 293.0, equations.end_rises)
+    T, V = cold.space.nodal(rest[:, 0], 293.0, equations.terminals.end_rises)
     assert np.abs(V).max() < 1e-12
     np.testing.assert_allclose(heat_left(equations, rest), 0.0, atol=1e-10)
     grid = np.linspace(293.0, 593.0, 20001)

@@ -4,12 +4,10 @@ Heat (paper's first equation, with the sign corrected) and charge::
 
     −∇·(κ ∇T) = σ |∇V|² − heat lost to air,    ∇·(σ ∇V) = 0,
 
-with T = base temperature at all terminals (or what each is held at), V = 0 at ground, V = V_l on
-the contact of the swept supply, no current into sense contacts, and into other contacts what their
-supplies give by Ohm's law, J − G V. One more condition, the *constraint*, selects a state: its tip
-temperature. What is behind the swept supply does not enter: what a lever shows at a tip temperature
-does not depend on it. Units are µm, V, mA, mW and K. Several states stand side by side, see
-`hotlever.lever.space`.
+with what is wired to the terminals (`hotlever.lever.terminals`). One more condition, the
+*constraint*, selects a state: its tip temperature. What is behind the swept supply does not enter:
+what a lever shows at a tip temperature does not depend on it. Units are µm, V, mA, mW and K.
+Several states stand side by side, see `hotlever.lever.space`.
 
 The loss to air is linear in θ = ∫κ_air dT on the surface (`hotlever.air.operator`). The air
 operator fills the plate itself with air too; κ is therefore κ_Si − κ_air where there is air.
@@ -33,6 +31,7 @@ from hotlever.lever.space import (
     Fluxes,
     Tangent,
 )
+from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 
 #: What an instrument shows of a state, in the order of `LeverEquations.observed`.
@@ -53,14 +52,14 @@ class LeverEquations(LawsAtPoints):
     def balance(self, x: Array) -> Array:
         """Return the residuals of heat and charge, and last the current I_h (mA), (size + 1, n)."""
         weak = self.space.weak_form(self.fluxes(x))
-        if self.space.wired:
-            weak[self.space.contacts] += self._into_contacts(x) - self.source_mA[:, None]
+        self.terminals.add_currents(weak, x)
         return weak + self.space.air.weak_form(self.kirchhoff(x)[0])
 
-    def _into_contacts(self, x: Array) -> Array:
-        """Return G V (mA) at the contacts, (contacts, ...), of states or of changes of them."""
-        potential = x[self.space.contacts]
-        return self.conductance.reshape(-1, *(1,) * (x.ndim - 1)) * potential
+    def balance_in(self, circuit: Circuit, x: Array, bias_V: Array | float) -> Array:
+        """Return the residuals of heat and charge, and last of a circuit, V_l + R_s I_h − V_b."""
+        balance = self.balance(x)
+        balance[-1] = circuit.bias(x[-1], balance[-1]) - bias_V
+        return balance
 
     def factorised(self, x: Array, constraint: Constraint = TIP, per_us: float = 0.0) -> Factors:
         """Return the factorised Jacobians of states, with the row of a constraint last.
@@ -74,7 +73,7 @@ class LeverEquations(LawsAtPoints):
             tangent = replace(tangent, heat_source_T=tangent.heat_source_T + stored)
         taken_up = self.heat_in_air.taken_up(per_us) if per_us else None
         air = AirTangent(self.kirchhoff(x)[1], taken_up)
-        return self.space.factorised(tangent, air, constraint, self.conductance)
+        return self.space.factorised(tangent, air, constraint, self.terminals.conductance)
 
     # --- derivatives --------------------------------------------------------------------------
 
@@ -100,10 +99,16 @@ class LeverEquations(LawsAtPoints):
     def balance_change(self, x: Array, change: Array) -> Array:
         """Return how `balance` changes with the unknowns: the Jacobian times changes."""
         weak = self.space.weak_form(self.flux_changes(x, change))
-        weak[self.space.contacts] += self._into_contacts(change)
+        self.terminals.add_current_changes(weak, change)
         kappa = self.kirchhoff(x)[1]
         kappa = kappa if change.ndim == 2 else kappa[..., None]
         return weak + self.space.air.weak_form(kappa * self.space.air.rise(change))
+
+    def balance_change_in(self, circuit: Circuit, x: Array, change: Array) -> Array:
+        """Return how `balance_in` changes with the unknowns."""
+        balance = self.balance_change(x, change)
+        balance[-1] = circuit.bias(change[-1], balance[-1])
+        return balance
 
     def by_parameter(self, x: Array, names: Sequence[str]) -> Array:
         """Return how `balance` changes with parameters or dimensions, (size + 1, n, k)."""
@@ -116,8 +121,9 @@ class LeverEquations(LawsAtPoints):
         grad_T, grad_V = fields.grad_T[..., None], fields.grad_V[..., None]
         heat = -sigma * square(fields.grad_V)[..., None]
         changes = Fluxes(heat, kappa * grad_T, sigma * grad_V)
-        if self.end_rises and BASE in names:
-            self._without_ends(changes, names.index(BASE), now.kappa)
+        ends = self.terminals.held_ends()
+        if ends is not None and BASE in names:
+            _without_ends(changes, names.index(BASE), now.kappa, *ends)
         for column in (names.index(name) for name in names if name in self.motions):
             motion = self.motions[names[column]]
             moved = motion.of_fluxes(fields, self.fluxes(x), now.kappa, now.sigma)
@@ -135,15 +141,6 @@ class LeverEquations(LawsAtPoints):
             elif name == GAP:
                 weak[..., column] += air.change_with_gap(theta)
         return weak
-
-    def _without_ends(self, changes: Fluxes, column: int, kappa: Array) -> None:
-        """Correct changes with the base temperature: leg ends of their own do not move with it."""
-        tests = [self.space.end_tests[name][..., None] for name in self.end_rises]
-        value, slope = np.split(np.sum(tests, axis=0), [1])
-        changes.heat_source[..., column] *= 1.0 - value[0]
-        changes.heat[..., column] *= 1.0 - value[0]
-        changes.heat[..., column] -= kappa * slope
-        changes.charge[..., column] *= 1.0 - value[0]
 
     def tip_by_parameter(self, x: Array, names: Sequence[str]) -> Array:
         """Return how the tip's rise (K) changes with parameters, the unknowns being the same.
@@ -212,9 +209,7 @@ class LeverEquations(LawsAtPoints):
 
     def power(self, x: Array) -> Array:
         """Return the power (mW) that the swept supply and others put into states, (n,)."""
-        into = self.space.weak_form(self.fluxes(x))
-        contacts = self.space.contacts
-        return np.asarray(x[-1] * into[-1] + (x[contacts] * into[contacts]).sum(axis=0))
+        return self.terminals.power(x, self.space.weak_form(self.fluxes(x)))
 
     # --- what is measured ------------------------------------------------------------------------
 
@@ -248,6 +243,14 @@ class LeverEquations(LawsAtPoints):
             # the nodes of a contact share one unknown
             np.add.at(gradient[..., 2], unknowns, weights[:, None])
         return gradient
+
+
+def _without_ends(changes: Fluxes, column: int, kappa: Array, value: Array, slope: Array) -> None:
+    """Correct changes with the base temperature: leg ends of their own do not move with it."""
+    changes.heat_source[..., column] *= 1.0 - value
+    changes.heat[..., column] *= 1.0 - value
+    changes.heat[..., column] -= kappa * slope
+    changes.charge[..., column] *= 1.0 - value
 
 
 def steps_of(equations: LeverEquations) -> Array:

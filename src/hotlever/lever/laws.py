@@ -26,6 +26,7 @@ from hotlever.lever.space import (
     PlacedFilm,
     Space,
 )
+from hotlever.lever.terminals import Terminals
 from hotlever.materials import Kind, full_name
 from hotlever.materials.air import kirchhoff_variable, thermal_conductivity_of_air
 from hotlever.materials.doping import tapered_doping
@@ -164,6 +165,8 @@ class LawsAtPoints:
 
     Attributes
     ----------
+    terminals : Terminals
+        What is wired to the lever, in its equations.
     films : list of FilmLaws
     scale, step_limit : ndarray, shape (size + 1, 1)
         For Newton's method: the size of one unit of each unknown, by which kelvin and volts
@@ -179,8 +182,7 @@ class LawsAtPoints:
     ) -> None:
         self.space, self.materials, self.motions = space, materials, motions or {}
         self.circuit, self.base_temperature_K = circuit, circuit.base_temperature_K
-        self.conductance, self.source_mA = circuit.norton(space.wired)
-        self.end_rises = circuit.end_rises()
+        self.terminals = Terminals(space, circuit)
         for name, kind in self.made_of.items():
             if reason := kind.impossible(self.base_temperature_K):
                 raise ComputationError(f"{name}: {reason}")
@@ -231,17 +233,15 @@ class LawsAtPoints:
         # residual, Jacobian and derivatives are asked for at the same states one by one
         if self._latest is None or not np.array_equal(self._latest[0], x):
             moved = self.space.fields(x)
-            T, grad_T = self.base_temperature_K + moved.T, moved.grad_T
-            for name, rise in self.end_rises.items():
-                value, slope = np.split(self.space.end_tests[name][..., None], [1])
-                T, grad_T = T + rise * value[0], grad_T + rise * slope
+            T = self.base_temperature_K + moved.T
+            T, grad_T = self.terminals.warmed(T, moved.grad_T)
             fields = Fields(T, grad_T, moved.grad_V)
             self._latest = x.copy(), (fields, self.conductivities(fields.T))
         return self._latest[1]
 
     def nodal_rises(self, x: Array) -> Array:
         """Return the rises of the temperature (K) of states at all nodes, (nodes, n)."""
-        return self.space.nodal_rises(x, self.end_rises)
+        return self.space.nodal_rises(x, self.terminals.end_rises)
 
     def highest_rise(self, x: Array) -> Array:
         """Return the highest rise of the temperature (K) in states, between the nodes too, (n,)."""
@@ -249,17 +249,16 @@ class LawsAtPoints:
 
     def driven(self, share: float) -> Self:
         """Return the same with held supplies and warmer leg ends at a share of their values."""
-        other = copy(self)
-        other.source_mA = share * self.source_mA
-        other.end_rises = {name: share * rise for name, rise in self.end_rises.items()}
-        other._latest = None
-        return other
+        return self._at(self.terminals.scaled(share, share))
 
     @property
     def mirrored(self) -> Self:
         """The same with held supplies of the other polarity."""
+        return self._at(self.terminals.scaled(-1.0, 1.0))
+
+    def _at(self, terminals: Terminals) -> Self:
         other = copy(self)
-        other.source_mA = -self.source_mA
+        other.terminals, other._latest = terminals, None
         return other
 
     def fluxes(self, x: Array) -> Fluxes:

@@ -373,7 +373,7 @@ class State:
         """Temperature (K) and potential (V) at the nodes of the elements."""
         equations = self.lever.equations
         base = equations.base_temperature_K
-        return self.lever.space.nodal(self.x[:, 0], base, equations.end_rises)
+        return self.lever.space.nodal(self.x[:, 0], base, equations.terminals.end_rises)
 
 
 def sweep(

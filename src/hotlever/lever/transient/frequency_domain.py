@@ -265,8 +265,8 @@ class HarmonicBalance:
         for done in range(_MOST):
             if inverses is None or done in (2, 8):
                 inverses = self._inverses(x.mean(axis=1, keepdims=True), turns, of_air)
-            stored, rest = self._equations.storage(x), self._equations.balance(x)
-            rest[-1] = self._circuit.bias(x[-1], rest[-1]) - self._bias
+            stored = self._equations.storage(x)
+            rest = self._equations.balance_in(self._circuit, x, self._bias)
             residual = np.fft.rfft(rest, axis=1) + turns * np.fft.rfft(stored, axis=1)
             residual += np.einsum("kij,jk->ik", of_air, np.fft.rfft(x, axis=1))
             change = -np.einsum("kij,jk->ik", inverses, residual)
@@ -300,8 +300,7 @@ class HarmonicBalance:
         """Return the inverses of the equations linearised about a state, for each harmonic."""
         unit = np.eye(len(x))
         many = np.repeat(x, len(x), axis=1)
-        residual = self._equations.balance_change(many, unit)
-        residual[-1] = self._circuit.bias(unit[-1], residual[-1])
+        residual = self._equations.balance_change_in(self._circuit, many, unit)
         moving = self._equations.storage_change(many, unit)
         return np.linalg.inv(turns[:, None, None] * moving + residual + of_air)
 

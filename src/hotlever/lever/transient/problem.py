@@ -118,8 +118,7 @@ class TransientProblem:
     def residual(self, t: float, x: Array) -> Array:
         """Return the residuals of heat, charge and circuit, and of the stores in the air."""
         lever, in_air = self.parts(x)
-        balance = self.equations.balance(lever)
-        balance[-1] = self._circuit.bias(lever[-1], balance[-1]) - self._bias(t)
+        balance = self.equations.balance_in(self._circuit, lever, self._bias(t))
         return np.concatenate([balance, self._air.rates * (in_air - self._air.follows(lever))])
 
     def change(self, x: Array, changes: Array, rate: float) -> Array:
@@ -136,8 +135,7 @@ class TransientProblem:
     def residual_change(self, x: Array, changes: Array) -> Array:
         """Return how `residual` changes with the unknowns (rows, 1, k), to first order."""
         (lever, _), (moved, in_air) = self.parts(x), self.parts(changes)
-        residual = self.equations.balance_change(lever, moved)
-        residual[-1] = self._circuit.bias(moved[-1], residual[-1])
+        residual = self.equations.balance_change_in(self._circuit, lever, moved)
         lag = self._air.rates * (in_air[:, 0] - self._air.follows(moved[:, 0]))
         return np.concatenate([residual, lag[:, None]])
 

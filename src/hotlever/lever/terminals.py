@@ -1,0 +1,102 @@
+"""The terminals in the equations of a lever.
+
+Each terminal gives its potential V one equation, and the leg end there the temperature at which the
+chip holds it:
+
+=======  =========================================  ===========================================
+kind     what it is                                 equation of the potential
+=======  =========================================  ===========================================
+ground   wired to ground, nothing between           V = 0, no unknown
+held     a supply of its own, of a voltage behind   one unknown, the same all over the contact;
+         a resistor or of a current, or a ground    current into the lever I = J − G V
+         behind a resistor (Norton)
+sense    floating                                   no current density; V is the mean over it
+swept    the supply that is swept                   V_l, the last unknown: a constraint selects
+                                                    a state, or the circuit V_l + R_s I_h = V_b
+=======  =========================================  ===========================================
+
+Which terminals are what is a matter of the space, whose unknowns depend on it; what is behind them
+and how warm the leg ends are is one of the circuit.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+
+import numpy as np
+
+from hotlever.lever.space import Space
+from hotlever.probe.circuit import Circuit
+from hotlever.types import Array
+
+
+class Terminals:
+    """What is wired to the terminals of a lever, in its equations; see the module's text.
+
+    Parameters
+    ----------
+    space : Space
+    circuit : Circuit
+
+    Attributes
+    ----------
+    conductance : ndarray, shape (contacts,)
+        G of the held terminals (mA/V).
+    source_mA : ndarray, shape (contacts,)
+        J of the held terminals.
+    end_rises : dict of str to float
+        How much warmer than the base temperature leg ends are (K), if they are.
+    """
+
+    def __init__(self, space: Space, circuit: Circuit) -> None:
+        self._space = space
+        self.conductance, self.source_mA = circuit.norton(space.wired)
+        self.end_rises = circuit.end_rises()
+
+    def scaled(self, sources: float, rises: float) -> Terminals:
+        """Return the same with so many times the sources, and the rises of leg ends."""
+        other = copy(self)
+        other.source_mA = sources * self.source_mA
+        other.end_rises = {name: rises * rise for name, rise in self.end_rises.items()}
+        return other
+
+    def add_currents(self, weak: Array, x: Array) -> None:
+        """Add what held terminals take from states (size + 1, n), G V − J, to the balances there.
+
+        Of an ideal supply both parts are large, so that the difference is taken first.
+        """
+        weak[self._space.contacts] += self._conducted(x) - self.source_mA[:, None]
+
+    def add_current_changes(self, weak: Array, change: Array) -> None:
+        """Do the same with changes of the unknowns, (size + 1, n) or (size + 1, n, k)."""
+        weak[self._space.contacts] += self._conducted(change)
+
+    def _conducted(self, x: Array) -> Array:
+        conductance = self.conductance.reshape(-1, *(1,) * (x.ndim - 1))
+        return np.asarray(conductance * x[self._space.contacts])
+
+    def power(self, x: Array, into: Array) -> Array:
+        """Return the power (mW) that supplies put into states, (n,), by the currents (mA) there.
+
+        These are the weak form of the fluxes, (size + 1, n).
+        """
+        contacts = self._space.contacts
+        return np.asarray(x[-1] * into[-1] + (x[contacts] * into[contacts]).sum(axis=0))
+
+    def warmed(self, T: Array, grad_T: Array) -> tuple[Array, Array]:
+        """Return temperatures and slopes at the points with leg ends as warm as they are held."""
+        for name, rise in self.end_rises.items():
+            value, slope = np.split(self._space.end_tests[name][..., None], [1])
+            T, grad_T = T + rise * value[0], grad_T + rise * slope
+        return T, grad_T
+
+    def held_ends(self) -> tuple[Array, Array] | None:
+        """Return values and slopes of the function that is one at leg ends of their own warmth.
+
+        These do not move with the base temperature; None without any.
+        """
+        if not self.end_rises:
+            return None
+        tests = [self._space.end_tests[name][..., None] for name in self.end_rises]
+        value, slope = np.split(np.sum(tests, axis=0), [1])
+        return value[0], slope
