@@ -97,7 +97,9 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
     """
     reports = error.errors(include_url=False)
     first = min(reports, key=lambda report: report["type"] != "extra_forbidden")
-    key = shown(".".join(map(str, first["loc"])), _LONGEST_KEY)
+    # where a number or a word may stand, pydantic adds which of them it has tried
+    path = [part for part in first["loc"] if part not in ("float", "constrained-float")]
+    key = shown(".".join(map(str, path)), _LONGEST_KEY)
     if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
         return unknown_name("key", key, record.model_fields, where)
     if first["type"] == "missing":

@@ -196,6 +196,15 @@ def test_what_a_silicon_leaves_out_is_that_of_the_reference_probe():
         assert material_of({"kind": made.kind}, kind) == made
 
 
+def test_the_papers_material_has_each_parameter_of_its_two_kinds():
+    kinds = OPTION_III.kinds.values()
+    assert set(type(OPTION_III).model_fields) == {name for kind in kinds for name in kind.declared}
+    for kind in kinds:
+        assert {name: getattr(OPTION_III, name) for name in kind.declared} == {
+            name: getattr(kind, name) for name in kind.declared
+        }
+
+
 def test_the_paper_varies_six_parameters_and_every_kind_its_own():
     assert list(PARAMETERS) == ["c_kappa", "delta", "n_d", "p", "a0", "a1"]
     for made in MADE.values():
@@ -221,7 +230,8 @@ def test_the_paper_varies_six_parameters_and_every_kind_its_own():
         ({"kind": "dielectric", "kappa": -1.0}, "kappa = -1.0: input should be greater"),
         ({"kind": "n-silicon", "n_d": 1e25}, "n_d = 1e+25: input should be less"),
         ({"kind": "p-silicon", "a0": 1e-3}, "unknown key 'a0'"),
-        ({"kind": "n-silicon", "c_kappa": "thicknes"}, "c_kappa"),
+        ({"kind": "n-silicon", "c_kappa": "thicknes"}, "here: c_kappa = 'thicknes': input should"),
+        ({"kind": "n-silicon", "c_kappa": -1.0}, "here: c_kappa = -1.0: input should be greater"),
     ],
 )
 def test_bad_sections_are_refused_in_one_line(values, text):

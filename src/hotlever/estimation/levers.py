@@ -11,8 +11,13 @@ from scipy.special import chdtri
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
 from hotlever.estimation.result import Fit
-from hotlever.materials import PARAMETERS
-from hotlever.materials.parameters import INVERSION, heading, parameter_named, scale_of
+from hotlever.materials.parameters import (
+    INVERSION,
+    heading,
+    is_of_material,
+    parameter_named,
+    scale_of,
+)
 from hotlever.text import aligned, value_with_error
 
 #: Levers are said to differ if equal ones would scatter as much less often than this.
@@ -105,7 +110,7 @@ def _quantities(fit: Fit) -> dict[str, tuple[float, float | None]]:
     quantities = {
         name: (fitted.value, fitted.stderr)
         for name, fitted in fit.parameters.items()
-        if name in PARAMETERS or "." in name
+        if is_of_material(name)
     }
     if np.isfinite(fit.inversion_temperature_K):
         quantities[INVERSION] = fit.inversion_temperature_K, fit.inversion_temperature_stderr_K

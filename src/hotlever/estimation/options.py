@@ -8,8 +8,8 @@ from typing import Any, Literal, cast, get_args
 
 from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError, unknown_name
-from hotlever.materials import PARAMETERS, parameter
-from hotlever.materials.parameters import is_of_material
+from hotlever.materials import PARAMETERS
+from hotlever.materials.parameters import OF_SILICON, is_of_material
 from hotlever.probe import Probe
 from hotlever.probe.parameters import (
     heat_capacities,
@@ -81,7 +81,7 @@ class FitOptions:
     def __post_init__(self) -> None:
         for name in self.fixed:
             if not is_of_material(name):
-                parameter(name)
+                raise unknown_name("parameter", name, OF_SILICON)
             for others, what in ((self.priors, "has a prior"), (self.free, "is free")):
                 if name in others:
                     raise InputError(f"{name} is fixed and {what}, expected one of them")

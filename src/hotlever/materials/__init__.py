@@ -1,15 +1,14 @@
 """Material laws, the doping profile, and the published parameter sets."""
 
-from hotlever.materials.kinds import KINDS, Kind, Material
+from hotlever.materials.kinds import KINDS, Kind
 from hotlever.materials.parameters import (
     HIGH_DOPED,
     LOW_DOPED,
     PARAMETERS,
     Parameter,
     full_name,
-    parameter,
 )
-from hotlever.materials.presets import PUBLISHED, REFERENCE, published
+from hotlever.materials.presets import PUBLISHED, REFERENCE, Material, published
 
 __all__ = [
     "HIGH_DOPED",
@@ -22,6 +21,5 @@ __all__ = [
     "Material",
     "Parameter",
     "full_name",
-    "parameter",
     "published",
 ]

@@ -3,15 +3,19 @@
 A material of a kind gives thermal and electrical conductivity with exact derivatives by the
 temperature, by its own parameters and, where it is doped, by the local doping. The laws are those
 of the modules beside this one; here is said which kind follows which, and with which parameters.
+
+A property that all materials have is a method of `Kind`, and a method of each family that says by
+which law. A parameter is a row of `hotlever.materials.parameters` and a field of the kinds that
+have it: what a fit may vary, probe files and ``[material]`` follow from these.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hotlever.errors import InputError
 from hotlever.materials.films import (
@@ -24,13 +28,11 @@ from hotlever.materials.heat import enthalpy, enthalpy_by_capacity
 from hotlever.materials.laws import FORMULA_TO, Evaluated, Law
 from hotlever.materials.p_silicon import conductivity_p, inversion_temperature_p
 from hotlever.materials.parameters import (
-    HIGH_DOPED,
-    LOW_DOPED,
     OF_DIELECTRIC,
     OF_METAL,
     OF_SILICON,
     Parameter,
-    bounded,
+    field_of,
 )
 from hotlever.materials.silicon import (
     MELTING_POINT,
@@ -49,17 +51,11 @@ BY_THICKNESS = "thickness"
 _LEAST_LEFT = 0.1
 
 
-def _impurity_exponent() -> Any:
-    return bounded(
-        OF_SILICON["impurity_exponent"],
-        default=0.0,
-        description="mobility limited by impurities rises as (T / 300 K) to this power; 0: Eq. 9",
-    )
-
-
 class Kind(Record):
     """A material of one kind (section ``[materials.NAME]`` of a probe file)."""
 
+    #: The parameters of its family, of which it has those that are its fields.
+    family: ClassVar[dict[str, Parameter]]
     #: All parameters that one of this kind may have, by name.
     declared: ClassVar[dict[str, Parameter]]
     #: Those that a fit varies unless it is told otherwise.
@@ -68,6 +64,14 @@ class Kind(Record):
     conducts: ClassVar[bool] = True
 
     kind: str
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **options: Any) -> None:
+        """Find the parameters among the fields."""
+        super().__pydantic_init_subclass__(**options)
+        family = getattr(cls, "family", {})
+        cls.declared = {name: family[name] for name in family if name in cls.model_fields}
+        cls.usual = tuple(name for name, parameter in cls.declared.items() if parameter.usual)
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -121,12 +125,14 @@ class Kind(Record):
 class Silicon(Kind):
     """What all kinds of silicon have in common."""
 
-    c_kappa: float | Literal["thickness"] = Field(
+    family: ClassVar = OF_SILICON
+
+    c_kappa: Annotated[float, field_of(OF_SILICON["c_kappa"])] | Literal["thickness"] = Field(
         union_mode="left_to_right",
         description=f'scale of the thermal conductivity; or "{BY_THICKNESS}": it follows from the '
         "thickness",
     )
-    heat_capacity_scale: float = bounded(OF_SILICON["heat_capacity_scale"], default=1.0)
+    heat_capacity_scale: float = field_of(OF_SILICON["heat_capacity_scale"])
 
     def end(self, name: str) -> str:
         """Say what happens to a material of this name above its highest temperature."""
@@ -176,19 +182,14 @@ class Stored(Kind):
 class LowDopedSilicon(Silicon):
     """Silicon whose carriers are those of its dopant and, when hot, its own."""
 
-    declared: ClassVar = {
-        name: OF_SILICON[name]
-        for name in ("c_kappa", "delta", "n_d", "p", "impurity_exponent", "heat_capacity_scale")
-    }
-    usual: ClassVar = ("c_kappa", "delta", "n_d", "p")
     #: Laws by temperature, doping, p and the impurity exponent; and where σ is least.
     conductivity: ClassVar[Law]
     inversion: ClassVar[Callable[..., Array]]
 
-    delta: float = bounded(OF_SILICON["delta"])
-    n_d: float = bounded(OF_SILICON["n_d"])
-    p: float = bounded(OF_SILICON["p"])
-    impurity_exponent: float = _impurity_exponent()
+    delta: float = field_of(OF_SILICON["delta"])
+    n_d: float = field_of(OF_SILICON["n_d"])
+    p: float = field_of(OF_SILICON["p"])
+    impurity_exponent: float = field_of(OF_SILICON["impurity_exponent"])
 
     @property
     def laws(self) -> tuple[Law, ...]:
@@ -229,15 +230,10 @@ class PSilicon(LowDopedSilicon):
 class HighDopedSilicon(Silicon):
     """Quasi-metallic silicon; its dopant diffuses into low-doped silicon beside it."""
 
-    declared: ClassVar = {
-        name: OF_SILICON[name] for name in ("c_kappa", "a0", "a1", "n_hd", "heat_capacity_scale")
-    }
-    usual: ClassVar = ("c_kappa", "a0", "a1")
-
     kind: Literal["high-doped-silicon"] = "high-doped-silicon"
-    a0: float = bounded(OF_SILICON["a0"])
-    a1: float = bounded(OF_SILICON["a1"])
-    n_hd: float = bounded(OF_SILICON["n_hd"], default=2.2e20)
+    a0: float = field_of(OF_SILICON["a0"])
+    a1: float = field_of(OF_SILICON["a1"])
+    n_hd: float = field_of(OF_SILICON["n_hd"])
 
     def impossible(self, coldest_K: float) -> str:
         """Say that the straight line of Eq. 11 falls to nothing below 300 K, if it does."""
@@ -262,15 +258,14 @@ class HighDopedSilicon(Silicon):
 class MetalFilm(Stored):
     """A metal film; the values of a bulk metal are where a fit may start."""
 
-    declared: ClassVar = OF_METAL
-    usual: ClassVar = ("resistivity", "tcr")
+    family: ClassVar = OF_METAL
 
     kind: Literal["metal-film"] = "metal-film"
     preset: str | None = Field(default=None, description="metal whose values those left out are")
-    resistivity: float = bounded(OF_METAL["resistivity"])
-    tcr: float = bounded(OF_METAL["tcr"])
-    lorenz_ratio: float = bounded(OF_METAL["lorenz_ratio"], default=1.0)
-    kappa: float | None = bounded(
+    resistivity: float = field_of(OF_METAL["resistivity"])
+    tcr: float = field_of(OF_METAL["tcr"])
+    lorenz_ratio: float = field_of(OF_METAL["lorenz_ratio"])
+    kappa: float | None = field_of(
         OF_METAL["kappa"],
         default=None,
         description="thermal conductivity (W cm⁻¹ K⁻¹); left out: by Wiedemann and Franz",
@@ -312,16 +307,15 @@ class MetalFilm(Stored):
 class Dielectric(Stored):
     """An insulator, which carries heat alone."""
 
-    declared: ClassVar = OF_DIELECTRIC
-    usual: ClassVar = ("kappa",)
+    family: ClassVar = OF_DIELECTRIC
     conducts: ClassVar = False
 
     kind: Literal["dielectric"] = "dielectric"
     preset: str | None = Field(
         default=None, description="dielectric whose values those left out are"
     )
-    kappa: float = bounded(OF_DIELECTRIC["kappa"])
-    kappa_exponent: float = bounded(OF_DIELECTRIC["kappa_exponent"], default=0.0)
+    kappa: float = field_of(OF_DIELECTRIC["kappa"])
+    kappa_exponent: float = field_of(OF_DIELECTRIC["kappa_exponent"])
 
     @property
     def laws(self) -> tuple[Law, ...]:
@@ -347,40 +341,3 @@ KINDS: dict[str, type[Kind]] = {
     kind.model_fields["kind"].default: kind
     for kind in (NSilicon, PSilicon, HighDopedSilicon, MetalFilm, Dielectric)
 }
-
-
-class Material(Record):
-    """Parameters of the laws in Eqs. 4 to 11 (section ``[material]`` of a probe file).
-
-    They make two kinds of silicon that share c_κ: the n-doped one of heater and reader, and the
-    high-doped one around it.
-    """
-
-    c_kappa: float = bounded(OF_SILICON["c_kappa"])
-    delta: float = bounded(OF_SILICON["delta"])
-    n_d: float = bounded(OF_SILICON["n_d"])
-    p: float = bounded(OF_SILICON["p"])
-    a0: float = bounded(OF_SILICON["a0"])
-    a1: float = bounded(OF_SILICON["a1"])
-    n_hd: float = bounded(OF_SILICON["n_hd"], default=2.2e20)
-    impurity_exponent: float = _impurity_exponent()
-    heat_capacity_scale: float = bounded(OF_SILICON["heat_capacity_scale"], default=1.0)
-
-    @model_validator(mode="after")
-    def _heater_is_the_low_doped_part(self) -> Material:
-        if self.n_d >= self.n_hd:
-            raise ValueError(f"n_d = {self.n_d:g} must be below n_hd = {self.n_hd:g}")
-        return self
-
-    @property
-    def kinds(self) -> dict[str, Kind]:
-        """The two kinds of silicon, by `LOW_DOPED` and `HIGH_DOPED`."""
-        values = dict(self)
-        made: dict[str, type[Kind]] = {LOW_DOPED: NSilicon, HIGH_DOPED: HighDopedSilicon}
-        # unchecked, since the values are checked already: fits make many
-        return {
-            name: kind.model_construct(
-                **{own: values[own] for own in kind.model_fields if own in values}
-            )
-            for name, kind in made.items()
-        }

@@ -1,7 +1,9 @@
 """The table of all parameters of materials: unit, bounds, scale and what is known beforehand.
 
-Kinds of material say which of them they have, probes add their dimensions, circuit and gas
-(`hotlever.probe.parameters`), and texts and axes ask here how a parameter is named.
+A new parameter of a material is a row here and a field of its kinds (`hotlever.materials.kinds`),
+made of the row by `field_of`; whatever asks for parameters meets it then. Probes add their
+dimensions, circuit and gas (`hotlever.probe.parameters`), and texts and axes ask here how a
+parameter is named.
 """
 
 from __future__ import annotations
@@ -13,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from hotlever.errors import unknown_name
 from hotlever.spieser2017 import PUBLISHED_VALUES
 
 INVERSION = "inversion_temperature"
@@ -51,8 +52,10 @@ class Parameter(NamedTuple):
         Whether that is a share of the value: a standard deviation of the logarithm.
     in_time : bool
         Whether it counts in time only.
+    usual : bool
+        Whether a fit varies it unless it is told otherwise.
     value : float
-        What it is in a probe.
+        What it is in a probe, or where a probe file leaves it out; NaN if that must state it.
     """
 
     name: str
@@ -65,6 +68,7 @@ class Parameter(NamedTuple):
     spread: float | None = None
     relative: bool = True
     in_time: bool = False
+    usual: bool = False
     value: float = math.nan
 
     @property
@@ -96,7 +100,7 @@ def _table(*rows: Parameter) -> dict[str, Parameter]:
 #: All parameters of silicon: first the six that the paper fits, in its order.
 OF_SILICON = _table(
     *(
-        Parameter(*row, spread=_KNOWN[row[0]])
+        Parameter(*row, spread=_KNOWN[row[0]], usual=True)
         for row in (
             ("c_kappa", "c_κ", "1", 1.0, 0.1, 1.5, "scale of the thermal conductivity"),
             ("delta", "Δ", "µm", 1.0, 0.05, 2.0, "diffusion length of the doping profile"),
@@ -109,32 +113,41 @@ OF_SILICON = _table(
     Parameter(
         *("n_hd", "n_hd", "cm⁻³", 1e20, 2e18, 5e21),
         "doping concentration of the high-doped silicon",
+        value=2.2e20,
     ),
     Parameter(
         *("impurity_exponent", "s", "1", 10.0, -2.0, 4.0),
-        "power of the temperature in mobility limited by impurities",
+        "power of T / 300 K in mobility limited by impurities; 0: Eq. 9",
         spread=_IMPURITIES,
         relative=False,
+        value=0.0,
     ),
     Parameter(
         *("heat_capacity_scale", "c_h", "1", 1.0, 0.5, 1.5),
         "scale of the heat capacity, which counts in time",
         in_time=True,
+        value=1.0,
     ),
 )
-#: The six fit parameters in the paper's order.
-PARAMETERS = {name: OF_SILICON[name] for name in PUBLISHED_SCATTER}
+#: The six fit parameters of the paper, in its order.
+PARAMETERS = {name: parameter for name, parameter in OF_SILICON.items() if parameter.usual}
 #: Of metal films. With any of these temperature coefficients the resistivity stays positive.
 OF_METAL = _table(
-    Parameter("resistivity", "ρ₂₉₃", "Ω cm", 1e-5, 1e-6, 1e-3, "resistivity at 293 K", _FILM),
+    Parameter(
+        *("resistivity", "ρ₂₉₃", "Ω cm", 1e-5, 1e-6, 1e-3, "resistivity at 293 K"),
+        spread=_FILM,
+        usual=True,
+    ),
     Parameter(
         *("tcr", "α", "K⁻¹", 1e-3, -5e-4, 5e-3),
         "temperature coefficient of the resistivity",
         spread=_FILM,
+        usual=True,
     ),
     Parameter(
         *("lorenz_ratio", "L/L₀", "1", 1.0, 0.2, 5.0),
         "heat carried over what Wiedemann and Franz give",
+        value=1.0,
     ),
     Parameter("kappa", "κ", "W cm⁻¹ K⁻¹", 0.01, 0.01, 5.0, "thermal conductivity"),
 )
@@ -143,38 +156,30 @@ OF_DIELECTRIC = _table(
         *("kappa", "κ₃₀₀", "W cm⁻¹ K⁻¹", 0.01, 1e-3, 1.0),
         "thermal conductivity at 300 K",
         spread=_FILM,
+        usual=True,
     ),
-    Parameter("kappa_exponent", "m", "1", 1.0, -1.5, 1.5, "power of the temperature in it"),
+    Parameter(
+        *("kappa_exponent", "m", "1", 1.0, -1.5, 1.5),
+        "power of the temperature in it",
+        value=0.0,
+    ),
 )
 
 
-def bounded(parameter: Parameter, **others: Any) -> Any:
-    """Return the field of a record for a parameter: what it is, and its bounds.
+def field_of(parameter: Parameter, **others: Any) -> Any:
+    """Return the field of a record for a parameter: what it is, its bounds, and its value if any.
 
-    They are twice as wide as a fit's; those of what may be negative are the fit's own.
+    The bounds are twice as wide as a fit's; those of what may be negative are the fit's own.
     """
     widened = 1.0 if parameter.lower < 0 else 2.0
-    meaning = f"{parameter.meaning}, {parameter.symbol} ({parameter.unit})"
-    bounds = {"ge": parameter.lower / widened, "le": widened * parameter.upper}
-    return Field(**{"description": meaning, **bounds, **others})
-
-
-def parameter(name: str) -> Parameter:
-    """Return the fit parameter of this name.
-
-    Raises
-    ------
-    InputError
-        If there is none; the text gives the nearest one.
-
-    Examples
-    --------
-    >>> parameter("a0").unit
-    'Ω cm'
-    """
-    if name not in PARAMETERS:
-        raise unknown_name("parameter", name, PARAMETERS)
-    return PARAMETERS[name]
+    stated = {
+        "description": f"{parameter.meaning}, {parameter.symbol} ({parameter.unit})",
+        "ge": parameter.lower / widened,
+        "le": widened * parameter.upper,
+    }
+    if not math.isnan(parameter.value):
+        stated["default"] = parameter.value
+    return Field(**{**stated, **others})
 
 
 # --- names --------------------------------------------------------------------------------------
@@ -220,11 +225,13 @@ def parameter_named(name: str) -> Parameter:
     --------
     >>> parameter_named("heater_width_um").symbol, parameter_named("heater_width_um").unit
     ('heater width', 'µm')
+    >>> parameter_named("n_hd").unit
+    'cm⁻³'
     >>> parameter_named("film.tcr").symbol, parameter_named("film.tcr").unit
     ('α (film)', 'K⁻¹')
     """
-    if name in PARAMETERS:
-        return PARAMETERS[name]
+    if name in OF_SILICON:
+        return OF_SILICON[name]
     material, _, own = name.rpartition(".")
     if material and (declared := (OF_DIELECTRIC | OF_METAL | OF_SILICON).get(own)):
         return declared._replace(

@@ -1,4 +1,4 @@
-"""Published values of materials: those of the paper, of metals and of dielectrics."""
+"""Published values of materials: the paper's two kinds of silicon, metals and dielectrics."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic import create_model, model_validator
+
 from hotlever.errors import unknown_name
 from hotlever.materials.films import SOMMERFELD
-from hotlever.materials.kinds import KINDS, Material
+from hotlever.materials.kinds import KINDS, HighDopedSilicon, Kind, NSilicon
+from hotlever.materials.parameters import HIGH_DOPED, LOW_DOPED, OF_SILICON, field_of
+from hotlever.records import Record
 from hotlever.spieser2017 import (
     FITTED_OBSERVABLES,
     INVERSION_TEMPERATURES_K,
@@ -71,8 +75,40 @@ PRESETS: dict[str, Preset] = {
     ),
 }
 
-#: Lattice mobility exponent of holes; Arora et al., IEEE Trans. Electron Devices 29, 292 (1982).
-_HOLES = 2.23
+#: What kinds of silicon have in place of the paper's values. Lattice mobility exponent of holes:
+#: Arora et al., IEEE Trans. Electron Devices 29, 292 (1982).
+_OF_THEIR_OWN = {"p-silicon": {"p": 2.23}}
+
+# --- the paper's silicon --------------------------------------------------------------------------
+
+_FIELDS: Any = {name: (float, field_of(parameter)) for name, parameter in OF_SILICON.items()}
+#: A record with a number for each parameter of silicon.
+_Numbers: Any = create_model("_Numbers", __base__=Record, __module__=__name__, **_FIELDS)
+
+
+class Material(_Numbers):
+    """Parameters of the laws in Eqs. 4 to 11 (section ``[material]`` of a probe file).
+
+    They are a preset of two kinds of silicon that share what both have: the n-doped one of heater
+    and reader, and the high-doped one around it.
+    """
+
+    @model_validator(mode="after")
+    def _heater_is_the_low_doped_part(self) -> Material:
+        if self.n_d >= self.n_hd:
+            raise ValueError(f"n_d = {self.n_d:g} must be below n_hd = {self.n_hd:g}")
+        return self
+
+    @property
+    def kinds(self) -> dict[str, Kind]:
+        """The two kinds of silicon, by `LOW_DOPED` and `HIGH_DOPED`."""
+        values = dict(self)
+        made: dict[str, type[Kind]] = {LOW_DOPED: NSilicon, HIGH_DOPED: HighDopedSilicon}
+        # unchecked, since the values are checked already: fits make many
+        return {
+            name: kind.model_construct(**{own: values[own] for own in kind.declared})
+            for name, kind in made.items()
+        }
 
 
 @dataclass(frozen=True)
@@ -123,7 +159,5 @@ def published(name: str) -> PublishedSet:
 
 def usual_values(kind: str) -> dict[str, Any]:
     """Return the values that parameters of a kind have where a probe file leaves them out."""
-    if not kind.endswith("silicon"):
-        return {}
-    values = REFERENCE.model_dump() | ({"p": _HOLES} if kind == "p-silicon" else {})
-    return {name: values[name] for name in KINDS[kind].declared}
+    values = REFERENCE.model_dump() | _OF_THEIR_OWN.get(kind, {})
+    return {name: values[name] for name in KINDS[kind].declared if name in values}

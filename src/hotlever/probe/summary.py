@@ -6,6 +6,7 @@ from hotlever.probe.layout import Layout, Taper
 from hotlever.probe.mesh import ProbeMesh
 from hotlever.probe.probe import Probe
 from hotlever.probe.shapes import DRAWING
+from hotlever.records import Record
 
 
 def probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
@@ -40,7 +41,7 @@ def probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
 
 def _materials(probe: Probe) -> list[str]:
     """Return the values of what a probe is made of, a line for each material."""
-    plain = {"material": probe.material} if probe.has_plain_silicon else {}
+    plain: dict[str, Record] = {"material": probe.material} if probe.has_plain_silicon else {}
     lines = []
     for name, material in {**plain, **probe.materials}.items():
         values = [
