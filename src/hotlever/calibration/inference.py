@@ -158,11 +158,10 @@ def calibrated_by_estimate(
     if own.knee is None:
         own = vacuum if medium == "vacuum" else lever.in_medium(medium).branch()
     knee, threshold = knee_with_errors(estimate, own), vacuum.knee
-    law, residual, k, k_stderr, turns = None, np.nan, np.nan, np.nan, ""
-    if circuit.starts_cold:
-        turns = power_turns(own, medium) or power_turns(vacuum, "vacuum")
+    law, residual, k, k_stderr = None, np.nan, np.nan, np.nan
+    turns = power_turns(own, medium) or power_turns(vacuum, "vacuum")
     # with held supplies, or where the power turns, the tip does not follow from a power
-    by_power = circuit.starts_cold and not turns
+    by_power = own.starts_cold and not turns
     if own.knee is None or (by_power and threshold is None):
         notes.append(f"the model has no knee below {vacuum.hottest_K:.0f} K; none is needed")
     elif by_power and medium == "vacuum":
@@ -212,7 +211,7 @@ def _verdict(estimate: Estimate, priors: Mapping[str, PriorUse]) -> tuple[bool, 
 
 def _tips(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
     """Return the tip temperatures of a branch at the measured power; or bias, if not that tells."""
-    if circuit.starts_cold and branch.power_turns_K is None:
+    if branch.starts_cold and branch.power_turns_K is None:
         return branch.tip_temperature(circuit.power(measured.bias_V, measured.current_mA))
     return branch.tip_K(branch.read(circuit, measured.bias_V).u)
 

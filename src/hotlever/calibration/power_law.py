@@ -284,8 +284,8 @@ def law_of_model(vacuum: Branch, threshold_mW: float | None) -> tuple[PowerLaw, 
 
 
 def power_turns(branch: Branch, medium: str) -> str:
-    """Say where the power of a lever turns in a medium; empty if it does not."""
-    turn = branch.power_turns_K
+    """Say where the power of a lever that starts cold turns in a medium; empty if it does not."""
+    turn = branch.power_turns_K if branch.starts_cold else None
     if turn is None:
         return ""
     return (

@@ -102,13 +102,13 @@ class Rows:
     def _nearest(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
         """Return the states nearest to what was measured; see `states`."""
         curve = branch.bias_by_u(circuit)
-        cold = branch.equations.circuit.starts_cold
+        cold = branch.starts_cold
         start = float(branch.u[0])
         level = np.sort(curve.derivative().roots())
         ends = [start, *level[(level > start) & (level < branch.end_u)].tolist(), branch.end_u]
         # a cold lever is told apart from itself by the size of the bias only, and has none without
         bias = np.abs(self.bias_V) if cold else self.bias_V
-        heated = np.flatnonzero(branch.equations.circuit.heats(bias))
+        heated = np.flatnonzero((bias > 0) | (not cold))
         u, distance = np.zeros(bias.shape), np.full(bias.shape, np.inf)
         u[heated] = np.nan
         short = np.ones(bias.shape)

@@ -196,9 +196,9 @@ class ResultFile(Section):
 
     @model_validator(mode="after")
     def _bias_heats_the_lever(self, info: ValidationInfo) -> Self:
-        cold_at_rest = self.probe.circuit.starts_cold and self.data.time_us is None
-        if cold_at_rest and not np.all(self.data.columns["V_b"] >= 0):
-            raise InputError(f"{info.context}: data: V_b: expected biases of 0 or more")
+        lowest = self.probe.circuit.lowest_bias_V if self.data.time_us is None else -np.inf
+        if np.isfinite(lowest) and not np.all(self.data.columns["V_b"] >= lowest):
+            raise InputError(f"{info.context}: data: V_b: expected biases of {lowest:g} or more")
         return self
 
     def attributes_of(self, kind: Any) -> dict[str, Any]:

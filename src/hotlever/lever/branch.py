@@ -109,7 +109,7 @@ class Branch(SolvedStates):
     @cached_property
     def parametrisation(self) -> Parametrisation:
         """What a place on the branch of a similar lever has in common with one on this."""
-        if self.equations.circuit.starts_cold:
+        if self.starts_cold:
             return NATURAL
         return self.places or PseudoArclength(self.path)
 

@@ -316,7 +316,7 @@ def at_places_of(similar: Branch, branch: Branch) -> Branch:
         If a state was not found.
     """
     equations, places = branch.equations, similar.parametrisation
-    if equations.circuit.starts_cold:
+    if branch.starts_cold:
         return branch
     u = np.linspace(branch.u[0], branch.u[-1], _LOOKED_AT * branch.u.size)
     away = branch.path(u) - similar.path(similar.u)[:, None]

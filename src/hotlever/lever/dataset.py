@@ -233,9 +233,10 @@ def checked_bias(bias: ArrayLike, circuit: Circuit) -> Array:
         another state than the positive one.
     """
     values = np.atleast_1d(np.asarray(bias, dtype=float))
-    wrong = values[~np.isfinite(values) | ((values < 0) & circuit.starts_cold)]
+    lowest = circuit.lowest_bias_V
+    wrong = values[~np.isfinite(values) | (values < lowest)]
     if wrong.size:
-        of = " of 0 or more" if circuit.starts_cold else ""
+        of = f" of {lowest:g} or more" if np.isfinite(lowest) else ""
         raise InputError(f"found a bias of {wrong[0]:g} V, expected finite biases{of}")
     if not values.size:
         raise InputError("no bias, expected one or more")

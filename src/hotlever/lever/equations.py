@@ -254,12 +254,7 @@ def _without_ends(changes: Fluxes, column: int, kappa: Array, value: Array, slop
 
 
 def steps_of(equations: LeverEquations) -> Array:
-    """Return u where the tip passes a step of a law, at which the curves bend sharply.
-
-    Of a lever that does not start cold, whose u is not of its tip, they are not known.
-    """
-    if not equations.circuit.starts_cold:
-        return np.empty(0)
+    """Return u = √(T_tip − T_base) where the tip passes a step of a law: the curves bend there."""
     laws = [law for kind in equations.made_of.values() for law in kind.laws]
     steps = sorted({T for law in laws for T in law.steps})
     rises = np.array(steps) - equations.base_temperature_K

@@ -196,7 +196,7 @@ class Linearised:
         moved, x = probe.values(self.names) - self.probe.values(self.names), self.branch.x
         if self.changes.size:
             return np.asarray(x + self.changes @ moved)
-        if not self.branch.equations.circuit.starts_cold:
+        if not self.branch.starts_cold:
             return x
         factor = np.ones(x.shape[1])
         factor[1:] += self.shown[1:, 0] @ moved / x[-1, 1:]

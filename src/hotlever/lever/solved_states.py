@@ -110,17 +110,22 @@ class SolvedStates:
 
     @cached_property
     def steps(self) -> Array:
-        """Where higher derivatives by u step."""
-        return steps_of(self.equations)
+        """Where higher derivatives by u step; not known of places that are not of the tip."""
+        return steps_of(self.equations) if self.starts_cold else np.empty(0)
+
+    @cached_property
+    def starts_cold(self) -> bool:
+        """Whether they begin at the base temperature: without a bias nothing heats the lever."""
+        return not self.x.any(axis=0).all()
 
     @property
     def solved(self) -> slice:
         """The states that were solved: all but the one without power."""
-        return slice(0 if self.x[:, 0].any() else 1, None)
+        return slice(int(self.starts_cold), None)
 
     def has_power(self, u: Array) -> NDArray[np.bool_]:
         """Return which states at some u have power, (n,): only the first one may have none."""
-        return np.asarray((u != self.u[0]) | self.x[:, 0].any())
+        return np.asarray((u != self.u[0]) | (not self.starts_cold))
 
     # --- how hot they get -------------------------------------------------------------------------
 

@@ -118,7 +118,7 @@ def _complete_in_time(
 
 def _complete_at_rest(contents: Contents, circuit: Circuit | None) -> str:
     """Complete a slow sweep, of either polarity; return the order of its rows in words."""
-    symmetric = circuit is None or circuit.starts_cold
+    symmetric = circuit is None or circuit.lowest_bias_V == 0.0
     find_bias(contents, circuit, None)
     bias = contents.values["V_b"]
     if symmetric:

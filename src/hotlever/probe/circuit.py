@@ -7,6 +7,7 @@ resistor or of a current.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Self
@@ -292,9 +293,14 @@ class Circuit(Record):
             contact.norton[1] for contact in self.contacts.values()
         )
 
-    def heats(self, bias_V: Array) -> NDArray[np.bool_]:
+    @property
+    def lowest_bias_V(self) -> float:
+        """Lowest bias (V) that is told apart from its opposite: none, where others heat as well."""
+        return 0.0 if self.starts_cold else -math.inf
+
+    def heats(self, bias_V: Array | float) -> NDArray[np.bool_]:
         """Return at which biases (V) the lever is heated: at any where others heat it as well."""
-        return (bias_V > 0) | (not self.starts_cold)
+        return (np.asarray(bias_V) > 0) | (not self.starts_cold)
 
     @property
     def is_plain(self) -> bool:

@@ -156,9 +156,10 @@ def parse_bias(text: str, circuit: Circuit | None = None) -> Array:
 
     where = f"--bias {shown(text)}"
     start, stop, count = _parse_range(text, where, "such as 1:11:25 (V)", MOST_BIASES)
-    signed = circuit is not None and not circuit.starts_cold
-    if (start < 0 and not signed) or stop < start:
-        raise InputError(f"{where}: expected {'' if signed else '0 <= '}START <= STOP")
+    lowest = 0.0 if circuit is None else circuit.lowest_bias_V
+    if start < lowest or stop < start:
+        least = f"{lowest:g} <= " if np.isfinite(lowest) else ""
+        raise InputError(f"{where}: expected {least}START <= STOP")
     if (count == 1) != (start == stop):
         raise InputError(f"{where}: COUNT 1 goes with START = STOP, more with START < STOP")
     biases = np.linspace(start, stop, count)

@@ -121,14 +121,13 @@ def _expected_rise(lever: Lever, bias: float) -> float:
 
 def initial_state(lever: Lever, waveform: Waveform) -> State:
     """Return the state at rest before a wave form."""
-    bias = waveform.before_V
-    if not lever.circuit.starts_cold:
-        return lever.solve([bias])[0]
-    if bias == 0.0:
+    circuit, bias = lever.circuit, waveform.before_V
+    polarity = -1.0 if bias < circuit.lowest_bias_V else 1.0
+    if not circuit.heats(polarity * bias):
         return State(lever, np.zeros((lever.space.size + 1, 1)))
-    (state,) = lever.solve([abs(bias)])
+    (state,) = lever.solve([polarity * bias])
     # the other polarity has the potentials reversed
-    sign = np.where(lever.space.is_temperature, 1.0, np.sign(bias))
+    sign = np.where(lever.space.is_temperature, 1.0, polarity)
     return State(lever, sign[:, None] * state.x)
 
 
