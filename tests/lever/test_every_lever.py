@@ -22,7 +22,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.reduced.training import cached_reduction
 from hotlever.lever.sensitivities import Linearised, by_parameter
-from hotlever.lever.similar import SimilarLevers
+from hotlever.lever.similar import BranchSolver, SimilarLevers
 from hotlever.lever.space import LEVER, TIP
 from hotlever.lever3d import SolidLever
 from hotlever.materials import PARAMETERS, published
@@ -57,7 +57,7 @@ class One:
         return tuple(own or PARAMETERS)
 
     @property
-    def solver(self) -> SimilarLevers | ReducedLever:
+    def solver(self) -> BranchSolver:
         """What solves it for any material."""
         known = isinstance(self.lever, ReducedLever)
         return self.lever if known else SimilarLevers(self.lever)

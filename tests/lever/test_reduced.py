@@ -175,7 +175,7 @@ def write_many_times(arguments):
     path, domain = folder / "one.npz", ParameterDomain.of(lever.probe)
     space = None
     for _ in range(count):
-        found = stored(path, lambda a: ReducedLever.from_arrays(lever.space, 293.0, domain, a))
+        found = stored(path, lambda a: ReducedLever.from_arrays(lever, domain, a))
         space = found or space
         if space is not None:
             store_arrays(path, space.arrays())
@@ -188,7 +188,8 @@ def test_two_processes_may_write_the_same_file(coarse, reduced, tmp_path):
         assert all(pool.map(write_many_times, [(tmp_path, 20)] * 2))
     domain = ParameterDomain.of(coarse.probe)
     loaded = stored(
-        tmp_path / "one.npz", lambda a: ReducedLever.from_arrays(coarse.space, 293.0, domain, a)
+        tmp_path / "one.npz",
+        lambda a: ReducedLever.from_arrays(coarse, domain, a),
     )
     assert loaded is not None
     assert [path.name for path in tmp_path.iterdir()] == ["one.npz"]

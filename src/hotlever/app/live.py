@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -107,7 +106,6 @@ class LiveLever:
     space: FullSpace
     circuit: Circuit
     branch: Branch
-    expanded: Callable[[Array], Array]
 
     @cached_property
     def curves(self) -> dict[str, Any]:
@@ -139,7 +137,7 @@ class LiveLever:
         if not np.isfinite(reading.u).all():
             raise self.branch.ended(reading)
         shown = {name: float(value[0]) for name, value in self.branch.shown(reading.u).items()}
-        x = self.expanded(self.branch.states(reading.u))
+        x = self.branch.equations.space.expanded(self.branch.states(reading.u))
         low = self.branch.base_temperature_K
         drawn, T = _map_of(self.space), self.space.nodal(x[:, 0], low, self.circuit.end_rises())[0]
         # in steps, so that colours stay the same while the lever gets a little hotter
@@ -274,7 +272,7 @@ def _read_probe(path: Path | None, stamp: float, changes: tuple[tuple[str, Any],
 @lru_cache(maxsize=_KEPT)
 def _full(report: Report, probe: Probe, most: float) -> LiveLever:
     lever = make_lever(report, probe)
-    return LiveLever(FULL, lever.space, lever.circuit, _branch(lever, most), lambda x: x)
+    return LiveLever(FULL, lever.space, lever.circuit, _branch(lever, most))
 
 
 @lru_cache(maxsize=_KEPT)
@@ -285,12 +283,11 @@ def _quick(probe: Probe, most: float, is_reduced: bool) -> LiveLever:
         full, small = reduced
         try:
             branch = small.branch(probe, Reach(probe.circuit, most))
-            expanded = small.space.expanded
-            return LiveLever(REDUCED, full.space, probe.circuit, branch, expanded)
+            return LiveLever(REDUCED, full.space, probe.circuit, branch)
         except HotleverError:
             pass  # beyond what it is made for
     lever = Lever(probe, COARSE)
-    return LiveLever(COARSE_MODEL, lever.space, probe.circuit, _branch(lever, most), lambda x: x)
+    return LiveLever(COARSE_MODEL, lever.space, probe.circuit, _branch(lever, most))
 
 
 def _can_be_reduced(probe: Probe) -> bool:

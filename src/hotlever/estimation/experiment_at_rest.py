@@ -17,17 +17,11 @@ from hotlever.estimation.experiment import TIP, Prediction, named
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.surrogate import CurveSurrogate
 from hotlever.lever.branch import TIP_RISE, Branch, Reach, shifted
-from hotlever.lever.continuation import at_places_of, continued
 from hotlever.lever.curve import spline_through
-from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import COARSE, Lever
-from hotlever.lever.newton import NewtonOptions
-from hotlever.lever.parametrisation import solve_at
-from hotlever.lever.reduced.lever import ReducedLever
-from hotlever.lever.reduced.space import ReducedSpace
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
 from hotlever.lever.sensitivities import Linearised, by_parameter
-from hotlever.lever.similar import SimilarLevers
+from hotlever.lever.similar import BranchSolver, SimilarLevers
 from hotlever.probe import Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread
@@ -35,12 +29,6 @@ from hotlever.types import Array
 
 #: How far beyond zero bias the branch of a lever goes that does not start cold: share of the range.
 _BEYOND_ZERO = 0.05
-#: States at which the full lever corrects a reduced one.
-_CORRECTED_AT = 10
-
-
-# A lever that is solved for any similar probe: full or coarse, or reduced.
-BranchSolver = SimilarLevers | ReducedLever
 
 
 @dataclass(frozen=True)
@@ -103,15 +91,12 @@ class ExperimentAtRest:
     @property
     def drawn(self) -> Probe:
         """The probe whose drawing has the meshes that others move."""
-        similar = self.fast if isinstance(self.fast, SimilarLevers) else self.full
-        assert similar is not None
-        return similar.drawn
+        return self.fast.drawn
 
     def coarse(self) -> ExperimentAtRest:
         """Return the model with a lever that is solved for any parameters, not corrected."""
-        if isinstance(self.fast, SimilarLevers):
-            return self
-        return replace(self, fast=SimilarLevers(Lever(self.drawn, COARSE)), correction=None)
+        fast = self.fast.for_any_parameters()
+        return self if fast is self.fast else replace(self, fast=fast, correction=None)
 
     def drawn_anew(self, probe: Probe) -> ExperimentAtRest:
         """Return the model on meshes of a probe's own drawing, not corrected."""
@@ -162,7 +147,7 @@ class ExperimentAtRest:
             return self
         fast, probe = at.linearised.branch, at.probe
         equations = self.full.equations(probe, self.names)
-        u, x = self._full_states(fast, equations, probe)
+        u, x = self.fast.full_states(fast, equations, self.reach(probe))
         by_fast, places = at.linearised.shown_at(u), fast.parametrisation
         values = np.zeros(by_fast.shape[:2])
         values[:, :TIP_RISE] = equations.observed(x).T - fast.curve(u)[:, :TIP_RISE]
@@ -190,21 +175,6 @@ class ExperimentAtRest:
         exact = self.confirmed(uncorrected)
         return exact, exact.predict(probe, uncorrected)
 
-    def _full_states(
-        self, fast: Branch, equations: LeverEquations, probe: Probe
-    ) -> tuple[Array, Array]:
-        """Return states of the full lever, (size + 1, k), and u of the fast one's that they match.
-
-        Few suffice to correct a reduced lever, whose errors are small and smooth.
-        """
-        space = fast.equations.space
-        if not isinstance(space, ReducedSpace):
-            branch = at_places_of(fast, continued(equations, self.reach(probe)))
-            return branch.u[branch.solved], branch.x[:, branch.solved]
-        some = np.unique(np.linspace(1, fast.u.size - 1, _CORRECTED_AT).astype(int))
-        u, guess = fast.u[some], space.expanded(fast.x[:, some])
-        return u, solve_at(equations, u, guess, NewtonOptions(tolerance=1e-5)).x
-
 
 def experiment_of(
     probe: Probe,
@@ -230,5 +200,5 @@ def experiment_of(
     names = usual_parameters(probe) if names is None else names
     if can_be_reduced(probe, names):
         reduced = cached_reduction(lever, names=names) if reduce else known_reduction(lever, names)
-    fast: BranchSolver = SimilarLevers(Lever(probe, COARSE)) if reduced is None else reduced
+    fast = reduced or SimilarLevers(Lever(probe, COARSE))
     return ExperimentAtRest(fast, SimilarLevers(lever), bias, names)

@@ -36,8 +36,6 @@ from hotlever.estimation.profile import ErrorProfile, hotter_rows
 from hotlever.estimation.result import Fit
 from hotlever.estimation.subproblem import Subproblem
 from hotlever.estimation.surrogate import ReducedSurrogate
-from hotlever.lever.lever import Lever
-from hotlever.lever.reduced.error_estimate import estimated_error
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.materials import full_name
 from hotlever.materials.parameters import INVERSION
@@ -92,11 +90,7 @@ class SampledLever:
         solved = self._experiment.predict(probe, self.at)
         surrogate = self.at.surrogate.shown(probe.values(self._experiment.names))
         error = float(np.abs(surrogate - solved.values)[TIP].max())
-        if isinstance(self._experiment.fast, ReducedLever):
-            branch = solved.linearised.branch
-            u = branch.u[np.linspace(1, branch.u.size - 1, 4).astype(int)]
-            error += float(estimated_error(Lever(probe), branch, u)[TIP].max())
-        return error
+        return error + self._experiment.fast.tip_error_K(probe, solved.linearised.branch)
 
 
 # --- the tip of a calibration -------------------------------------------------------------------

@@ -1,14 +1,15 @@
-"""Levers of similar probes on one mesh, which moves with their dimensions."""
+"""Levers of similar probes: what solves them all, and one mesh that moves with their dimensions."""
 
 from __future__ import annotations
 
 from copy import copy
 from functools import cached_property
+from typing import Protocol, Self
 
 from hotlever.air.coupling import AirLoss
 from hotlever.air.operator import change_with_gap
 from hotlever.lever.branch import Branch, Reach
-from hotlever.lever.continuation import continued
+from hotlever.lever.continuation import at_places_of, continued
 from hotlever.lever.equations import GAP, LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever
@@ -22,6 +23,42 @@ from hotlever.probe.moving import MovingMesh
 from hotlever.probe.parameters import dimensions_of, usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
+
+
+class BranchSolver(Protocol):
+    """Solves the branch of any similar probe: a lever as it is, on a coarse mesh, or reduced."""
+
+    @property
+    def drawn(self) -> Probe:
+        """The probe whose drawing has the mesh."""
+        ...
+
+    def linearised(
+        self,
+        probe: Probe,
+        reach: Reach,
+        near: Linearised | None = None,
+        names: tuple[str, ...] | None = None,
+    ) -> Linearised:
+        """Solve the branch of a probe, with its derivatives; see `SimilarLevers.linearised`."""
+        ...
+
+    def for_any_parameters(self) -> BranchSolver:
+        """Return what solves levers far away too, for which this may not be made."""
+        ...
+
+    def full_states(
+        self, branch: Branch, equations: LeverEquations, reach: Reach
+    ) -> tuple[Array, Array]:
+        """Return u of states of a branch of this lever, (k,), and those of another's equations.
+
+        These, (size + 1, k), are as many as it takes to see by how much the branches differ.
+        """
+        ...
+
+    def tip_error_K(self, probe: Probe, branch: Branch) -> float:
+        """Return by how much tips on a branch of it may be off its equations' at a fixed bias."""
+        ...
 
 
 class SimilarLevers:
@@ -62,6 +99,21 @@ class SimilarLevers:
         dimensions = [name for name in names if name in dimensions_of(probe)]
         motions = {name: motion_of(space, self._moving.movement(name)) for name in dimensions}
         return LeverEquations(space, probe.kinds, probe.circuit, motions)
+
+    def for_any_parameters(self) -> Self:
+        """See `BranchSolver`."""
+        return self
+
+    def full_states(
+        self, branch: Branch, equations: LeverEquations, reach: Reach
+    ) -> tuple[Array, Array]:
+        """See `BranchSolver`."""
+        other = at_places_of(branch, continued(equations, reach))
+        return other.u[other.solved], other.x[:, other.solved]
+
+    def tip_error_K(self, probe: Probe, branch: Branch) -> float:
+        """See `BranchSolver`: its states are solved."""
+        return 0.0
 
     def _space(self, probe: Probe, names: tuple[str, ...] = ()) -> FullSpace:
         """Return mesh, operators and air of a similar probe, for derivatives by some names."""

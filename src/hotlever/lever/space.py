@@ -335,6 +335,10 @@ class Space(ABC):
             return np.full(x.shape[1:], np.nan)
         return _combined(x, *self.reader)
 
+    def expanded(self, x: Array) -> Array:
+        """Return states of the full lever: those of modes in terms of its own unknowns."""
+        return x
+
     @abstractmethod
     def rises(self, x: Array) -> Array:
         """Return rises of the temperature (K), the highest among them, (places, n), of states."""

@@ -13,7 +13,6 @@ from hotlever.lever.branch import TIP_RISE, Branch
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import Lever
 from hotlever.lever.parametrisation import Constrained
-from hotlever.lever.reduced.space import ReducedSpace
 from hotlever.lever.sensitivities import at_fixed_bias
 from hotlever.lever.space import TIP
 from hotlever.threads import one_blas_thread
@@ -43,11 +42,8 @@ def estimated_error(lever: Lever, branch: Branch, u: Array) -> Array:
     ndarray, shape (3, n)
         Bounds on the errors of I_h (mA), V_r (V) and T_tip (K).
     """
-    space = branch.equations.space
-    assert isinstance(space, ReducedSpace)
     equations = LeverEquations(lever.space, branch.equations.materials, lever.circuit)
-    reduced = branch.states(u)
-    x, every = space.expanded(reduced), np.arange(u.size)
+    x, every = branch.equations.space.expanded(branch.states(u)), np.arange(u.size)
     problem = Constrained(equations, TIP, u**2)
     factors = problem.factorised(x, every)
     first = x - factors.solve(problem.residual(x, every), every)

@@ -15,12 +15,14 @@ import numpy as np
 
 from hotlever.lever.branch import Branch, Reach
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.full_space import FullSpace
+from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.newton import NewtonOptions, NewtonResult
 from hotlever.lever.parametrisation import solve_at
+from hotlever.lever.reduced.error_estimate import estimated_error
 from hotlever.lever.reduced.response_surface import ParameterDomain, ResponseSurface
 from hotlever.lever.reduced.space import ReducedSpace
 from hotlever.lever.sensitivities import Linearised
+from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Circuit, Probe
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
@@ -29,8 +31,8 @@ from hotlever.types import Array, Index
 #: one Jacobian from which a new one is cheaper.
 _NEARLY = NewtonOptions(tolerance=1e-2, keep_while=0.2, max_iterations=12)
 _DONE = NewtonOptions(tolerance=1e-3, keep_while=0.5, max_iterations=12)
-
-
+#: States at which the full lever is solved too, and at which the error is estimated.
+_COMPARED_AT, _ESTIMATED_AT = 10, 4
 #: What is stored of a response surface.
 _OF_SURFACE = ("u", "coefficients", "grows", "scale")
 # Equations on the few points, and what Newton's method found.
@@ -51,14 +53,15 @@ class ReducedLever:
         Which of the full lever's quadrature points the few are.
     surface : ResponseSurface
         To start from.
-    base_temperature_K : float
+    drawn : Probe
+        One of that geometry, medium and base temperature.
     """
 
     space: ReducedSpace
     hyper_reduced: ReducedSpace
     points: Index
     surface: ResponseSurface
-    base_temperature_K: float
+    drawn: Probe
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,7 +69,7 @@ class ReducedLever:
         return self.surface.domain.parameters
 
     def _equations(self, probe: Probe, space: ReducedSpace) -> LeverEquations:
-        circuit = Circuit(base_temperature_K=self.base_temperature_K)
+        circuit = Circuit(base_temperature_K=self.drawn.circuit.base_temperature_K)
         return LeverEquations(space, probe.kinds, circuit)
 
     @one_blas_thread
@@ -128,6 +131,24 @@ class ReducedLever:
         branch = Branch.whole(every, u, roots)
         return Linearised.of(probe, names, branch, reach, few, roots.factors)
 
+    def for_any_parameters(self) -> SimilarLevers:
+        """See `hotlever.lever.similar.BranchSolver`."""
+        return SimilarLevers(Lever(self.drawn, COARSE))
+
+    def full_states(
+        self, branch: Branch, equations: LeverEquations, reach: Reach
+    ) -> tuple[Array, Array]:
+        """See `hotlever.lever.similar.BranchSolver`: few, since its errors are small and smooth."""
+        some = np.unique(np.linspace(1, branch.u.size - 1, _COMPARED_AT).astype(int))
+        u, guess = branch.u[some], self.space.expanded(branch.x[:, some])
+        return u, solve_at(equations, u, guess, NewtonOptions(tolerance=1e-5)).x
+
+    def tip_error_K(self, probe: Probe, branch: Branch) -> float:
+        """See `hotlever.lever.similar.BranchSolver`: what the full lever's residual says."""
+        u = branch.u[np.linspace(1, branch.u.size - 1, _ESTIMATED_AT).astype(int)]
+        *_, tip = estimated_error(Lever(probe), branch, u)
+        return float(tip.max())
+
     # --- on disk ----------------------------------------------------------------------------------
 
     def arrays(self) -> dict[str, Array]:
@@ -147,21 +168,20 @@ class ReducedLever:
     @classmethod
     def from_arrays(
         cls,
-        full: FullSpace,
-        base_temperature_K: float,
+        lever: Lever,
         domain: ParameterDomain,
         arrays: Mapping[str, Array],
     ) -> ReducedLever:
-        """Make a reduced lever of stored arrays; of the domain, they have the ranges themselves.
+        """Make the reduced lever of a lever of stored arrays, which have the domain's ranges.
 
         Raises
         ------
         KeyError, ValueError, IndexError
             If they do not belong to the space.
         """
-        space = ReducedSpace(full, arrays["modes_T"], arrays["modes_V"], arrays["lift"])
+        space = ReducedSpace(lever.space, arrays["modes_T"], arrays["modes_V"], arrays["lift"])
         points = arrays["points"].astype(np.intp)
         few = space.at_points(points, arrays["weights"])
         fitted: dict[str, Any] = {name: arrays[name] for name in _OF_SURFACE}
         there = replace(domain, low=arrays["low"], high=arrays["high"])
-        return cls(space, few, points, ResponseSurface(there, **fitted), base_temperature_K)
+        return cls(space, few, points, ResponseSurface(there, **fitted), lever.probe)

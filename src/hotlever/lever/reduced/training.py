@@ -95,7 +95,7 @@ def reduce(
     space = _space(lever, training, domain, options)
     points, weights = empirical_cubature(_integrands(space, training), space.weights[:, 0])
     few, surface = space.at_points(points, weights), _surface(space, training, domain)
-    return ReducedLever(space, few, points, surface, lever.circuit.base_temperature_K)
+    return ReducedLever(space, few, points, surface, lever.probe)
 
 
 def cached_reduction(
@@ -111,10 +111,10 @@ def cached_reduction(
 
 def known_reduction(lever: Lever, names: Collection[str] = ()) -> ReducedLever | None:
     """Return the reduced lever of a lever's geometry and medium, if it is in the cache."""
-    base, domain = lever.circuit.base_temperature_K, ParameterDomain.of(lever.probe, names)
+    domain = ParameterDomain.of(lever.probe, names)
     reduced = stored(
         _file(lever, domain),
-        lambda arrays: ReducedLever.from_arrays(lever.space, base, domain, arrays),
+        lambda arrays: ReducedLever.from_arrays(lever, domain, arrays),
     )
     covers = reduced is not None and reduced.surface.domain.covers(lever.probe)
     return reduced if covers else None
