@@ -26,8 +26,8 @@ from skfem.models.poisson import laplace, mass
 from hotlever.air.operator import PanelledAir
 from hotlever.air.surface import PanelOptions, lever_surface
 from hotlever.lever import Lever
+from hotlever.lever.films import PlacedFilm
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.space import PlacedFilm
 from hotlever.lever3d import SolidLever
 from hotlever.materials import LOW_DOPED
 from hotlever.probe import Layout, MeshOptions, Probe, mesh_layout

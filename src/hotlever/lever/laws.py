@@ -17,13 +17,13 @@ import numpy as np
 
 from hotlever.air.stores import HeatInAir
 from hotlever.errors import ComputationError
+from hotlever.lever.films import PlacedFilm
 from hotlever.lever.motion import Motion
 from hotlever.lever.space import (
     PER_CM3_TO_NANO_PER_UM3,
     PER_CM_TO_MILLI_PER_UM,
     Fields,
     Fluxes,
-    PlacedFilm,
     Space,
 )
 from hotlever.lever.terminals import Terminals

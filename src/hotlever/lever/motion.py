@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hotlever.lever.full_space import FullSpace, thickness_at
-from hotlever.lever.space import Fields, Fluxes, PlacedFilm
+from hotlever.lever.films import PlacedFilm, thickness_at
+from hotlever.lever.full_space import FullSpace
+from hotlever.lever.space import Fields, Fluxes
 from hotlever.probe.layout import Taper
 from hotlever.probe.moving import Movement
 from hotlever.types import Array
@@ -34,7 +35,7 @@ class Motion:
     thickening_um : ndarray, shape (points, 1)
         Of the body (µm).
     distances : tuple of ndarray, shape (borders, k, 1)
-        Of those of each `hotlever.lever.space.PlacedFilm`.
+        Of those of each `hotlever.lever.films.PlacedFilm`.
     tip : ndarray, shape (nodes,)
         Of the weights that give the rise of the tip temperature.
     """

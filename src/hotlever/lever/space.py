@@ -11,21 +11,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hotlever.lever.elements import FiniteElements
+from hotlever.lever.films import PlacedFilm
 from hotlever.types import Array, Index
 
 #: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
 PER_CM_TO_MILLI_PER_UM = 0.1
 #: J/cm³ to nJ/µm³; with times in µs, nJ are mW µs.
 PER_CM3_TO_NANO_PER_UM3 = 1e-3
-#: As good as infinitely far from a border (µm).
-FAR = 1e6
 
 
 class Factors(Protocol):
@@ -88,50 +87,6 @@ class LinearMap:
             self._of_values = self._transposed[:, : len(samples)]
         tested = np.asarray(self._of_values @ samples.reshape(len(samples), -1))
         return tested.reshape(-1, *samples.shape[1:])
-
-
-@dataclass(frozen=True)
-class PlacedFilm:
-    """The quadrature points at which a film lies, or the body of the lever.
-
-    Attributes
-    ----------
-    material : str
-    points : ndarray of int, shape (k,)
-    thickness_um : float or ndarray, shape (k, 1)
-    counted_um : float or ndarray, shape (k, 1)
-        The thickness that makes a sheet conductance: 1 where the elements have it themselves.
-    is_body : bool
-    dopant_from : str or None
-        The material from which dopant diffuses into this one.
-    distances : ndarray, shape (borders, k, 1)
-        From the borders of each point's region with that material (µm); `FAR` where it has fewer
-        than others. No borders where the doping is even.
-    """
-
-    material: str
-    points: Index
-    thickness_um: float | Array
-    counted_um: float | Array
-    is_body: bool
-    dopant_from: str | None
-    distances: Array
-
-    def among(self, points: Index) -> PlacedFilm:
-        """Return the film at some of the quadrature points, by their number there."""
-        kept = np.isin(self.points, points)
-        return replace(
-            self,
-            points=np.searchsorted(points, self.points[kept]),
-            thickness_um=at_some(self.thickness_um, kept),
-            counted_um=at_some(self.counted_um, kept),
-            distances=self.distances[:, kept],
-        )
-
-
-def at_some(values: float | Array, points: Any) -> float | Array:
-    """Return values at some points, or the value that all have."""
-    return values if isinstance(values, float) else values[points]
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,9 @@ import numpy as np
 from scipy.optimize import nnls
 
 from hotlever.air.coupling import ReducedAir
+from hotlever.lever.films import at_some
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.space import AirTangent, Constraint, LinearMap, Space, Tangent, at_some
+from hotlever.lever.space import AirTangent, Constraint, LinearMap, Space, Tangent
 from hotlever.types import Array, Index
 
 #: Random combinations of the training integrals that a cubature is made to reproduce.
