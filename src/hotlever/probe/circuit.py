@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from hotlever.errors import InputError, unknown_name
@@ -295,12 +294,11 @@ class Circuit(Record):
 
     @property
     def lowest_bias_V(self) -> float:
-        """Lowest bias (V) that is told apart from its opposite: none, where others heat as well."""
-        return 0.0 if self.starts_cold else -math.inf
+        """Bias (V) above which the lever is heated, and below which it is as at the opposite bias.
 
-    def heats(self, bias_V: Array | float) -> NDArray[np.bool_]:
-        """Return at which biases (V) the lever is heated: at any where others heat it as well."""
-        return (np.asarray(bias_V) > 0) | (not self.starts_cold)
+        There is none, −∞, where others than the swept supply heat it as well.
+        """
+        return 0.0 if self.starts_cold else -math.inf
 
     @property
     def is_plain(self) -> bool:

@@ -123,7 +123,7 @@ def initial_state(lever: Lever, waveform: Waveform) -> State:
     """Return the state at rest before a wave form."""
     circuit, bias = lever.circuit, waveform.before_V
     polarity = -1.0 if bias < circuit.lowest_bias_V else 1.0
-    if not circuit.heats(polarity * bias):
+    if polarity * bias <= circuit.lowest_bias_V:
         return State(lever, np.zeros((lever.space.size + 1, 1)))
     (state,) = lever.solve([polarity * bias])
     # the other polarity has the potentials reversed
