@@ -148,10 +148,10 @@ def by_the_rule(T: float, n: float, kind: str) -> float:
 def largest(n: float, r: float, kind: str = "n-silicon") -> tuple[float, float]:
     """Return where the majority's S is largest, from 300 to 1600 K, and S there."""
     sign = 1.0 if kind == "n-silicon" else -1.0
-    found = minimize_scalar(
+    top = minimize_scalar(
         lambda T: sign * seebeck(float(T), n, r, kind), bounds=(300.0, 1600.0), method="bounded"
     )
-    return float(found.x), seebeck(float(found.x), n, r, kind)
+    return float(top.x), seebeck(float(top.x), n, r, kind)
 
 
 def main() -> None:

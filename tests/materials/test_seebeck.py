@@ -34,8 +34,8 @@ def test_fermi_integral_of_order_0_is_known_in_full(eta):
 
 def test_fermi_integral_of_order_half_at_0_is_that_of_the_zeta_function():
     # (1 − 2^(−½)) ζ(3/2)
-    known = (1.0 - 2.0**-0.5) * 2.612375348685488
-    assert fermi_integral(0.5, 0.0) == pytest.approx(known, rel=1e-10)
+    by_zeta = (1.0 - 2.0**-0.5) * 2.612375348685488
+    assert fermi_integral(0.5, 0.0) == pytest.approx(by_zeta, rel=1e-10)
 
 
 @pytest.mark.parametrize("ratio", [1e-9, 1e-2, 1.0, 30.0, 1e4])
