@@ -30,8 +30,8 @@ MODULES = sorted(
 FLOORS = {
     "ground": ("colours", "errors", "memory", "threads", "types"),
     "numbers and files": ("files", "records", "spieser2017", "steps", "units"),
-    "texts": ("cache", "cells", "datasets", "text", "unforeseen"),
-    "tables and processes": ("blocks", "cluster", "processes", "tables"),
+    "texts": ("cache", "datasets", "text", "unforeseen"),
+    "tables and processes": ("cluster", "processes", "tables"),
     "materials": ("materials",),
     "probe": ("probe",),
     "air": ("air",),

@@ -7,11 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from hotlever import blocks
-from hotlever.blocks import find_blocks
-from hotlever.cells import number, text_lines
 from hotlever.errors import InputError
-from hotlever.tables import read_table
+from hotlever.tables import find_tables, read_table, reading
+from hotlever.tables.cells import number, text_lines
 from hotlever.units import conversion
 
 ADVERSARIAL = [" ", "\t", "(", "[", "a (", "=", ":", "#", '"', "R_s ", "1", "1,", "k", "°", "base "]
@@ -119,6 +117,19 @@ def test_every_line_keeps_its_number(tmp_path):
     assert [found.where(row).split(": ")[1] for row in (-1, 0, 1)] == ["line 3", "line 4", "line 6"]
 
 
+@pytest.mark.parametrize("line", ["\x1f", " \x1f ", "\u2003", ",;\t", '"'])
+def test_a_line_that_holds_nothing_is_no_row(tmp_path, line):
+    found = table(tmp_path, f"{line}\na,b\n{line}\n1,2\n")
+    assert (found.names, found.rows, found.where(0)) == (
+        *(["a", "b"], [["1", "2"]]),
+        f"{found.path}: line 4",
+    )
+    with pytest.raises(InputError, match="no header row and no rows"):
+        table(tmp_path, line)
+    with pytest.raises(InputError, match="the file is empty"):
+        find_tables(line.encode(), "f")
+
+
 @pytest.mark.parametrize("part", ADVERSARIAL)
 def test_no_line_takes_long_to_read(tmp_path, part):
     line = (part * 100_000)[:100_000]
@@ -130,21 +141,22 @@ def test_no_line_takes_long_to_read(tmp_path, part):
         except InputError as error:
             message = str(error)
         assert len(message) < 250
-    find_blocks([f"{line}x", f"Temperature (K)={line}x", "1 2", "3 4"], "")
+    find_tables(f"{line}x\nTemperature (K)={line}x\n1 2\n3 4".encode(), "")
     assert time.process_time() - began < 30  # backtracking takes hours
 
 
 def test_a_map_of_millions_of_numbers_is_read_and_more_are_refused(monkeypatch):
     lines = ["\t".join(["1234.5"] * 2000)] * 100
-    assert find_blocks(lines, "map")[0].values.shape == (100, 2000)
-    monkeypatch.setattr(blocks, "MOST_NUMBERS", 100_000)
+    raw = "\n".join(lines).encode()
+    assert find_tables(raw, "map")[0].array.shape == (100, 2000)
+    monkeypatch.setattr(reading, "MOST_NUMBERS", 100_000)
     with pytest.raises(InputError, match="map: more than 100000 numbers"):
-        find_blocks(lines, "map")
+        find_tables(raw, "map")
 
 
-def test_a_huge_number_is_no_number_in_a_block_either():
-    (found,) = find_blocks(["1 2", "3 4", "5 1e300", "6 7"], "")
-    np.testing.assert_array_equal(found.values, [[1, 2], [3, 4], [5, np.nan], [6, 7]])
+def test_a_huge_number_is_no_number_there_either():
+    (table_of_numbers,) = find_tables(b"1 2\n3 4\n5 1e300\n6 7", "")
+    np.testing.assert_array_equal(table_of_numbers.array, [[1, 2], [3, 4], [5, np.nan], [6, 7]])
 
 
 def test_binary_content_is_refused():

@@ -10,12 +10,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hotlever.blocks import find_blocks
-from hotlever.cells import decode
 from hotlever.errors import InputError
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.reading import read_file, read_spectra, read_spectrum, spectrum_files
 from hotlever.raman.spectrum import temperature_in_metadata, temperature_in_name
+from hotlever.tables import find_tables
 
 
 def rows(x, y, separator="\t", comma=False, end="\n"):
@@ -198,8 +197,8 @@ def test_any_table_of_two_columns_is_read_back(
     text = end.join(lines)
     if comma:
         text = text.replace(".", ",")
-    (table,) = find_blocks(decode(text.encode(encoding), "f").splitlines(), "f")
-    np.testing.assert_allclose(table.values[order], np.stack([x, y], axis=1), atol=1e-9)
+    (table,) = find_tables(text.encode(encoding), "f")
+    np.testing.assert_allclose(table.array[order], np.stack([x, y], axis=1), atol=1e-9)
 
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hotlever.cells import text_lines
 from hotlever.datasets import MEASURANDS, OBSERVABLES
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_bytes
 from hotlever.measurement.data import LEVER, MEASURED, TIME
-from hotlever.tables import Table
+from hotlever.tables import TextTable
+from hotlever.tables.cells import text_lines
 from hotlever.types import Array
 from hotlever.units import TIMES, conversion, name_and_unit, unknown_unit
 
@@ -49,8 +49,8 @@ class Column:
         written = name_and_unit(self.heading)[1] == self.unit
         return heading if written else f"{heading} in {self.unit}"
 
-    def values(self, table: Table) -> Array:
-        """Return the data in the unit used inside; raises InputError (see `Table.numbers`)."""
+    def values(self, table: TextTable) -> Array:
+        """Return the data in the unit used inside; raises InputError (see `TextTable.numbers`)."""
         return self.factor * table.numbers(self.index, self.symbol) + self.offset
 
 
@@ -127,13 +127,13 @@ def is_heading(name: str, assigned: Mapping[str, str]) -> bool:
 
 
 def find_columns(
-    table: Table, assigned: Mapping[str, str], *, driven: bool = False
+    table: TextTable, assigned: Mapping[str, str], *, driven: bool = False
 ) -> dict[str, Column]:
     """Find the column of each quantity, that of the time only in a table of what is in time.
 
     Parameters
     ----------
-    table : Table
+    table : TextTable
     assigned : mapping of str to str
         From `parse_columns`.
     driven : bool
@@ -180,9 +180,9 @@ def find_columns(
     return columns
 
 
-def _column(table: Table, symbol: str, index: int, assigned: str | None) -> Column:
+def _column(table: TextTable, symbol: str, index: int, assigned: str | None) -> Column:
     """Return a column with its unit, which the file or the user gives."""
-    heading, inside = table.names[index] if table.names else "", MEASURANDS[symbol].unit
+    heading, inside = table.names[index], MEASURANDS[symbol].unit
     where = f"{table.where(-1)}: column '{shown(heading or str(index + 1))}'"
     written = name_and_unit(heading)[1]
     if table.names[:1] == [_IN_SI]:
@@ -213,7 +213,7 @@ def _assignment(symbol: str, heading: str = "HEADING") -> str:
     return f"--column '{MEASURANDS[symbol].heading}={shown(heading)}'"
 
 
-def _are_brief(table: Table, column: Column) -> bool:
+def _are_brief(table: TextTable, column: Column) -> bool:
     """Whether times are numbers, and close enough to each other for what is measured in time."""
     if table.dialect.number(table.rows[0][column.index]) is None:
         return False  # clocks show no numbers
@@ -221,7 +221,7 @@ def _are_brief(table: Table, column: Column) -> bool:
     return bool(0.0 < np.nanmax(times, initial=-np.inf) - np.nanmin(times, initial=np.inf) <= BRIEF)
 
 
-def _require(table: Table, columns: Mapping[str, Column], driven: bool) -> None:
+def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> None:
     """Refuse a table without bias or times, or without anything that depends on them."""
     if driven and TIME not in columns:
         raise InputError(
@@ -236,9 +236,9 @@ def _require(table: Table, columns: Mapping[str, Column], driven: bool) -> None:
     if has_bias and observed & columns.keys():
         return
     names = ", ".join(repr(shown(name)) for name in table.names[:9])
-    given = f"the header names {names}" if table.names else "numbers without a header row"
+    given = f"the header names {names}" if table.is_named else "numbers without a header row"
     voltages = (name for name in table.names if conversion(name_and_unit(name)[1] or "", "V"))
-    example = next(voltages, "HEADING" if table.names else "1")
+    example = next(voltages, "HEADING" if table.is_named else "1")
     raise InputError(
         f"{table.where(-1)}: {given}; expected 'V_b (V)' and at least one of 'I_h (mA)', "
         "'V_r (mV)', 'T_tip (K)', or 'V_l (V)' and 'I_h (mA)'; beside a time V_b, or a wave form "
@@ -246,7 +246,7 @@ def _require(table: Table, columns: Mapping[str, Column], driven: bool) -> None:
     )
 
 
-def unused_columns(table: Table, columns: Mapping[str, Column]) -> list[str]:
+def unused_columns(table: TextTable, columns: Mapping[str, Column]) -> list[str]:
     """Return a note on each column that is no quantity, with the one that it may be."""
     notes = []
     used = {column.index for column in columns.values()}

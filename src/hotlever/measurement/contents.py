@@ -12,7 +12,7 @@ from hotlever.measurement.columns import Column
 from hotlever.measurement.data import LEVER, MEASURED, TIME
 from hotlever.measurement.settings import Settings
 from hotlever.probe import Circuit
-from hotlever.tables import Table
+from hotlever.tables import TextTable
 from hotlever.types import Array, Mask
 from hotlever.units import plausible
 
@@ -23,7 +23,7 @@ class Contents:
 
     Attributes
     ----------
-    table : Table
+    table : TextTable
     columns : dict of str to Column
         By symbol: the quantities that the file gives.
     settings : Settings
@@ -40,7 +40,7 @@ class Contents:
         If a cell is no number.
     """
 
-    table: Table
+    table: TextTable
     columns: dict[str, Column]
     settings: Settings
     notes: list[str]

@@ -10,7 +10,7 @@ from typing import Any
 from hotlever.errors import InputError, shown
 from hotlever.materials.air import ATMOSPHERE
 from hotlever.probe import Circuit
-from hotlever.tables import Table
+from hotlever.tables import TextTable
 from hotlever.units import (
     amount,
     conversion,
@@ -91,7 +91,7 @@ class Settings:
     notes: list[str] = field(default_factory=list)
 
     @classmethod
-    def of(cls, table: Table) -> Settings:
+    def of(cls, table: TextTable) -> Settings:
         """Read the comments that give a setting.
 
         Raises

@@ -14,7 +14,7 @@ import numpy as np
 
 from hotlever.errors import InputError, shown
 from hotlever.raman.spectrum import aliases, file_and_label
-from hotlever.tables import Table, read_table
+from hotlever.tables import TextTable, read_table
 from hotlever.units import name_and_unit
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ _OLD = re.compile(r"d?T_?tip\b", re.I)
 _IN_NAME = re.compile(r"(?:^|[^0-9A-Za-z.,-])(\d+(?:[.,p]\d+)?)\s?V(?![a-zA-Z0-9])")
 
 
-def read_bias_log(path: str | os.PathLike[str]) -> Table:
+def read_bias_log(path: str | os.PathLike[str]) -> TextTable:
     """Read a bias log: ``#`` comments, a header row, rows of numbers.
 
     Raises
@@ -45,7 +45,7 @@ def read_bias_log(path: str | os.PathLike[str]) -> Table:
     return log
 
 
-def join(log: Table, spectra: xr.Dataset) -> str:
+def join(log: TextTable, spectra: xr.Dataset) -> str:
     """Measurement CSV: the log with tip temperature and error in two more columns.
 
     A row finds its spectrum by a ``file`` column of the log; else by the bias in the
@@ -55,7 +55,7 @@ def join(log: Table, spectra: xr.Dataset) -> str:
 
     Parameters
     ----------
-    log : Table
+    log : TextTable
         From `read_bias_log`.
     spectra : xarray.Dataset
         With temperatures, see `hotlever.raman.series.read_lines`.
@@ -85,12 +85,12 @@ def join(log: Table, spectra: xr.Dataset) -> str:
     return out.getvalue()
 
 
-def _column(log: Table, pattern: re.Pattern[str]) -> int | None:
+def _column(log: TextTable, pattern: re.Pattern[str]) -> int | None:
     """Index of the first column whose heading begins so."""
     return next((j for j, name in enumerate(log.names) if pattern.match(name)), None)
 
 
-def _bias(log: Table) -> np.ndarray | None:
+def _bias(log: TextTable) -> np.ndarray | None:
     """Bias of each row in volts, NaN where blank; None without such a column."""
     column = _column(log, _BIAS)
     if column is None:
@@ -98,7 +98,7 @@ def _bias(log: Table) -> np.ndarray | None:
     return log.values(column, "V", name_and_unit(log.names[column])[0], unit="V")
 
 
-def _match(log: Table, names: list[str]) -> list[int | None]:
+def _match(log: TextTable, names: list[str]) -> list[int | None]:
     """For each row of the log the index of its spectrum."""
     column = _column(log, _FILE)
     if column is not None:
@@ -122,7 +122,7 @@ def _bias_in_name(name: str) -> float | None:
     return float(match[1].replace(",", ".").replace("p", ".")) if match else None
 
 
-def _by_name(log: Table, column: int, names: list[str]) -> list[int | None]:
+def _by_name(log: TextTable, column: int, names: list[str]) -> list[int | None]:
     called = defaultdict[str, list[int]](list)
     for spectrum, name in enumerate(names):
         for alias in aliases(name):
@@ -139,7 +139,7 @@ def _by_name(log: Table, column: int, names: list[str]) -> list[int | None]:
 
 
 def _by_bias(
-    log: Table, bias: np.ndarray, stated: list[float], names: list[str]
+    log: TextTable, bias: np.ndarray, stated: list[float], names: list[str]
 ) -> list[int | None]:
     matched: list[int | None] = [None] * bias.size
     for spectrum, (value, name) in enumerate(zip(stated, names, strict=True)):

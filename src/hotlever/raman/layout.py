@@ -10,7 +10,6 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from hotlever.blocks import Block
 from hotlever.errors import InputError, shown
 from hotlever.raman.peak import MIN_SAMPLES, WINDOW, in_window
 from hotlever.raman.spectrum import (
@@ -19,6 +18,7 @@ from hotlever.raman.spectrum import (
     temperature_in_metadata,
     temperature_in_name,
 )
+from hotlever.tables import TextTable
 from hotlever.types import Array, Index
 from hotlever.units import quantity
 
@@ -28,7 +28,7 @@ _TURNS = 1.9  # times that each value of an axis stands in it, if positions take
 _OVERLAP = 0.5  # part of an axis that it repeats, from which on it is that of another spectrum
 
 
-def pick_spectra(table: Block, where: str) -> list[Spectrum]:
+def pick_spectra(table: TextTable) -> list[Spectrum]:
     """Every spectrum of a table, with what sets it apart: its position, or its column's heading.
 
     Raises
@@ -36,16 +36,16 @@ def pick_spectra(table: Block, where: str) -> list[Spectrum]:
     InputError
         If there is none, or it is not clear which columns they are.
     """
-    if table.values.shape[1] < 2:
+    if table.array.shape[1] < 2:
         raise InputError(
-            f"{where}: one column of numbers, expected Raman shift (cm⁻¹) and intensity"
+            f"{table.path}: one column of numbers, expected Raman shift (cm⁻¹) and intensity"
         )
-    return _in_rows(table) or _in_pairs(table, where) or _in_columns(table, where)
+    return _in_rows(table) or _in_pairs(table) or _in_columns(table)
 
 
-def _in_rows(table: Block) -> list[Spectrum]:
+def _in_rows(table: TextTable) -> list[Spectrum]:
     """Spectra of a table with the axis in its first row or its headings, as LabSpec's maps."""
-    values, names = table.values, table.names
+    values, names = table.array, table.names
     if values.shape[1] <= _MAP_COLUMNS:
         return []
     first, rows = values[0], values[1:]
@@ -70,15 +70,15 @@ def _heading(name: str) -> float:
     return value if value is not None and unit.strip() in _SHIFT_UNITS else np.nan
 
 
-def _in_pairs(table: Block, where: str) -> list[Spectrum]:
+def _in_pairs(table: TextTable) -> list[Spectrum]:
     """Spectra of a table in which each intensity has an axis of its own before it."""
-    values, names = table.values, table.names
+    values, names = table.array, table.names
     axes = range(0, values.shape[1], 2)
     if values.shape[1] < 4 or values.shape[1] % 2:
         return []
     if not all(is_axis(values[:, j]) and not is_axis(values[:, j + 1]) for j in axes):
         return []
-    shifts = [raman_shift(table, j, where) for j in axes]
+    shifts = [raman_shift(table, j) for j in axes]
     if not all(covers_line(x) and not is_index(x) for x in shifts):
         return []
     return [
@@ -87,10 +87,10 @@ def _in_pairs(table: Block, where: str) -> list[Spectrum]:
     ]
 
 
-def _in_columns(table: Block, where: str) -> list[Spectrum]:
+def _in_columns(table: TextTable) -> list[Spectrum]:
     """Spectra beside each other with one axis, or below each other as in WiRE's maps, or both."""
-    values, names = table.values, table.names
-    axis, x = axis_of(table, where)
+    values, names = table.array, table.names
+    axis, x = axis_of(table)
     others = [j for j in range(values.shape[1]) if j != axis]
     groups = _groups(x, values, others)
     first = np.array([rows[0] for rows in groups])
@@ -100,7 +100,7 @@ def _in_columns(table: Block, where: str) -> list[Spectrum]:
         if len(groups) > 1 and all(np.ptp(values[rows, j]) == 0.0 for rows in groups)
     ]
     columns = {names[j].lstrip("#").strip(): values[first, j] for j in fixed if names[j]}
-    chosen = intensities(table, [j for j in others if j not in fixed], where)
+    chosen = intensities(table, [j for j in others if j not in fixed])
     headings = {column: names[column] if len(chosen) > 1 else "" for column in chosen}
     labels = positions(columns, len(groups))
     return [
@@ -195,7 +195,7 @@ _OTHER_QUANTITY = re.compile(
 )
 
 
-def axis_of(table: Block, where: str) -> tuple[int, Array]:
+def axis_of(table: TextTable) -> tuple[int, Array]:
     """Index of the axis among the columns, and the Raman shift (cm⁻¹) in it.
 
     Raises
@@ -203,7 +203,7 @@ def axis_of(table: Block, where: str) -> tuple[int, Array]:
     InputError
         If no column is one, or it is a wavelength and the header does not name the laser.
     """
-    values, names = table.values, table.names
+    values, names = table.array, table.names
     axes = [j for j in range(values.shape[1]) if is_axis(values[:, j])]
     headed = [j for j in axes if _SHIFT.search(names[j]) and not _is_wavelength(names[j])]
     headed += [j for j in axes if _WAVELENGTH.search(names[j])]
@@ -214,17 +214,17 @@ def axis_of(table: Block, where: str) -> tuple[int, Array]:
     # a running number reaches 520 too, but a later column may be the axis
     others = [j for j in reaching if not is_index(values[:, j])]
     axis = (*headed, *absolute, *others, *reaching, *axes, 0)[0]
-    x = raman_shift(table, axis, where)
-    require_line(x, where)
-    in_window(np.unique(x[np.isfinite(x)]), f"{where}: ")
+    x = raman_shift(table, axis)
+    require_line(x, table.path)
+    in_window(np.unique(x[np.isfinite(x)]), f"{table.path}: ")
     if not axes:
         raise InputError(
-            f"{where}: none of {len(names)} columns rises or falls all the way, expected a Raman "
-            "shift (cm⁻¹) in one"
+            f"{table.path}: none of {len(names)} columns rises or falls all the way, expected a "
+            "Raman shift (cm⁻¹) in one"
         )
     if not headed and _OTHER_QUANTITY.search(names[axis]):
         raise InputError(
-            f"{where}: the axis is '{shown(names[axis])}', expected a Raman shift in cm⁻¹"
+            f"{table.path}: the axis is '{shown(names[axis])}', expected a Raman shift in cm⁻¹"
         )
     return axis, x
 
@@ -233,16 +233,16 @@ def _is_wavelength(name: str) -> bool:
     return bool(_WAVELENGTH.search(name) and not _RAMAN.search(name))
 
 
-def raman_shift(table: Block, column: int, where: str) -> Array:
+def raman_shift(table: TextTable, column: int) -> Array:
     """Return a column in cm⁻¹: a wavelength is converted by the laser that the header names."""
-    x, name = table.values[:, column], table.names[column]
+    x, name = table.array[:, column], table.names[column]
     if not _is_wavelength(name):
         return x
-    laser = _laser(table.metadata)
+    laser = _laser(table.settings)
     if laser is None:
         raise InputError(
-            f"{where}: the axis is a wavelength ('{shown(name)}') and the file does not name the "
-            "laser; expected Raman shift in cm⁻¹, or a line like '#Laser (nm)= 532' above"
+            f"{table.path}: the axis is a wavelength ('{shown(name)}') and the file does not name "
+            "the laser; expected Raman shift in cm⁻¹, or a line like '#Laser (nm)= 532' above"
         )
     with np.errstate(divide="ignore"):
         return np.asarray(1e7 / laser - 1e7 / x)
@@ -286,7 +286,7 @@ def _laser(metadata: dict[str, str]) -> float | None:
     return None
 
 
-def intensities(table: Block, others: list[int], where: str) -> list[int]:
+def intensities(table: TextTable, others: list[int]) -> list[int]:
     """Columns that are spectra, of those beside the axis: by their names, else all that vary.
 
     Raises
@@ -294,10 +294,10 @@ def intensities(table: Block, others: list[int], where: str) -> list[int]:
     InputError
         If there are none, or if it is not clear which they are.
     """
-    values, names = table.values, [name.strip() for name in table.names]
+    values, names = table.array, [name.strip() for name in table.names]
     useful = [j for j in others if np.nanmin(values[:, j]) < np.nanmax(values[:, j])]
     if not useful:
-        raise InputError(f"{where}: no column of intensities beside the axis")
+        raise InputError(f"{table.path}: no column of intensities beside the axis")
     # a second axis, such as a running number, is no intensity
     useful = [j for j in useful if not is_axis(values[:, j])] or useful
     kinds = {j: _kind(names[j]) for j in useful}
@@ -307,15 +307,15 @@ def intensities(table: Block, others: list[int], where: str) -> list[int]:
     unclear = best < _PLAIN and _UNNAMED in kinds.values()
     if unclear or (not spectra and len(useful) > 1):
         raise InputError(
-            f"{where}: the columns beside the axis are {_listed(names, useful)}; expected "
+            f"{table.path}: the columns beside the axis are {_listed(names, useful)}; expected "
             "intensities alone, or all of them named so"
         )
     chosen = [j for j in spectra if kinds[j] == best or best >= _PLAIN] or useful
     for first, second in combinations(chosen[:_MOST_COMPARED], 2):
         if _computed_from(values[:, first], values[:, second]):
             raise InputError(
-                f"{where}: columns {first + 1} and {second + 1} rise and fall as one, as counts "
-                "and their error do; expected spectra alone"
+                f"{table.path}: columns {first + 1} and {second + 1} rise and fall as one, as "
+                "counts and their error do; expected spectra alone"
             )
     return chosen
 

@@ -13,8 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from hotlever.blocks import MOST_LINES, find_blocks
-from hotlever.cells import text_lines
 from hotlever.errors import InputError
 from hotlever.files import LARGEST_TEXT, read_bytes
 from hotlever.raman.layout import pick_spectra, require_line
@@ -28,6 +26,7 @@ from hotlever.raman.spectrum import (
     temperature_in_name,
 )
 from hotlever.steps import each
+from hotlever.tables import find_tables
 from hotlever.types import Array, Progress
 
 SKIPPED_SUFFIXES = {".md", ".json", ".toml", ".yaml", ".yml", ".py", ".ipynb", ".html", ".pdf"}
@@ -116,16 +115,16 @@ def _kind(file: Path, raw: bytes) -> str:
 
 
 def _in_text(file: Path, raw: bytes) -> list[Spectrum]:
-    """Spectra of a text file; a block of numbers beside them may be something else."""
+    """Spectra of a text file; a table of numbers beside them may be something else."""
     spectra: list[Spectrum] = []
     errors: list[tuple[int, InputError]] = []
-    for block in find_blocks(text_lines(raw, str(file), MOST_LINES), str(file)):
+    for table in find_tables(raw, str(file)):
         try:
-            in_block = pick_spectra(block, str(file))
+            in_table = pick_spectra(table)
         except InputError as error:
-            errors.append((len(block.values), error))
+            errors.append((len(table.lines), error))
             continue
-        spectra += [replace(spectrum, metadata=block.metadata) for spectrum in in_block]
+        spectra += [replace(spectrum, metadata=table.settings) for spectrum in in_table]
     if not spectra and errors:
         raise max(errors, key=lambda entry: entry[0])[1]
     return spectra

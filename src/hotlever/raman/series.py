@@ -229,12 +229,12 @@ def read_temperatures(path: str | os.PathLike[str]) -> dict[str, float]:
     {'a.txt': 298.15, 'b.txt': 373.15}
     """
     table = read_table(path, "rows of file name and temperature", header=False)
-    if len(table.rows[0]) < 2:
+    if len(table.names) < 2:
         raise InputError(
             f"{table.where(0)}: '{shown(table.rows[0][0])}', expected a file name and a temperature"
         )
     # a heading such as T_C has its unit without brackets
-    celsius = table.names and re.search(r"[\W_](C|celsius)\W*$", table.names[1], re.I)
+    celsius = re.search(r"[\W_](C|celsius)\W*$", table.names[1], re.I)
     kelvin = table.values(1, "K", "temperature", unit="C" if celsius else "K")
     temperatures: dict[str, float] = {}
     for row, (cells, value) in enumerate(zip(table.rows, kelvin, strict=True)):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import math
 import re
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +18,11 @@ from hotlever.units import LARGEST_NUMBER, LONGEST_NUMBER, NUMBER
 MOST_LINES = 200_000  #: of a file, unless its reader says otherwise
 LONGEST_LINE = 2**17  #: characters; a spectrometer's map has some 40 000
 
+#: A line of a file, and its number.
+Line = tuple[int, str]
+
+#: Lines by which a file's dialect is told.
+_SAMPLE_LINES = 40
 #: A line of nothing but numbers, in any dialect.
 _PLAIN = re.compile(r"[-+.0-9eE\s;,|]*", re.ASCII)
 _MISSING = {"", "nan", "-", "--", "n/a", "na"}
@@ -73,6 +79,12 @@ def text_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[str]:
     return lines
 
 
+def filled_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[Line]:
+    """Return the lines of `text_lines` that hold more than separators, with their numbers."""
+    numbered = enumerate(text_lines(raw, where, most), start=1)
+    return [(number, line) for number, line in numbered if line.strip(' \t,;"\u00a0').strip()]
+
+
 def number(cell: str, decimal_comma: bool = False) -> float | None:
     """Return a cell's number: NaN where it says that there is none, None if it is something else.
 
@@ -100,6 +112,21 @@ class Dialect:
     decimal_comma: bool = False
     grouped: bool = False  #: whether the other sign may stand between thousands
 
+    @classmethod
+    def of(cls, lines: Sequence[Line]) -> Dialect:
+        """Return what makes the most of a sample of lines rows of numbers; two columns beat one."""
+        tail = lines[len(lines) // 4 :] if len(lines) > 8 else lines
+        sample = [line for _, line in tail[:: max(len(tail) // _SAMPLE_LINES, 1)]]
+
+        def fit(dialect: Dialect) -> tuple[int, int]:
+            rows = [row for line in sample if (row := dialect.row(line)) is not None]
+            return sum(int(np.count_nonzero(~np.isnan(row)) >= 2) for row in rows), len(rows)
+
+        best = max(DIALECTS, key=fit)
+        grouped = [replace(dialect, grouped=True) for dialect in DIALECTS]
+        # 1,234 is a number with a decimal comma before it is one in the thousands
+        return replace(best, grouped=True) if fit(best)[0] else max(grouped, key=fit)
+
     def cells(self, line: str) -> list[str] | None:
         """Return a line's cells, None if quotes do not end."""
         line = line.strip(" ")
@@ -126,22 +153,29 @@ class Dialect:
 
     def row(self, line: str) -> Array | None:
         """Return the numbers of a line, NaN for blank cells, None if it holds anything else."""
-        comma = self.decimal_comma
-        plain = _PLAIN.fullmatch(line) and not (comma and "." in line)
-        cells = self.cells(line.replace(",", ".") if plain and comma else line)
-        if not cells:
-            return None
         # nearly every line has nothing but numbers, and maps have millions
-        if plain:
+        if _PLAIN.fullmatch(line) and not (self.decimal_comma and "." in line):
+            cells = (line.replace(",", ".") if self.decimal_comma else line).split(self.separator)
             with suppress(ValueError):
-                row = np.array([float(cell) if cell else math.nan for cell in cells])
-                # fmax leaves NaN out
-                largest = np.fmax.reduce(np.abs(row))
-                return row if largest <= LARGEST_NUMBER else None
-            cells = self.cells(line) or []
-        values = [self.number(cell) for cell in cells]
+                return _limited(list(map(float, cells)))
+            with suppress(ValueError):
+                filled = np.array([bool(cell.strip()) for cell in cells])
+                numbers = _limited([float(cell) for cell in cells if cell.strip()])
+                if numbers is None:
+                    return None
+                row = np.full(len(cells), np.nan)
+                row[filled] = numbers
+                return row
+        values = [self.number(cell) for cell in self.cells(line) or []]
         row = np.array(values, dtype=float)
         return None if None in values or np.isnan(row).all() else row
+
+
+def _limited(numbers: list[float]) -> Array | None:
+    """Return numbers as a row, None if there are none or one is too large."""
+    if not numbers or max(numbers) > LARGEST_NUMBER or min(numbers) < -LARGEST_NUMBER:
+        return None
+    return np.array(numbers)
 
 
 #: In the order in which they are tried.

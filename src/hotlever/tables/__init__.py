@@ -1,0 +1,11 @@
+"""Tables in text files, whoever wrote them.
+
+Encoding, separator, decimal sign, header and units are found, not asked for; what the columns and
+the lines beside the rows mean is for the caller to know. `read_table` is for files of one table,
+where a line that is no row is an error; `find_tables` for files with numbers anywhere.
+"""
+
+from hotlever.tables.reading import find_tables, read_table
+from hotlever.tables.table import TextTable
+
+__all__ = ["TextTable", "find_tables", "read_table"]

@@ -1,0 +1,172 @@
+"""What stands above the numbers of a table: its header row, its units, and remarks.
+
+Here belongs what instruments write there, such as the lines between the sweeps of a file; what the
+headings mean is said where the quantities are (`hotlever.datasets.MEASURANDS`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hotlever.tables.cells import DIALECTS, Dialect, Line
+from hotlever.units import LONGEST_NUMBER, NUMBER, is_unit, name_and_unit
+
+#: Lines among which a header row is looked for, how near to the numbers a comment is one, and
+#: characters of a heading.
+_MOST_ABOVE, _NEAR, _LONGEST_HEADING = 2000, 20, 100
+#: First cells of what stands between the sweeps of LabVIEW and of B1500 files, up to the next
+#: header row; and of a row with the units of the columns.
+_BETWEEN = {"channels", "setuptitle", "labview measurement"}
+_UNIT_ROWS = ("y_unit_label", "unit", "units")
+#: LabVIEW's last column, for remarks, which most rows leave out.
+_REMARKS = "comment"
+#: Marks of a comment, around it, and quotes.
+_MARKS = ' \t"#%!'
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line starts with the mark of a comment."""
+    return line.lstrip(' "').startswith("#")
+
+
+def begins_number(cell: str) -> bool:
+    """Whether a cell is a number or begins with one."""
+    return (cell[:1] in set("0123456789+-.,") and len(cell) > 1) or cell.isdigit()
+
+
+def separator_in(line: str) -> str | None:
+    """Return the first mark that separates cells, of those that no name contains."""
+    return next((mark for mark in "\t;," if mark in line), None)
+
+
+def row_of_numbers(line: str, width: int | None = None) -> tuple[str | None, int] | None:
+    """Return separator and number of cells of a row of nothing but numbers; None if it is not."""
+    if not NUMBER.match(line.lstrip('" \t;,')[:LONGEST_NUMBER]):
+        return None
+    for dialect in DIALECTS:
+        row = dialect.row(line)
+        if row is None:
+            continue
+        blank = width is not None and row.size > width and bool(np.isnan(row[width:]).all())
+        count = width if width is not None and blank else row.size
+        if count == (width or count) > 1:
+            return dialect.separator, count
+    return None
+
+
+def headings_in(line: str) -> list[str]:
+    """Split a header row; one without separators between its names, not before a unit.
+
+    Examples
+    --------
+    >>> headings_in("# V_b (V), I_h (mA)"), headings_in("V_b (V)  I_h / mA")
+    (['V_b (V)', 'I_h (mA)'], ['V_b (V)', 'I_h / mA'])
+    """
+    line = line.strip(_MARKS)
+    separator = separator_in(line)
+    if separator is not None and (cells := Dialect(separator).cells(line)) is not None:
+        return cells
+    names: list[str] = []
+    for word in line.split():
+        if names and (word[0] in "([{</" or names[-1].endswith("/")):
+            names[-1] += f" {word}"
+        else:
+            names.append(word)
+    return names or [""]
+
+
+def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int | None:
+    """Return the index of the header row among the lines of a file; None for numbers alone.
+
+    It is the first line with two headings, a comment if numbers follow; without such a line, the
+    one above the first row of numbers, but for a row of units.
+    """
+
+    def width(index: int) -> int:
+        names = headings_in(lines[index][1])
+        asked = [name for name in names if len(name) <= _LONGEST_HEADING]
+        return len(names) if sum(map(is_heading, asked)) >= 2 else 0
+
+    plain = [index for index, (_, line) in enumerate(lines) if not is_comment(line)]
+    named: list[int] = []
+    for order, index in enumerate(plain[:_MOST_ABOVE]):
+        if row_of_numbers(lines[index][1]):
+            above = range(max(plain[order - 1] + 1 if order else 0, index - _NEAR), index)
+            for comment in reversed(above):
+                if row_of_numbers(lines[index][1], width(comment) or -1):
+                    return comment
+            break
+        if count := width(index):
+            cells = headings_in(lines[plain[order + 1]][1]) if order + 1 < len(plain) else []
+            if len(cells) == count and any(map(begins_number, cells)):
+                return index
+            named.append(index)
+    else:
+        return (named or plain)[0]
+    texts = plain[:order]
+    if len(texts) > 1 and any(map(is_unit, headings_in(lines[texts[-1]][1]))):
+        texts.pop()
+    return next(iter(named or texts[-1:]), None)
+
+
+def begins_other_lines(cells: Sequence[str]) -> bool:
+    """Whether a line begins what stands between two sweeps of a file, up to the next header row."""
+    return cells[0].lower() in _BETWEEN
+
+
+def may_end_early(names: Sequence[str]) -> bool:
+    """Whether rows may lack the last column, which is one for remarks."""
+    return names[-1].lower() == _REMARKS
+
+
+def is_row_of_units(line: str) -> bool:
+    """Whether a comment says that it has the units of the columns."""
+    return line[:20].strip(_MARKS).lower().startswith(_UNIT_ROWS)
+
+
+def without_marks(name: str) -> str:
+    """Return the first heading of a row without what marks the row as a comment."""
+    return name.lstrip(_MARKS)
+
+
+def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
+    """Return headings with units that stand in a row of their own.
+
+    Examples
+    --------
+    >>> with_units(["V_b", "I_h (mA)", "note"], ["V", "A"])
+    ['V_b (V)', 'I_h (mA)', 'note']
+    """
+    units = [*units, *[""] * (len(names) - len(units))]
+    return [
+        f"{name} ({unit})" if is_unit(unit) and name_and_unit(name)[1] is None else name
+        for name, unit in zip(names, units, strict=False)
+    ]
+
+
+def names_above(above: Sequence[Line], dialect: Dialect, width: int) -> tuple[list[str], int]:
+    """Return names of columns from the last lines above numbers, and how many lines they took.
+
+    Of two such lines the lower one may hold units: each name is that above, then that below.
+    """
+    names = [""] * width
+    used = 0
+    for _, line in reversed(above[-2:]):
+        cells = [cell.strip(' "') for cell in line.strip(" ").split(dialect.separator)]
+        if dialect.separator is None:
+            wide = [cell for cell in re.split(r"\t+|\s{2,}", line.strip()) if cell]
+            cells = wide if len(wide) == width else cells
+        while len(cells) > width and not cells[-1]:
+            cells.pop()
+        setting = line.lstrip().startswith("#") and "=" in line
+        numbers = [dialect.number(cell) for cell in cells]
+        # 'Laser (nm)  532' is no heading, while a map's headings, or temperatures, are numbers
+        setting = setting or (numbers[-1:] != [None] and (len(cells) == 2 or used > 0))
+        if len(cells) != width or setting or not any(cells):
+            break
+        names = [f"{cell} {name}".strip() for cell, name in zip(cells, names, strict=True)]
+        used += 1
+    return names, used

@@ -1,0 +1,345 @@
+"""From a file's text to its tables."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from itertools import groupby
+
+import numpy as np
+
+from hotlever.errors import InputError, shown
+from hotlever.files import read_bytes
+from hotlever.tables.cells import Dialect, Line, filled_lines
+from hotlever.tables.headings import (
+    begins_number,
+    begins_other_lines,
+    header_row,
+    headings_in,
+    is_comment,
+    is_row_of_units,
+    may_end_early,
+    names_above,
+    row_of_numbers,
+    separator_in,
+    with_units,
+    without_marks,
+)
+from hotlever.tables.table import TextTable
+from hotlever.types import Array
+from hotlever.units import NUMBER, is_unit, key_and_value
+
+# --- a file of one table --------------------------------------------------------------------------
+
+
+def read_table(
+    path: str | os.PathLike[str],
+    expected: str,
+    header: bool = True,
+    is_heading: Callable[[str], bool] | None = None,
+) -> TextTable:
+    """Read a table of cells separated by tabs, semicolons, commas or, some, by blanks.
+
+    Numbers may have decimal commas unless these separate the cells. Lines that start with ``#``
+    are comments.
+
+    Parameters
+    ----------
+    path : path
+    expected : str
+        What the file should hold, for the error if it holds nothing.
+    header : bool
+        Whether there must be a header row. Else a first row with a number is none, and blanks
+        may separate cells.
+    is_heading : callable, optional
+        Whether a heading is one of those looked for. The header row is then looked for
+        (`hotlever.tables.headings.header_row`). Lines above it are comments; units may stand in a
+        row below it, and the header row may be repeated. Numbers alone have no header row.
+
+    Raises
+    ------
+    InputError
+        If there is no such table; the text names file and line.
+    """
+    raw = read_bytes(path)
+    lines = filled_lines(raw, str(path))
+    first = next((i for i, (_, line) in enumerate(lines) if not is_comment(line)), None)
+    if first is None:
+        raise InputError(f"{path}: no header row and no rows, expected {expected}")
+    row = first if is_heading is None else header_row(lines, is_heading)
+    start = first if row is None else row
+    named, loose = row is not None, is_heading is not None
+    reader = _Reader(str(path), lines[start:], named, header, loose)
+    comments = lines[:start]
+    for line in lines[start + named :]:
+        if is_comment(line[1]) or not reader.takes(*line):
+            comments.append(line)
+    names, rows = reader.names, reader.rows
+    if not header and (not rows or any(map(NUMBER.fullmatch, names))):
+        names, rows = [""] * len(names), [lines[start], *rows]
+    if reader.skipping or not rows:
+        where = f"line {reader.skipping}: another table" if reader.skipping else "no data rows"
+        raise InputError(f"{path}: {where} after the header")
+    if loose and named:
+        names = reader.with_units(comments)
+    dialect = reader.dialect(rows)
+    return TextTable(
+        path=str(path),
+        dialect=dialect,
+        names=names,
+        array=np.array([_numbers(line, dialect, len(names)) for _, line in rows]),
+        lines=rows,
+        comments=comments,
+        header=lines[start][0],
+        sha256=hashlib.sha256(raw).hexdigest(),
+        columns=list(range(len(names))),
+        remarks=reader.remarks,
+    )
+
+
+def _numbers(line: str, dialect: Dialect, width: int) -> Array:
+    """Return the numbers of a row of some width, NaN where a cell holds something else."""
+    row = dialect.row(line)
+    if row is None:
+        numbers = [dialect.number(cell) for cell in dialect.cells(line) or []]
+        row = np.array(numbers, dtype=float)
+    return row[:width] if row.size >= width else np.append(row, np.full(width - row.size, np.nan))
+
+
+class _Reader:
+    """The rows below a header row, or of numbers alone.
+
+    `lines` begin with the header row, or the first row if there is none.
+    """
+
+    def __init__(
+        self, path: str, lines: list[Line], named: bool, header: bool, loose: bool
+    ) -> None:
+        self._path, self._loose = path, loose
+        self._first = "header" if header else "first row"
+        self.rows: list[Line] = []
+        self.remarks: list[Line] = []
+        self.skipping = 0  # the line since which the next header row is waited for
+        self._units: list[str] = []
+        number, line = lines[0]
+        separator = separator_in(line)
+        if not named or is_comment(line):
+            # the heading may be separated in another way than the rows
+            row = next(text for _, text in lines if not is_comment(text))
+            self.names = headings_in(line) if named else []
+            separator, width = row_of_numbers(row, len(self.names) or None) or (separator, 0)
+            self.names = self.names or [""] * width
+        elif separator is None and loose:
+            self.names = headings_in(line)
+            separator = None if len(self.names) > 1 else ","
+        else:
+            separator = separator or ("," if header else None)
+            self.names = self._cells(number, line, separator)
+        self._separator = separator
+        while named and len(self.names) > 1 and not self.names[-1]:
+            self.names.pop()
+        if named and loose:
+            self.names[0] = without_marks(self.names[0])
+
+    def _cells(self, number: int, line: str, separator: str | None) -> list[str]:
+        cells = Dialect(separator).cells(line)
+        if cells is None:
+            raise InputError(
+                f"{self._path}: line {number}: found '{shown(line)}', expected quotes in pairs "
+                "around a cell"
+            )
+        return cells
+
+    def takes(self, number: int, line: str) -> bool:
+        """Take a line as a row if it is one; return whether it has been used."""
+        if self.skipping and self._separator is not None and self.names[-1] not in line:
+            return False
+        cells = self._cells(number, line, self._separator)
+        width = len(self.names)
+        while len(cells) > width and not cells[-1]:
+            cells.pop()
+        if self._loose:
+            if cells == self.names:
+                self.skipping = 0  # a further sweep
+                return True
+            if self.skipping or begins_other_lines(cells):
+                self.skipping = self.skipping or number
+                return False
+            if len(cells) < width and may_end_early(self.names):
+                cells += [""] * (width - len(cells))
+            if not self.rows and len(cells) <= width and not any(map(begins_number, cells)):
+                self._remark(number, line, cells)
+                return True
+        if len(cells) != width:
+            halves = self._separator == "," and len(cells) == 2 * width
+            hint = "; with decimal commas, tabs or semicolons must separate the cells" * halves
+            raise InputError(
+                f"{self._path}: line {number}: {len(cells)} cells, expected {width} as in the "
+                f"{self._first}{hint}"
+            )
+        self.rows.append((number, line))
+        return True
+
+    def _remark(self, number: int, line: str, cells: list[str]) -> None:
+        units = [cell.strip("()[]{}<> ") for cell in cells]
+        if not self._units and any(map(is_unit, units)):
+            self._units = units
+        else:
+            self.remarks.append((number, line))
+
+    def with_units(self, comments: list[Line]) -> list[str]:
+        """Return the headings with the units that stand in a row of their own."""
+        rows = [self._units]
+        rows += [
+            self._cells(*line, self._separator) for line in comments if is_row_of_units(line[1])
+        ]
+        return with_units(self.names, next((row for row in rows if any(map(is_unit, row))), []))
+
+    def dialect(self, rows: list[Line]) -> Dialect:
+        """Return how the rows are written: with decimal commas, if any number has one."""
+        dialect = Dialect(self._separator, decimal_comma=True)
+        cells = (cell for _, line in rows for cell in dialect.cells(line) or [])
+        commas = any("," in cell and dialect.number(cell) is not None for cell in cells)
+        return dialect if commas else Dialect(self._separator)
+
+
+# --- numbers anywhere -----------------------------------------------------------------------------
+
+#: Of a file; a map of 500 spectra below each other has half a million lines.
+MOST_LINES, MOST_NUMBERS = 600_000, 10_000_000
+_RIVAL = 0.25  # part of the rows that may be of another width
+_MOST_GAPS = 0.1  # of rows; where more have no number, the file means something else
+_SPLIT = re.compile(r",0\d+(,|$)")  # a decimal comma's digits, taken for a cell
+_FEWEST_ROWS = 12  # of a further table; a spectrum has more
+
+
+def find_tables(raw: bytes, path: str) -> list[TextTable]:
+    """Find the tables of numbers that have the commonest number of columns.
+
+    A table goes on beyond lines that say nothing, such as a comment; what has a header of its own
+    is another one, to which the first header applies too where its own says nothing else.
+
+    Raises
+    ------
+    InputError
+        If there is none, or there are too many numbers.
+
+    Examples
+    --------
+    >>> text = "#Laser (nm)=\\t532\\nshift;counts\\n1,5;10\\n2,5;20\\n3,5;30"
+    >>> (table,) = find_tables(text.encode(), "")
+    >>> table.array.tolist(), table.names, table.settings
+    ([[1.5, 10.0], [2.5, 20.0], [3.5, 30.0]], ['shift', 'counts'], {'Laser (nm)': '532'})
+    """
+    lines = filled_lines(raw, path, MOST_LINES)
+    if not lines:
+        raise InputError(f"{path}: the file is empty, expected a table of numbers")
+    dialect = Dialect.of(lines)
+    rows: list[Array | None] = []
+    size = 0
+    for _, line in lines:
+        rows.append(row := dialect.row(line))
+        size += 0 if row is None else row.size
+        if size > MOST_NUMBERS:
+            raise InputError(f"{path}: more than {MOST_NUMBERS} numbers, expected fewer")
+    split = [line for _, line in lines if "." not in line and _SPLIT.search(line)]
+    if dialect.separator == "," and len(split) > 1:
+        raise InputError(
+            f"{path}: decimal commas between commas (line '{shown(split[0])}'), expected decimal "
+            "points or another separator"
+        )
+    widths = Counter(row.size for row in rows if row is not None)
+    if widths.total() < 2:
+        raise InputError(
+            f"{path}: no table of numbers found (first line: '{shown(lines[0][1])}'), expected "
+            "columns of numbers"
+        )
+    width, count = widths.most_common(1)[0]
+    for other, rivals in widths.items():
+        if other != width > 1 < other and rivals > max(_FEWEST_ROWS, _RIVAL * count):
+            raise InputError(
+                f"{path}: {count} rows of {width} numbers and {rivals} of {other}, expected rows "
+                "of as many cells"
+            )
+    width = _to_one_width(lines, rows, width, dialect, path)
+    sha256 = hashlib.sha256(raw).hexdigest()
+    tables = []
+    for run, names, comments in _parts(lines, rows, width, dialect):
+        array = np.array([rows[index] for index in run], dtype=float)
+        columns = np.flatnonzero(~np.isnan(array).all(axis=0)).tolist()
+        tables.append(
+            TextTable(
+                path=path,
+                dialect=dialect,
+                names=[names[column] for column in columns],
+                array=array[:, columns],
+                lines=[lines[index] for index in run],
+                comments=comments,
+                header=lines[run[0]][0],
+                sha256=sha256,
+                columns=columns,
+            )
+        )
+    return tables
+
+
+def _to_one_width(
+    lines: list[Line], rows: list[Array | None], width: int, dialect: Dialect, path: str
+) -> int:
+    """Bring the rows to the width of most of them, less columns that are blank to the right.
+
+    Rows of another width become None. Between two rows a line of as many cells, of which the first
+    is a number, is a row with gaps: it has an overflow or an error code in a cell.
+    """
+    full = np.array([row for row in rows if row is not None and row.size == width])
+    width = int(np.flatnonzero(~np.isnan(full).all(axis=0)).max()) + 1
+    for index, row in enumerate(rows):
+        if row is not None:
+            fits = row.size >= width and bool(np.isnan(row[width:]).all())
+            rows[index] = row[:width] if fits else None
+    inside = [index for index, row in enumerate(rows) if row is not None]
+    odd = ""
+    count = 0
+    for index in range(inside[0], inside[-1]):
+        if rows[index] is None:
+            cells = dialect.cells(lines[index][1]) or []
+            numbers = [dialect.number(cell) for cell in cells] if len(cells) == width else [None]
+            if numbers[0] is not None and not np.isnan(numbers[0]):
+                rows[index] = np.array(numbers, dtype=float)
+                odd, count = odd or cells[numbers.index(None)], count + 1
+    if count > max(_FEWEST_ROWS, _MOST_GAPS * len(inside)):
+        raise InputError(
+            f"{path}: {count} rows of {len(inside) + count} have a cell that is no number, the "
+            f"first '{shown(odd)}'; expected numbers"
+        )
+    return width
+
+
+def _parts(
+    lines: list[Line], rows: list[Array | None], width: int, dialect: Dialect
+) -> Iterator[tuple[list[int], list[str], list[Line]]]:
+    """Give the rows, names and comments of each table: the longest, and what could be one too."""
+    fits = [row is not None for row in rows]
+    runs = [list(run) for fitting, run in groupby(range(len(rows)), fits.__getitem__) if fitting]
+    fewest = min(_FEWEST_ROWS, max(map(len, runs)))
+    parts: list[tuple[list[int], list[str], list[Line]]] = []
+    end = 0
+    for run in runs:
+        above = lines[end : run[0]]
+        names, used = names_above(above, dialect, width)
+        comments = above[: len(above) - used]
+        end = run[-1] + 1
+        says_nothing = not any(names) and not any(key_and_value(line)[1] for _, line in comments)
+        if parts and says_nothing:
+            parts[-1][0].extend(run)
+        else:
+            parts.append((run, names, comments))
+    _, first_names, first_comments = parts[0]
+    for run, names, comments in parts:
+        if len(run) >= fewest:
+            # the nearest comments first
+            more = [] if comments is first_comments else first_comments
+            yield run, names if any(names) else first_names, [*comments, *more]
