@@ -39,7 +39,7 @@ def solved(problem: TransientProblem, x: np.ndarray, stops: np.ndarray) -> np.nd
         state = np.array(y)[:, None]
         T = equations.at(state)[0].T
         rise = space.temperature.at_points(np.array(moving)[:, None])[0]
-        heat, nothing = equations.heat_density(T)[1] * rise, np.zeros((2, *T.shape))
+        heat, nothing = equations.laws.heat_density(T)[1] * rise, np.zeros((2, *T.shape))
         out[:] = (space.weak_form(Fluxes(heat, nothing, nothing)) + problem.residual(t, state))[
             :, 0
         ]

@@ -71,10 +71,9 @@ def test_sources_add_up_and_a_cold_tip_is_as_sure_as_the_base(calibrated):
 def test_more_heat_capacity_is_a_slower_lever(coarse, monkeypatch):
     usual = simulate(coarse, pulse(8.0, 5.0 / 1.03), at=[5.0 / 1.03], tolerance_K=1e-3).tip_K.item()
     other = Lever(coarse.probe, COARSE)
-    held = other.equations.heat_density
-    monkeypatch.setattr(
-        other.equations, "heat_density", lambda T: tuple(1.03 * value for value in held(T))
-    )
+    laws = other.equations.laws
+    held = laws.heat_density
+    monkeypatch.setattr(laws, "heat_density", lambda T: tuple(1.03 * value for value in held(T)))
     slower = simulate(other, pulse(8.0, 5.0), at=[5.0], tolerance_K=1e-3).tip_K.item()
     assert slower == pytest.approx(usual, abs=2e-3)
 

@@ -71,7 +71,7 @@ def test_a_reader_may_have_doping_of_its_own():
     lever = Lever(probe, COARSE)
     films = {film.material: film for film in lever.space.films}
     assert films["light"].dopant_from == HIGH_DOPED
-    laws = lever.equations.films
+    laws = lever.equations.laws.films
     doping = {film.film.material: film.doping for film in laws if np.ndim(film.doping)}
     assert doping["light"].min() == pytest.approx(1e17, rel=0.1)
     assert doping["low-doped"].min() == pytest.approx(OPTION_III.n_d, rel=0.1)

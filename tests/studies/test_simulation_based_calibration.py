@@ -96,10 +96,10 @@ def test_another_mobility_changes_the_lever_and_nobody_else_s():
     probe = Probe.reference()
     before = Lever(probe, COARSE).sweep([5.0, 9.0])
     other = MinimosLever(probe, COARSE)
-    assert isinstance(other.equations.made_of[LOW_DOPED], MinimosSilicon)
+    assert isinstance(other.equations.laws.made_of[LOW_DOPED], MinimosSilicon)
     assert abs(other.sweep([5.0, 9.0]).current_mA / before.current_mA - 1).max() > 5e-3
     again = Lever(probe, COARSE)
-    assert type(again.equations.made_of[LOW_DOPED]) is NSilicon
+    assert type(again.equations.laws.made_of[LOW_DOPED]) is NSilicon
     xr.testing.assert_allclose(again.sweep([5.0, 9.0]).current_mA, before.current_mA)
     assert isinstance(other.with_probe(probe.with_(n_d=4e17)), MinimosLever)
 

@@ -69,7 +69,7 @@ def heat_left(equations: LeverEquations, x: Array) -> Array:
 def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
     """Return the heat in states (nJ), (n,), and its part that is tested at the leg ends."""
     space = equations.space
-    (heat,) = space.weighted(equations.heat_density(equations.at(x)[0].T)[0][None])
+    (heat,) = space.weighted(equations.laws.heat_density(equations.at(x)[0].T)[0][None])
     return heat.sum(axis=0), space.end_test[0] @ heat
 
 

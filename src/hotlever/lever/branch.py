@@ -261,7 +261,7 @@ class Branch(SolvedStates):
         one, which goes as far as it was made for.
         """
         bias, tip = reading.last_V, reading.last_K
-        limit, end = self.equations.limit
+        limit, end = self.equations.laws.limit
         side = self if bias >= 0 else self.mirrored
         at_end = f"at a bias of {bias:.4f} V, where the tip is at {tip:.1f} K"
         if self.equations.space.is_reduced:

@@ -227,7 +227,8 @@ class ArclengthContinuation(Continuation):
         slope = along / np.linalg.norm(in_plane(equations.space, along))
         branch = Branch.of(equations, np.zeros(1), rest, slope)
         if branch.melts:
-            raise ComputationError(f"without a bias {equations.limit[1]}: held supplies heat it")
+            end = equations.laws.limit[1]
+            raise ComputationError(f"without a bias {end}: held supplies heat it")
         self._branch = branch
         part = self._next(_FIRST)
         return branch if part is None else branch.followed_by(part)

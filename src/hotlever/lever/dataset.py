@@ -79,7 +79,7 @@ def _dataset(
     sensitivities: Array | None = None,
 ) -> xr.Dataset:
     """Return what is observed of n states, of which the balances (n, k) are `balance_columns`."""
-    made_of = equations.made_of
+    made_of = equations.laws.made_of
     names = balance_names(probe.wiring)
     columns = {**shown, **dict(zip(names, balances.T, strict=True))}
     at_terminals = names[len(BALANCES) :]

@@ -20,7 +20,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hotlever.lever.laws import GAS, LawsAtPoints, square
+from hotlever.lever.at_points import StatesAtPoints, square
+from hotlever.lever.laws import GAS
 from hotlever.lever.newton import refined
 from hotlever.lever.space import (
     LEVER,
@@ -44,8 +45,8 @@ BASE, GAP = "base_temperature_K", "surface_gap_um"
 _EXACT = 1e-6
 
 
-class LeverEquations(LawsAtPoints):
-    """Residual, Jacobian and derivatives of one lever of some materials; see `LawsAtPoints`."""
+class LeverEquations(StatesAtPoints):
+    """Residual, Jacobian and derivatives of one lever of some materials; see `StatesAtPoints`."""
 
     # --- the equations ------------------------------------------------------------------------
 
@@ -69,7 +70,7 @@ class LeverEquations(LawsAtPoints):
         """
         tangent = self.tangent(x)
         if per_us:
-            stored = per_us * self.heat_density(self.at(x)[0].T)[1]
+            stored = per_us * self.laws.heat_density(self.at(x)[0].T)[1]
             tangent = replace(tangent, heat_source_T=tangent.heat_source_T + stored)
         taken_up = self.heat_in_air.taken_up(per_us) if per_us else None
         air = AirTangent(self.kirchhoff(x)[1], taken_up)
@@ -115,7 +116,7 @@ class LeverEquations(LawsAtPoints):
         fields, now = self.at(x)
         # a base temperature that rises takes the whole lever with it
         by = ["T" if name == BASE else name for name in names]
-        laws = self.conductivities(fields.T, by)
+        laws = self.laws.conductivities(fields.T, by)
         sigma = np.stack([laws.sigma_by[name] for name in by], axis=-1)
         kappa = np.stack([laws.kappa_by[name] for name in by], axis=-1)
         grad_T, grad_V = fields.grad_T[..., None], fields.grad_V[..., None]
@@ -255,7 +256,5 @@ def _without_ends(changes: Fluxes, column: int, kappa: Array, value: Array, slop
 
 def steps_of(equations: LeverEquations) -> Array:
     """Return u = √(T_tip − T_base) where the tip passes a step of a law: the curves bend there."""
-    laws = [law for kind in equations.made_of.values() for law in kind.laws]
-    steps = sorted({T for law in laws for T in law.steps})
-    rises = np.array(steps) - equations.base_temperature_K
+    rises = np.array(equations.laws.steps_K) - equations.base_temperature_K
     return np.sqrt(rises[rises > 0])

@@ -308,7 +308,7 @@ class Lever:
         """
         branch = self.branch_past_knee()
         if branch.knee_u is None:
-            end = f"{self.equations.limit[1]}, with the tip at {branch.hottest_K:.0f} K"
+            end = f"{self.equations.laws.limit[1]}, with the tip at {branch.hottest_K:.0f} K"
             raise ComputationError(f"V_l rises until {end}: there is no knee")
         return dataset_of_branch(self.probe, branch, np.array([branch.knee_u]))
 

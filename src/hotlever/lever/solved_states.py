@@ -132,7 +132,7 @@ class SolvedStates:
     @property
     def melting_rise(self) -> float:
         """Rise (K) beyond which no state is meaningful."""
-        return self.equations.limit[0] - self.equations.base_temperature_K
+        return self.equations.laws.limit[0] - self.equations.base_temperature_K
 
     @property
     def melts(self) -> bool:

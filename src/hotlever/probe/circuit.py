@@ -288,16 +288,12 @@ class Circuit(Record):
     @property
     def starts_cold(self) -> bool:
         """Whether all of the lever is at the base temperature until the swept supply heats it."""
-        return not self.end_rises() and not any(
-            contact.norton[1] for contact in self.contacts.values()
-        )
+        held = any(contact.norton[1] for contact in self.contacts.values())
+        return not held and not self.end_rises()
 
     @property
     def lowest_bias_V(self) -> float:
-        """Bias (V) above which the lever is heated, and below which it is as at the opposite bias.
-
-        There is none, −∞, where others than the swept supply heat it as well.
-        """
+        """Bias (V) above which the lever is heated: any, −∞, where more than this heats it."""
         return 0.0 if self.starts_cold else -math.inf
 
     @property

@@ -205,7 +205,7 @@ def test_a_lever_of_a_metal_film_on_a_dielectric_has_the_heat_of_both():
     (rest,) = lever.solve([0.5])
     assert found.tip_K.values[-1] - 293.0 == pytest.approx(rest.tip_K - 293.0, rel=1e-5)
     # 0.4 µm of nitride and, on it, 0.05 µm of palladium
-    density, by_T = lever.equations.heat_density(np.full((len(lever.space.weights), 1), 294.0))
+    density, by_T = lever.equations.laws.heat_density(np.full((len(lever.space.weights), 1), 294.0))
     assert {0.4 * 2.1e-3, 0.4 * 2.1e-3 + 0.05 * 2.93e-3} == set(by_T.ravel().round(9))
     np.testing.assert_allclose(density, by_T)
 

@@ -198,7 +198,7 @@ def integrate(
             end = recorder.add(piece, step)
             reached = step.end if end is None else end
             if end is not None:
-                failure = f"{lever.equations.limit[1]} after {end:.6g} µs"
+                failure = f"{lever.equations.laws.limit[1]} after {end:.6g} µs"
                 break
             if progress is not None:
                 progress(int(_PARTS * reached / until), _PARTS)
@@ -227,7 +227,7 @@ class _Recorder:
         values, slopes = self._observer.read(step)
         if not self.time and (self._asked is None or self._asked[0] == 0.0):
             self._add(piece, step, values, slopes, 0.0)
-        melts = _melts(step, values, slopes, self._lever.equations.limit[0])
+        melts = _melts(step, values, slopes, self._lever.equations.laws.limit[0])
         end = step.end if melts is None else melts
         if self._asked is None:
             inside = np.linspace(step.start, end, self._per_step + 1)[1:]
@@ -291,12 +291,12 @@ def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Arra
     time = columns["time_us"]
     at_rest = lever.medium == "air" and not lever.equations.heat_in_air.size
     notes = [_AIR_NOTE] if at_rest else []
-    notes += range_notes(lever.equations.made_of, "{} µs on", time, columns["max_K"])
+    notes += range_notes(lever.equations.laws.made_of, "{} µs on", time, columns["max_K"])
     return labelled(
         columns,
         "time",
         {"time": time},
-        **probe_attributes(lever.probe, lever.equations.made_of),
+        **probe_attributes(lever.probe, lever.equations.laws.made_of),
         waveform=waveform.text,
         notes="\n".join(notes),
     )

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.laws import Conductivities
+from hotlever.lever.laws import Conductivities, LawsAtPoints
 from hotlever.lever.lever import State
+from hotlever.lever.motion import Motion
 from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
 from hotlever.lever.space import Space
 from hotlever.materials import Kind
-from hotlever.probe import Circuit
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -52,7 +52,7 @@ def reduced_in_time(lever: Lever, snapshots: Array) -> Lever:
     other = copy(lever)
     space = every.at_points(points, few)
     other.space = cast("Any", space)
-    other.equations = TabulatedEquations(space, lever.probe.kinds, lever.circuit)
+    other.equations = LeverEquations(space, lever.probe.kinds, lever.circuit, laws=TabulatedLaws)
     return other
 
 
@@ -85,15 +85,21 @@ def on_all_nodes(lever: Lever, state: State) -> State:
     return State(lever, space.expanded(state.x), space.air.expanded(in_air))
 
 
-class TabulatedEquations(LeverEquations):
-    """The equations of a lever, with the laws of each point looked up by its temperature.
+class TabulatedLaws(LawsAtPoints):
+    """The laws of each point, looked up by its temperature.
 
     In thousands of steps with one material the laws would take most of the time. Each piece is the
     parabola through its ends and its middle: within 1e-6, and 2e-4 at the step in the slope of κ.
     """
 
-    def __init__(self, space: Space, materials: Mapping[str, Kind], circuit: Circuit) -> None:
-        super().__init__(space, materials, circuit)
+    def __init__(
+        self,
+        space: Space,
+        materials: Mapping[str, Kind],
+        base_temperature_K: float,
+        motions: Mapping[str, Motion],
+    ) -> None:
+        super().__init__(space, materials, base_temperature_K, motions)
         self._found: tuple[Array, Array, Array] | None = None
         T = np.arange(_COLDEST, _HOTTEST + 1.0, 0.5 * _PIECE)
         T = np.broadcast_to(T, (space.weights.size, T.size))
@@ -150,7 +156,7 @@ def _integrands(lever: Lever, space: ReducedSpace, x: Array) -> Iterator[Array]:
     T = space.temperature.matrix.reshape(space.temperature.kinds, weights.size, -1)
     V = space.potential.matrix.reshape(space.potential.kinds, weights.size, -1)
     fluxes = equations.fluxes(x)
-    stored = equations.heat_density(equations.at(x)[0].T)[0]
+    stored = equations.laws.heat_density(equations.at(x)[0].T)[0]
     power = float(np.max(-fluxes.heat_source.T @ weights))
     heat, volt = float(np.max(stored.T @ weights)), float(np.abs(x[-1]).max())
     ends = full.end_test

@@ -111,7 +111,7 @@ def with_sensitivities(
             bias.append(piece.bias(0.0))
             shown.append(along.shown(step.x[:, :1]))
             slopes.append(along.slopes_at_start)
-        limit_K, end = lever.equations.limit
+        limit_K, end = lever.equations.laws.limit
         if lever.circuit.base_temperature_K + along.hottest(step.x[:, 1:]) > limit_K:
             raise HistoryEndError(f"{end} before {step.end:.6g} µs", step.start, None)
         if step.end in wanted:
@@ -129,7 +129,7 @@ def with_sensitivities(
         },
         "time",
         {"time": times, "observable": list(OBSERVABLES), "parameter": list(names)},
-        **probe_attributes(lever.probe, lever.equations.made_of),
+        **probe_attributes(lever.probe, lever.equations.laws.made_of),
         waveform=waveform.text,
     )
 

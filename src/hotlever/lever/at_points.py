@@ -1,0 +1,156 @@
+"""The states of a lever at its quadrature points: fields, fluxes, and the heat that they hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from typing import Self
+
+import numpy as np
+
+from hotlever.air.stores import HeatInAir
+from hotlever.lever.laws import Conductivities, LawsAtPoints
+from hotlever.lever.motion import Motion
+from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM, Fields, Fluxes, Space
+from hotlever.lever.terminals import Terminals
+from hotlever.materials import Kind
+from hotlever.materials.air import kirchhoff_variable
+from hotlever.probe.circuit import Circuit
+from hotlever.types import Array
+
+
+class StatesAtPoints:
+    """Fields, fluxes and heat of states of one lever of some materials, in its circuit.
+
+    Parameters
+    ----------
+    space : Space
+    materials : mapping of str to Kind
+        What it is made of, by name.
+    circuit : Circuit
+        What is wired to the terminals, and how warm they are.
+    motions : mapping of str to Motion, optional
+        Of the dimensions by which derivatives may be asked for.
+    laws : type of LawsAtPoints
+        How the laws are evaluated.
+
+    Raises
+    ------
+    ComputationError
+        As `LawsAtPoints`.
+
+    Attributes
+    ----------
+    terminals : Terminals
+        What is wired to the lever, in its equations.
+    laws : LawsAtPoints
+    scale, step_limit : ndarray, shape (size + 1, 1)
+        For Newton's method: the size of one unit of each unknown, by which kelvin and volts
+        compare, and the largest step.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        materials: Mapping[str, Kind],
+        circuit: Circuit,
+        motions: Mapping[str, Motion] | None = None,
+        laws: type[LawsAtPoints] = LawsAtPoints,
+    ) -> None:
+        self.space, self.materials, self.motions = space, materials, motions or {}
+        self.circuit, self.base_temperature_K = circuit, circuit.base_temperature_K
+        self.terminals = Terminals(space, circuit)
+        self.laws = laws(space, materials, self.base_temperature_K, self.motions)
+        self._latest: tuple[Array, tuple[Fields, Conductivities]] | None = None
+        self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]
+        self.step_limit = np.where(space.is_temperature, 60.0, 5.0)[:, None]
+
+    def at(self, x: Array) -> tuple[Fields, Conductivities]:
+        """Return the fields of states (size + 1, n), and κ and σ, at the quadrature points."""
+        # residual, Jacobian and derivatives are asked for at the same states one by one
+        if self._latest is None or not np.array_equal(self._latest[0], x):
+            moved = self.space.fields(x)
+            T = self.base_temperature_K + moved.T
+            T, grad_T = self.terminals.warmed(T, moved.grad_T)
+            fields = Fields(T, grad_T, moved.grad_V)
+            self._latest = x.copy(), (fields, self.laws.conductivities(fields.T))
+        return self._latest[1]
+
+    def nodal_rises(self, x: Array) -> Array:
+        """Return the rises of the temperature (K) of states at all nodes, (nodes, n)."""
+        return self.space.nodal_rises(x, self.terminals.end_rises)
+
+    def highest_rise(self, x: Array) -> Array:
+        """Return the highest rise of the temperature (K) in states, between the nodes too, (n,)."""
+        return self.space.elements.highest(self.nodal_rises(x))
+
+    def driven(self, share: float) -> Self:
+        """Return the same with held supplies and warmer leg ends at a share of their values."""
+        return self._at(self.terminals.scaled(share, share))
+
+    @property
+    def mirrored(self) -> Self:
+        """The same with held supplies of the other polarity."""
+        return self._at(self.terminals.scaled(-1.0, 1.0))
+
+    def _at(self, terminals: Terminals) -> Self:
+        other = copy(self)
+        other.terminals, other._latest = terminals, None
+        return other
+
+    def fluxes(self, x: Array) -> Fluxes:
+        """Return what the weak equations test."""
+        fields, laws = self.at(x)
+        return Fluxes(
+            -laws.sigma * square(fields.grad_V),
+            laws.kappa * fields.grad_T,
+            laws.sigma * fields.grad_V,
+        )
+
+    def kirchhoff(self, x: Array) -> tuple[Array, Array]:
+        """Return θ (mW/µm) and κ (mW/(K µm)) of the gas at the sites of the air operator."""
+        base = self.base_temperature_K
+        rise = self.space.air.rise(x)
+        if not rise.size:
+            return rise, rise
+        theta, by = kirchhoff_variable(base + rise, base)
+        unit = PER_CM_TO_MILLI_PER_UM * self.space.air.gas_conductivity
+        return unit * theta, unit * by["T"]
+
+    @property
+    def heat_in_air(self) -> HeatInAir:
+        """Heat that the air takes up itself; nothing in vacuum, or where that is not known."""
+        stores: HeatInAir = self.space.air.stores
+        return stores
+
+    def storage(self, x: Array) -> Array:
+        """Return the heat stored in states (nJ), tested as the balance is, (size + 1, n).
+
+        In time the balance is what it loses per µs.
+        """
+        return self._only_heat(self.laws.heat_density(self.at(x)[0].T)[0])
+
+    def storage_change(self, x: Array, change: Array) -> Array:
+        """Return how `storage` changes by one change of each state, or by several."""
+        by_T = self.laws.heat_density(self.at(x)[0].T)[1]
+        rise = self.space.temperature.at_points(change)[0]
+        heat = (by_T if change.ndim == 2 else by_T[..., None]) * rise
+        return self._only_heat(heat)
+
+    def storage_by_parameter(self, x: Array, names: Sequence[str]) -> Array:
+        """Return how `storage` changes with parameters of materials, (size + 1, n, k)."""
+        cold = np.full_like(self.space.weights, self.base_temperature_K)
+        by = self.laws.enthalpy_by(self.at(x)[0].T, names) - self.laws.enthalpy_by(cold, names)
+        return self._only_heat(by)
+
+    def _only_heat(self, heat: Array) -> Array:
+        """Test a heat by area alone."""
+        tested = self.space.temperature.values_tested(self.space.weighted(heat[None])[0])
+        weak = np.zeros((self.space.size + 1, *heat.shape[1:]))
+        weak[self.space.temperature.columns] = tested
+        return weak
+
+
+def square(gradient: Array) -> Array:
+    """Return the squared length of vectors (dimension, points, n)."""
+    return np.einsum("dpn,dpn->pn", gradient, gradient)
