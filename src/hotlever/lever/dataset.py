@@ -87,7 +87,7 @@ def _dataset(
     columns["power_mW"] = shown["lever_V"] * shown["current_mA"]
     for part in ("heater", "leg1", "leg2"):
         columns[f"{part}_ohm"] = _resistance(columns[f"{part}_mW"], shown["current_mA"])
-    if probe.wiring.contacts:
+    if probe.wiring.held:
         # the same current does not pass all parts
         columns["leg2_ohm"] = np.full_like(columns["leg2_ohm"], np.nan)
     columns["legs_ohm"] = columns["leg1_ohm"] + columns["leg2_ohm"]

@@ -82,10 +82,9 @@ class FullSpace(Space):
         tip[:2] = mesh.layout.tip
         (element,), (weights,), _ = self.elements.at_points(tip[None])
         self.tip = (self._T[self.elements.dofs[element]], weights)
-        self.wired = self.wiring.contacts
-        self.contacts = np.array([self._V[self.contact_nodes[name][0]] for name in self.wired], int)
+        self.held = {name: int(self._V[self.contact_nodes[name][0]]) for name in self.wiring.held}
         unknowns = np.stack([self._T, self._V])
-        self._jacobian = SparseJacobian(self.elements, unknowns, self.size, self.contacts, self.tip)
+        self._jacobian = SparseJacobian(self.elements, unknowns, self.size, self.held, self.tip)
         self.air = AirLoss.nothing(self.size + 1)
         measurable = "reader" in self.wiring.measurable
         self.reader = self.potential_at("reader") if measurable else None

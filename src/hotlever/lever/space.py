@@ -223,10 +223,8 @@ class Space(ABC):
         Unknowns and weights that give the rise of the tip temperature.
     reader : tuple of (ndarray of int, ndarray), or None
         The same for the reader voltage V_r; None without a reader.
-    contacts : ndarray of int
-        Unknowns that are the potentials of contacts, beside the swept supply's.
-    wired : tuple of str
-        The names of their terminals.
+    held : dict of str to int
+        The unknowns that are potentials of held terminals, see `hotlever.lever.terminals`.
     end_test : ndarray, shape (1 + dimension, points)
         Values and slopes of the function that is one at the leg ends.
     end_tests : dict of str to ndarray
@@ -250,8 +248,7 @@ class Space(ABC):
     is_temperature: NDArray[np.bool_]
     tip: tuple[Index, Array]
     reader: tuple[Index, Array] | None
-    contacts: Index = np.empty(0, dtype=np.intp)
-    wired: tuple[str, ...] = ()
+    held: Mapping[str, int]
     end_test: Array
     end_tests: Mapping[str, Array]
     elements: FiniteElements
@@ -311,7 +308,7 @@ class Space(ABC):
     ) -> Factors:
         """Put the Jacobians of all states together, the constraint last, and factorise.
 
-        Behind each of the contacts is a conductance (mA/V).
+        Behind each held terminal is a conductance (mA/V).
         """
 
 

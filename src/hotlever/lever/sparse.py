@@ -27,8 +27,8 @@ class SparseJacobian:
         Those of temperature and potential at each node, -1 where they are held.
     size : int
         How many there are, without the lever voltage, which has this number itself.
-    contacts : ndarray of int
-        Unknowns on whose diagonal there are conductances.
+    held : mapping of str to int
+        Unknowns on whose diagonal there are conductances, by terminal.
     tip : tuple of (ndarray of int, ndarray)
         Unknowns and weights that give the rise of the tip temperature.
 
@@ -43,7 +43,7 @@ class SparseJacobian:
         elements: FiniteElements,
         unknowns: Index,
         size: int,
-        contacts: Index,
+        held: Mapping[str, int],
         tip: tuple[Index, Array],
     ) -> None:
         self._elements, self._count, self._tip = elements, size + 1, tip[1]
@@ -55,12 +55,13 @@ class SparseJacobian:
             count**2,  # after all others: dropped
         )
         of_constraint = np.append(tip[0], size) * count + size
-        every = np.concatenate([keys.ravel(), of_constraint, contacts * (count + 1)])
+        diagonal = np.array(list(held.values()), dtype=int) * (count + 1)
+        every = np.concatenate([keys.ravel(), of_constraint, diagonal])
         unique, slots = np.unique(every, return_inverse=True)
         unique = unique[unique < count**2]
         self._entries = unique.size
         self.slots = slots[: keys.size].reshape(keys.shape)
-        self._constraint_slots, self._contact_slots = np.split(
+        self._constraint_slots, self._held_slots = np.split(
             slots[keys.size :], [of_constraint.size]
         )
         self._rows = (unique % count).astype(np.int32)
@@ -80,7 +81,7 @@ class SparseJacobian:
         element[:, nodes:, :nodes] = matrices(slope_value=tangent.charge_flux_T)
         element[:, nodes:, nodes:] = matrices(slope_slope=tangent.sigma)
         entries = sums_by_index(self.slots, element, self._entries + 1)[: self._entries]
-        entries[self._contact_slots] += conductance
+        entries[self._held_slots] += conductance
         return entries
 
     def factorised(self, entries: Array, constraint: Constraint) -> SuperLU:
@@ -123,7 +124,7 @@ def numbered(
     """Give every nodal value its unknown, in an order with little fill.
 
     Values that are held get -1, the potential of the swept supply the number after all others; a
-    contact has that of its first node.
+    held terminal has that of its first node.
 
     Parameters
     ----------
@@ -146,7 +147,7 @@ def numbered(
     free[0, ends] = free[1, contact_nodes[wiring.swept]] = False
     for name in wiring.grounds:
         free[1, contact_nodes[name]] = False
-    for name in wiring.contacts:
+    for name in wiring.held:
         free[1, contact_nodes[name][1:]] = False
     flat = free[:, order].T
     size = int(flat.sum())
@@ -156,7 +157,7 @@ def numbered(
     number[order] = ordered
     T, V = number.T.copy()
     V[contact_nodes[wiring.swept]] = size
-    for name in wiring.contacts:
+    for name in wiring.held:
         V[contact_nodes[name]] = V[contact_nodes[name][0]]
     return T, V, size
 

@@ -40,17 +40,17 @@ class Terminals:
 
     Attributes
     ----------
-    conductance : ndarray, shape (contacts,)
+    conductance : ndarray, shape (held,)
         G of the held terminals (mA/V).
-    source_mA : ndarray, shape (contacts,)
+    source_mA : ndarray, shape (held,)
         J of the held terminals.
     end_rises : dict of str to float
         How much warmer than the base temperature leg ends are (K), if they are.
     """
 
     def __init__(self, space: Space, circuit: Circuit) -> None:
-        self._space = space
-        self.conductance, self.source_mA = circuit.norton(space.wired)
+        self._space, self._held = space, np.array(list(space.held.values()), dtype=int)
+        self.conductance, self.source_mA = circuit.norton(space.held)
         self.end_rises = circuit.end_rises()
 
     def scaled(self, sources: float, rises: float) -> Terminals:
@@ -65,23 +65,23 @@ class Terminals:
 
         Of an ideal supply both parts are large, so that the difference is taken first.
         """
-        weak[self._space.contacts] += self._conducted(x) - self.source_mA[:, None]
+        weak[self._held] += self._conducted(x) - self.source_mA[:, None]
 
     def add_current_changes(self, weak: Array, change: Array) -> None:
         """Do the same with changes of the unknowns, (size + 1, n) or (size + 1, n, k)."""
-        weak[self._space.contacts] += self._conducted(change)
+        weak[self._held] += self._conducted(change)
 
     def _conducted(self, x: Array) -> Array:
         conductance = self.conductance.reshape(-1, *(1,) * (x.ndim - 1))
-        return np.asarray(conductance * x[self._space.contacts])
+        return np.asarray(conductance * x[self._held])
 
     def power(self, x: Array, into: Array) -> Array:
         """Return the power (mW) that supplies put into states, (n,), by the currents (mA) there.
 
         These are the weak form of the fluxes, (size + 1, n).
         """
-        contacts = self._space.contacts
-        return np.asarray(x[-1] * into[-1] + (x[contacts] * into[contacts]).sum(axis=0))
+        by_held = (x[self._held] * into[self._held]).sum(axis=0)
+        return np.asarray(x[-1] * into[-1] + by_held)
 
     def warmed(self, T: Array, grad_T: Array) -> tuple[Array, Array]:
         """Return temperatures and slopes at the points with leg ends as warm as they are held."""

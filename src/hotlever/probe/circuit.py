@@ -95,26 +95,26 @@ class Wiring:
         The swept supply.
     grounds : tuple of str
         At ground, nothing between.
-    contacts : tuple of str
-        Each of one potential that follows from what is behind it.
+    held : tuple of str
+        Each of one potential that follows from what is behind it: a supply of its own, or ground.
     senses : tuple of str
         No current.
     """
 
     swept: str
     grounds: tuple[str, ...]
-    contacts: tuple[str, ...]
+    held: tuple[str, ...]
     senses: tuple[str, ...]
 
     @property
     def measurable(self) -> tuple[str, ...]:
         """Those whose potential follows from the rest."""
-        return (*self.senses, *self.contacts)
+        return (*self.senses, *self.held)
 
     @property
     def conducting(self) -> tuple[str, ...]:
         """Those that a current passes, beside the swept supply."""
-        return (*self.grounds, *self.contacts)
+        return (*self.grounds, *self.held)
 
 
 class Circuit(Record):
@@ -254,8 +254,8 @@ class Circuit(Record):
         senses = tuple(name for name, contact in others.items() if contact.kind == "sense")
         if not any(contact.norton[0] for name, contact in others.items() if name not in senses):
             raise InputError(f"{where}: [circuit]: no terminal is at ground, expected one")
-        contacts = tuple(name for name in others if name not in (*bare, *senses))
-        return Wiring(self.swept, tuple(bare), contacts, senses)
+        held = tuple(name for name in others if name not in (*bare, *senses))
+        return Wiring(self.swept, tuple(bare), held, senses)
 
     def check(self, terminals: Iterable[str], medium: str, where: str) -> None:
         """Refuse what does not fit some terminals in a medium.

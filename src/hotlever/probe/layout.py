@@ -249,7 +249,7 @@ class Layout:
 
     def heaters(self, wiring: Wiring) -> tuple[Region, ...]:
         """Return the regions that a current heats much: with other circuits not the heater only."""
-        beside = wiring.contacts or len(wiring.grounds) > 1
+        beside = wiring.held or len(wiring.grounds) > 1
         return tuple(
             region
             for region in self.regions

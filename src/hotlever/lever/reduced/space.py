@@ -134,7 +134,7 @@ class ReducedSpace(Space):
             unknowns, weights = full.reader
             values = np.vstack([modes_V, lift])[:, unknowns] @ weights
             self.reader = (np.arange(self.count, self.size + 1), values)
-        self.elements = full.elements
+        self.elements, self.held = full.elements, {}
         self._hot = modes_T if hot is None else modes_T[:, hot]
         self.air = ReducedAir(full.air, modes_T, self.size)
 

@@ -77,7 +77,7 @@ def simulate(
         end = float(checked_times(at)[-1])
     often = waveform.count >= FEWEST and end < np.inf
     # modes are of levers that only the swept supply drives, from cold
-    cold = start is None and not lever.space.wired
+    cold = start is None and not lever.space.held
     if period is not None and often and FEWEST * period <= end and cold:
         try:
             return _on_modes(lever, waveform, period, end, at, tolerance_K, callback, **options)
