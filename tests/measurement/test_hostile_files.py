@@ -72,7 +72,7 @@ REFUSED = {
 WORDS = {
     "thousands": "line 4: I_h: '1,041' may be 1.041 or 1041, expected numbers without marks of",
     "thousands and decimals": "line 3: I_h: found '1,041.5', expected a number",
-    "thousands with commas": "line 3: 3 cells, expected 2 as in the header",
+    "thousands with commas": "line 3: 3 cells, expected 2 as in line 1",
     "thousands with points": "line 3: I_h: found '1.041,5', expected a number with a decimal comma",
     "thousands with blanks": "line 3: I_h: found '1 041,5', expected a number",
     "thousands with apostrophes": "line 3: I_h: found '1'041.5', expected a number",
@@ -93,7 +93,7 @@ WORDS = {
     "two settings in one": "line 1: R_s: found '5 R_s .kOhm.: 5.6', expected a number",
     "signs disagree": "line 2: V_b is '-2' and I_h is '0.2849', expected the same sign",
     "text among numbers": "line 3: V_b: found 'overflow', expected a number",
-    "a row too short": "line 3: 1 cells, expected 2 as in the header",
+    "a row too short": "line 3: 1 cells, expected 2 as in line 1",
     "another table below": "line 12: another table after the header",
     "a segment cut off": "line 26: another table after the header",
     "header twice, changed": r"line 3: V_b: found 'V_b \(V\)', expected a number",

@@ -56,6 +56,15 @@ def test_join_by_bias_in_the_name_leaves_other_rows_empty(tmp_path):
     ]
 
 
+def test_a_log_of_two_sweeps_names_its_columns_twice(tmp_path):
+    log = tmp_path / "log.txt"
+    log.write_text("V_b (V)  I_h (mA)\n1  0.14\nV_b (V)  I_h (mA)\n2  0.28\n")
+    table = read_bias_log(log)
+    assert (table.names, table.rows) == (["V_b (V)", "I_h (mA)"], [["1", "0.14"], ["2", "0.28"]])
+    joined = join(table, read("a_1V.txt", "a_2V.txt")).splitlines()
+    assert joined[1:] == ["1,0.14,500.0,3.0", "2,0.28,500.0,3.0"]
+
+
 def test_join_by_order_keeps_the_files_dialect_and_replaces_old_temperatures(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("V_b (mV);T_tip (K);dT_tip (K);I_h (mA)\n1000,5;999;9;0,14\n2000,5;;;0,28\n")

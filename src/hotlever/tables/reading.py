@@ -52,12 +52,12 @@ def read_table(
     expected : str
         What the file should hold, for the error if it holds nothing.
     header : bool
-        Whether there must be a header row. Else a first row with a number is none, and blanks
-        may separate cells.
+        Whether there must be a header row. Else a first row with a number is none.
     is_heading : callable, optional
-        Whether a heading is one of those looked for. The header row is then looked for
-        (`hotlever.tables.headings.header_row`). Lines above it are comments; units may stand in a
-        row below it, and the header row may be repeated. Numbers alone have no header row.
+        Whether a heading is one of those looked for, in a table of numbers. The header row is then
+        looked for (`hotlever.tables.headings.header_row`): lines above it are comments, numbers
+        alone have none, and lines without numbers between it and the first row are remarks. Else
+        it is the first line that is no comment, and rows may be words alone.
 
     Raises
     ------
@@ -71,8 +71,8 @@ def read_table(
         raise InputError(f"{path}: no header row and no rows, expected {expected}")
     row = first if is_heading is None else header_row(lines, is_heading)
     start = first if row is None else row
-    named, loose = row is not None, is_heading is not None
-    reader = _Reader(str(path), lines[start:], named, header, loose)
+    named = row is not None
+    reader = _Reader(str(path), lines[start:], named, words=is_heading is None)
     comments = lines[:start]
     for line in lines[start + named :]:
         if is_comment(line[1]) or not reader.takes(*line):
@@ -83,7 +83,7 @@ def read_table(
     if reader.skipping or not rows:
         where = f"line {reader.skipping}: another table" if reader.skipping else "no data rows"
         raise InputError(f"{path}: {where} after the header")
-    if loose and named:
+    if named and any(names):
         names = reader.with_units(comments)
     dialect = reader.dialect(rows)
     return TextTable(
@@ -115,16 +115,13 @@ class _Reader:
     `lines` begin with the header row, or the first row if there is none.
     """
 
-    def __init__(
-        self, path: str, lines: list[Line], named: bool, header: bool, loose: bool
-    ) -> None:
-        self._path, self._loose = path, loose
-        self._first = "header" if header else "first row"
+    def __init__(self, path: str, lines: list[Line], named: bool, words: bool) -> None:
+        self._path, self._words = path, words
         self.rows: list[Line] = []
         self.remarks: list[Line] = []
         self.skipping = 0  # the line since which the next header row is waited for
         self._units: list[str] = []
-        number, line = lines[0]
+        self._header, line = lines[0]
         separator = separator_in(line)
         if not named or is_comment(line):
             # the heading may be separated in another way than the rows
@@ -132,16 +129,15 @@ class _Reader:
             self.names = headings_in(line) if named else []
             separator, width = row_of_numbers(row, len(self.names) or None) or (separator, 0)
             self.names = self.names or [""] * width
-        elif separator is None and loose:
+        elif separator is None:
             self.names = headings_in(line)
             separator = None if len(self.names) > 1 else ","
         else:
-            separator = separator or ("," if header else None)
-            self.names = self._cells(number, line, separator)
+            self.names = self._cells(self._header, line, separator)
         self._separator = separator
         while named and len(self.names) > 1 and not self.names[-1]:
             self.names.pop()
-        if named and loose:
+        if named:
             self.names[0] = without_marks(self.names[0])
 
     def _cells(self, number: int, line: str, separator: str | None) -> list[str]:
@@ -161,24 +157,24 @@ class _Reader:
         width = len(self.names)
         while len(cells) > width and not cells[-1]:
             cells.pop()
-        if self._loose:
-            if cells == self.names:
-                self.skipping = 0  # a further sweep
-                return True
-            if self.skipping or begins_other_lines(cells):
-                self.skipping = self.skipping or number
-                return False
-            if len(cells) < width and may_end_early(self.names):
-                cells += [""] * (width - len(cells))
-            if not self.rows and len(cells) <= width and not any(map(begins_number, cells)):
-                self._remark(number, line, cells)
-                return True
+        if cells == self.names:
+            self.skipping = 0  # a further sweep
+            return True
+        if self.skipping or begins_other_lines(cells):
+            self.skipping = self.skipping or number
+            return False
+        if len(cells) < width and may_end_early(self.names):
+            cells += [""] * (width - len(cells))
+        has_number = self._words or any(map(begins_number, cells))
+        if not (self.rows or has_number) and len(cells) <= width:
+            self._remark(number, line, cells)
+            return True
         if len(cells) != width:
             halves = self._separator == "," and len(cells) == 2 * width
             hint = "; with decimal commas, tabs or semicolons must separate the cells" * halves
             raise InputError(
-                f"{self._path}: line {number}: {len(cells)} cells, expected {width} as in the "
-                f"{self._first}{hint}"
+                f"{self._path}: line {number}: {len(cells)} cells, expected {width} as in line "
+                f"{self._header}{hint}"
             )
         self.rows.append((number, line))
         return True
