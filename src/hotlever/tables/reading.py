@@ -122,6 +122,7 @@ class _Reader:
         self.skipping = 0  # the line since which the next header row is waited for
         self._units: list[str] = []
         self._header, line = lines[0]
+        self._named_by = line if named else None
         separator = separator_in(line)
         if not named or is_comment(line):
             # the heading may be separated in another way than the rows
@@ -157,7 +158,7 @@ class _Reader:
         width = len(self.names)
         while len(cells) > width and not cells[-1]:
             cells.pop()
-        if cells == self.names:
+        if cells == self.names or line == self._named_by:
             self.skipping = 0  # a further sweep
             return True
         if self.skipping or begins_other_lines(cells):
