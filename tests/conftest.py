@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from experiments import on_coarse_meshes
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.cli import main, output
 from hotlever.lever import Branch, Lever
@@ -48,6 +49,13 @@ def lever() -> Lever:
 def coarse() -> Lever:
     """The reference lever on a coarse mesh: for what does not depend on accuracy."""
     return Lever(Probe.reference(), COARSE)
+
+
+@pytest.fixture(scope="module")
+def coarse_meshes(lever: Lever) -> Iterator[None]:
+    """For a whole module, see `on_coarse_meshes`; the lever that all share is made before."""
+    with on_coarse_meshes():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -1,9 +1,16 @@
-"""Experiments with levers that tests choose: as they are, or reduced."""
+"""Experiments with levers that tests choose: as they are, or reduced, or on coarse meshes."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
 from hotlever.estimation.experiment_at_rest import ExperimentAtRest
 from hotlever.lever import Lever
+from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe.parameters import usual_parameters
@@ -18,3 +25,19 @@ def full_experiment(lever: Lever, bias: Array) -> ExperimentAtRest:
 def reduced_experiment(lever: Lever, reduced: ReducedLever, bias: Array) -> ExperimentAtRest:
     """Return a reduced lever, corrected by the full one, as forward model."""
     return ExperimentAtRest(reduced, SimilarLevers(lever), bias, reduced.names)
+
+
+@contextmanager
+def on_coarse_meshes() -> Iterator[None]:
+    """Let levers of this process have the coarse mesh where they would have the usual one.
+
+    For what is said, written and drawn of a lever, whatever its numbers are in the fourth digit.
+    """
+    make = Lever.__init__
+
+    def made_coarse(self: Lever, probe: Any, mesh: Any = None, **others: Any) -> None:
+        make(self, probe, mesh or COARSE, **others)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Lever, "__init__", made_coarse)
+        yield

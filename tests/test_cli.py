@@ -17,6 +17,8 @@ from hotlever.errors import ComputationError
 from hotlever.probe import Probe
 from of_materials import p_type_probe
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 EXAMPLE = Path(__file__).parents[1] / "src" / "hotlever" / "examples" / "lever-a.csv"
 
 

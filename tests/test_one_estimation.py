@@ -11,6 +11,8 @@ import hotlever
 from hotlever.calibration import calibrate
 from hotlever.estimation import fit
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 SLOW = pytest.mark.slow
 FOLDER = Path(hotlever.__file__).parent / "examples"
 EXAMPLES = [

@@ -16,6 +16,8 @@ from hotlever.errors import InputError
 from hotlever.estimation import Measurement
 from hotlever.lever.lever import COARSE
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 HELD = {"kind": "supply", "bias_V": 2.0, "series_resistance_ohm": 500.0}
 PROBE = Probe.reference().with_(**{f"circuit.reader.{key}": HELD[key] for key in HELD})
 TRUE = PROBE.replace({"c_kappa": 0.66, "n_d": 5.3e17, "p": 2.6})

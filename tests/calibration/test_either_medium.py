@@ -16,6 +16,8 @@ from hotlever.estimation.inverse_problem import in_medium
 from hotlever.estimation.residuals import Residuals
 from synthetic_curves import measured_curve, measurement_of
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 #: Where a lever is so cold that little tells what it is in (K).
 COLD_K = 480.0
 

@@ -14,6 +14,8 @@ from hotlever.lever import Lever
 from hotlever.probe import Circuit, Probe
 from synthetic_curves import measured_curve, measurement_of
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 
 def test_priors_are_about_the_circuit_of_the_measurement(reference):
     """Not about the probe file's, where they differ; also as text."""

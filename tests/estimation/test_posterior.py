@@ -19,6 +19,8 @@ from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, default_priors
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 BIAS = np.linspace(2, 11, 10)
 HELD = {"n_d": None, "a0": None, "a1": None}
 
@@ -206,7 +208,7 @@ def informed(coarse):
 
 def test_the_posterior_of_a_fit_with_priors_agrees_with_its_covariance(informed):
     assert {"heater_length_um", "series_resistance_ohm"} < set(informed.names)
-    posterior = sample_posterior(informed, samples=1200, processes=1)
+    posterior = sample_posterior(informed, samples=1200, walkers=12, processes=1)
     for name in ("n_d", "c_kappa", "heater_length_um", "series_resistance_ohm"):
         known = informed.parameters[name]
         assert posterior[name].mean().item() == pytest.approx(known.value, abs=0.4 * known.stderr)

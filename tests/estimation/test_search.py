@@ -26,6 +26,8 @@ from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from little_known_levers import little_known_lever
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 NOISE = 5e-4
 FOLDER = Path(hotlever.__file__).parent / "examples"
 
@@ -120,6 +122,7 @@ def test_hints_on_a_file_are_tried(tmp_path, reference_curve, bias, current, que
         fit(path)
 
 
+@pytest.mark.slow
 def test_a_current_whose_unit_is_wrong_is_told_from_other_scales(reference_curve):
     thousandth = replace(reference_curve, current_mA=reference_curve.current_mA / 1000.0)
     with pytest.raises(InputError, match="1000 times too small"):
