@@ -156,26 +156,18 @@ class Dialect:
         # nearly every line has nothing but numbers, and maps have millions
         if _PLAIN.fullmatch(line) and not (self.decimal_comma and "." in line):
             cells = (line.replace(",", ".") if self.decimal_comma else line).split(self.separator)
-            with suppress(ValueError):
-                return _limited(list(map(float, cells)))
-            with suppress(ValueError):
-                filled = np.array([bool(cell.strip()) for cell in cells])
-                numbers = _limited([float(cell) for cell in cells if cell.strip()])
-                if numbers is None:
-                    return None
-                row = np.full(len(cells), np.nan)
-                row[filled] = numbers
-                return row
+            for read in (float, _number_or_blank):
+                with suppress(ValueError):
+                    row = np.array(list(map(read, cells)))
+                    # fmax leaves NaN out
+                    return row if np.fmax.reduce(np.abs(row)) <= LARGEST_NUMBER else None
         values = [self.number(cell) for cell in self.cells(line) or []]
         row = np.array(values, dtype=float)
         return None if None in values or np.isnan(row).all() else row
 
 
-def _limited(numbers: list[float]) -> Array | None:
-    """Return numbers as a row, None if there are none or one is too large."""
-    if not numbers or max(numbers) > LARGEST_NUMBER or min(numbers) < -LARGEST_NUMBER:
-        return None
-    return np.array(numbers)
+def _number_or_blank(cell: str) -> float:
+    return float(cell) if cell.strip() else math.nan
 
 
 #: In the order in which they are tried.
