@@ -42,6 +42,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "ground_current_mA": ("mA", "current leaving to ground"),
     "end_heat_mW": ("mW", "heat leaving by the leg ends"),
     "air_heat_mW": ("mW", "heat leaving into the air"),
+    "radiated_mW": ("mW", "heat leaving by radiation"),
     "sensitivity": ("of the observable by the parameter", "derivative at fixed bias"),
     # in time
     "time": ("µs", "time"),

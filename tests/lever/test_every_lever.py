@@ -27,6 +27,7 @@ from hotlever.lever.space import LEVER, TIP
 from hotlever.lever3d import SolidLever
 from hotlever.materials import PARAMETERS, published
 from hotlever.probe import Circuit, Probe
+from hotlever.probe.physics import Physics
 from hotlever.probe.solid import SolidMeshOptions
 from of_materials import metal_film_probe, p_type_probe
 
@@ -47,14 +48,16 @@ class One:
     def probe(self) -> Probe:
         """Its probe, or one that differs from it in nothing that matters, with option III."""
         probe = getattr(self.lever, "probe", Probe.reference())
-        return probe.model_copy(update={"material": MATERIAL})
+        material = MATERIAL.model_copy(update={"scattering_exponent": 0.3})
+        return probe.model_copy(update={"material": material})
 
     @property
     def names(self) -> tuple[str, ...]:
         """The parameters of its materials."""
         named = self.probe.materials.items()
         own = [f"{name}.{one}" for name, kind in named for one in kind.usual]
-        return tuple(own or PARAMETERS)
+        effects = ("n_hd", "scattering_exponent", "emissivity") if self.probe.physics else ()
+        return tuple(own or [*PARAMETERS, *effects])
 
     @property
     def solver(self) -> BranchSolver:
@@ -68,6 +71,8 @@ class One:
         return self.solver.linearised(self.probe, Reach(circuit, bias)).branch
 
 
+#: All that counts beyond the paper.
+ALL = Probe.reference().with_physics(Physics.model_fields)
 SOLID = SolidMeshOptions(refinement=0.4, grading=0.7)
 KINDS: dict[str, Callable[[pytest.FixtureRequest], One]] = {
     "flat": lambda request: One(request.getfixturevalue("coarse"), 9.5),
@@ -77,6 +82,11 @@ KINDS: dict[str, Callable[[pytest.FixtureRequest], One]] = {
     "no reader": lambda _: One(Lever(Probe.u_shape(), COARSE), 9.5),
     "no reader, reduced": lambda _: One(cached_reduction(Lever(Probe.u_shape(), COARSE)), 9.5),
     "solid": lambda _: One(SolidLever(Probe.reference(), SOLID), 4.0),
+    "all effects": lambda _: One(Lever(ALL, COARSE), 9.5),
+    "all effects, in air": lambda _: One(Lever(ALL.in_medium("air"), COARSE), 9.5),
+    "boron-doped, all effects": lambda _: One(
+        Lever(p_type_probe().with_physics(Physics.model_fields), COARSE), 9.5
+    ),
     "boron-doped": lambda _: One(Lever(p_type_probe(), COARSE), 9.5),
     "metal film": lambda _: One(Lever(metal_film_probe(), COARSE), 4.0),
     "metal film, in air": lambda _: One(Lever(metal_film_probe().in_medium("air"), COARSE), 4.0),
@@ -116,7 +126,8 @@ def test_charge_and_energy_are_conserved(one, branch):
     columns = dict(zip(BALANCES, balance_columns(branch.equations, hot(branch)).T, strict=True))
     power = branch.values[1:, 0] * branch.values[1:, 1]
     np.testing.assert_allclose(columns["ground_current_mA"], branch.values[1:, 1], rtol=1e-7)
-    np.testing.assert_allclose(columns["end_heat_mW"] + columns["air_heat_mW"], power, rtol=1e-6)
+    ways = ("end_heat_mW", "air_heat_mW", "radiated_mW")
+    np.testing.assert_allclose(sum(columns[way] for way in ways), power, rtol=1e-6)
 
 
 def test_the_jacobian_passes_a_taylor_test(branch):

@@ -54,11 +54,12 @@ def understood(
     Beside it may be told its columns, the file of the probe, and the pulse that was measured.
     """
     told = told or {}
-    circuit = _probe(folder, told.get("probe")).circuit
+    probe = _probe(folder, told.get("probe"))
+    circuit, signed = probe.circuit, probe.lowest_bias_V < 0.0
     columns = parse_columns(told.get("columns") or [])
     pulse = told.get("waveform")
     waveform = waveform_from_text("pulse", pulse) if pulse else None
-    measurement = read_measurement(folder / name, columns, circuit, waveform)
+    measurement = read_measurement(folder / name, columns, circuit, waveform, signed=signed)
     data = measurement.dataset(circuit)
     (along,) = data.sizes
     data = data.isel({along: slice(None, None, data.sizes[along] // _POINTS + 1)})

@@ -211,7 +211,8 @@ def _verdict(estimate: Estimate, priors: Mapping[str, PriorUse]) -> tuple[bool, 
 
 def _tips(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
     """Return the tip temperatures of a branch at the measured power; or bias, if not that tells."""
-    if branch.starts_cold and branch.power_turns_K is None:
+    one_way = measured.bias_V.min() >= 0.0
+    if one_way and branch.starts_cold and branch.power_turns_K is None:
         return branch.tip_temperature(circuit.power(measured.bias_V, measured.current_mA))
     return branch.tip_K(branch.read(circuit, measured.bias_V).u)
 

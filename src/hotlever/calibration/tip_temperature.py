@@ -119,9 +119,9 @@ def tip_by_bias(
 
 def measured_range(estimate: Estimate) -> Array:
     """Return even biases (V) over the measured range, as far as the lever has states."""
-    measured, circuit = estimate.measurement, estimate.probe.circuit
+    measured = estimate.measurement
     # without a bias nothing is known of a lever that is cold then
-    heated = measured.bias_V > circuit.lowest_bias_V
+    heated = measured.bias_V > estimate.probe.lowest_bias_V
     present = measured.bias_V[np.isfinite(measured.current_mA) & heated]
     return np.linspace(present.min(), min(present.max(), highest_bias(estimate)), _ROWS)
 

@@ -11,12 +11,18 @@ from hotlever.files import FIGURE_TYPES, Outputs, write_text
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import read_probe
-from hotlever.tasks.requests import File, PlotRequest, ProbeRequest, option
+from hotlever.tasks.requests import (
+    File,
+    PhysicsRequest,
+    PlotRequest,
+    ProbeRequest,
+    option,
+)
 from hotlever.tasks.texts import check_number, parse_vary
 
 
 @dataclass(kw_only=True)
-class DesignRequest(PlotRequest, ProbeRequest):
+class DesignRequest(PlotRequest, PhysicsRequest, ProbeRequest):
     """What a change of a probe's design does."""
 
     vary: str | None = option(
@@ -51,7 +57,9 @@ def design_command(request: DesignRequest) -> None:
     if vary is None and (plot is not None or output is not None):
         raise InputError("a file or a figure needs a sweep: --vary NAME=START:STOP:COUNT")
     start = study.Design(
-        read_probe(terminal, request.probe), request.annealing_K, request.annealing_min
+        request.with_physics(read_probe(terminal, request.probe)),
+        request.annealing_K,
+        request.annealing_min,
     )
     if vary is None:
         with terminal.progress("design") as update:

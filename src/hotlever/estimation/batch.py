@@ -127,7 +127,8 @@ def fit_many(
 
     for name, path in data.items():
         try:
-            measurement = read_measurement(path, columns, probe.circuit)
+            signed = probe.lowest_bias_V < 0.0
+            measurement = read_measurement(path, columns, probe.circuit, signed=signed)
             measurement.need_rest("a fit of several levers")
             if reading is not None:
                 reading(measurement)

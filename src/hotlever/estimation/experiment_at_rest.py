@@ -109,7 +109,9 @@ class ExperimentAtRest:
         Similar levers have no bias elsewhere.
         """
         lowest, highest = min(float(self.bias.min()), 0.0), max(float(self.bias.max()), 0.0)
-        return Reach(probe.circuit, highest, lowest - _BEYOND_ZERO * (highest - lowest))
+        if not probe.circuit.starts_cold:
+            lowest -= _BEYOND_ZERO * (highest - lowest)
+        return Reach(probe.circuit, highest, lowest or None)
 
     @one_blas_thread
     def predict(self, probe: Probe, near: PredictionAtRest | None = None) -> PredictionAtRest:
@@ -151,15 +153,15 @@ class ExperimentAtRest:
         by_fast, places = at.linearised.shown_at(u), fast.parametrisation
         values = np.zeros(by_fast.shape[:2])
         values[:, :TIP_RISE] = equations.observed(x).T - fast.curve(u)[:, :TIP_RISE]
-        values[:, TIP_RISE] = places.rise(u, equations.space.tip_rise(x)) - fast.rise(u)
+        values[:, TIP_RISE] = equations.space.tip_rise(x) - fast.rise(u)
         slopes = np.zeros(by_fast.shape)
         if self.first_order:
             constraint = places.constraint(u)
             slopes = by_parameter(equations, x, self.names, constraint=constraint) - by_fast
-        if fast.solved.start:
+        if fast.starts_cold:
             # without power nothing is lacking
-            u = np.append(fast.u[0], u)
-            values, slopes = (np.insert(each, 0, 0.0, axis=0) for each in (values, slopes))
+            cold = int(np.searchsorted(u, 0.0))
+            u, values, slopes = (np.insert(each, cold, 0.0, axis=0) for each in (u, values, slopes))
         lacking = spline_through(u, values), spline_through(u, slopes)
         return replace(self, correction=Correction(probe.values(self.names), *lacking))
 

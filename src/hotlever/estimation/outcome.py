@@ -196,7 +196,7 @@ class ResultFile(Section):
 
     @model_validator(mode="after")
     def _bias_heats_the_lever(self, info: ValidationInfo) -> Self:
-        lowest = self.probe.circuit.lowest_bias_V if self.data.time_us is None else -np.inf
+        lowest = self.probe.lowest_bias_V if self.data.time_us is None else -np.inf
         if np.isfinite(lowest) and not np.all(self.data.columns["V_b"] >= lowest):
             raise InputError(f"{info.context}: data: V_b: expected biases of {lowest:g} or more")
         return self

@@ -9,13 +9,15 @@ from typing import Self
 import numpy as np
 
 from hotlever.air.stores import HeatInAir
-from hotlever.lever.laws import Conductivities, LawsAtPoints
+from hotlever.lever.laws import LawsAtPoints
 from hotlever.lever.motion import Motion
-from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM, Fields, Fluxes, Space
+from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM, Fields, Fluxes, Space, Tangent
 from hotlever.lever.terminals import Terminals
+from hotlever.lever.transport import Properties, fluxes_of, tangent_of
 from hotlever.materials import Kind
 from hotlever.materials.air import kirchhoff_variable
 from hotlever.probe.circuit import Circuit
+from hotlever.probe.physics import THE_PAPERS, Physics
 from hotlever.types import Array
 
 
@@ -29,6 +31,8 @@ class StatesAtPoints:
         What it is made of, by name.
     circuit : Circuit
         What is wired to the terminals, and how warm they are.
+    physics : Physics, optional
+        The effects that count; those of the paper by default.
     motions : mapping of str to Motion, optional
         Of the dimensions by which derivatives may be asked for.
     laws : type of LawsAtPoints
@@ -54,27 +58,46 @@ class StatesAtPoints:
         space: Space,
         materials: Mapping[str, Kind],
         circuit: Circuit,
+        physics: Physics = THE_PAPERS,
         motions: Mapping[str, Motion] | None = None,
         laws: type[LawsAtPoints] = LawsAtPoints,
     ) -> None:
         self.space, self.materials, self.motions = space, materials, motions or {}
         self.circuit, self.base_temperature_K = circuit, circuit.base_temperature_K
         self.terminals = Terminals(space, circuit)
-        self.laws = laws(space, materials, self.base_temperature_K, self.motions)
-        self._latest: tuple[Array, tuple[Fields, Conductivities]] | None = None
+        self.laws = laws(space, materials, self.base_temperature_K, physics, self.motions)
+        self._polarity = 1.0
+        self._latest: tuple[Array, tuple[Fields, Properties, Properties]] | None = None
         self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]
         self.step_limit = np.where(space.is_temperature, 60.0, 5.0)[:, None]
 
-    def at(self, x: Array) -> tuple[Fields, Conductivities]:
-        """Return the fields of states (size + 1, n), and κ and σ, at the quadrature points."""
+    def at(self, x: Array) -> tuple[Fields, Properties, Properties]:
+        """Return fields of states (size + 1, n), properties and those by T, at the points."""
         # residual, Jacobian and derivatives are asked for at the same states one by one
         if self._latest is None or not np.array_equal(self._latest[0], x):
             moved = self.space.fields(x)
             T = self.base_temperature_K + moved.T
             T, grad_T = self.terminals.warmed(T, moved.grad_T)
-            fields = Fields(T, grad_T, moved.grad_V)
-            self._latest = x.copy(), (fields, self.laws.conductivities(fields.T))
+            properties, by = self.properties(T)
+            self._latest = x.copy(), (Fields(T, grad_T, moved.grad_V), properties, by["T"])
         return self._latest[1]
+
+    def properties(
+        self, T: Array, names: Sequence[str] = ("T",)
+    ) -> tuple[Properties, dict[str, Properties]]:
+        """Return what the laws say at temperatures, and derivatives; see `LawsAtPoints`.
+
+        With all potentials reversed the carriers have the other sign.
+        """
+        total, by = self.laws.properties(T, names)
+        if self._polarity > 0:
+            return total, by
+        return total.reversed(), {name: each.reversed() for name, each in by.items()}
+
+    @property
+    def is_even(self) -> bool:
+        """Whether opposite biases make the same temperatures."""
+        return self.circuit.starts_cold and not self.laws.physics.thermoelectric
 
     def nodal_rises(self, x: Array) -> Array:
         """Return the rises of the temperature (K) of states at all nodes, (nodes, n)."""
@@ -90,8 +113,10 @@ class StatesAtPoints:
 
     @property
     def mirrored(self) -> Self:
-        """The same with held supplies of the other polarity."""
-        return self._at(self.terminals.scaled(-1.0, 1.0))
+        """The same with all potentials reversed."""
+        other = self._at(self.terminals.scaled(-1.0, 1.0))
+        other._polarity = -self._polarity
+        return other
 
     def _at(self, terminals: Terminals) -> Self:
         other = copy(self)
@@ -100,12 +125,23 @@ class StatesAtPoints:
 
     def fluxes(self, x: Array) -> Fluxes:
         """Return what the weak equations test."""
-        fields, laws = self.at(x)
-        return Fluxes(
-            -laws.sigma * square(fields.grad_V),
-            laws.kappa * fields.grad_T,
-            laws.sigma * fields.grad_V,
-        )
+        fields, properties, _ = self.at(x)
+        return fluxes_of(fields, properties)
+
+    def tangent(self, x: Array) -> Tangent:
+        """Return how the fluxes of states change with their fields, to first order."""
+        return tangent_of(*self.at(x))
+
+    def emission(self, x: Array) -> Array:
+        """Return what the faces radiate (mW/µm²) at the points, (points, n)."""
+        emission = self.at(x)[1].emission
+        return np.zeros((len(self.space.weights), x.shape[1])) if emission is None else emission
+
+    def emission_change(self, x: Array, change: Array) -> Array:
+        """Return how `emission` changes with one change of each state."""
+        by_T = self.at(x)[2].emission
+        rise = self.space.temperature.at_points(change)[0]
+        return np.zeros_like(rise) if by_T is None else by_T * rise
 
     def kirchhoff(self, x: Array) -> tuple[Array, Array]:
         """Return θ (mW/µm) and κ (mW/(K µm)) of the gas at the sites of the air operator."""
@@ -149,8 +185,3 @@ class StatesAtPoints:
         weak = np.zeros((self.space.size + 1, *heat.shape[1:]))
         weak[self.space.temperature.columns] = tested
         return weak
-
-
-def square(gradient: Array) -> Array:
-    """Return the squared length of vectors (dimension, points, n)."""
-    return np.einsum("dpn,dpn->pn", gradient, gradient)

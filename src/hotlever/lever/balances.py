@@ -10,8 +10,8 @@ from hotlever.lever.space import Fluxes, Space
 from hotlever.probe.circuit import Wiring
 from hotlever.types import Array, Index
 
-#: What `balance_columns` returns: Joule heat of heater and legs (mW; NaN without legs), current to
-#: ground (mA), heat through the leg ends and into the air (mW).
+#: What `balance_columns` returns: heat made in heater and legs (mW; NaN without legs), current to
+#: ground (mA), heat through the leg ends, into the air and radiated (mW).
 BALANCES = (
     "heater_mW",
     "leg1_mW",
@@ -19,6 +19,7 @@ BALANCES = (
     "ground_current_mA",
     "end_heat_mW",
     "air_heat_mW",
+    "radiated_mW",
 )
 
 
@@ -49,21 +50,21 @@ def balance_columns(equations: LeverEquations, x: Array) -> Array:
     Currents and heats at terminals are consistent fluxes: reactions of the weak form at the nodes
     of each. The names are `balance_names`.
     """
-    theta = equations.kirchhoff(x)[0]
-    return _balances(equations, x, equations.fluxes(x), theta)
+    theta, emission = equations.kirchhoff(x)[0], equations.emission(x)
+    return _balances(equations, x, equations.fluxes(x), theta, emission)
 
 
 def balance_slopes(equations: LeverEquations, x: Array, slopes: Array) -> Array:
     """Return how the `balance_columns` of states change with changes (size + 1, n) of them."""
     theta = equations.kirchhoff(x)[1] * equations.space.air.rise(slopes)
-    return _balances(equations, slopes, equations.flux_changes(x, slopes), theta)
+    emission = equations.emission_change(x, slopes)
+    return _balances(equations, slopes, equations.flux_changes(x, slopes), theta, emission)
 
 
 def heat_left(equations: LeverEquations, x: Array) -> Array:
-    """Return the heat that leaves states by the leg ends and into the air (mW), (n,)."""
-    theta = equations.kirchhoff(x)[0]
-    by_ends, into_air, _ = _heat_out(equations.space, equations.fluxes(x), theta)
-    return by_ends + into_air
+    """Return the heat that leaves states by the leg ends, into the air and as light (mW), (n,)."""
+    theta, emission = equations.kirchhoff(x)[0], equations.emission(x)
+    return np.asarray(sum(_heat_out(equations.space, equations.fluxes(x), theta, emission)))
 
 
 def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
@@ -73,21 +74,27 @@ def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
     return heat.sum(axis=0), space.end_test[0] @ heat
 
 
-def _heat_out(space: Space, fluxes: Fluxes, theta: Array) -> tuple[Array, Array, Array]:
-    """Return the heat through the leg ends and into the air, and the heat source by point."""
+def _heat_out(
+    space: Space, fluxes: Fluxes, theta: Array, emission: Array
+) -> tuple[Array, Array, Array]:
+    """Return the heat through the leg ends, into the air, and radiated."""
     heat = space.weighted(np.concatenate([fluxes.heat_source[None], fluxes.heat]))
     by_ends = -np.einsum("dp,dpn->n", space.end_test, heat)
     into_air, at_ends = space.air.heat(theta)
-    return by_ends - at_ends, into_air, heat[0]
+    radiated = (space.weights * emission).sum(axis=0)
+    return by_ends - at_ends, into_air, radiated
 
 
-def _balances(equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array) -> Array:
-    """Return the balances of states, fluxes and θ at the sites of the air; all are linear."""
+def _balances(
+    equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array, emission: Array
+) -> Array:
+    """Return the balances of states, fluxes, θ at the sites of the air, emission; all linear."""
     space = equations.space
     assert isinstance(space, FullSpace)  # a reduced lever has no ends
-    end_heat, air_heat, heat_source = _heat_out(space, fluxes, theta)
+    end_heat, air_heat, radiated = _heat_out(space, fluxes, theta, emission)
+    made = space.weights * (emission - fluxes.heat_source)
     charge = space.weighted(fluxes.charge)
-    joule = [_joule(heat_source, space.parts[part]) for part in ("heater", "leg 1", "leg 2")]
+    of_parts = [_made(made, space.parts[part]) for part in ("heater", "leg 1", "leg 2")]
     into = {
         name: np.einsum("dp,dpn->n", space.charge_tests[name], charge)
         for name in space.wiring.conducting
@@ -100,10 +107,10 @@ def _balances(equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array)
         for unknowns, weights in [space.potential_at(name)]
     ]
     currents = [into[name] for name in _unusual(space.wiring)]
-    return np.stack([*joule, ground, end_heat, air_heat, *volts, *currents], axis=-1)
+    return np.stack([*of_parts, ground, end_heat, air_heat, radiated, *volts, *currents], axis=-1)
 
 
-def _joule(heat_source: Array, points: Index) -> Array:
+def _made(heat: Array, points: Index) -> Array:
     """Return the heat made at some points; NaN if the lever has no such part."""
-    made = -heat_source[points].sum(axis=0)
+    made = heat[points].sum(axis=0)
     return np.asarray(made if points.size else np.full_like(made, np.nan))

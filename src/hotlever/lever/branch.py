@@ -32,6 +32,8 @@ from hotlever.types import Array
 
 #: A bias (V) that is none.
 _NO_BIAS = 1e-9
+#: Steps of Newton's method from the root of a rise to its place.
+_CORRECTIONS = 3
 #: Where a branch's values have the rise of the tip.
 TIP_RISE = len(SHOWN)
 
@@ -97,7 +99,9 @@ class Branch(SolvedStates):
         branch = cls.of_roots(equations, u, roots, places)
         if places is not NATURAL:
             return replace(branch, places=places)
-        return cls.cold(equations, equations.cold()[0]).followed_by(branch)
+        cold = cls.cold(equations, equations.cold()[0])
+        below, above = branch.among(u < 0.0), branch.among(u > 0.0)
+        return below.followed_by(cold).followed_by(above)
 
     # --- the curves -------------------------------------------------------------------------------
 
@@ -131,18 +135,22 @@ class Branch(SolvedStates):
 
     def tip_K(self, u: ArrayLike) -> Array:
         """Return tip temperatures (K) at some places of the branch."""
-        u = np.asarray(u, dtype=float)
-        return self.base_temperature_K + self.rise(u)
+        return self.base_temperature_K + self.rise(np.asarray(u, dtype=float))
 
     def rise(self, u: Array) -> Array:
         """Return rises of the tip (K) at some places of the branch."""
-        return self.parametrisation.rise(u, self.curve(u)[..., TIP_RISE])
+        return np.asarray(self.curve(u)[..., TIP_RISE])
 
     def u_at(self, tip_K: ArrayLike) -> Array:
         """Return u at tip temperatures (K) of a lever that starts cold; NaN outside the branch."""
         rise = np.asarray(tip_K, dtype=float) - self.base_temperature_K
         inside = (rise >= 0) & (rise <= self.end_u**2 * (1 + 1e-12))
-        return np.sqrt(np.where(inside, np.maximum(rise, 0.0), np.nan))
+        u = np.sqrt(np.where(inside, np.maximum(rise, 0.0), np.nan))
+        for _ in range(_CORRECTIONS):
+            # before the first state places may differ from the root of the rise
+            slope = self.curve(u, 1)[..., TIP_RISE]
+            u = u - np.divide(self.rise(u) - rise, slope, out=np.zeros_like(u), where=slope > 0)
+        return np.asarray(u)
 
     def shown(self, u: ArrayLike) -> dict[str, Array]:
         """Return what an instrument shows, by name: ``lever_V``, ``current_mA``, ``reader_V``."""
@@ -188,8 +196,7 @@ class Branch(SolvedStates):
 
     def tip_temperature(self, power_mW: ArrayLike) -> Array:
         """Return the tip temperature (K) by power (mW); NaN where there is none, or several."""
-        u = self.by_power.u(np.asarray(power_mW, dtype=float))
-        return np.asarray(self.base_temperature_K + u**2)
+        return self.tip_K(self.by_power.u(np.asarray(power_mW, dtype=float)))
 
     def tip_slope(self, power_mW: ArrayLike) -> Array:
         """Return dT_tip/dP_l (K/mW) by power (mW), which is not zero."""

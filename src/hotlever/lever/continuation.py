@@ -68,16 +68,15 @@ def continued(
         seen(branch)
         return enough(branch)
 
-    if equations.circuit.starts_cold:
-        return NaturalContinuation(equations, start).until(far_enough)
-    branch = ArclengthContinuation(equations, start).until(far_enough)
-    if not isinstance(enough, Reach) or enough.lowest_V is None:
+    follow = NaturalContinuation if equations.circuit.starts_cold else ArclengthContinuation
+    branch = follow(equations, start).until(far_enough)
+    if not isinstance(enough, Reach) or enough.lowest_V is None or equations.is_even:
         return branch
     other, back = enough.mirrored, branch.mirrored
     if other(back):
         return branch
     try:
-        return ArclengthContinuation(back.equations, back).until(other).mirrored
+        return follow(back.equations, back).until(other).mirrored
     except ComputationError as error:
         error.partial = error.partial.mirrored
         raise
@@ -169,10 +168,15 @@ class NaturalContinuation(Continuation):
     def __init__(self, equations: LeverEquations, start: Branch | None = None) -> None:
         self._bends = steps_of(equations)
         super().__init__(equations, start, _STEP_K)
+        if self._branch.u[-1] == 0.0:
+            self._branch = self._from_cold(self._branch)
 
     def _beginning(self) -> Branch:
+        return Branch.cold(self._equations, self._equations.cold()[0])
+
+    def _from_cold(self, branch: Branch) -> Branch:
+        """Add the first states that are not cold."""
         first, second = self._equations.cold()
-        branch = Branch.cold(self._equations, first)
         for u in (0.5 * _STEP_U, _STEP_U):
             try:
                 branch = branch.followed_by(self._solved(u, u * first + u**2 * second))

@@ -35,7 +35,7 @@ SWEEP_COLUMNS = (
 #: Further variables of a sweep.
 _MORE = (
     *("leg1_ohm", "leg2_ohm", "lever_ohm", "max_K"),
-    *("ground_current_mA", "end_heat_mW", "air_heat_mW"),
+    *("ground_current_mA", "end_heat_mW", "air_heat_mW", "radiated_mW"),
 )
 
 
@@ -223,17 +223,17 @@ def circuit_of(data: xr.Dataset) -> Circuit:
     return Circuit.from_values(json.loads(data.attrs["circuit"]), "sweep: [circuit]")
 
 
-def checked_bias(bias: ArrayLike, circuit: Circuit) -> Array:
+def checked_bias(bias: ArrayLike, probe: Probe) -> Array:
     """Return biases as an array.
 
     Raises
     ------
     InputError
-        If one is not finite or there is none; or one is negative, unless a held supply makes that
-        another state than the positive one.
+        If one is not finite or there is none; or one is negative, unless that is another state
+        than the positive one.
     """
     values = np.atleast_1d(np.asarray(bias, dtype=float))
-    lowest = circuit.lowest_bias_V
+    lowest = probe.lowest_bias_V
     wrong = values[~np.isfinite(values) | (values < lowest)]
     if wrong.size:
         of = f" of {lowest:g} or more" if np.isfinite(lowest) else ""

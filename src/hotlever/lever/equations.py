@@ -4,6 +4,9 @@ Heat (paper's first equation, with the sign corrected) and charge::
 
     −∇·(κ ∇T) = σ |∇V|² − heat lost to air,    ∇·(σ ∇V) = 0,
 
+and, where a probe asks for them, what the current carries and the surface radiates
+(`hotlever.lever.transport`),
+
 with what is wired to the terminals (`hotlever.lever.terminals`). One more condition, the
 *constraint*, selects a state: its tip temperature. What is behind the swept supply does not enter:
 what a lever shows at a tip temperature does not depend on it. Units are µm, V, mA, mW and K.
@@ -20,8 +23,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hotlever.lever.at_points import StatesAtPoints, square
-from hotlever.lever.laws import GAS
+from hotlever.lever.at_points import StatesAtPoints
+from hotlever.lever.laws import BASE, GAS
 from hotlever.lever.newton import refined
 from hotlever.lever.space import (
     LEVER,
@@ -30,19 +33,21 @@ from hotlever.lever.space import (
     Constraint,
     Factors,
     Fluxes,
-    Tangent,
 )
+from hotlever.lever.transport import fluxes_of
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 
 #: What an instrument shows of a state, in the order of `LeverEquations.observed`.
 SHOWN = ("lever_V", "current_mA", "reader_V")
 
-#: Parameters that are of no law: one moves all temperatures, the other is of the air.
-BASE, GAP = "base_temperature_K", "surface_gap_um"
+#: A parameter of the air alone.
+GAP = "surface_gap_um"
 
 #: Error (relative) to which derivatives are solved.
 _EXACT = 1e-6
+#: A lever voltage (V) at which a lever is nearly cold.
+_NEAR_V = 1e-3
 
 
 class LeverEquations(StatesAtPoints):
@@ -78,18 +83,6 @@ class LeverEquations(StatesAtPoints):
 
     # --- derivatives --------------------------------------------------------------------------
 
-    def tangent(self, x: Array) -> Tangent:
-        """Return how the fluxes of states change with their fields, to first order."""
-        fields, laws = self.at(x)
-        return Tangent(
-            heat_source_T=-laws.sigma_by["T"] * square(fields.grad_V),
-            heat_flux_T=laws.kappa_by["T"] * fields.grad_T,
-            kappa=laws.kappa,
-            heat_source_V=-2.0 * laws.sigma * fields.grad_V,
-            charge_flux_T=laws.sigma_by["T"] * fields.grad_V,
-            sigma=laws.sigma,
-        )
-
     def flux_changes(self, x: Array, change: Array) -> Fluxes:
         """Return how the fluxes of states (size + 1, n) change with the unknowns, to first order.
 
@@ -113,24 +106,18 @@ class LeverEquations(StatesAtPoints):
 
     def by_parameter(self, x: Array, names: Sequence[str]) -> Array:
         """Return how `balance` changes with parameters or dimensions, (size + 1, n, k)."""
-        fields, now = self.at(x)
-        # a base temperature that rises takes the whole lever with it
-        by = ["T" if name == BASE else name for name in names]
-        laws = self.laws.conductivities(fields.T, by)
-        sigma = np.stack([laws.sigma_by[name] for name in by], axis=-1)
-        kappa = np.stack([laws.kappa_by[name] for name in by], axis=-1)
-        grad_T, grad_V = fields.grad_T[..., None], fields.grad_V[..., None]
-        heat = -sigma * square(fields.grad_V)[..., None]
-        changes = Fluxes(heat, kappa * grad_T, sigma * grad_V)
-        ends = self.terminals.held_ends()
-        if ends is not None and BASE in names:
-            _without_ends(changes, names.index(BASE), now.kappa, *ends)
-        for column in (names.index(name) for name in names if name in self.motions):
-            motion = self.motions[names[column]]
-            moved = motion.of_fluxes(fields, self.fluxes(x), now.kappa, now.sigma)
-            changes.heat_source[..., column] += moved.heat_source
-            changes.heat[..., column] += moved.heat
-            changes.charge[..., column] += moved.charge
+        fields, _, _ = self.at(x)
+        by = self.properties(fields.T, names)[1]
+        columns = []
+        for name in names:
+            change = fluxes_of(fields, by[name])
+            if name == BASE:
+                change += self.tangent(x).fluxes(self.terminals.warmed_by_base(fields))
+            elif name in self.motions:
+                motion = self.motions[name]
+                change += motion.of_fluxes(fields, self.fluxes(x), self.tangent(x))
+            columns.append(change)
+        changes = Fluxes(*(np.stack(column, axis=-1) for column in zip(*columns, strict=True)))
         weak = self.space.weak_form(changes)
         air, (theta, kappa_air) = self.space.air, self.kirchhoff(x)
         for column, name in enumerate(names):
@@ -199,14 +186,15 @@ class LeverEquations(StatesAtPoints):
         unit = nothing.copy()
         unit[-1] = 1.0
         factors = self.factorised(nothing, LEVER)
-        potential = self.solve_linear(nothing, factors, unit, LEVER)
-        grad_V = self.space.fields(potential).grad_V
-        joule = self.at(nothing)[1].sigma * square(grad_V)
-        heat = self.space.weak_form(Fluxes(joule, 0.0 * grad_V, 0.0 * grad_V))
-        heat[-1] = 0.0
-        rise = self.solve_linear(nothing, factors, heat, LEVER)
-        per_square_volt = self.space.tip_rise(rise)
-        return potential / np.sqrt(per_square_volt), rise / per_square_volt
+        first = self.solve_linear(nothing, factors, unit, LEVER)
+        # how the equations bend along it, by their derivatives on either side
+        bent = self.balance_change(_NEAR_V * first, first)
+        bent -= self.balance_change(-_NEAR_V * first, first)
+        bent *= -0.25 / _NEAR_V
+        bent[-1] = 0.0
+        second = self.solve_linear(nothing, factors, bent, LEVER)
+        per_square_volt = self.space.tip_rise(second)
+        return first / np.sqrt(per_square_volt), second / per_square_volt
 
     def power(self, x: Array) -> Array:
         """Return the power (mW) that the swept supply and others put into states, (n,)."""
@@ -238,6 +226,8 @@ class LeverEquations(StatesAtPoints):
         flat = np.zeros_like(tangent.charge_flux_T)
         gradient = np.zeros((*x.shape, len(SHOWN)))
         gradient[-1, :, 0] = 1.0
+        if tangent.thermoelectric is not None:
+            flat = tangent.thermoelectric.charge_T * supply
         gradient[..., 1] = self.space.weak_form(Fluxes(along, flat, tangent.sigma * supply))
         if self.space.reader is not None:
             unknowns, weights = self.space.reader
@@ -246,15 +236,8 @@ class LeverEquations(StatesAtPoints):
         return gradient
 
 
-def _without_ends(changes: Fluxes, column: int, kappa: Array, value: Array, slope: Array) -> None:
-    """Correct changes with the base temperature: leg ends of their own do not move with it."""
-    changes.heat_source[..., column] *= 1.0 - value
-    changes.heat[..., column] *= 1.0 - value
-    changes.heat[..., column] -= kappa * slope
-    changes.charge[..., column] *= 1.0 - value
-
-
 def steps_of(equations: LeverEquations) -> Array:
     """Return u = √(T_tip − T_base) where the tip passes a step of a law: the curves bend there."""
     rises = np.array(equations.laws.steps_K) - equations.base_temperature_K
-    return np.sqrt(rises[rises > 0])
+    u = np.sqrt(rises[rises > 0])
+    return np.concatenate([-u[::-1], u])

@@ -79,7 +79,7 @@ class FieldMapper:
         middle = centres, np.full(centres.shape[1], 0.5 / cuts**2)
         elements = FiniteElements(mesh.elements, element, middle)
         space = FullSpace(mesh, elements, lever.space.wiring)
-        self._centres = LeverEquations(space, lever.probe.kinds, lever.circuit)
+        self._centres = LeverEquations(space, lever.probe.kinds, lever.circuit, lever.probe.physics)
 
     def map(self, state: State) -> FieldMap:
         """Return the fields of a state of the lever."""
@@ -90,7 +90,7 @@ class FieldMapper:
         conducting = state.lever.space.conducting
         V[np.repeat(~conducting, corners.per_element)] = np.nan
         offsets = corners.per_element * np.arange(elements)[:, None, None]
-        fields, laws = self._centres.at(state.x)
+        properties, fluxes = self._centres.at(state.x)[1], self._centres.fluxes(state.x)
 
         def per_triangle(vectors: Array) -> Array:
             return np.asarray((vectors / space.thickness_um)[:, :, 0].T)
@@ -102,9 +102,9 @@ class FieldMapper:
             temperature=T,
             potential=V,
             region=np.repeat(state.lever.space.mesh.region, len(self._cell)),
-            current_density=per_triangle(-laws.sigma * fields.grad_V),
-            heat_flux=per_triangle(-laws.kappa * fields.grad_T),
-            resistivity=_resistivity(space.thickness_um, laws.sigma),
+            current_density=per_triangle(-fluxes.charge),
+            heat_flux=per_triangle(-fluxes.heat),
+            resistivity=_resistivity(space.thickness_um, properties.sigma),
         )
 
 

@@ -31,6 +31,9 @@ class PlacedFilm:
     is_body : bool
     dopant_from : str or None
         The material from which dopant diffuses into this one.
+    faces : float or ndarray, shape (k, 1)
+        How many of its faces are on the outside: of a stack the lowest film has one, the uppermost
+        the other; none in a solid.
     distances : ndarray, shape (borders, k, 1)
         From the borders of each point's region with that material (µm); `FAR` where it has fewer
         than others. No borders where the doping is even.
@@ -42,6 +45,7 @@ class PlacedFilm:
     counted_um: float | Array
     is_body: bool
     dopant_from: str | None
+    faces: float | Array
     distances: Array
 
     def among(self, points: Index) -> PlacedFilm:
@@ -52,6 +56,7 @@ class PlacedFilm:
             points=np.searchsorted(points, self.points[kept]),
             thickness_um=at_some(self.thickness_um, kept),
             counted_um=at_some(self.counted_um, kept),
+            faces=at_some(self.faces, kept),
             distances=self.distances[:, kept],
         )
 
@@ -85,6 +90,7 @@ def placed_films(
     # elements of a solid have their thickness themselves
     flat = len(positions) == 2
     body = thickness_at(layout, positions[:2])
+    levels = np.array([len(of_layout.stack) for of_layout in layout.regions])[region]
     where: dict[tuple[int, Film, str | None], list[int]] = {}
     for number, of_layout in enumerate(layout.regions):
         for level, film in enumerate(of_layout.stack):
@@ -92,11 +98,12 @@ def placed_films(
             source = of_layout.dopant_from if tapered else None
             where.setdefault((level, film, source), []).append(number)
     films = []
-    for (_, film, source), numbers in where.items():
+    for (level, film, source), numbers in where.items():
         points = np.flatnonzero(np.isin(region, numbers))
         is_body = film.thickness_um is None
         thickness = at_some(body, points) if film.thickness_um is None else film.thickness_um
         even = np.empty((0, points.size, 1))
+        uppermost = (levels[points] == level + 1)[:, None]
         films.append(
             PlacedFilm(
                 film.material,
@@ -105,6 +112,7 @@ def placed_films(
                 counted_um=thickness if flat else 1.0,
                 is_body=is_body,
                 dopant_from=source,
+                faces=float(level == 0) + uppermost if flat else 0.0,
                 distances=even
                 if source is None
                 else _from_borders(layout, region[points], positions[:2, points]),

@@ -8,7 +8,6 @@ names of probe files: ``n_d`` of the silicon of ``[material]``, ``film.tcr`` of 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,46 +16,24 @@ from hotlever.errors import ComputationError
 from hotlever.lever.films import PlacedFilm
 from hotlever.lever.motion import Motion
 from hotlever.lever.space import (
+    PER_CM2_TO_MILLI_PER_UM2,
     PER_CM3_TO_NANO_PER_UM3,
     PER_CM_TO_MILLI_PER_UM,
     Space,
 )
+from hotlever.lever.transport import Properties
 from hotlever.materials import Kind, full_name
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
+from hotlever.materials.laws import Evaluated
+from hotlever.materials.silicon import Carrier
+from hotlever.probe.physics import Physics
 from hotlever.types import Array
 
-#: How many times as well as air the gas conducts, a parameter of no material.
-GAS = "gas_conductivity"
-
-
-@dataclass(frozen=True)
-class Conductivities:
-    """Sheet conductivities (thickness included) at the quadrature points, with derivatives.
-
-    Attributes
-    ----------
-    kappa, sigma : ndarray, shape (points, n)
-        mW/K and mA/V.
-    kappa_by, sigma_by : dict of str to ndarray
-        Derivatives by ``T``, or by the parameters and dimensions asked for.
-    """
-
-    kappa: Array
-    sigma: Array
-    kappa_by: dict[str, Array]
-    sigma_by: dict[str, Array]
-
-    @classmethod
-    def zero(cls, shape: tuple[int, ...], names: Sequence[str]) -> Conductivities:
-        """Return those of nothing."""
-        return cls(
-            np.zeros(shape),
-            np.zeros(shape),
-            {name: np.zeros(shape) for name in names},
-            {name: np.zeros(shape) for name in names},
-        )
+#: Parameters of no material: how many times as well as air the gas conducts, and what moves all
+#: temperatures and that of the surroundings.
+GAS, BASE = "gas_conductivity", "base_temperature_K"
 
 
 class FilmLaws:
@@ -70,6 +47,8 @@ class FilmLaws:
         Which of the films of the space it is.
     motions : mapping of str to Motion
         Of the dimensions by which derivatives may be asked for.
+    carrier : str
+        Of high-doped silicon.
     """
 
     def __init__(
@@ -78,10 +57,11 @@ class FilmLaws:
         materials: Mapping[str, Kind],
         number: int,
         motions: Mapping[str, Motion],
+        carrier: Carrier,
     ) -> None:
-        self.film, self.kind = film, materials[film.material]
+        self.film, self.kind, self.carrier = film, materials[film.material], carrier
         # what the laws call a parameter, by its name in the probe
-        self.own = {"T": "T"}
+        self.own = {"T": "T", BASE: "surroundings_K"}
         self.own |= {full_name(film.material, own): own for own in self.kind.declared}
         self.thickening = {
             name: motion.thickening_um[film.points]
@@ -115,27 +95,60 @@ class FilmLaws:
             for name, motion in motions.items()
         }
 
-    def add_to(self, total: Conductivities, T: Array, names: Sequence[str]) -> None:
-        """Add the film to sheet conductivities at temperatures (K), (points of the space, n)."""
-        film, points = self.film, self.film.points
-        sheet, T = PER_CM_TO_MILLI_PER_UM * film.counted_um, T[points]
-        thermal = self.kind.thermal_conductivity(T, film.thickness_um)
-        electrical = self.kind.electrical_conductivity(T, self.doping)
-        for (value, by), sum_of, sum_by in (
-            (thermal, total.kappa, total.kappa_by),
-            (electrical, total.sigma, total.sigma_by),
-        ):
-            sum_of[points] += sheet * value
-            for name in names:
-                own = self.own.get(name)
-                if own in by:
-                    sum_by[name][points] += sheet * by[own]
-                if "n" in by and name in self.doping_by:
-                    sum_by[name][points] += sheet * (by["n"] * self.doping_by[name])
-                if name in self.thickening:
-                    more = PER_CM_TO_MILLI_PER_UM * self.thickening[name]
-                    by_thickness = film.thickness_um * by.get("thickness_um", 0.0)
-                    sum_by[name][points] += more * (value + by_thickness)
+    def add_to(
+        self, total: Properties, by: Mapping[str, Properties], T: Array, surroundings_K: float
+    ) -> None:
+        """Add the film to properties at temperatures (K), (points of the space, n).
+
+        And to their derivatives, by parameter.
+        """
+        film, kind, T = self.film, self.kind, T[self.film.points]
+        sheet = PER_CM_TO_MILLI_PER_UM * film.counted_um
+        self._add("kappa", kind.thermal_conductivity(T, film.thickness_um), sheet, total, by)
+        self._add("sigma", kind.electrical_conductivity(T, self.doping), sheet, total, by)
+        if total.beta is not None:
+            (beta, gamma), by_own = kind.thermoelectric(T, self.doping, self.carrier)
+            for row, (name, value) in enumerate((("beta", beta), ("gamma", gamma))):
+                rows = {own: change[row] for own, change in by_own.items()}
+                self._add(name, (value, rows), sheet, total, by)
+        if total.emission is not None:
+            faces = PER_CM2_TO_MILLI_PER_UM2 * film.faces
+            emission = kind.emission(T, surroundings_K)
+            self._add("emission", emission, faces, total, by, thickens=False)
+
+    def _add(
+        self,
+        law: str,
+        evaluated: Evaluated,
+        sheet: float | Array,
+        total: Properties,
+        by: Mapping[str, Properties],
+        *,
+        thickens: bool = True,
+    ) -> None:
+        """Add a law to the sheet's, and its derivatives to theirs."""
+        film, points, (value, by_own) = self.film, self.film.points, evaluated
+        total.named[law][points] += sheet * value
+        for name, changes in by.items():
+            change, own = changes.named[law], self.own.get(name)
+            if own in by_own:
+                change[points] += sheet * by_own[own]
+            if "n" in by_own and name in self.doping_by:
+                change[points] += sheet * (by_own["n"] * self.doping_by[name])
+            if thickens and name in self.thickening:
+                more = PER_CM_TO_MILLI_PER_UM * self.thickening[name]
+                by_thickness = film.thickness_um * by_own.get("thickness_um", 0.0)
+                change[points] += more * (value + by_thickness)
+
+
+def carriers_of(film: PlacedFilm, space: Space, materials: Mapping[str, Kind]) -> Carrier:
+    """Return the carriers of high-doped silicon: those of the low-doped silicon it dopes.
+
+    Or of any other that the lever has; electrons without any.
+    """
+    doped = [other for other in space.films if other.dopant_from == film.material]
+    kinds = (materials[other.material] for other in (*doped, *space.films))
+    return next((kind.carrier for kind in kinds if isinstance(kind, LowDopedSilicon)), "electron")
 
 
 class LawsAtPoints:
@@ -147,6 +160,8 @@ class LawsAtPoints:
     materials : mapping of str to Kind
         What it is made of, by name.
     base_temperature_K : float
+    physics : Physics
+        The effects that count.
     motions : mapping of str to Motion
         Of the dimensions by which derivatives may be asked for.
 
@@ -167,15 +182,18 @@ class LawsAtPoints:
         space: Space,
         materials: Mapping[str, Kind],
         base_temperature_K: float,
+        physics: Physics,
         motions: Mapping[str, Motion],
     ) -> None:
         self.space, self.base_temperature_K, self.motions = space, base_temperature_K, motions
+        self.physics = physics
         self.made_of = {film.material: materials[film.material] for film in space.films}
         for name, kind in self.made_of.items():
             if reason := kind.impossible(base_temperature_K):
                 raise ComputationError(f"{name}: {reason}")
         self.films = [
-            FilmLaws(film, materials, number, motions) for number, film in enumerate(space.films)
+            FilmLaws(film, materials, number, motions, carriers_of(film, space, materials))
+            for number, film in enumerate(space.films)
         ]
 
     @property
@@ -189,29 +207,32 @@ class LawsAtPoints:
         laws = [law for kind in self.made_of.values() for law in kind.laws]
         return sorted({T for law in laws for T in law.steps})
 
-    def conductivities(self, T: Array, names: Sequence[str] = ("T",)) -> Conductivities:
-        """Evaluate κ and σ at temperatures (K), (points, n), with some of their derivatives."""
-        total = Conductivities.zero(T.shape, names)
+    def properties(
+        self, T: Array, names: Sequence[str] = ("T",)
+    ) -> tuple[Properties, dict[str, Properties]]:
+        """Evaluate the laws at temperatures (K), (points, n), and some of their derivatives."""
+        total = Properties.zero(T.shape, self.physics)
+        by = {name: Properties.zero(T.shape, self.physics) for name in names}
         for film in self.films:
-            film.add_to(total, T, names)
+            film.add_to(total, by, T, self.base_temperature_K)
         if self.space.air.filling:
-            self._take_off_air(total, T, names)
-        return total
+            self._take_off_air(total.kappa, by, T)
+        return total, by
 
-    def _take_off_air(self, total: Conductivities, T: Array, names: Sequence[str]) -> None:
+    def _take_off_air(self, total: Array, by: Mapping[str, Properties], T: Array) -> None:
         """Take off what air that fills the plate would conduct; see `hotlever.lever.equations`."""
         share = PER_CM_TO_MILLI_PER_UM * self.space.air.filling
         filling = share * self.space.air.gas_conductivity
-        kappa, by = thermal_conductivity_of_air(T)
-        total.kappa[:] -= filling * self.space.plate_um * kappa
-        for name in names:
+        kappa, kappa_by = thermal_conductivity_of_air(T)
+        total -= filling * self.space.plate_um * kappa
+        for name, changes in by.items():
+            change = changes.kappa
             if name == "T":
-                total.kappa_by[name] -= filling * self.space.plate_um * by["T"]
+                change -= filling * self.space.plate_um * kappa_by["T"]
             elif name == GAS:
-                total.kappa_by[name] -= share * self.space.plate_um * kappa
+                change -= share * self.space.plate_um * kappa
             elif name in self.motions:
-                thickening = self.motions[name].thickening_um
-                total.kappa_by[name] -= filling * thickening * kappa
+                change -= filling * self.motions[name].thickening_um * kappa
 
     def heat_density(self, T: Array) -> tuple[Array, Array]:
         """Return the heat above that at the base temperature (nJ/µm²), and its slope by T.

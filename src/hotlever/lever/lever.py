@@ -85,7 +85,9 @@ class Lever:
         self._prepare()
 
     def _prepare(self) -> None:
-        self.equations = LeverEquations(self.space, self.probe.kinds, self.circuit)
+        self.equations = LeverEquations(
+            self.space, self.probe.kinds, self.circuit, self.probe.physics
+        )
         self._branch: Branch | None = None
 
     def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
@@ -194,7 +196,7 @@ class Lever:
         BranchEndError, ComputationError
             If not every bias is reached; ``partial`` holds the states up to there.
         """
-        values = checked_bias(bias, self.circuit)
+        values = checked_bias(bias, self.probe)
         branch, reading, failure = self._read(values)
         states: list[State] = []
         for u, value in zip(reading.u, values.tolist(), strict=True):
@@ -273,7 +275,7 @@ class Lever:
         ones (`solve`), a third of the mesh's error, the highest temperature too; 5e-5 and 0.05 K
         where a leg gets hot faster than the tip.
         """
-        values = checked_bias(bias, self.circuit)
+        values = checked_bias(bias, self.probe)
         branch, reading, failure = self._read(values, progress)
         reached = np.flatnonzero(np.isfinite(reading.u))
         u, slopes = reading.u[reached], None

@@ -96,9 +96,9 @@ def energy_between_degrees(space: FullSpace, kinds: Mapping[str, Kind], circuit:
         equations = LeverEquations(of_degree, kinds, circuit).driven(0.0)
         potential, rise = (of_degree.fields(x) for x in equations.cold())
         slopes.append((potential.grad_V, rise.grad_T))
-    laws = equations.at(np.zeros((space.size + 1, 1)))[1]
+    properties = equations.at(np.zeros((space.size + 1, 1)))[1]
     energy = np.zeros(len(space.elements.dofs))
-    for coefficient, low, high in zip((laws.sigma, laws.kappa), *slopes, strict=True):
+    for coefficient, low, high in zip((properties.sigma, properties.kappa), *slopes, strict=True):
         weight = space.weights * coefficient
         whole = (weight * (high**2).sum(axis=0)).sum()
         apart = weight * ((high - low) ** 2).sum(axis=0)

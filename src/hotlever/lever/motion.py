@@ -13,7 +13,7 @@ import numpy as np
 
 from hotlever.lever.films import PlacedFilm, thickness_at
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.space import Fields, Fluxes
+from hotlever.lever.space import Fields, Fluxes, Tangent
 from hotlever.probe.layout import Taper
 from hotlever.probe.moving import Movement
 from hotlever.types import Array
@@ -60,17 +60,17 @@ class Motion:
     def _contracted(self, strain: Array, vectors: Array) -> Array:
         return (strain[..., None] * vectors[None]).sum(axis=1)
 
-    def of_fluxes(self, fields: Fields, fluxes: Fluxes, kappa: Array, sigma: Array) -> Fluxes:
+    def of_fluxes(self, fields: Fields, fluxes: Fluxes, tangent: Tangent) -> Fluxes:
         """Return how fluxes change with the dimension, conductivities (points, n) being the same.
 
-        The heat source is ``−σ |∇V|²``.
+        The tangent is that of the fluxes.
         """
-        grad_T, grad_V = self.strained(fields.grad_T), self.strained(fields.grad_V)
-        made = 2.0 * sigma * (fields.grad_V * grad_V).sum(axis=0)
+        slopes = self.strained(fields.grad_T), self.strained(fields.grad_V)
+        strained = tangent.fluxes(Fields(np.zeros_like(fields.T), *slopes))
         return Fluxes(
-            self.swelling * fluxes.heat_source - made,
-            self.pulled(fluxes.heat) + kappa * grad_T,
-            self.pulled(fluxes.charge) + sigma * grad_V,
+            self.swelling * fluxes.heat_source + strained.heat_source,
+            self.pulled(fluxes.heat) + strained.heat,
+            self.pulled(fluxes.charge) + strained.charge,
         )
 
 

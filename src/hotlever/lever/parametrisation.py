@@ -45,13 +45,13 @@ class Parametrisation(Protocol):
         """Return how fast the values pass states (size + 1, n), by u, (n,)."""
         ...
 
-    def rise(self, u: Array, of_states: Array) -> Array:
-        """Return the rise of the tip (K) there, by that of the states that were found."""
-        ...
-
 
 class Natural:
-    """The places of a lever that starts cold: u = √(T_tip − T_base)."""
+    """The places of a lever that starts cold: u = √(T_tip − T_base), negative with the bias.
+
+    With thermoelectricity the temperature begins in proportion to the bias, not to its square: the
+    places between the cold state and the next are those of the smooth curve through both.
+    """
 
     def constraint(self, u: Array) -> Constraint:
         """See `Parametrisation`."""
@@ -64,10 +64,6 @@ class Natural:
     def rate(self, u: Array, space: Space, x: Array) -> Array:
         """See `Parametrisation`."""
         return np.asarray(2.0 * u)
-
-    def rise(self, u: Array, of_states: Array) -> Array:
-        """See `Parametrisation`; it is what selects the states."""
-        return np.asarray(u**2)
 
 
 #: It has no state of its own.
@@ -106,10 +102,6 @@ class PseudoArclength:
         # the lines turn, so that they pass faster on the outside of a bend than on the inside
         aside = in_plane(space, x) - self._curve(u)
         return np.asarray((along**2 - bend * aside).sum(axis=1))
-
-    def rise(self, u: Array, of_states: Array) -> Array:
-        """See `Parametrisation`."""
-        return of_states
 
 
 class Constrained:

@@ -181,10 +181,11 @@ class Linearised:
             if factors is None or longer is not branch:
                 factors = derivatives.factorised(x)
             changes, shown = with_changes(derivatives, x, names, factors)
-            changes = np.insert(changes, 0, 0.0, axis=1)
-        if longer.u.size > len(shown):
+        if longer.starts_cold:
             # without power nothing depends on the parameters
-            shown = np.insert(shown, 0, 0.0, axis=0)
+            cold = int(np.searchsorted(longer.u, 0.0))
+            shown = np.insert(shown, cold, 0.0, axis=0)
+            changes = np.insert(changes, cold, 0.0, axis=1) if changes.size else changes
         return cls(probe, names, longer, factors, changes, shown)
 
     def states(self, probe: Probe) -> Array:
@@ -198,8 +199,8 @@ class Linearised:
             return np.asarray(x + self.changes @ moved)
         if not self.branch.starts_cold:
             return x
-        factor = np.ones(x.shape[1])
-        factor[1:] += self.shown[1:, 0] @ moved / x[-1, 1:]
+        factor, solved = np.ones(x.shape[1]), self.branch.solved
+        factor[solved] += self.shown[solved, 0] @ moved / x[-1, solved]
         return np.where(self.branch.equations.space.is_temperature[:, None], x, factor * x)
 
     def shown_at(self, u: Array) -> Array:

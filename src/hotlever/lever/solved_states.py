@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hotlever.lever.curve import Piecewise, smooth_curve
 from hotlever.lever.equations import SHOWN, LeverEquations, steps_of
-from hotlever.types import Array
+from hotlever.types import Array, Index
 
 #: Places along a branch that are looked at together.
 _AT_ONCE = 64
@@ -35,9 +35,9 @@ class SolvedStates:
     ----------
     equations : LeverEquations
     u : ndarray, shape (k,)
-        Where they are: √(T_tip − T_base) (K^½), the first at zero power. Of a lever that does not
-        start cold: how far along the branch they are, from where it is without a bias; negative
-        on the way to biases of the other polarity.
+        Where they are: √(T_tip − T_base) (K^½), zero without power. Of a lever that does not start
+        cold: how far along the branch they are, from where it is without a bias. Negative on the
+        way to biases of the other polarity.
     x, slopes : ndarray, shape (size + 1, k)
         The states, and their derivatives by u.
     values, value_slopes : ndarray, shape (k, 4)
@@ -66,6 +66,18 @@ class SolvedStates:
     def cold(cls, equations: LeverEquations, slope: Array) -> Self:
         """Return the state without power, whose slope is given."""
         return cls.of(equations, np.zeros(1), np.zeros_like(slope), slope)
+
+    def among(self, which: NDArray[np.bool_]) -> Self:
+        """Return some of them."""
+        return type(self)(
+            equations=self.equations,
+            u=self.u[which],
+            x=self.x[:, which],
+            slopes=self.slopes[:, which],
+            values=self.values[which],
+            value_slopes=self.value_slopes[which],
+            highest_rise=self.highest_rise[which],
+        )
 
     def followed_by(self, after: Self) -> Self:
         """Return the same with others after them."""
@@ -115,17 +127,17 @@ class SolvedStates:
 
     @cached_property
     def starts_cold(self) -> bool:
-        """Whether they begin at the base temperature: without a bias nothing heats the lever."""
+        """Whether one is at the base temperature: without a bias nothing heats the lever."""
         return not self.x.any(axis=0).all()
 
     @property
-    def solved(self) -> slice:
+    def solved(self) -> Index:
         """The states that were solved: all but the one without power."""
-        return slice(int(self.starts_cold), None)
+        return np.flatnonzero(self.x.any(axis=0))
 
     def has_power(self, u: Array) -> NDArray[np.bool_]:
-        """Return which states at some u have power, (n,): only the first one may have none."""
-        return np.asarray((u != self.u[0]) | (not self.starts_cold))
+        """Return which states at some u have power, (n,)."""
+        return np.asarray((u != 0.0) | (not self.starts_cold))
 
     # --- how hot they get -------------------------------------------------------------------------
 
@@ -162,9 +174,10 @@ class SolvedStates:
 
         The place lies before the first state that is as hot.
         """
-        after = int(np.flatnonzero(self.highest_rise >= rise)[0])
-        if after == 0:
-            return float(self.u[0])
+        start = int(np.searchsorted(self.u, 0.0))
+        after = start + int(np.flatnonzero(self.highest_rise[start:] >= rise)[0])
+        if after == start:
+            return float(self.u[start])
         low, high = self.u[after - 1 : after + 1]
         for _ in range(_ROUNDS):
             u = np.linspace(low, high, _POINTS)

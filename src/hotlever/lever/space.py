@@ -10,9 +10,9 @@ nothing else.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ from hotlever.types import Array, Index
 
 #: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
 PER_CM_TO_MILLI_PER_UM = 0.1
+#: W/cm² to mW/µm².
+PER_CM2_TO_MILLI_PER_UM2 = 1e-5
 #: J/cm³ to nJ/µm³; with times in µs, nJ are mW µs.
 PER_CM3_TO_NANO_PER_UM3 = 1e-3
 
@@ -115,23 +117,42 @@ class Fluxes:
     heat_source : ndarray, shape (points, n)
         Tested with φ; the heat made is negative.
     heat : ndarray, shape (dimension, points, n)
-        κ ∇T, tested with ∇φ.
+        The heat flux turned round, κ ∇T and what the current carries, tested with ∇φ.
     charge : ndarray, shape (dimension, points, n)
-        σ ∇V, tested with ∇φ.
+        The current density turned round, σ ∇V and what ∇T drives, tested with ∇φ.
     """
 
     heat_source: Array
     heat: Array
     charge: Array
 
+    def __add__(self, other: Fluxes) -> Fluxes:
+        return Fluxes(*(mine + its for mine, its in zip(self, other, strict=True)))
+
+    def __iter__(self) -> Iterator[Array]:
+        return iter((self.heat_source, self.heat, self.charge))
+
+
+class Thermoelectric(NamedTuple):
+    """What thermoelectricity adds to a tangent: ∫ φ e·∇ψ, f ∇φ·∇ψ and g ∇φ·∇ψ.
+
+    Of the heat source with the slope of the temperature, of the heat flux with that of the
+    potential, and of the current density with that of the temperature.
+    """
+
+    heat_source_slope: Array
+    heat_V: Array
+    charge_T: Array
+
 
 @dataclass(frozen=True)
 class Tangent:
     """Coefficients of the linearised equations at the quadrature points, shapes (..., points, n).
 
-    The names say test function, then trial function: ``heat_V`` is how the heat equation
+    The names say test function, then trial function: ``heat_source_V`` is how the heat equation
     changes with the potential. Heat: ∫ φ a ψ + ∇φ·b ψ + κ ∇φ·∇ψ for a temperature ψ and
     ∫ φ c·∇ψ for a potential ψ; charge: ∫ ∇φ·d ψ for a temperature and σ ∇φ·∇ψ for a potential.
+    With thermoelectricity slopes of each field drive the flux of the other as well.
     """
 
     heat_source_T: Array
@@ -140,20 +161,37 @@ class Tangent:
     heat_source_V: Array
     charge_flux_T: Array
     sigma: Array
+    thermoelectric: Thermoelectric | None = None
 
     def of(self, state: int) -> Tangent:
         """Return the coefficients of one state."""
-        return Tangent(*(coefficient[..., state] for coefficient in vars(self).values()))
+        return self._each(lambda coefficient: coefficient[..., state])
+
+    def _each(self, of: Callable[[Array], Array]) -> Tangent:
+        coefficients = {name: of(value) for name, value in self._own().items()}
+        more = self.thermoelectric
+        return Tangent(**coefficients, thermoelectric=more and Thermoelectric(*map(of, more)))
+
+    def _own(self) -> dict[str, Array]:
+        return {name: value for name, value in vars(self).items() if name != "thermoelectric"}
 
     def fluxes(self, changes: Fields) -> Fluxes:
         """Return the changes of the fluxes with one change of each state, or with several."""
         at = self
         if changes.T.ndim > self.sigma.ndim:
-            at = Tangent(*(coefficient[..., None] for coefficient in vars(self).values()))
-        return Fluxes(
+            at = self._each(lambda coefficient: coefficient[..., None])
+        fluxes = Fluxes(
             at.heat_source_T * changes.T + (at.heat_source_V * changes.grad_V).sum(axis=0),
             at.heat_flux_T * changes.T + at.kappa * changes.grad_T,
             at.charge_flux_T * changes.T + at.sigma * changes.grad_V,
+        )
+        if at.thermoelectric is None:
+            return fluxes
+        source, heat, charge = at.thermoelectric
+        return Fluxes(
+            fluxes.heat_source + (source * changes.grad_T).sum(axis=0),
+            fluxes.heat + heat * changes.grad_V,
+            fluxes.charge + charge * changes.grad_T,
         )
 
 

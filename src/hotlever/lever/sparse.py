@@ -72,13 +72,15 @@ class SparseJacobian:
         elements, nodes = self._elements.dofs.shape
         matrices = self._elements.matrices
         element = np.empty((elements, 2 * nodes, 2 * nodes))
+        source, heat, charge = tangent.thermoelectric or (None, None, None)
         element[:, :nodes, :nodes] = matrices(
             value_value=tangent.heat_source_T,
+            value_slope=source,
             slope_value=tangent.heat_flux_T,
             slope_slope=tangent.kappa,
         )
-        element[:, :nodes, nodes:] = matrices(value_slope=tangent.heat_source_V)
-        element[:, nodes:, :nodes] = matrices(slope_value=tangent.charge_flux_T)
+        element[:, :nodes, nodes:] = matrices(value_slope=tangent.heat_source_V, slope_slope=heat)
+        element[:, nodes:, :nodes] = matrices(slope_value=tangent.charge_flux_T, slope_slope=charge)
         element[:, nodes:, nodes:] = matrices(slope_slope=tangent.sigma)
         entries = sums_by_index(self.slots, element, self._entries + 1)[: self._entries]
         entries[self._held_slots] += conductance

@@ -25,7 +25,7 @@ from copy import copy
 
 import numpy as np
 
-from hotlever.lever.space import Space
+from hotlever.lever.space import Fields, Space
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 
@@ -90,13 +90,10 @@ class Terminals:
             T, grad_T = T + rise * value[0], grad_T + rise * slope
         return T, grad_T
 
-    def held_ends(self) -> tuple[Array, Array] | None:
-        """Return values and slopes of the function that is one at leg ends of their own warmth.
-
-        These do not move with the base temperature; None without any.
-        """
-        if not self.end_rises:
-            return None
-        tests = [self._space.end_tests[name][..., None] for name in self.end_rises]
-        value, slope = np.split(np.sum(tests, axis=0), [1])
-        return value[0], slope
+    def warmed_by_base(self, fields: Fields) -> Fields:
+        """Return how fields change with the base temperature: leg ends of their own stay."""
+        warmer, slope = np.ones_like(fields.T), np.zeros_like(fields.grad_T)
+        for name in self.end_rises:
+            value, slopes = np.split(self._space.end_tests[name][..., None], [1])
+            warmer, slope = warmer - value[0], slope - slopes
+        return Fields(warmer, slope, np.zeros_like(fields.grad_V))

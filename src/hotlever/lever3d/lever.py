@@ -128,7 +128,7 @@ class SolidLever(Lever):
 
         Sensitivities are those of the flat lever.
         """
-        values = checked_bias(bias, self.circuit)
+        values = checked_bias(bias, self.probe)
         states, failure = as_far_as_possible(lambda: self.solve(values, progress))
         solved = values[: len(states)]
         notes = self._flat.branch_to(float(values.max())).read(self.circuit, values).notes(values)

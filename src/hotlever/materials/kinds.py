@@ -15,6 +15,7 @@ from abc import abstractmethod
 from collections.abc import Callable
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
 from hotlever.errors import InputError
@@ -34,13 +35,21 @@ from hotlever.materials.parameters import (
     Parameter,
     field_of,
 )
+from hotlever.materials.radiation import grey_emission
 from hotlever.materials.silicon import (
     MELTING_POINT,
+    Carrier,
     conductivity_high_doped,
     conductivity_low_doped,
     inversion_temperature,
     thermal_conductivity,
     thermal_conductivity_of_layer,
+)
+from hotlever.materials.thermopower import (
+    thermoelectric_high_doped,
+    thermoelectric_metal,
+    thermoelectric_n_silicon,
+    thermoelectric_p_silicon,
 )
 from hotlever.records import Record
 from hotlever.types import Array
@@ -64,6 +73,7 @@ class Kind(Record):
     conducts: ClassVar[bool] = True
 
     kind: str
+    emissivity: float
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
@@ -115,6 +125,18 @@ class Kind(Record):
         """
 
     @abstractmethod
+    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
+        """Return β (A cm⁻¹ K⁻¹) and γ (W cm⁻¹ K⁻²), (2, ...), with their derivatives.
+
+        They are Σ σ S and Σ σ S² of the carriers, see `hotlever.materials.thermopower`; those of
+        high-doped silicon are of the kind `carrier`.
+        """
+
+    def emission(self, T: Array, surroundings_K: float) -> Evaluated:
+        """Return what a face radiates less what it takes up (W cm⁻²), with its derivatives."""
+        return grey_emission(T, self.emissivity, surroundings_K)
+
+    @abstractmethod
     def enthalpy(self, T: Array) -> Evaluated:
         """Return the heat held above that at 298.15 K (J cm⁻³), with its derivatives.
 
@@ -133,6 +155,8 @@ class Silicon(Kind):
         "thickness",
     )
     heat_capacity_scale: float = field_of(OF_SILICON["heat_capacity_scale"])
+    scattering_exponent: float = field_of(OF_SILICON["scattering_exponent"])
+    emissivity: float = field_of(OF_SILICON["emissivity"])
 
     def end(self, name: str) -> str:
         """Say what happens to a material of this name above its highest temperature."""
@@ -185,6 +209,9 @@ class LowDopedSilicon(Silicon):
     #: Laws by temperature, doping, p and the impurity exponent; and where σ is least.
     conductivity: ClassVar[Law]
     inversion: ClassVar[Callable[..., Array]]
+    #: Its law of thermoelectricity, by these and the scattering exponent; and the majority.
+    seebeck: ClassVar[Law]
+    carrier: ClassVar[Carrier]
 
     delta: float = field_of(OF_SILICON["delta"])
     n_d: float = field_of(OF_SILICON["n_d"])
@@ -200,6 +227,11 @@ class LowDopedSilicon(Silicon):
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
         return type(self).conductivity(T, n, self.p, self.impurity_exponent)
 
+    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
+        """Return β and γ, see `Kind.thermoelectric`."""
+        exponents = self.p, self.impurity_exponent, self.scattering_exponent
+        return type(self).seebeck(T, n, *exponents)
+
     def inversion_temperature(self, n: Array | None = None) -> Array:
         """Return the temperature (K) at which the resistivity of a doping (cm⁻³) is highest.
 
@@ -214,6 +246,8 @@ class NSilicon(LowDopedSilicon):
 
     conductivity: ClassVar = conductivity_low_doped
     inversion: ClassVar = inversion_temperature
+    seebeck: ClassVar = thermoelectric_n_silicon
+    carrier: ClassVar = "electron"
 
     kind: Literal["n-silicon"] = "n-silicon"
 
@@ -223,6 +257,8 @@ class PSilicon(LowDopedSilicon):
 
     conductivity: ClassVar = conductivity_p
     inversion: ClassVar = inversion_temperature_p
+    seebeck: ClassVar = thermoelectric_p_silicon
+    carrier: ClassVar = "hole"
 
     kind: Literal["p-silicon"] = "p-silicon"
 
@@ -254,6 +290,11 @@ class HighDopedSilicon(Silicon):
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
         return conductivity_high_doped(T, self.a0, self.a1)
 
+    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
+        """Return β and γ, see `Kind.thermoelectric`."""
+        own = self.a0, self.a1, self.n_hd, self.scattering_exponent
+        return thermoelectric_high_doped(T, *own, carrier)
+
 
 class MetalFilm(Stored):
     """A metal film; the values of a bulk metal are where a fit may start."""
@@ -270,6 +311,8 @@ class MetalFilm(Stored):
         default=None,
         description="thermal conductivity (W cm⁻¹ K⁻¹); left out: by Wiedemann and Franz",
     )
+    seebeck: float = field_of(OF_METAL["seebeck"])
+    emissivity: float = field_of(OF_METAL["emissivity"])
     melting_point_K: float = Field(default=MELTING_POINT, ge=400, le=4000, description="K")
 
     @property
@@ -303,6 +346,10 @@ class MetalFilm(Stored):
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
         return metal_conductivity(T, self.resistivity, self.tcr)
 
+    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
+        """Return β and γ, see `Kind.thermoelectric`."""
+        return thermoelectric_metal(T, self.resistivity, self.tcr, self.seebeck)
+
 
 class Dielectric(Stored):
     """An insulator, which carries heat alone."""
@@ -316,6 +363,7 @@ class Dielectric(Stored):
     )
     kappa: float = field_of(OF_DIELECTRIC["kappa"])
     kappa_exponent: float = field_of(OF_DIELECTRIC["kappa_exponent"])
+    emissivity: float = field_of(OF_DIELECTRIC["emissivity"])
 
     @property
     def laws(self) -> tuple[Law, ...]:
@@ -334,6 +382,11 @@ class Dielectric(Stored):
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), zero."""
         nothing = 0.0 * T
+        return nothing, {"T": nothing}
+
+    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
+        """Return β and γ, zero."""
+        nothing = np.zeros((2, *T.shape))
         return nothing, {"T": nothing}
 
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from hotlever.materials.laws import Evaluated, law
 from hotlever.materials.silicon import (
     ELEMENTARY_CHARGE,
+    Carried,
     band_gap,
     carriers,
     conducted,
@@ -107,13 +108,18 @@ def conductivity_p(
     >>> (1.0 / sigma).round(5).tolist()  # Ω cm
     [13.30622, 0.00117]
     """
+    return conducted(carried_in_p_silicon(T, n, p, impurity_exponent))
+
+
+def carried_in_p_silicon(
+    T: ArrayLike, n: ArrayLike, p: float, impurity_exponent: float = 0.0
+) -> list[Carried]:
+    """Return the carriers of silicon doped with boron; see `conductivity_p`."""
     holes, electrons = carriers(T, n, band_gap_p)
-    return conducted(
-        [
-            (holes, hole_mobility.formula(T, n, p, impurity_exponent)),
-            (electrons, mobility.formula(T, n, p, impurity_exponent)),
-        ]
-    )
+    return [
+        (holes, hole_mobility.formula(T, n, p, impurity_exponent), "hole"),
+        (electrons, mobility.formula(T, n, p, impurity_exponent), "electron"),
+    ]
 
 
 def inversion_temperature_p(

@@ -30,6 +30,14 @@ _FILM = 0.2
 #: Of the exponent of the temperature in mobility limited by impurities: half of what it is without
 #: screening, 1.5. The paper takes 0.
 _IMPURITIES = 0.75
+#: Of the power of the energy in the relaxation time of carriers: half of what lies between acoustic
+#: phonons, −1/2, and the half-way to ionised impurities, 3/2; and of a metal's Seebeck coefficient
+#: (µV/K), which films have another of than the bulk.
+_SCATTERING, _SEEBECK = 0.5, 5.0
+#: Of the emissivity: it depends on the thickness and on the doping.
+_EMISSIVITY = 0.7
+#: What counts in time alone.
+IN_TIME = "in time"
 #: Units by the endings of names in probe files.
 _UNITS = {"um": "µm", "ohm": "Ω", "K": "K", "deg": "°"}
 
@@ -50,8 +58,10 @@ class Parameter(NamedTuple):
         Standard deviation of the prior that it has unless another is stated; none if left out.
     relative : bool
         Whether that is a share of the value: a standard deviation of the logarithm.
-    in_time : bool
-        Whether it counts in time only.
+    counts : str
+        With what it counts alone: `IN_TIME`, or an effect of `hotlever.probe.physics`.
+    exact : bool
+        Whether no value outside the bounds has a meaning.
     usual : bool
         Whether a fit varies it unless it is told otherwise.
     value : float
@@ -67,7 +77,8 @@ class Parameter(NamedTuple):
     meaning: str
     spread: float | None = None
     relative: bool = True
-    in_time: bool = False
+    counts: str = ""
+    exact: bool = False
     usual: bool = False
     value: float = math.nan
 
@@ -97,6 +108,17 @@ def _table(*rows: Parameter) -> dict[str, Parameter]:
     return {row.name: row for row in rows}
 
 
+def _emissivity(value: float) -> Parameter:
+    return Parameter(
+        *("emissivity", "ε", "1", 1.0, 0.0, 1.0),
+        "emissivity of a face, which counts with radiation",
+        spread=_EMISSIVITY,
+        counts="radiation",
+        exact=True,
+        value=value,
+    )
+
+
 #: All parameters of silicon: first the six that the paper fits, in its order.
 OF_SILICON = _table(
     *(
@@ -123,9 +145,19 @@ OF_SILICON = _table(
         value=0.0,
     ),
     Parameter(
+        *("scattering_exponent", "r", "1", 1.0, -1.0, 2.0),
+        "power of the energy in the relaxation time of carriers, which counts with "
+        "thermoelectricity",
+        spread=_SCATTERING,
+        relative=False,
+        counts="thermoelectric",
+        value=0.0,
+    ),
+    _emissivity(0.2),
+    Parameter(
         *("heat_capacity_scale", "c_h", "1", 1.0, 0.5, 1.5),
         "scale of the heat capacity, which counts in time",
-        in_time=True,
+        counts=IN_TIME,
         value=1.0,
     ),
 )
@@ -150,6 +182,15 @@ OF_METAL = _table(
         value=1.0,
     ),
     Parameter("kappa", "κ", "W cm⁻¹ K⁻¹", 0.01, 0.01, 5.0, "thermal conductivity"),
+    Parameter(
+        *("seebeck", "S", "µV K⁻¹", 1.0, -100.0, 100.0),
+        "Seebeck coefficient, which counts with thermoelectricity",
+        spread=_SEEBECK,
+        relative=False,
+        counts="thermoelectric",
+        value=0.0,
+    ),
+    _emissivity(0.1),
 )
 OF_DIELECTRIC = _table(
     Parameter(
@@ -163,15 +204,17 @@ OF_DIELECTRIC = _table(
         "power of the temperature in it",
         value=0.0,
     ),
+    _emissivity(0.15),
 )
 
 
 def field_of(parameter: Parameter, **others: Any) -> Any:
     """Return the field of a record for a parameter: what it is, its bounds, and its value if any.
 
-    The bounds are twice as wide as a fit's; those of what may be negative are the fit's own.
+    The bounds are twice as wide as a fit's; those of what may be negative, or are exact, are the
+    fit's own.
     """
-    widened = 1.0 if parameter.lower < 0 else 2.0
+    widened = 1.0 if parameter.lower < 0 or parameter.exact else 2.0
     stated = {
         "description": f"{parameter.meaning}, {parameter.symbol} ({parameter.unit})",
         "ge": parameter.lower / widened,

@@ -20,6 +20,8 @@ from hotlever.materials.laws import FORMULA_TO, Evaluated, Law, Partials, law
 from hotlever.types import Array
 
 Carrier = Literal["electron", "hole"]
+# Density (cm⁻³) and mobility (cm² V⁻¹ s⁻¹) of carriers, and what they are.
+Carried = tuple[Evaluated, Evaluated, Carrier]
 #: Majority first.
 _CARRIERS: tuple[Carrier, Carrier] = ("electron", "hole")
 
@@ -134,6 +136,23 @@ def band_gap(T: ArrayLike, n: ArrayLike) -> Evaluated:
 
 
 @law(meant_for=(200.0, 1300.0), source="Eq. 7; Altermatt et al. (1999)")
+def density_of_states(T: ArrayLike) -> Evaluated:
+    """Effective density of states of a band of silicon, in cm⁻³ (Eq. 7, first line).
+
+    Eq. 7 has the root of the product of both bands' densities; they differ by some ten per cent,
+    and each is taken to be the root.
+
+    Examples
+    --------
+    >>> f"{density_of_states(300.0)[0]:.2e}"
+    '2.70e+19'
+    """
+    T = np.asarray(T, dtype=float)
+    states = 2.70e19 * (T / 300.0) ** 1.5
+    return states, {"T": 1.5 * states / T}
+
+
+@law(meant_for=(200.0, 1300.0), source="Eq. 7; Altermatt et al. (1999)")
 def intrinsic_density(T: ArrayLike, n: ArrayLike) -> Evaluated:
     """Intrinsic carrier density, in cm⁻³ (Eq. 7, first line); doping narrows the gap.
 
@@ -150,7 +169,7 @@ def _intrinsic(T: ArrayLike, band_gap: Evaluated) -> Evaluated:
     """Eq. 7, first line, for a band gap."""
     T, (gap, d_gap) = np.asarray(T, dtype=float), band_gap
     two_kT = 2.0 * BOLTZMANN * T
-    n_i = 2.70e19 * (T / 300.0) ** 1.5 * np.exp(-gap / two_kT)
+    n_i = density_of_states.formula(T)[0] * np.exp(-gap / two_kT)
     return n_i, {
         "T": n_i * (1.5 / T + (gap / T - d_gap["T"]) / two_kT),
         "n": -n_i * d_gap["n"] / two_kT,
@@ -298,17 +317,28 @@ def conductivity_low_doped(
     mobility_law: Law = mobility,
 ) -> Evaluated:
     """Electrical conductivity of the low-doped heater and reader, in S cm⁻¹ (Eq. 5)."""
-    return conducted(
-        (density, mobility_law.formula(T, n, p, impurity_exponent, carrier))
+    return conducted(carried_in_n_silicon(T, n, p, impurity_exponent, mobility_law))
+
+
+def carried_in_n_silicon(
+    T: ArrayLike,
+    n: ArrayLike,
+    p: float,
+    impurity_exponent: float = 0.0,
+    mobility_law: Law = mobility,
+) -> list[Carried]:
+    """Return the carriers of n-doped silicon (Eqs. 6 to 10)."""
+    return [
+        (density, mobility_law.formula(T, n, p, impurity_exponent, carrier), carrier)
         for density, carrier in zip(carriers(T, n, band_gap), _CARRIERS, strict=True)
-    )
+    ]
 
 
-def conducted(carried: Iterable[tuple[Evaluated, Evaluated]]) -> Evaluated:
+def conducted(carried: Iterable[Carried]) -> Evaluated:
     """Return the conductivity (S cm⁻¹) of carriers of some densities and mobilities (Eq. 5)."""
     sigma: Array = np.zeros(())
     total: Partials = dict.fromkeys(("T", "n", "p", "impurity_exponent"), sigma)
-    for (density, d_density), (speed, d_speed) in carried:
+    for (density, d_density), (speed, d_speed), _ in carried:
         sigma = sigma + ELEMENTARY_CHARGE * density * speed
         total = {
             name: total[name]

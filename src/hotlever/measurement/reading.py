@@ -34,6 +34,8 @@ def read_measurement(
     columns: Mapping[str, str] | None = None,
     circuit: Circuit | None = None,
     waveform: Waveform | None = None,
+    *,
+    signed: bool = False,
 ) -> Measurement:
     """Read a measurement file.
 
@@ -61,6 +63,8 @@ def read_measurement(
         signs of bias, current and voltage count.
     waveform : Waveform, optional
         Of the bias in time, instead of the column ``V_b``.
+    signed : bool
+        Whether the signs count without held supplies too, as they do with thermoelectricity.
 
     Raises
     ------
@@ -81,7 +85,8 @@ def read_measurement(
     if TIME in quantities:
         waveform, order = _complete_in_time(contents, circuit, waveform)
     else:
-        order = _complete_at_rest(contents, circuit)
+        signed = signed or (circuit is not None and circuit.lowest_bias_V < 0.0)
+        order = _complete_at_rest(contents, circuit, symmetric=not signed)
     notes = contents.notes + unused_columns(table, quantities)
     more = len(notes) - _MOST_NOTES
     if more > 0:
@@ -116,9 +121,8 @@ def _complete_in_time(
     return waveform, f"in time, {len(contents.table.rows)} rows; {waveform.text}"
 
 
-def _complete_at_rest(contents: Contents, circuit: Circuit | None) -> str:
+def _complete_at_rest(contents: Contents, circuit: Circuit | None, *, symmetric: bool) -> str:
     """Complete a slow sweep, of either polarity; return the order of its rows in words."""
-    symmetric = circuit is None or circuit.lowest_bias_V == 0.0
     find_bias(contents, circuit, None)
     bias = contents.values["V_b"]
     if symmetric:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from hotlever.errors import unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
-from hotlever.materials.parameters import parameter_named
+from hotlever.materials.parameters import IN_TIME, parameter_named
 from hotlever.probe.parts import ProbeParts
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
 
@@ -44,11 +44,14 @@ def nuisances(probe: ProbeParts) -> list[str]:
     return [name for name in probe.shape.dimensions() if name not in held]
 
 
-def of_materials(probe: ProbeParts, *, in_time: bool = False) -> dict[str, Parameter]:
+def of_materials(
+    probe: ProbeParts, *, anywhere: bool = False, in_time: bool = False
+) -> dict[str, Parameter]:
     """Return all parameters of what a probe is made of, by name: first those a fit usually varies.
 
-    With `in_time`, what counts in time only as well. Those of ``[material]`` keep the paper's
-    order; two kinds of silicon share c_κ there. What nothing tells of has no prior.
+    With `in_time`, what counts in time only as well; with `anywhere`, what counts with effects that
+    are off too. Those of ``[material]`` keep the paper's order; two kinds of silicon share c_κ
+    there. What nothing tells of has no prior.
 
     Examples
     --------
@@ -56,17 +59,20 @@ def of_materials(probe: ProbeParts, *, in_time: bool = False) -> dict[str, Param
     >>> list(of_materials(Probe.reference()))
     ['c_kappa', 'delta', 'n_d', 'p', 'a0', 'a1', 'impurity_exponent', 'n_hd']
     """
-    usual = usual_parameters(probe)
+    usual, effects = usual_parameters(probe), probe.physics.effects
+    counting = {"", *effects, *([IN_TIME] if in_time else [])}
     table = {
         name: parameter._replace(
             name=name,
-            spread=parameter.spread if name in usual or not parameter.relative else None,
+            spread=parameter.spread
+            if name in usual or parameter.counts or not parameter.relative
+            else None,
             value=float(getattr(kind, own)),
         )
         for material, kind in _kinds(probe)
         for own, parameter in kind.parameters.items()
         for name in [full_name(material, own)]
-        if in_time or not parameter.in_time
+        if anywhere or parameter.counts in counting
     }
     return {name: table[name] for name in dict.fromkeys([*usual, *table])}
 
@@ -109,7 +115,9 @@ def heat_capacities(probe: ProbeParts) -> tuple[str, ...]:
     ('heat_capacity_scale',)
     """
     return tuple(
-        name for name, parameter in of_materials(probe, in_time=True).items() if parameter.in_time
+        name
+        for name, parameter in of_materials(probe, in_time=True).items()
+        if parameter.counts == IN_TIME
     )
 
 
@@ -118,7 +126,8 @@ def parameters_of(
 ) -> dict[str, Parameter]:
     """Return all that a fit may vary, by name: first the materials' parameters.
 
-    With `in_time`, what counts in time only as well; with `anywhere`, in other surroundings too.
+    With `in_time`, what counts in time only as well; with `anywhere`, in other surroundings and
+    with effects that are off too.
 
     Examples
     --------
@@ -126,7 +135,7 @@ def parameters_of(
     >>> parameters_of(Probe.reference())["heater_width_um"].unit
     'µm'
     """
-    table = of_materials(probe, in_time=anywhere or in_time)
+    table = of_materials(probe, anywhere=anywhere, in_time=in_time)
     parts = (probe.shape, probe.tip, probe.circuit, probe.surroundings)
     meaning = {name: text for part in parts if part for name, text in part.description().items()}
 

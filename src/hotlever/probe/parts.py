@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
@@ -14,6 +15,7 @@ from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind, Material,
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.probe.circuit import Circuit, Contact, Wiring
 from hotlever.probe.layout import Layout
+from hotlever.probe.physics import THE_PAPERS, Physics
 from hotlever.probe.shapes import PARAMETRIC, SHAPE_SECTIONS, Shape
 from hotlever.probe.surroundings import Surroundings
 from hotlever.probe.tip import Tip
@@ -34,6 +36,7 @@ PARTS: dict[str, type[Record]] = {
     "material": Material,
     "surroundings": Surroundings,
     "tip": Tip,
+    "physics": Physics,
     "prior": PriorTexts,
 }
 MATERIALS = "materials"
@@ -50,6 +53,7 @@ class ProbeParts(Record):
     materials: dict[str, SerializeAsAny[Kind]] = Field(default_factory=dict)
     surroundings: Surroundings = Surroundings()
     tip: Tip | None = None
+    physics: Physics = THE_PAPERS
     prior: PriorTexts | None = None
 
     @model_validator(mode="after")
@@ -125,6 +129,14 @@ class ProbeParts(Record):
         """The low-doped silicon of the heater; None if it is of another material."""
         kind = self.kinds[self.layout().heater.material]
         return kind if isinstance(kind, LowDopedSilicon) else None
+
+    @property
+    def lowest_bias_V(self) -> float:
+        """Bias (V) below which the lever is as at the opposite bias, with the signs reversed.
+
+        There is none, −∞, with held supplies or thermoelectricity: there the polarity counts.
+        """
+        return -math.inf if self.physics.thermoelectric else self.circuit.lowest_bias_V
 
     @property
     def wiring(self) -> Wiring:

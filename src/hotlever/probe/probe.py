@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from hotlever.files import read_text, write_text
 from hotlever.materials import REFERENCE, Kind
 from hotlever.materials.sections import LAWS, materials_of, own_laws, refuse_own_laws, with_laws_of
 from hotlever.probe.parts import MATERIALS, PARTS, SECTIONS, ProbeParts
+from hotlever.probe.physics import Physics
 from hotlever.probe.priors import priors_of
 from hotlever.probe.shapes import (
     DRAWING,
@@ -205,6 +206,16 @@ class Probe(ProbeParts):
         """
         return self.with_(medium=medium)
 
+    def with_physics(self, effects: Iterable[str], where: str = "physics") -> Probe:
+        """Return the probe with some effects beyond the paper, and no others.
+
+        Raises
+        ------
+        InputError
+            If there is no such effect.
+        """
+        return self.model_copy(update={"physics": Physics.of(effects, where)})
+
     def to_toml(self) -> str:
         """Return the probe as a commented probe file."""
         lines = ["# A hotlever probe file: lengths in µm, temperatures in K."]
@@ -228,6 +239,10 @@ class Probe(ProbeParts):
             lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]
             values, meaning = example.model_dump(), example.description()
             lines += section_lines("tip", values, meaning, start="# ")[1:]
+        if not self.physics:
+            lines += ["", "# Without a section [physics] the physics is the paper's. Beyond it:"]
+            effects = dict.fromkeys(Physics.model_fields, True)
+            lines += section_lines("physics", effects, Physics.description(), start="# ")[1:]
         if laws := own_laws(self.made_of):
             lines += section_lines(LAWS, laws, {})
         return "\n".join(lines) + "\n"

@@ -88,7 +88,7 @@ class MinimosLever(Lever):
         super()._prepare()
         kinds = self.probe.kinds
         kinds[LOW_DOPED] = MinimosSilicon.model_construct(**dict(kinds[LOW_DOPED]))
-        self.equations = LeverEquations(self.space, kinds, self.circuit)
+        self.equations = LeverEquations(self.space, kinds, self.circuit, self.probe.physics)
 
 
 def draw(

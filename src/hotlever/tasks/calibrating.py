@@ -28,9 +28,9 @@ def calibrate_file(reporter: Reporter, request: CalibrateRequest) -> None:
     timing = None if request.pulse is None else parse_timing(request.pulse)
     columns, outputs = request.columns, request.outputs()
     fit = None if request.fit is None else read_fit(request.fit)
-    like = read_probe(reporter, request.probe) if fit is None else fit.probe
+    like = fit.probe if fit else request.with_physics(read_probe(reporter, request.probe))
     priors = parse_priors(request.prior, like)
-    measurement = read_measurement(data, columns, like.circuit)
+    measurement = read_measurement(data, columns, like.circuit, signed=like.lowest_bias_V < 0.0)
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes)
     if "current" not in measurement.observables:

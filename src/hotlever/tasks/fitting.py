@@ -34,7 +34,7 @@ def fit_files(reporter: Reporter, request: FitRequest) -> int:
         If no lever shows the data of a single one; what the search ended at is written.
     """
     request.check()
-    probe = read_probe(reporter, request.probe)
+    probe = request.with_physics(read_probe(reporter, request.probe))
     options, columns = request.options(probe), request.columns
     if len(request.data) > 1:
         return _fit_several(reporter, request, probe, options, columns).exit_status
@@ -53,7 +53,9 @@ def _fit_one(
     samples = request.samples if request.posterior else None
     outputs.file(request.output)
     outputs.folder(request.report)
-    measurement = read_measurement(data, columns, probe.circuit, waveform)
+    measurement = read_measurement(
+        data, columns, probe.circuit, waveform, signed=probe.lowest_bias_V < 0.0
+    )
     if samples or request.profiles:
         measurement.need_rest("--posterior" if samples else "--profiles")
     reporter.tell_table(measurement.understood)

@@ -11,6 +11,7 @@ from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.tasks.requests import (
     DriveRequest,
     File,
+    PhysicsRequest,
     PlotRequest,
     argument,
     check_medium,
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class MeasuredRequest:
+class MeasuredRequest(PhysicsRequest):
     """What is done with a measurement: how its file is read, and what is known beforehand."""
 
     column: list[str] | None = option(
@@ -168,6 +169,8 @@ class CalibrateRequest(PlotRequest, MeasuredRequest):
         if len(several) > 1:
             names = " and ".join(several)
             raise InputError(f"{names}: expected at most one of {', '.join(sources)}")
+        if self.physics is not None and (self.fit or self.power_law):
+            raise InputError("--physics: goes with --probe, expected neither --fit nor --power-law")
         check_medium(self.medium, UNKNOWN_MEDIUM)
 
     def outputs(self) -> Outputs:

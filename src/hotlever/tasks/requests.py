@@ -53,8 +53,27 @@ class ProbeRequest:
 
 
 @dataclass(kw_only=True)
-class LeverRequest(ProbeRequest):
-    """A lever to solve: its probe, with some values changed, and the medium around it."""
+class PhysicsRequest:
+    """Physics beyond the paper."""
+
+    physics: str | None = option(
+        None,
+        metavar="EFFECT,...",
+        help="thermoelectric, radiation or both: effects that count beyond the paper's, or none; "
+        "what the probe file says if left out.",
+    )
+
+    def with_physics(self, probe: Probe) -> Probe:
+        """Return a probe with the effects that are asked for."""
+        if self.physics is None:
+            return probe
+        names = [name.strip() for name in self.physics.split(",")]
+        return probe.with_physics(() if names == ["none"] else names, "--physics")
+
+
+@dataclass(kw_only=True)
+class LeverRequest(PhysicsRequest, ProbeRequest):
+    """A lever to solve: its probe, with some values changed, the medium and the effects."""
 
     medium: str | None = option(None, help="vacuum or air; what the files say if left out.")
     set: list[str] | None = option(
@@ -65,6 +84,7 @@ class LeverRequest(ProbeRequest):
         """Read the probe; what should be known of its shape is told."""
         check_medium(self.medium)
         probe = read_probe(reporter, self.probe, self.set)
+        probe = self.with_physics(probe)
         return probe if self.medium is None else probe.in_medium(self.medium)
 
 

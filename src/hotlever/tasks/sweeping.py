@@ -23,7 +23,7 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
     outputs = request.outputs(request.probe)
     outputs.folder(request.fields)
     probe = request.read_probe(reporter)
-    biases = parse_bias(request.bias, probe.circuit)
+    biases = parse_bias(request.bias, probe.lowest_bias_V)
     lever = make_lever(reporter, probe, request.model)
     states: list[State] = []
     with reporter.progress("sweep") as update:

@@ -11,7 +11,7 @@ from hotlever.units import LEAST_BIAS, MOST_BIAS, setting
 
 if TYPE_CHECKING:
     from hotlever.calibration.pulses import PulseTiming
-    from hotlever.probe import Circuit, Probe
+    from hotlever.probe import Probe
     from hotlever.types import Array
 
 #: A sweep of so many biases takes minutes, as does a design varied so often.
@@ -142,10 +142,11 @@ def parse_timing(text: str) -> PulseTiming:
 # --- ranges: START:STOP:COUNT ---------------------------------------------------------------------
 
 
-def parse_bias(text: str, circuit: Circuit | None = None) -> Array:
+def parse_bias(text: str, lowest_V: float = 0.0) -> Array:
     """Parse ``START:STOP:COUNT`` in volts, ends included.
 
-    With held supplies in the circuit the start may be negative.
+    Where the lowest bias that a lever is told of is negative, as with held supplies or
+    thermoelectricity, the start may be negative.
 
     Examples
     --------
@@ -156,9 +157,8 @@ def parse_bias(text: str, circuit: Circuit | None = None) -> Array:
 
     where = f"--bias {shown(text)}"
     start, stop, count = _parse_range(text, where, "such as 1:11:25 (V)", MOST_BIASES)
-    lowest = 0.0 if circuit is None else circuit.lowest_bias_V
-    if start < lowest or stop < start:
-        least = f"{lowest:g} <= " if np.isfinite(lowest) else ""
+    if start < lowest_V or stop < start:
+        least = f"{lowest_V:g} <= " if np.isfinite(lowest_V) else ""
         raise InputError(f"{where}: expected {least}START <= STOP")
     if (count == 1) != (start == stop):
         raise InputError(f"{where}: COUNT 1 goes with START = STOP, more with START < STOP")

@@ -81,10 +81,10 @@ def test_laws_that_are_looked_up_are_the_laws(coarse):
     exact = LeverEquations(reduced.space, coarse.probe.kinds, coarse.circuit).laws
     T = np.random.default_rng(0).uniform(293.0, 1600.0, (reduced.space.weights.size, 3))
     tabulated = reduced.equations.laws
-    looked_up, true = tabulated.conductivities(T), exact.conductivities(T)
+    (looked_up, by), (true, true_by) = tabulated.properties(T), exact.properties(T)
     np.testing.assert_allclose(looked_up.kappa, true.kappa, rtol=2e-4)
     np.testing.assert_allclose(looked_up.sigma, true.sigma, rtol=1e-6)
-    np.testing.assert_allclose(looked_up.sigma_by["T"], true.sigma_by["T"], rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(by["T"].sigma, true_by["T"].sigma, rtol=1e-3, atol=1e-6)
     for found, expected in zip(tabulated.heat_density(T), exact.heat_density(T), strict=True):
         np.testing.assert_allclose(found, expected, rtol=1e-5)
     # Newton's method may stray beyond the table

@@ -42,7 +42,9 @@ def estimated_error(lever: Lever, branch: Branch, u: Array) -> Array:
     ndarray, shape (3, n)
         Bounds on the errors of I_h (mA), V_r (V) and T_tip (K).
     """
-    equations = LeverEquations(lever.space, branch.equations.materials, lever.circuit)
+    equations = LeverEquations(
+        lever.space, branch.equations.materials, lever.circuit, branch.equations.laws.physics
+    )
     x, every = branch.equations.space.expanded(branch.states(u)), np.arange(u.size)
     problem = Constrained(equations, TIP, u**2)
     factors = problem.factorised(x, every)

@@ -70,7 +70,7 @@ class ReducedLever:
 
     def _equations(self, probe: Probe, space: ReducedSpace) -> LeverEquations:
         circuit = Circuit(base_temperature_K=self.drawn.circuit.base_temperature_K)
-        return LeverEquations(space, probe.kinds, circuit)
+        return LeverEquations(space, probe.kinds, circuit, probe.physics)
 
     @one_blas_thread
     def solved(self, probe: Probe, u: Array, guess: Array, factors: Any = None) -> Solved:

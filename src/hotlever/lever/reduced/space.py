@@ -230,9 +230,18 @@ class ReducedSpace(Space):
         heat_V = np.einsum("dqm,dqm->qm", scaled(tangent.heat_source_V), V)
         charge_T = scaled(tangent.charge_flux_T) * T[0]
         charge_V = scaled(tangent.sigma) * V
+        heat_slope_V = None
+        if tangent.thermoelectric is not None:
+            source, heat, charge = map(scaled, tangent.thermoelectric)
+            heat_T[0] += np.einsum("dqm,dqm->qm", source, T[1:])
+            charge_T += charge * T[1:]
+            heat_slope_V = heat * V
         test_T, test_V = self.temperature.matrix.T, self.potential.matrix.T
         matrix[:split, :split] = test_T @ heat_T.reshape(-1, split)
         matrix[:split, split:] = T[0].T @ heat_V
+        if heat_slope_V is not None:
+            slopes = T[1:].reshape(-1, split)
+            matrix[:split, split:] += slopes.T @ heat_slope_V.reshape(-1, V.shape[2])
         matrix[split:, :split] = test_V @ charge_T.reshape(-1, split)
         matrix[split:, split:] = test_V @ charge_V.reshape(-1, V.shape[2])
 

@@ -121,9 +121,9 @@ def _expected_rise(lever: Lever, bias: float) -> float:
 
 def initial_state(lever: Lever, waveform: Waveform) -> State:
     """Return the state at rest before a wave form."""
-    circuit, bias = lever.circuit, waveform.before_V
-    polarity = -1.0 if bias < circuit.lowest_bias_V else 1.0
-    if polarity * bias <= circuit.lowest_bias_V:
+    lowest, bias = lever.probe.lowest_bias_V, waveform.before_V
+    polarity = -1.0 if bias < lowest else 1.0
+    if polarity * bias <= lowest:
         return State(lever, np.zeros((lever.space.size + 1, 1)))
     (state,) = lever.solve([polarity * bias])
     # the other polarity has the potentials reversed

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.laws import Conductivities, LawsAtPoints
+from hotlever.lever.laws import LawsAtPoints
 from hotlever.lever.lever import State
 from hotlever.lever.motion import Motion
 from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
 from hotlever.lever.space import Space
+from hotlever.lever.transport import Properties
 from hotlever.materials import Kind
+from hotlever.probe.physics import Physics
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -52,7 +54,10 @@ def reduced_in_time(lever: Lever, snapshots: Array) -> Lever:
     other = copy(lever)
     space = every.at_points(points, few)
     other.space = cast("Any", space)
-    other.equations = LeverEquations(space, lever.probe.kinds, lever.circuit, laws=TabulatedLaws)
+    probe = lever.probe
+    other.equations = LeverEquations(
+        space, probe.kinds, probe.circuit, probe.physics, laws=TabulatedLaws
+    )
     return other
 
 
@@ -97,14 +102,16 @@ class TabulatedLaws(LawsAtPoints):
         space: Space,
         materials: Mapping[str, Kind],
         base_temperature_K: float,
+        physics: Physics,
         motions: Mapping[str, Motion],
     ) -> None:
-        super().__init__(space, materials, base_temperature_K, motions)
+        super().__init__(space, materials, base_temperature_K, physics, motions)
         self._found: tuple[Array, Array, Array] | None = None
         T = np.arange(_COLDEST, _HOTTEST + 1.0, 0.5 * _PIECE)
         T = np.broadcast_to(T, (space.weights.size, T.size))
-        laws = super().conductivities(T, ())
-        values = np.stack([laws.kappa, laws.sigma, super().heat_density(T)[0]])
+        laws = super().properties(T, ())[0].named
+        self._laws = tuple(laws)
+        values = np.stack([*laws.values(), super().heat_density(T)[0]])
         low, middle, high = values[..., :-2:2], values[..., 1::2], values[..., 2::2]
         # Newton's method may stray beyond the pieces, where the outermost go on, straight
         for piece in (0, -1):
@@ -113,11 +120,11 @@ class TabulatedLaws(LawsAtPoints):
         # looked up as rows by point and piece: powers, laws
         self._last = low.shape[-1] - 1
         rows = np.stack(table).transpose(2, 3, 0, 1)
-        self._table = np.ascontiguousarray(rows).reshape(-1, 3, 3)
+        self._table = np.ascontiguousarray(rows).reshape(-1, 3, len(values))
         self._first = low.shape[-1] * np.arange(space.weights.size)[:, None]
 
     def _look_up(self, T: Array) -> tuple[Array, Array]:
-        """Return κ, σ and the heat (3, points, n), and their slopes."""
+        """Return the properties and the heat (laws, points, n), and their slopes."""
         if self._found is None or self._found[0] is not T:
             position = (T - _COLDEST) * (1.0 / _PIECE)
             piece = position.clip(0.0, self._last).astype(np.intp)
@@ -133,20 +140,24 @@ class TabulatedLaws(LawsAtPoints):
             self._found = T, value, slope
         return self._found[1:]
 
-    def conductivities(self, T: Array, names: Sequence[str] = ("T",)) -> Conductivities:
-        """Return κ and σ; derivatives by parameters are not looked up.
+    def properties(
+        self, T: Array, names: Sequence[str] = ("T",)
+    ) -> tuple[Properties, dict[str, Properties]]:
+        """Return the properties; derivatives by parameters are not looked up.
 
-        See `hotlever.lever.laws.LawsAtPoints.conductivities`.
+        See `hotlever.lever.laws.LawsAtPoints.properties`.
         """
         if tuple(names) != ("T",):
-            return super().conductivities(T, names)
-        values, slopes = self._look_up(T)
-        return Conductivities(values[0], values[1], {"T": slopes[0]}, {"T": slopes[1]})
+            return super().properties(T, names)
+        now, by_T = (
+            Properties(**dict(zip(self._laws, rows, strict=False))) for rows in self._look_up(T)
+        )
+        return now, {"T": by_T}
 
     def heat_density(self, T: Array) -> tuple[Array, Array]:
         """See `hotlever.lever.laws.LawsAtPoints.heat_density`."""
         values, slopes = self._look_up(T)
-        return values[2], slopes[2]
+        return values[-1], slopes[-1]
 
 
 def _integrands(lever: Lever, space: ReducedSpace, x: Array) -> Iterator[Array]:

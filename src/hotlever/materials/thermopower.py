@@ -1,0 +1,282 @@
+"""Thermoelectricity: Seebeck coefficients of carriers by Fermi integrals, and of silicon.
+
+With thermoelectricity the current density is −σ∇V − β∇T and the heat flux −κ₀∇T − T(β∇V + γ∇T),
+where σ, β = Σ σ_i S_i and γ = Σ σ_i S_i² are sums over carriers that conduct beside each other. The
+heat flux is −κ∇T + S T J with S = β/σ and κ = κ₀ + T(γ − β²/σ), whose last part is the bipolar one:
+electrons and holes that carry heat without a current (G. S. Nolas, J. Sharp and H. J. Goldsmid,
+Thermoelectrics, Springer 2001, sec. 2.3). Peltier and Thomson heat follow from the two fluxes.
+
+Units are those of `hotlever.materials.silicon`; S is in V/K, β in A cm⁻¹ K⁻¹, γ in W cm⁻¹ K⁻².
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial.chebyshev import Chebyshev, chebpts1
+from numpy.typing import ArrayLike
+
+from hotlever.materials.films import metal_conductivity
+from hotlever.materials.laws import Evaluated, Partials, law
+from hotlever.materials.p_silicon import carried_in_p_silicon
+from hotlever.materials.silicon import (
+    BOLTZMANN,
+    Carried,
+    Carrier,
+    carried_in_n_silicon,
+    conducted,
+    conductivity_high_doped,
+    density_of_states,
+)
+from hotlever.types import Array
+
+#: Charge of the carriers, in elementary charges.
+SIGN: dict[Carrier, float] = {"electron": -1.0, "hole": 1.0}
+#: Doping (cm⁻³) of silicon whose own carriers are all that count where κ was measured hot.
+_PURE = 1e12
+#: Up to which ratio of carriers to states the reduced Seebeck coefficient is tabulated; the degree
+#: of the polynomial through the integrals, their points, and the cells of the table.
+_DENSEST, _DEGREE, _POINTS, _CELLS = 1e4, 60, 6000, 2000
+
+
+class _Cubic(NamedTuple):
+    """A function by cubics on even cells from 0 on: coefficients (4, cells) by powers."""
+
+    cell: float
+    coefficients: Array
+
+    @classmethod
+    def of(cls, function: Chebyshev) -> _Cubic:
+        """Return a smooth function's, with its values and slopes at the ends of the cells."""
+        ends, cell = np.linspace(0.0, function.domain[1], _CELLS + 1, retstep=True)
+        value, slope = function(ends), cell * function.deriv()(ends)
+        rise = np.diff(value)
+        square, cube = 3 * rise - 2 * slope[:-1] - slope[1:], slope[:-1] + slope[1:] - 2 * rise
+        return cls(float(cell), np.stack([value[:-1], slope[:-1], square, cube]))
+
+    def __call__(self, w: Array) -> tuple[Array, Array]:
+        """Return the function and its slope."""
+        along = w / self.cell
+        cell = np.minimum(along.astype(np.intp), self.coefficients.shape[1] - 1)
+        along = along - cell
+        a, b, c, d = (each[cell] for each in self.coefficients)
+        value = a + along * (b + along * (c + along * d))
+        return value, (b + along * (2.0 * c + along * 3.0 * d)) / self.cell
+
+
+class _Reduced(NamedTuple):
+    """|S| e/k_B plus the logarithm of the density, by w = ln(1 + density / density of states).
+
+    And its derivative by the scattering exponent.
+    """
+
+    value: _Cubic
+    by_exponent: _Cubic
+
+
+@lru_cache(maxsize=64)
+def _reduced_seebeck(scattering_exponent: float) -> _Reduced:
+    """Tabulate the reduced Seebeck coefficient of a parabolic band.
+
+    With the relaxation time τ ∝ E^r it is the mean energy of the transport less the Fermi energy,
+    both over k_B T: ⟨x⟩ − η, with weights x^(r + 3/2) (−∂f/∂x).
+    """
+    # x = exp(t − exp(−t)): both ends of the integrals fall faster than exponentially
+    t, step = np.linspace(-4.0, 8.0, _POINTS, retstep=True)
+    x = np.exp(t - np.exp(-t))
+    measure = step * x * (1.0 + np.exp(-t))
+    domain = 0.0, math.log1p(_DENSEST)
+    nodes = 0.5 * (chebpts1(_DEGREE + 1) + 1.0) * domain[1]
+    density = np.expm1(nodes)
+    eta = _fermi_level(density, x, measure)
+    weight = _edge(x, eta) * x ** (scattering_exponent + 1.5) * measure
+    weight /= weight.sum(axis=-1, keepdims=True)
+    log_x = np.log(x)
+    mean, mean_log = weight @ x, weight @ log_x
+    rows = mean - eta + np.log(density), weight @ (x * log_x) - mean * mean_log
+    functions = (Chebyshev.fit(nodes, row, _DEGREE, domain=domain) for row in rows)
+    return _Reduced(*map(_Cubic.of, functions))
+
+
+def _edge(x: Array, eta: Array) -> Array:
+    """Return −∂f/∂x of the Fermi function, (levels, points)."""
+    return 0.25 / np.cosh(np.clip(0.5 * (x - eta[:, None]), -300.0, 300.0)) ** 2
+
+
+def _fermi_level(density: Array, x: Array, measure: Array) -> Array:
+    """Return η with F½(η) = density, in units of the density of states; by Newton's method."""
+    # Joyce and Dixon's first term, and the degenerate limit
+    eta = np.log(density) + density / math.sqrt(8.0)
+    eta = np.minimum(eta, (0.75 * math.sqrt(math.pi) * density) ** (2.0 / 3.0))
+    for _ in range(50):
+        edge = _edge(x, eta) * measure / math.gamma(1.5)
+        full, slope = edge @ x**1.5 / 1.5, edge @ x**0.5
+        # by the logarithm, in which the integral is nearly straight where it is small
+        step = np.log(density / full) * full / slope
+        eta = eta + step
+        if np.abs(step).max() < 1e-13 * max(1.0, float(np.abs(eta).max())):
+            break
+    return np.asarray(eta)
+
+
+def seebeck_of_band(
+    carriers: Evaluated, states: Evaluated, scattering_exponent: float, carrier: Carrier
+) -> Evaluated:
+    """Return the Seebeck coefficient (V/K) of carriers of one band.
+
+    Parameters
+    ----------
+    carriers, states : tuple of ndarray and dict
+        Their density, and the effective density of states of the band (cm⁻³), with derivatives.
+    scattering_exponent : float
+        r in τ ∝ E^r: −1/2 for acoustic phonons, 3/2 for ionised impurities.
+    carrier : str
+
+    Returns
+    -------
+    tuple of ndarray and dict
+        With derivatives by what the densities depend on, and by ``scattering_exponent``.
+
+    Examples
+    --------
+    Few carriers: k_B/e (5/2 + r + ln(states/carriers)).
+
+    >>> few, states = (np.array(2.8e13), {}), (np.array(2.8e19), {})
+    >>> S, _ = seebeck_of_band(few, states, -0.5, "electron")
+    >>> round(1e6 * S.item()), round(-86.173 * (2 + np.log(1e6)))
+    (-1363, -1363)
+    """
+    (density, d_density), (full, d_full) = carriers, states
+    reduced = _reduced_seebeck(scattering_exponent)
+    ratio = density / full
+    w = np.log1p(ratio)
+    scale = SIGN[carrier] * BOLTZMANN
+    value, slope = reduced.value(w)
+    by_ratio = scale * (slope / (1.0 + ratio) - 1.0 / ratio)
+    names = set(d_density) | set(d_full)
+    by = {
+        name: by_ratio * (d_density.get(name, 0.0) - ratio * d_full.get(name, 0.0)) / full
+        for name in names
+    }
+    by["scattering_exponent"] = scale * reduced.by_exponent(w)[0]
+    return scale * (value - np.log(ratio)), by
+
+
+def _add(to: Partials, by: Partials, factor: Array) -> None:
+    """Add derivatives, by name, to others."""
+    for name, value in by.items():
+        to[name] = to.get(name, np.zeros(())) + factor * value
+
+
+def _summed(carried: Sequence[Carried], states: Evaluated, exponent: float) -> Evaluated:
+    """Return σ, β and γ of carriers beside each other, (3, ...)."""
+    total, total_by = [np.zeros(()) for _ in range(3)], [Partials() for _ in range(3)]
+    for carriers, mobility, carrier in carried:
+        sigma, d_sigma = conducted([(carriers, mobility, carrier)])
+        S, d_S = seebeck_of_band(carriers, states, exponent, carrier)
+        for power in range(3):
+            total[power] = total[power] + sigma * S**power
+            _add(total_by[power], d_sigma, S**power)
+            if power:
+                _add(total_by[power], d_S, sigma * power * S ** (power - 1))
+    names = set().union(*total_by)
+    nothing = np.zeros_like(total[0])
+    by = {name: np.stack([nothing + each.get(name, 0.0) for each in total_by]) for name in names}
+    return np.stack(np.broadcast_arrays(*total)), by
+
+
+def _bipolar(summed: Evaluated) -> Evaluated:
+    """Return the bipolar heat conductivity over the temperature, γ − β²/σ (W cm⁻¹ K⁻²)."""
+    (sigma, beta, gamma), by = summed
+    S = beta / sigma
+    return gamma - beta * S, {name: d[2] - 2.0 * S * d[1] + S**2 * d[0] for name, d in by.items()}
+
+
+def _of_silicon(
+    carried: Callable[[Array, ArrayLike], Sequence[Carried]],
+    T: Array,
+    n: ArrayLike,
+    exponent: float,
+) -> Evaluated:
+    """Return β and γ of carriers by temperature and doping, less what κ of pure silicon has."""
+    states = density_of_states.formula(T)
+    values, by = _summed(carried(T, n), states, exponent)
+    pure, pure_by = _bipolar(_summed(carried(T, _PURE), states, exponent))
+    pure_by.pop("n")
+    values, by = values[1:], {name: d[1:].copy() for name, d in by.items()}
+    values[1] = values[1] - pure
+    for name, d in pure_by.items():
+        by[name][1] = by[name][1] - d
+    return values, by
+
+
+_SOURCE = (
+    "Fermi integrals of parabolic bands with the carriers of Eqs. 5 to 10; Nolas, Sharp and "
+    "Goldsmid, Thermoelectrics (2001), secs. 2.2 and 2.3"
+)
+
+
+@law(meant_for=(300.0, 1300.0), source=_SOURCE)
+def thermoelectric_n_silicon(
+    T: ArrayLike, n: ArrayLike, p: float, impurity_exponent: float, scattering_exponent: float
+) -> Evaluated:
+    """β (A cm⁻¹ K⁻¹) and γ (W cm⁻¹ K⁻²) of n-doped silicon, (2, ...); see the module's text.
+
+    From γ the bipolar part of pure silicon is taken off: κ of Eq. 4 was measured on pure silicon
+    and has it. The phonons' drag on the carriers is left out; it adds to |S| of lightly doped
+    silicon near and below room temperature.
+
+    Parameters
+    ----------
+    T, n : array_like
+    p, impurity_exponent : float
+        See `hotlever.materials.silicon.mobility`.
+    scattering_exponent : float
+        See `seebeck_of_band`.
+    """
+
+    def carried(T: Array, n: ArrayLike) -> list[Carried]:
+        return carried_in_n_silicon(T, n, p, impurity_exponent)
+
+    return _of_silicon(carried, np.asarray(T, dtype=float), n, scattering_exponent)
+
+
+@law(meant_for=(300.0, 1300.0), source=_SOURCE)
+def thermoelectric_p_silicon(
+    T: ArrayLike, n: ArrayLike, p: float, impurity_exponent: float, scattering_exponent: float
+) -> Evaluated:
+    """β and γ of silicon doped with boron; see `thermoelectric_n_silicon`."""
+
+    def carried(T: Array, n: ArrayLike) -> list[Carried]:
+        return carried_in_p_silicon(T, n, p, impurity_exponent)
+
+    return _of_silicon(carried, np.asarray(T, dtype=float), n, scattering_exponent)
+
+
+@law(meant_for=(300.0, 1300.0), source=f"{_SOURCE}; σ of Eq. 11")
+def thermoelectric_high_doped(
+    T: ArrayLike, a0: float, a1: float, n_hd: float, scattering_exponent: float, carrier: Carrier
+) -> Evaluated:
+    """β and γ of high-doped silicon, whose carriers are those of its dopant alone."""
+    T = np.asarray(T, dtype=float)
+    sigma, d_sigma = conductivity_high_doped.formula(T, a0, a1)
+    carriers = np.full_like(T, n_hd), {"n_hd": np.ones_like(T)}
+    S, d_S = seebeck_of_band(carriers, density_of_states.formula(T), scattering_exponent, carrier)
+    by: Partials = {}
+    _add(by, d_sigma, np.stack([S, S**2]))
+    _add(by, d_S, np.stack([sigma, 2.0 * sigma * S]))
+    return np.stack([sigma * S, sigma * S**2]), by
+
+
+@law(meant_for=(200.0, 1700.0), source="definition")
+def thermoelectric_metal(T: ArrayLike, resistivity: float, tcr: float, seebeck: float) -> Evaluated:
+    """β and γ of a metal with one Seebeck coefficient (µV/K)."""
+    sigma, d_sigma = metal_conductivity.formula(T, resistivity, tcr)
+    S = 1e-6 * seebeck
+    by = {name: np.stack([S * d, S**2 * d]) for name, d in d_sigma.items()}
+    by["seebeck"] = 1e-6 * np.stack([sigma, 2.0 * S * sigma])
+    return np.stack([sigma * S, sigma * S**2]), by
