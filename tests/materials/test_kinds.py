@@ -42,14 +42,23 @@ MADE = {name: material_of(values, name) for name, values in SECTIONS.items()}
 DOPING, THICKNESS = 5.75e17, 0.3
 
 
+def of_row(row, evaluated):
+    """One of the two properties that a law of thermoelectricity gives."""
+    values, partials = evaluated
+    return values[row], {name: each[row] for name, each in partials.items()}
+
+
 @pytest.mark.parametrize("T", [*TEMPERATURES, *BEYOND])
 @pytest.mark.parametrize("name", MADE)
-def test_both_conductivities_have_exact_derivatives_by_all_that_they_depend_on(name, T):
+def test_all_properties_have_exact_derivatives_by_all_that_they_depend_on(name, T):
     kind, T = MADE[name], np.array([T])
     laws = {
         "heat": lambda kind, T, n, t: kind.thermal_conductivity(T, t),
         "charge": lambda kind, T, n, t: kind.electrical_conductivity(T, n),
         "held": lambda kind, T, n, t: kind.enthalpy(T),
+        "beta": lambda kind, T, n, t: of_row(0, kind.thermoelectric(T, n, "electron")),
+        "gamma": lambda kind, T, n, t: of_row(1, kind.thermoelectric(T, n, "hole")),
+        "radiated": lambda kind, T, n, t: kind.emission(T, 293.0),
     }
     found, at = set(), (DOPING, THICKNESS)
     for law in laws.values():
