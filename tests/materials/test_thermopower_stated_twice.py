@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hotlever.materials import thermopower
 from hotlever.materials.p_silicon import conductivity_p
 from hotlever.materials.silicon import conductivity_low_doped
 from seebeck import PHONON_EXPONENT, conductivity, seebeck
-
-thermopower = pytest.importorskip("hotlever.materials.thermopower")
 
 
 @pytest.mark.parametrize("kind", ["n-silicon", "p-silicon"])
