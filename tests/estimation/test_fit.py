@@ -104,13 +104,13 @@ def test_only_the_chosen_observables_enter(coarse, coarse_model):
 def test_the_band_is_the_spread_of_repeated_experiments(coarse, coarse_fast):
     """Fits of data with new noise each scatter in tip temperature as the band says."""
     tips, errors = [], []
-    for seed in range(12):
+    for seed in range(8):
         band = fit(twin(coarse, noise=2e-3, seed=seed), model=coarse_fast).band
         tips.append(band.tip_K.values)
         errors.append(band.tip_stderr_K.values)
     hot = BIAS > 6
     ratio = np.std(tips, axis=0)[hot].mean() / np.mean(errors, axis=0)[hot].mean()
-    # twelve fits know a spread to 20 %
+    # eight fits know a spread to 27 %
     assert 0.6 < ratio < 1.6
 
 
@@ -335,8 +335,10 @@ def test_measurement_errors_weigh_the_data(coarse, coarse_fast, monkeypatch):
     monkeypatch.setattr(Diagnosis, "named", lambda _: "")
     measurement = twin(coarse, noise=0.003)
     trusted = with_errors(measurement, current=1e-3, reader=0.3, tip=600.0)
-    result = fit(trusted, coarse.probe, weights="errors", model=coarse_fast)
-    alone = fit(measurement, coarse.probe, observables=["current"], model=coarse_fast)
+    # what a current alone hardly tells is held
+    given = {"fixed": {"n_d": TRUTH["n_d"], "a1": None}, "model": coarse_fast}
+    result = fit(trusted, coarse.probe, weights="errors", **given)
+    alone = fit(measurement, coarse.probe, observables=["current"], **given)
     assert result.residual_rms["current_mA"] == pytest.approx(
         alone.residual_rms["current_mA"], rel=1e-3
     )
