@@ -169,12 +169,12 @@ class Outputs:
         """
         if path is None:
             return
-        suffix = Path(path).suffix
+        target, suffix = self.target(path), Path(path).suffix
         if suffixes and suffix.lower() not in suffixes:
             raise InputError(
                 f"{path}: unknown file type '{suffix}', expected {' or '.join(suffixes)}"
             )
-        self._ask(path, self.target(path))
+        self._ask(path, target)
 
     def folder(self, path: Name | None) -> None:
         """Check like `file` that a folder is there or can be made, and files written to it."""

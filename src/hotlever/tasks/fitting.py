@@ -51,7 +51,7 @@ def _fit_one(
 ) -> None:
     outputs, (data,), waveform = request.outputs(), request.data, request.read_waveform()
     samples = request.samples if request.posterior else None
-    outputs.file(request.output)
+    outputs.file(request.output, ".json")
     outputs.folder(request.report)
     measurement = read_measurement(
         data, columns, probe.circuit, waveform, signed=probe.lowest_bias_V < 0.0
