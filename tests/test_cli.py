@@ -217,6 +217,15 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
         (("fit", EXAMPLE, "--scheduler", "tcp://a:1"), "--scheduler: expected several data"),
         (("fit", EXAMPLE, EXAMPLE, "--profiles"), "expected a single data file"),
         (("fit", EXAMPLE, "--fix", "n_d=a"), "--fix n_d: found 'a', expected a number"),
+        (
+            ["sweep", "--physics", "thermoelectrc"],
+            "--physics: unknown effect 'thermoelectrc': did you mean 'thermoelectric'?",
+        ),
+        (
+            ["sweep", "--physics", "radiation", "--set", "emissivity=2"],
+            "emissivity = 2.0: input should be less than or equal to 1",
+        ),
+        (["sweep", "--physics", "radiation", "--bias=-8:8:3"], "expected 0 <= START <= STOP"),
     ],
 )
 def test_bad_input_gets_one_line_and_status_two(run, tmp_path, arguments, message):

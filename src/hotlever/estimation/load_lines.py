@@ -102,7 +102,7 @@ class Rows:
     def _nearest(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
         """Return the states nearest to what was measured; see `states`."""
         curve = branch.bias_by_u(circuit)
-        cold = branch.starts_cold
+        cold = branch.begins_cold
         start = float(branch.u[0])
         level = np.sort(curve.derivative().roots())
         ends = [start, *level[(level > start) & (level < branch.end_u)].tolist(), branch.end_u]

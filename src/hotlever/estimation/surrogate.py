@@ -91,7 +91,7 @@ class CurveSurrogate:
         scale = Coordinates.of(probe, names).scale
         self._unit = np.maximum(np.abs(self._origin), 0.1 * scale)
         self._rates = by_parameter * self._unit
-        self._straight = not branch.starts_cold
+        self._straight = not branch.begins_cold
         if not self._straight:
             powers = self._rates[1:] / branch.values[1:, :, None]
             # without power everything is zero; its ratios are those of a barely warm lever

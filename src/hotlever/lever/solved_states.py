@@ -131,6 +131,11 @@ class SolvedStates:
         return not self.x.any(axis=0).all()
 
     @property
+    def begins_cold(self) -> bool:
+        """Whether they do, and none is on the way to biases of the other polarity."""
+        return self.starts_cold and self.u[0] == 0.0
+
+    @property
     def solved(self) -> Index:
         """The states that were solved: all but the one without power."""
         return np.flatnonzero(self.x.any(axis=0))

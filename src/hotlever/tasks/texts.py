@@ -159,7 +159,9 @@ def parse_bias(text: str, lowest_V: float = 0.0) -> Array:
     start, stop, count = _parse_range(text, where, "such as 1:11:25 (V)", MOST_BIASES)
     if start < lowest_V or stop < start:
         least = f"{lowest_V:g} <= " if np.isfinite(lowest_V) else ""
-        raise InputError(f"{where}: expected {least}START <= STOP")
+        polar = "; polarity counts with held supplies or --physics thermoelectric"
+        why = polar if start < lowest_V else ""
+        raise InputError(f"{where}: expected {least}START <= STOP{why}")
     if (count == 1) != (start == stop):
         raise InputError(f"{where}: COUNT 1 goes with START = STOP, more with START < STOP")
     biases = np.linspace(start, stop, count)

@@ -123,7 +123,7 @@ def initial_state(lever: Lever, waveform: Waveform) -> State:
     """Return the state at rest before a wave form."""
     lowest, bias = lever.probe.lowest_bias_V, waveform.before_V
     polarity = -1.0 if bias < lowest else 1.0
-    if polarity * bias <= lowest:
+    if bias == 0.0 and lever.circuit.starts_cold:
         return State(lever, np.zeros((lever.space.size + 1, 1)))
     (state,) = lever.solve([polarity * bias])
     # the other polarity has the potentials reversed
