@@ -2,9 +2,9 @@
 
 python benchmarks/tip.py [fitted|solid|air]
 
-fitted: the flat lever with an equivalent thickening, in vacuum and in air, and a tipless model
-fitted to it. solid: the thickening against the cone as a real body, in vacuum. air: the cone as a
-real body in air.
+fitted: the flat lever with an equivalent thickening, in vacuum and in air, there with the tip's
+surface, and a tipless model fitted to it. solid: the thickening against the cone as a real body, in
+vacuum. air: the tip's surface among the panels against the cone as a real body in air.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ import sys
 import numpy as np
 
 from hotlever.lever import Lever, State
+from hotlever.lever.air_fields import AirFields
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe, Tip
 from hotlever.spieser2017 import KNEE_MEASURED_K, KNEE_PREDICTED_K
-from hotlever.studies.tip_effect import SIZES, tip_effects
+from hotlever.studies.tip_effect import SIZES, TALL, tip_effects
 from problems import table
 
 #: What is printed of each tip: heading and format.
@@ -27,7 +28,11 @@ FITTED = {
     "knee_K": ("knee (K)", ".1f"),
     "knee_V": ("V_l at the knee (V)", ".3f"),
     "moved_K": ("knee moved by (K)", "+.1f"),
+    "moved_V": ("V_l (V)", "+.4f"),
     "at_power_K": ("T at equal power (K)", "+.1f"),
+    "surface_moved_K": ("of this its surface: knee (K)", "+.2f"),
+    "surface_moved_V": ("V_l (V)", "+.4f"),
+    "surface_at_power_K": ("T (K)", "+.2f"),
     "fitted_knee_K": ("knee of tipless fit (K)", ".1f"),
     "missed_K": ("missed (K)", "+.1f"),
 }
@@ -36,7 +41,7 @@ FITTED = {
 def fitted() -> None:
     """Print what the tip does to knee and T(P), and what a tipless fit makes of it."""
     for medium in ("vacuum", "air"):
-        effects = tip_effects(Probe.reference().in_medium(medium))
+        effects = tip_effects(Probe.reference().in_medium(medium), (*SIZES, *TALL))
         without_K, without_V = effects.attrs["without_K"], effects.attrs["without_V"]
         print(f"\nin {medium}; without a tip the knee is at {without_K:.1f} K, {without_V:.3f} V\n")
         table(
@@ -76,38 +81,59 @@ def solid() -> None:
     table(("height (µm)", "half-angle (°)", "model", *columns, "I_h (relative)"), rows)
 
 
-def apex_temperature(lever: SolidLever, state: State) -> float:
+def apex_temperature(state: State) -> float:
     """Return the temperature (K) of the tip's apex."""
-    points, (tip_x, tip_y) = lever.solid.elements.p, lever.solid.layout.tip
+    lever, layout = state.lever, state.lever.probe.layout()
+    height = layout.cone.height_um if layout.cone else 0.0
+    if not isinstance(lever, SolidLever):
+        apex = np.array([[*layout.tip, -layout.thickness_um / 2 - height]])
+        return float(AirFields(lever).temperature(state, apex)[0])
+    points, (tip_x, tip_y) = lever.solid.elements.p, layout.tip
     away = np.hypot(points[0] - tip_x, points[1] - tip_y)
     lowest = points[2] + 1e-3 * away
-    near = away < lever.solid.layout.thickness_um
+    near = away < layout.thickness_um
     vertex = int(np.argmin(np.where(near, lowest, np.inf)))
     return float(state.nodal[0][lever.space.elements.basis.nodal_dofs[0, vertex]])
 
 
 def air() -> None:
-    """Print what the cone changes in air, as a real body in the full 3-D simulation."""
+    """Print what the cone changes in air, by panels and in the full 3-D simulation."""
     bias = [7.22, 8.268, 10.748]
     probe = Probe.reference().in_medium("air")
     rows = []
-    for tip in (None, Tip(height_um=0.7, half_angle_deg=20), Tip(height_um=1, half_angle_deg=30)):
-        lever = SolidLever(probe.model_copy(update={"tip": tip}))
-        states = lever.solve(bias)
-        sweep = lever.dataset(states)
-        name = "none" if tip is None else f"{tip.height_um:g} µm, {tip.half_angle_deg:g}°"
-        for row, state in enumerate(states):
-            rows.append(
+    for height, angle in ((0.7, 20), (1.0, 20), (3.0, 10)):
+        tip = Tip(height_um=height, half_angle_deg=angle, in_air=True)
+        for kind, name in ((Lever, "panels"), (SolidLever, "full 3-D")):
+            lever = kind(probe.model_copy(update={"tip": tip}))
+            states = lever.solve(bias)
+            sweep, bare = lever.dataset(states), kind(probe).sweep(bias)
+            shares = sweep.air_heat_mW / sweep.power_mW
+            rows += [
                 (
+                    f"{height:g} µm, {angle:g}°",
                     name,
                     f"{state.bias_V:g}",
-                    f"{sweep.tip_K.values[row]:.2f}",
-                    "" if tip is None else f"{apex_temperature(lever, state):.2f}",
+                    f"{state.tip_K:.2f}",
+                    f"{state.tip_K - bare.tip_K.values[row]:+.2f}",
+                    f"{apex_temperature(state) - state.tip_K:+.2f}",
                     f"{sweep.power_mW.values[row]:.4f}",
-                    f"{sweep.air_heat_mW.values[row] / sweep.power_mW.values[row]:.4f}",
+                    f"{shares.values[row]:.4f}",
                 )
-            )
-    table(("tip", "bias (V)", "T_tip (K)", "T_apex (K)", "power (mW)", "air share"), rows)
+                for row, state in enumerate(states)
+            ]
+    table(
+        (
+            "tip",
+            "model",
+            "bias (V)",
+            "T_tip (K)",
+            "by the tip (K)",
+            "T_apex − T_tip (K)",
+            "power (mW)",
+            "air share",
+        ),
+        rows,
+    )
 
 
 def main() -> None:

@@ -127,7 +127,11 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "height_um": ("µm", "height of the tip"),
     "half_angle_deg": ("deg", "half-angle of the tip"),
     "moved_K": ("K", "change of the knee by the tip"),
+    "moved_V": ("V", "change of the knee by the tip"),
     "at_power_K": ("K", "largest change of the tip temperature at the same power"),
+    "surface_moved_K": ("K", "change of the knee by the tip's surface in air"),
+    "surface_moved_V": ("V", "change of the knee by the tip's surface in air"),
+    "surface_at_power_K": ("K", "largest change at the same power by the tip's surface in air"),
     "fitted_knee_K": ("K", "knee of a tipless lever fitted to the one with the tip"),
     "missed_K": ("K", "how far the knee lies above that of the fitted tipless lever"),
     # simulation-based calibration

@@ -81,7 +81,9 @@ def potential(points: Array, corners: Array) -> Array:
     across = np.einsum("...kd,...kd->...k", to_corner, outward)
     both = distance + np.roll(distance, -1, axis=-1)
     # ∫ 1/R along an edge is 2 artanh(length / both)
-    terms = across * np.log((both + lengths) / np.maximum(both - lengths, _TINY * both + _TINY))
+    # at a double corner of a triangle both are nothing
+    ratio = np.maximum(both + lengths, _TINY) / np.maximum(both - lengths, _TINY * both + _TINY)
+    terms = across * np.log(ratio)
     total: Array = terms.sum(axis=-1)
     return total - height * _solid_angle(to_corner, distance)
 

@@ -91,7 +91,7 @@ def air_operator(
     surroundings, options = surroundings or Surroundings(), options or PanelOptions()
     facts = {
         "layout": asdict(replace(layout, cone=None)),
-        "cone": layout.cone and layout.cone.model_dump(),
+        "cone": layout.cone_in_air and layout.cone_in_air.model_dump(),
         "surroundings": surroundings.model_dump(exclude={"medium", "gas_conductivity"}),
         "jump_um": surroundings.jump_length_um(base_temperature_K),
         "options": asdict(options),
@@ -150,7 +150,8 @@ class PanelledAir:
         # only air that is not in the cache needs panels, and with them Shapely
         from hotlever.air.surface import lever_surface
 
-        self.surface = lever_surface(layout, options, mirrored=surroundings.symmetric)
+        symmetric = surroundings.symmetric and layout.cone_in_air is None
+        self.surface = lever_surface(layout, options, mirrored=symmetric)
         chip = [chip_panels(layout, options.refinement)] if surroundings.chip else []
         self.panels = Panels(
             np.concatenate([panels.corners for panels in (self.surface.panels, *chip)])
@@ -162,7 +163,7 @@ class PanelledAir:
                 "thickness and heater too small for its other dimensions?"
             )
         below = _mirrors_below(layout, surroundings, base_temperature_K, self.panels)
-        mid_plane = [Mirror.in_plane((0, 0, 0), (0, 0, 1), +1.0)] if surroundings.symmetric else []
+        mid_plane = [Mirror.in_plane((0, 0, 0), (0, 0, 1), +1.0)] if symmetric else []
         self._halves = 1.0 + len(mid_plane)
         self.mirrors = mirror_group([*mid_plane, *below])
         self._layer = single_layer_matrix(self.panels, Laplace(), self.mirrors, progress)
@@ -171,6 +172,10 @@ class PanelledAir:
         jump[own] = surroundings.jump_length_um(surroundings.jump_temperature_K)
         self._resistances = jump * self.panels.areas
         self._layer[np.diag_indices_from(self._layer)] += self._resistances
+        through_tip = self.surface.through_tip
+        on_tip = own[len(own) - len(through_tip) :]
+        areas = self.panels.areas[on_tip]
+        self._layer[np.ix_(on_tip, on_tip)] += through_tip * np.outer(areas, areas)
         self._moments = np.zeros((len(self.panels), len(self.surface.sites)))
         self._moments[own, self.surface.site] = self.surface.panels.areas
 
@@ -247,7 +252,7 @@ def _mirrors_below(
     point = below_tip - surroundings.jump_length_um(base_temperature_K) * normal
     if ((panels.corners - point) @ normal).min() <= 0:
         raise InputError(
-            "surroundings: the surface below crosses the lever or its chip; expected a larger "
-            "surface_gap_um or another surface_tilt_deg"
+            "surroundings: the surface below crosses the lever, its tip or its chip; expected a "
+            "larger surface_gap_um or another surface_tilt_deg"
         )
     return [Mirror.in_plane(point, normal, -1.0)]

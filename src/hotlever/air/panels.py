@@ -32,11 +32,14 @@ class PanelOptions:
         At an edge of the lever, as a share of its thickness.
     heater : float
         In the heater, as a share of its narrow side.
+    tip : float
+        On the lever where a tip stands, as a share of the radius of its base.
     """
 
     refinement: float = 1.0
     edge: float = 0.15
     heater: float = 0.3
+    tip: float = 0.4
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@
 The lever is a plate of its true thickness and of any outline, with top, bottom and side faces. The
 flux into air is singular at the edges and its source is the heater, so panels are small at both.
 The leg ends are at base temperature and have no panels; borders between regions are no edges.
+A tip that stands in the air (`hotlever.air.cone`) has panels of its own. Those of the lever go on
+below it: between two bodies of one temperature nothing flows.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiLineString, Polygon
 
+from hotlever.air.cone import conduction, cone_panels
 from hotlever.air.panelling import GRID, divided, panelled, parts, rings, turns
 from hotlever.air.panels import PanelOptions, Panels
 from hotlever.probe.layout import Layout
@@ -43,11 +46,15 @@ class LeverSurface:
         Places in the plane of the lever (µm); the temperature does not depend on z.
     site : ndarray of int, shape (len(panels),)
         The site of each panel.
+    through_tip : ndarray, shape (k, k)
+        By how much θ is lower than at their sites on the last k panels, those of a tip, per heat
+        from each of them (1/µm).
     """
 
     panels: Panels
     sites: Array
     site: Index
+    through_tip: Array
 
 
 def lever_surface(
@@ -62,18 +69,24 @@ def lever_surface(
     mirrored : bool
         Only above the mid-plane: enough where the surroundings are symmetric about it.
     """
-    outline = _Outline(layout, options or PanelOptions())
+    options = options or PanelOptions()
+    outline = _Outline(layout, options)
     half = layout.thickness_um / 2
     upright = outline.upright(half, mirrored)
     cells = outline.cells()
     corners = [np.insert(cells, 2, z, axis=2) for z in ([half] if mirrored else [half, -half])]
     corners += [_wall(line, upright) for line in outline.divided_edges()]
+    through_tip = np.empty((0, 0))
+    if (cone := layout.cone_in_air) is not None:
+        of_cone = cone_panels(cone, options.refinement)
+        through_tip = conduction(cone, of_cone)
+        corners.append(of_cone.corners + np.append(outline.tip, -half))
     panels = Panels(np.concatenate(corners))
     sites, site = np.unique(panels.centres[:, :2].round(9), axis=0, return_inverse=True)
     placed = panels.corners.copy()
     placed[..., :2] = outline.on_the_lever(panels.corners[..., :2])
     within = outline.on_the_lever(outline.moved_inside(sites))
-    return LeverSurface(Panels(placed), within, site.ravel())
+    return LeverSurface(Panels(placed), within, site.ravel(), through_tip)
 
 
 class _Outline:
@@ -85,12 +98,13 @@ class _Outline:
 
     def __init__(self, layout: Layout, options: PanelOptions) -> None:
         fine = 1.0 / options.refinement
-        self._growth, self._from_heater = fine * _GROWTH, fine * _FROM_HEATER
+        self._growth, self._from_fine = fine * _GROWTH, fine * _FROM_HEATER
         self._edge = fine * options.edge * layout.thickness_um
         first = next(terminal for terminal in layout.terminals if terminal.name == "supply")
         self._origin = np.array(first.start)
         x, y = (self._origin - first.end) / np.linalg.norm(self._origin - first.end)
         self._axes = np.array([[x, y], [-y, x]])
+        self.tip = self._seen(layout.tip)
         shapes = {
             region: Polygon(self._seen(region.outline), [self._seen(hole) for hole in region.holes])
             for region in layout.regions
@@ -102,11 +116,14 @@ class _Outline:
         around = np.array(shapely.minimum_rotated_rectangle(self._shape).exterior.coords)
         length = np.linalg.norm(np.diff(around, axis=0), axis=1).max()
         self._largest = fine * _LARGEST * float(length)
-        self._heaters = [
+        self._fine = [
             (shape, fine * options.heater * region.narrow_um)
             for region, shape in shapes.items()
             if region.part == "heater"
         ]
+        if (cone := layout.cone_in_air) is not None:
+            base = shapely.Point(self.tip).buffer(cone.base_radius_um)
+            self._fine.append((base, fine * options.tip * cone.base_radius_um))
         self._edges, self._corners = self._exposed(layout)
 
     def _seen(self, places: object) -> Array:
@@ -139,8 +156,8 @@ class _Outline:
         """Return the largest edge (µm) that a panel may have at some places (n, 2)."""
         size = np.full(len(places), self._largest)
         points = shapely.points(places)
-        for shape, smallest in self._heaters:
-            size = np.minimum(size, smallest + self._from_heater * shapely.distance(points, shape))
+        for shape, smallest in self._fine:
+            size = np.minimum(size, smallest + self._from_fine * shapely.distance(points, shape))
         if len(self._corners):
             away = np.linalg.norm(places[:, None] - self._corners, axis=2).min(axis=1)
             size = np.minimum(size, self._edge + self._growth * away)

@@ -19,6 +19,7 @@ from hotlever.errors import InputError
 from hotlever.files import whole_file
 from hotlever.lever.lever import Lever, State
 from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
+from hotlever.lever.surroundings import plate_of
 from hotlever.materials.air import temperature_from_kirchhoff
 from hotlever.types import Array
 
@@ -46,12 +47,14 @@ class AirFields:
     @cached_property
     def _panelled(self) -> PanelledAir:
         """The panels: made again, since the operator on disk is without them."""
-        probe = self._lever.probe
-        return PanelledAir(probe.layout(), probe.surroundings, self._base, self._lever.panels)
+        plate, around = plate_of(self._lever.probe), self._lever.probe.surroundings
+        return PanelledAir(plate, around, self._base, self._lever.panels)
 
     @property
     def panels(self) -> Panels:
-        """The lever's panels; above its mid-plane only where the surroundings are symmetric."""
+        """The lever's panels, and last its tip's; without either a tip in the air or surroundings
+        that are not symmetric, those above its mid-plane only.
+        """
         return self._panelled.surface.panels
 
     def flux(self, state: State) -> Array:

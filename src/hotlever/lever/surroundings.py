@@ -98,6 +98,7 @@ def taken_up_around(
     facts = {
         "nodes": space.elements.nodes,
         "thickness_um": layout.thickness_um,
+        "cone": layout.cone_in_air and layout.cone_in_air.model_dump(),
         "surroundings": surroundings.model_dump(exclude={"medium", "gas_conductivity"}),
         "base_K": base_temperature_K,
         "panels": asdict(_PANELS),

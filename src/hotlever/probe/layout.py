@@ -210,6 +210,11 @@ class Layout:
         )
 
     @property
+    def cone_in_air(self) -> Tip | None:
+        """The tip's body where the air is to see its surface."""
+        return self.cone if self.cone is not None and self.cone.in_air else None
+
+    @property
     def heater(self) -> Region:
         """The region that heats the tip; where there are several, the first."""
         return next(region for region in self.regions if region.part == "heater")

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout, Point
 from hotlever.probe.mesh import ProbeMesh, doubled_areas, on_line
-from hotlever.probe.parameters import dimensions_of
+from hotlever.probe.parameters import OF_THE_TIP, dimensions_of
 from hotlever.probe.parts import ProbeParts
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
@@ -68,8 +68,8 @@ class Movement:
         if now is None or later is None:
             return None
         values, ends = now.model_dump(), later.model_dump()
-        rates = {name: (ends[name] - values[name]) / self.step for name in values}
-        return now.model_copy(update={n: values[n] + change * rates[n] for n in values})
+        rates = {name: (ends[name] - values[name]) / self.step for name in OF_THE_TIP}
+        return now.model_copy(update={n: values[n] + change * rates[n] for n in rates})
 
     def of_point(self, now: Point, later: Point) -> Array:
         """Return the velocity of a place in the drawing, shape (2,)."""

@@ -19,7 +19,9 @@ SIDEWAYS_MODE = 1.841184
 class Tip(Record):
     """A cone of silicon that points down from the heater (section ``[tip]`` of a probe file).
 
-    Its doping is that of the heater above it.
+    Its doping is that of the heater above it. In the flat lever it thickens the heater; its surface
+    in the air is left out, as in the paper, unless `in_air` asks for it. In full 3-D it is a body,
+    and its surface is in the air always.
 
     Examples
     --------
@@ -32,6 +34,16 @@ class Tip(Record):
         default=20.0, ge=1, le=80, description="between the axis and the side"
     )
     apex_radius_um: float = Field(default=0.02, ge=1e-4, le=10, description="of the flat end")
+    in_air: bool = Field(
+        default=False,
+        description="whether its surface gives heat to the air too, if the medium is air",
+    )
+    kappa: float = Field(
+        default=0.25,
+        ge=1e-3,
+        le=30,
+        description="W/(cm K), of the hot tip: how heat comes to its surface; counts with in_air",
+    )
 
     @property
     def slope(self) -> float:
