@@ -46,8 +46,8 @@ class AirLoss:
         Unknowns of the temperatures of the element at each site; −1 where the node is held.
     shares : ndarray, shape (sites, nodes)
         Their weights in the temperature at the site.
-    slots : ndarray of int, shape (sites, nodes, nodes)
-        Where products of two of them go among the entries of the sparse Jacobian.
+    losses : csr_matrix, shape (entries, sites)
+        What the slope of a loss at each site adds to the entries of the sparse Jacobian.
     size : int
         Number of unknowns, V_l included.
 
@@ -69,7 +69,7 @@ class AirLoss:
     by_inverse_gap = np.empty((0, 0))
 
     def __init__(
-        self, operator: Any, unknowns: Index, shares: Array, slots: Index, size: int
+        self, operator: Any, unknowns: Index, shares: Array, losses: csr_matrix, size: int
     ) -> None:
         self._take(operator)
         self.around = partial(_nothing_around, HeatInAir.nothing(size))
@@ -80,8 +80,7 @@ class AirLoss:
             (shares[~held], (rows[~held], unknowns[~held])), shape=(len(unknowns), size)
         )
         self.spreading = self.sampling.T.tocsr()
-        self._slots = slots
-        self._products = shares[:, :, None] * shares[:, None, :]
+        self._losses = losses
 
     def _take(self, operator: Any) -> None:
         self.operator, self.filling = operator, operator.filling
@@ -92,8 +91,8 @@ class AirLoss:
     def nothing(cls, size: int) -> AirLoss:
         """Return that of a lever in vacuum: air that takes nothing from anywhere."""
         vacuum = AirOperator(np.empty((0, 2)), np.empty((0, 0)), filling=0.0)
-        sites = np.empty((0, 1), dtype=np.intp)
-        return cls(vacuum, sites, np.empty((0, 1)), sites[..., None], size)
+        unknowns, shares = np.empty((0, 1), dtype=np.intp), np.empty((0, 1))
+        return cls(vacuum, unknowns, shares, csr_matrix((0, 0)), size)
 
     @property
     def medium(self) -> str:
@@ -137,15 +136,12 @@ class AirLoss:
         heat = self.operator.matrix @ theta
         return np.asarray(heat.sum(axis=0)), np.asarray(self._held @ heat)
 
-    def local_entries(self, kappa: Array, entries: int) -> Array:
+    def local_entries(self, kappa: Array) -> Array | float:
         """Return what a loss ∝ the temperature at each site adds to the sparse Jacobian.
 
         Each site loses as it would in a lever of one temperature.
         """
-        values = (self._local * kappa)[:, None, None] * self._products
-        # numpy's stubs overlook that weights make the counts floats
-        sums: Array = np.bincount(self._slots.ravel(), values.ravel(), minlength=entries + 1)  # type: ignore[assignment]
-        return sums[:entries]
+        return self._losses @ (self._local * kappa) if len(kappa) else 0.0
 
     def solver(self, factors: SuperLU, kappa: Array, taken_up: Array | None) -> Any:
         """Return what solves the whole linear system, of the factors of its local part."""

@@ -4,21 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from hotlever.air.stores import HeatInAir
 from hotlever.lever.laws import LawsAtPoints
 from hotlever.lever.motion import Motion
+from hotlever.lever.radiation import RimRadiation
+from hotlever.lever.rim import Rim
 from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM, Fields, Fluxes, Space, Tangent
 from hotlever.lever.terminals import Terminals
 from hotlever.lever.transport import Properties, fluxes_of, tangent_of
 from hotlever.materials import Kind
 from hotlever.materials.air import kirchhoff_variable
+from hotlever.materials.laws import Evaluated
 from hotlever.probe.circuit import Circuit
 from hotlever.probe.physics import THE_PAPERS, Physics
 from hotlever.types import Array
+
+
+class Radiated(NamedTuple):
+    """What radiates: faces at the quadrature points (mW/µm²), and the points of the rim (mW)."""
+
+    faces: Array
+    by_rim: Array
 
 
 class StatesAtPoints:
@@ -48,6 +58,8 @@ class StatesAtPoints:
     terminals : Terminals
         What is wired to the lever, in its equations.
     laws : LawsAtPoints
+    rim : Rim
+        What radiates where the mesh ends; nothing without radiation.
     scale, step_limit : ndarray, shape (size + 1, 1)
         For Newton's method: the size of one unit of each unknown, by which kelvin and volts
         compare, and the largest step.
@@ -66,6 +78,10 @@ class StatesAtPoints:
         self.circuit, self.base_temperature_K = circuit, circuit.base_temperature_K
         self.terminals = Terminals(space, circuit)
         self.laws = laws(space, materials, self.base_temperature_K, physics, self.motions)
+        self.rim = space.rim if physics.radiation else Rim.nothing(space.size)
+        self._radiation = RimRadiation(
+            self.rim, materials, circuit.base_temperature_K, self.motions
+        )
         self._polarity = 1.0
         self._latest: tuple[Array, tuple[Fields, Properties, Properties]] | None = None
         self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]
@@ -132,16 +148,23 @@ class StatesAtPoints:
         """Return how the fluxes of states change with their fields, to first order."""
         return tangent_of(*self.at(x))
 
-    def emission(self, x: Array) -> Array:
-        """Return what the faces radiate (mW/µm²) at the points, (points, n)."""
-        emission = self.at(x)[1].emission
-        return np.zeros((len(self.space.weights), x.shape[1])) if emission is None else emission
+    def radiated(self, x: Array) -> Radiated:
+        """Return what states radiate."""
+        faces = self.at(x)[1].emission
+        if faces is None:
+            faces = np.zeros((len(self.space.weights), x.shape[1]))
+        return Radiated(faces, self.by_rim(x)[0])
 
-    def emission_change(self, x: Array, change: Array) -> Array:
-        """Return how `emission` changes with one change of each state."""
+    def radiated_change(self, x: Array, change: Array) -> Radiated:
+        """Return how `radiated` changes with one change of each state."""
         by_T = self.at(x)[2].emission
         rise = self.space.temperature.at_points(change)[0]
-        return np.zeros_like(rise) if by_T is None else by_T * rise
+        faces = np.zeros_like(rise) if by_T is None else by_T * rise
+        return Radiated(faces, self.by_rim(x)[1]["T"] * self.rim.rise(change))
+
+    def by_rim(self, x: Array, names: Sequence[str] = ()) -> Evaluated:
+        """Return what the rim radiates, see `hotlever.lever.radiation`."""
+        return self._radiation.heat(x, self.terminals.end_rises, names)
 
     def kirchhoff(self, x: Array) -> tuple[Array, Array]:
         """Return θ (mW/µm) and κ (mW/(K µm)) of the gas at the sites of the air operator."""

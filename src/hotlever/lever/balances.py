@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from hotlever.lever.at_points import Radiated
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.space import Fluxes, Space
+from hotlever.lever.space import Fluxes
 from hotlever.probe.circuit import Wiring
 from hotlever.types import Array, Index
 
@@ -50,21 +51,21 @@ def balance_columns(equations: LeverEquations, x: Array) -> Array:
     Currents and heats at terminals are consistent fluxes: reactions of the weak form at the nodes
     of each. The names are `balance_names`.
     """
-    theta, emission = equations.kirchhoff(x)[0], equations.emission(x)
-    return _balances(equations, x, equations.fluxes(x), theta, emission)
+    theta, radiated = equations.kirchhoff(x)[0], equations.radiated(x)
+    return _balances(equations, x, equations.fluxes(x), theta, radiated)
 
 
 def balance_slopes(equations: LeverEquations, x: Array, slopes: Array) -> Array:
     """Return how the `balance_columns` of states change with changes (size + 1, n) of them."""
     theta = equations.kirchhoff(x)[1] * equations.space.air.rise(slopes)
-    emission = equations.emission_change(x, slopes)
-    return _balances(equations, slopes, equations.flux_changes(x, slopes), theta, emission)
+    radiated = equations.radiated_change(x, slopes)
+    return _balances(equations, slopes, equations.flux_changes(x, slopes), theta, radiated)
 
 
 def heat_left(equations: LeverEquations, x: Array) -> Array:
     """Return the heat that leaves states by the leg ends, into the air and as light (mW), (n,)."""
-    theta, emission = equations.kirchhoff(x)[0], equations.emission(x)
-    return np.asarray(sum(_heat_out(equations.space, equations.fluxes(x), theta, emission)))
+    theta, radiated = equations.kirchhoff(x)[0], equations.radiated(x)
+    return np.asarray(sum(_heat_out(equations, equations.fluxes(x), theta, radiated)))
 
 
 def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
@@ -75,24 +76,26 @@ def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
 
 
 def _heat_out(
-    space: Space, fluxes: Fluxes, theta: Array, emission: Array
+    equations: LeverEquations, fluxes: Fluxes, theta: Array, radiated: Radiated
 ) -> tuple[Array, Array, Array]:
     """Return the heat through the leg ends, into the air, and radiated."""
+    space, rim = equations.space, equations.rim
     heat = space.weighted(np.concatenate([fluxes.heat_source[None], fluxes.heat]))
     by_ends = -np.einsum("dp,dpn->n", space.end_test, heat)
     into_air, at_ends = space.air.heat(theta)
-    radiated = (space.weights * emission).sum(axis=0)
-    return by_ends - at_ends, into_air, radiated
+    at_ends = at_ends + rim.end_test @ radiated.by_rim
+    by_faces = (space.weights * radiated.faces).sum(axis=0)
+    return by_ends - at_ends, into_air, by_faces + radiated.by_rim.sum(axis=0)
 
 
 def _balances(
-    equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array, emission: Array
+    equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array, radiated: Radiated
 ) -> Array:
-    """Return the balances of states, fluxes, θ at the sites of the air, emission; all linear."""
+    """Return the balances of states, fluxes, θ at the sites of the air, light; all linear."""
     space = equations.space
     assert isinstance(space, FullSpace)  # a reduced lever has no ends
-    end_heat, air_heat, radiated = _heat_out(space, fluxes, theta, emission)
-    made = space.weights * (emission - fluxes.heat_source)
+    end_heat, air_heat, light = _heat_out(equations, fluxes, theta, radiated)
+    made = space.weights * (radiated.faces - fluxes.heat_source)
     charge = space.weighted(fluxes.charge)
     of_parts = [_made(made, space.parts[part]) for part in ("heater", "leg 1", "leg 2")]
     into = {
@@ -107,7 +110,7 @@ def _balances(
         for unknowns, weights in [space.potential_at(name)]
     ]
     currents = [into[name] for name in _unusual(space.wiring)]
-    return np.stack([*of_parts, ground, end_heat, air_heat, radiated, *volts, *currents], axis=-1)
+    return np.stack([*of_parts, ground, end_heat, air_heat, light, *volts, *currents], axis=-1)
 
 
 def _made(heat: Array, points: Index) -> Array:

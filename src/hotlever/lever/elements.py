@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -29,6 +30,27 @@ _BY_ROUNDING = 1e-3
 #: many as a cubic element has. And how far above its nodes an element may reach, as a share of the
 #: difference between its nodes.
 _STEPS, _ABOVE_NODES = 12, 0.25
+
+
+@dataclass(frozen=True)
+class FacetPoints:
+    """Quadrature points on facets, each seen from the element behind it.
+
+    Attributes
+    ----------
+    facets, elements : ndarray of int, shape (points,)
+    shares : ndarray, shape (points, nodes)
+        Its basis functions there.
+    weights : ndarray, shape (points,)
+        Lengths or areas included.
+    positions : ndarray, shape (dimension, points)
+    """
+
+    facets: Index
+    elements: Index
+    shares: Array
+    weights: Array
+    positions: Array
 
 
 class FiniteElements:
@@ -174,6 +196,22 @@ class FiniteElements:
     def facet_nodes(self, facets: Index) -> Index:
         """Return the numbers of the nodes on some facets of the mesh."""
         return np.asarray(self.basis.get_dofs(facets).flatten(), dtype=np.intp)
+
+    def on_facets(self, facets: Index) -> FacetPoints:
+        """Return quadrature points on some facets of the mesh, facet by facet."""
+        from skfem import FacetBasis  # see `hotlever.probe.mesh`
+
+        element = self.basis.elem
+        basis = FacetBasis(self.basis.mesh, element, facets=facets, intorder=2 * element.maxdeg - 1)
+        positions = np.asarray(basis.global_coordinates())
+        each = basis.dx.shape[1]
+        return FacetPoints(
+            facets=np.repeat(facets, each),
+            elements=np.repeat(basis.tind, each),
+            shares=np.stack([np.ravel(value[0]) for value in basis.basis], axis=1),
+            weights=np.ravel(basis.dx),
+            positions=positions.reshape(len(positions), -1),
+        )
 
     def at_points(self, points: Array) -> tuple[Index, Array, Array]:
         """Return the element at each point, and its basis functions there, with their slopes.

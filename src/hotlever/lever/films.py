@@ -33,7 +33,7 @@ class PlacedFilm:
         The material from which dopant diffuses into this one.
     faces : float or ndarray, shape (k, 1)
         How many of its faces are on the outside: of a stack the lowest film has one, the uppermost
-        the other; none in a solid.
+        the other; none in a solid, see `hotlever.lever.rim`.
     distances : ndarray, shape (borders, k, 1)
         From the borders of each point's region with that material (µm); `FAR` where it has fewer
         than others. No borders where the doping is even.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from copy import copy
+from functools import cached_property
 from typing import Any, get_args
 
 import numpy as np
@@ -19,7 +20,9 @@ from hotlever.air.operator import AirOperator
 from hotlever.air.stores import HeatInAir
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.films import placed_films
-from hotlever.lever.space import AirTangent, Constraint, LinearMap, Space, Tangent
+from hotlever.lever.linear_map import LinearMap
+from hotlever.lever.rim import Rim
+from hotlever.lever.space import Constraint, Space, SurfaceTangent, Tangent
 from hotlever.lever.sparse import SparseFactors, SparseJacobian, numbered
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Part
@@ -164,6 +167,16 @@ class FullSpace(Space):
         nodal = np.where((unknowns >= 0)[..., None], x[unknowns], 0.0)
         return np.asarray(np.einsum("ks,ksn->kn", shares, nodal))
 
+    @cached_property
+    def rim(self) -> Rim:
+        """The surface at which the mesh ends."""
+        return Rim.of(self.mesh, self.elements, self._selection(self._T), self.end_nodes)
+
+    @cached_property
+    def _losses_at_rim(self) -> csr_matrix:
+        places = self.rim.places
+        return self._jacobian.of_losses(places.elements, places.shares)
+
     # --- the air ----------------------------------------------------------------------------------
 
     def in_vacuum(self) -> FullSpace:
@@ -178,11 +191,10 @@ class FullSpace(Space):
         What the air takes up in time is made once it is asked for.
         """
         element, shares, _ = self.elements.at_points(air.sites)
-        nodes = self.elements.dofs.shape[1]
-        slots = self._jacobian.slots[element, :nodes, :nodes]
+        losses = self._jacobian.of_losses(element, shares)
         unknowns = self._T[self.elements.dofs[element]]
         space = copy(self)
-        space.air = AirLoss(air, unknowns, shares, slots, self.size + 1)
+        space.air = AirLoss(air, unknowns, shares, losses, self.size + 1)
         space.air.around = around
         return space
 
@@ -197,24 +209,27 @@ class FullSpace(Space):
 
         The air is what has the attributes of an `AirOperator`.
         """
-        # any element around a node knows where its diagonal entry is
+        # any element around a node will do
         _, first = np.unique(self.elements.dofs, return_index=True)
-        element, node = np.divmod(first[surface], self.elements.dofs.shape[1])
-        slots = self._jacobian.slots[element, node, node][:, None, None]
+        nodes = self.elements.dofs.shape[1]
+        element, node = np.divmod(first[surface], nodes)
+        losses = self._jacobian.of_losses(element, np.eye(nodes)[node])
         space = copy(self)
         shares = np.ones((surface.size, 1))
-        space.air = AirLoss(air, self._T[surface, None], shares, slots, self.size + 1)
+        space.air = AirLoss(air, self._T[surface, None], shares, losses, self.size + 1)
         return space
 
     def factorised(
-        self, tangent: Tangent, air: AirTangent, constraint: Constraint, conductance: Array
+        self, tangent: Tangent, surface: SurfaceTangent, constraint: Constraint, conductance: Array
     ) -> SparseFactors:
         """Put the Jacobians of all states together, the constraint last, and factorise."""
         solvers = []
         for state in range(tangent.sigma.shape[-1]):
-            kappa = air.kappa[:, state]
+            kappa = surface.kappa[:, state]
             entries = self._jacobian.entries(tangent.of(state), conductance)
-            entries += self.air.local_entries(kappa, entries.size)
+            entries += self.air.local_entries(kappa)
+            if len(surface.by_rim):
+                entries += self._losses_at_rim @ surface.by_rim[:, state]
             factors = self._jacobian.factorised(entries, constraint.among(state))
-            solvers.append(self.air.solver(factors, kappa, air.taken_up))
+            solvers.append(self.air.solver(factors, kappa, surface.taken_up))
         return SparseFactors(solvers)

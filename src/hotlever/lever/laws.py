@@ -60,9 +60,7 @@ class FilmLaws:
         carrier: Carrier,
     ) -> None:
         self.film, self.kind, self.carrier = film, materials[film.material], carrier
-        # what the laws call a parameter, by its name in the probe
-        self.own = {"T": "T", BASE: "surroundings_K"}
-        self.own |= {full_name(film.material, own): own for own in self.kind.declared}
+        self.own = names_in_laws(film.material, self.kind)
         self.thickening = {
             name: motion.thickening_um[film.points]
             for name, motion in motions.items()
@@ -139,6 +137,12 @@ class FilmLaws:
                 more = PER_CM_TO_MILLI_PER_UM * self.thickening[name]
                 by_thickness = film.thickness_um * by_own.get("thickness_um", 0.0)
                 change[points] += more * (value + by_thickness)
+
+
+def names_in_laws(material: str, kind: Kind) -> dict[str, str]:
+    """Return what the laws of a material call each parameter, by its name in the probe."""
+    own = {full_name(material, name): name for name in kind.declared}
+    return {"T": "T", BASE: "surroundings_K"} | own
 
 
 def carriers_of(film: PlacedFilm, space: Space, materials: Mapping[str, Kind]) -> Carrier:

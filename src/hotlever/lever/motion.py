@@ -13,8 +13,9 @@ import numpy as np
 
 from hotlever.lever.films import PlacedFilm, thickness_at
 from hotlever.lever.full_space import FullSpace
+from hotlever.lever.rim import RimFilm
 from hotlever.lever.space import Fields, Fluxes, Tangent
-from hotlever.probe.layout import Taper
+from hotlever.probe.layout import Layout, Taper
 from hotlever.probe.moving import Movement
 from hotlever.types import Array
 
@@ -38,6 +39,8 @@ class Motion:
         Of those of each `hotlever.lever.films.PlacedFilm`.
     tip : ndarray, shape (nodes,)
         Of the weights that give the rise of the tip temperature.
+    rim_swelling, rim_thickening_um : ndarray, shape (points of the rim, 1)
+        The same as of the points.
     """
 
     strain: Array
@@ -45,6 +48,13 @@ class Motion:
     thickening_um: Array
     distances: tuple[Array, ...]
     tip: Array
+    rim_swelling: Array
+    rim_thickening_um: Array
+
+    def of_rim(self, film: RimFilm) -> Array:
+        """Return how surface at the points of a rim grows, over their weights (as its heights)."""
+        longer = self.rim_swelling[film.points] * film.height_um
+        return longer + self.rim_thickening_um[film.points] if film.is_body else longer
 
     def strained(self, gradient: Array) -> Array:
         """Return how slopes (dimension, points, n) change, the values being the same."""
@@ -85,7 +95,36 @@ def motion_of(space: FullSpace, movement: Movement) -> Motion:
     velocity = (start + np.einsum("irm,rq->imq", sides, elements.basis.X)).reshape(2, -1)
     strain = np.repeat(strain, elements.per_element, axis=2)
 
-    layout, at = mesh.layout, elements.positions
+    layout = mesh.layout
+    longer, along_rim = _along_rim(space, movement)
+    (element,), _, slopes = elements.at_points(np.array([layout.tip]))
+    reference = elements.on_reference(np.array(layout.tip), element)
+    at_tip = corners[:, 0, element] + sides[:, :, element] @ reference
+    return Motion(
+        strain,
+        np.asarray(strain[0, 0] + strain[1, 1])[:, None],
+        _thickening(layout, movement, elements.positions, velocity),
+        tuple(_from_borders(space, film, movement, velocity) for film in space.films),
+        tip=(movement.tip - at_tip) @ slopes[:, 0],
+        rim_swelling=longer[:, None],
+        rim_thickening_um=_thickening(layout, movement, space.rim.places.positions, along_rim),
+    )
+
+
+def _along_rim(space: FullSpace, movement: Movement) -> tuple[Array, Array]:
+    """Return how edges of the rim grow, relative, and the velocity, at its points."""
+    mesh, places = space.mesh.elements, space.rim.places
+    vertices = mesh.facets[:, places.facets]
+    start, end = mesh.p[:, vertices].swapaxes(0, 1)
+    moved, rate = movement.velocity[:, vertices].swapaxes(0, 1)
+    side, stretch = end - start, rate - moved
+    square = (side**2).sum(axis=0)
+    share = ((places.positions - start) * side).sum(axis=0) / square
+    return (side * stretch).sum(axis=0) / square, moved + share * stretch
+
+
+def _thickening(layout: Layout, movement: Movement, at: Array, velocity: Array) -> Array:
+    """Return how the body thickens at points (2, points) that move, (points, 1)."""
 
     def thickness(way: float) -> float | Array:
         there = tuple((layout.tip + way * movement.tip).tolist())
@@ -94,16 +133,7 @@ def motion_of(space: FullSpace, movement: Movement) -> Motion:
         return thickness_at(moved, at + way * velocity)
 
     thicker = (thickness(_SMALL_UM) - thickness(-_SMALL_UM)) / (2 * _SMALL_UM)
-    (element,), _, slopes = elements.at_points(np.array([layout.tip]))
-    reference = elements.on_reference(np.array(layout.tip), element)
-    at_tip = corners[:, 0, element] + sides[:, :, element] @ reference
-    return Motion(
-        strain,
-        np.asarray(strain[0, 0] + strain[1, 1])[:, None],
-        np.broadcast_to(thicker, space.weights.shape),
-        tuple(_from_borders(space, film, movement, velocity) for film in space.films),
-        tip=(movement.tip - at_tip) @ slopes[:, 0],
-    )
+    return np.broadcast_to(thicker, (at.shape[1], 1))
 
 
 def _from_borders(space: FullSpace, film: PlacedFilm, movement: Movement, velocity: Array) -> Array:

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.films import PlacedFilm
+from hotlever.lever.linear_map import LinearMap
+from hotlever.lever.rim import Rim
 from hotlever.types import Array, Index
 
 #: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
@@ -39,56 +41,6 @@ class Factors(Protocol):
     def replaced(self, states: Index, other: Any) -> Any:
         """Return the same factors, those of some states taken from others, in their order."""
         ...
-
-
-class LinearMap:
-    """From unknowns to a field and its slopes at the quadrature points, and back.
-
-    Parameters
-    ----------
-    matrix : matrix, shape (kinds × points, columns)
-        Sparse or dense; first the values (where there are any), then the slope along each axis.
-    kinds : int
-    columns : slice
-        The unknowns that matter.
-    """
-
-    def __init__(self, matrix: Any, kinds: int, columns: slice = slice(None)) -> None:
-        self.matrix, self.kinds, self.columns = matrix, kinds, columns
-        self._transposed = matrix.T.tocsr() if hasattr(matrix, "tocsr") else matrix.T
-        self._of_values: Any = None
-
-    def among(self, points: Index) -> LinearMap:
-        """Return the same dense map to some of the points."""
-        rows = self.matrix.reshape(self.kinds, -1, self.matrix.shape[1])[:, points]
-        return LinearMap(rows.reshape(-1, rows.shape[2]), self.kinds, self.columns)
-
-    def integrands(self, samples: Array) -> Array:
-        """Return what a dense map integrates to test samples (kinds, points), (columns, points).
-
-        Given may be the first of the kinds alone.
-        """
-        rows = self.matrix.reshape(self.kinds, samples.shape[1], -1)[: len(samples)]
-        return np.asarray(np.einsum("dqm,dq->mq", rows, samples))
-
-    def at_points(self, x: Array) -> Array:
-        """Return the samples (kinds, points, ...) of states (size + 1, ...)."""
-        chosen = x[self.columns]
-        samples = np.asarray(self.matrix @ chosen.reshape(len(chosen), -1))
-        return samples.reshape(self.kinds, -1, *x.shape[1:])
-
-    def tested(self, samples: Array) -> Array:
-        """Return what weighted samples (kinds, points, ...) do to each unknown (columns, ...)."""
-        rows = self._transposed.shape[1]
-        tested = np.asarray(self._transposed @ samples.reshape(rows, -1))
-        return tested.reshape(-1, *samples.shape[2:])
-
-    def values_tested(self, samples: Array) -> Array:
-        """Return the same of weighted samples of the value alone, (points, ...)."""
-        if self._of_values is None:
-            self._of_values = self._transposed[:, : len(samples)]
-        tested = np.asarray(self._of_values @ samples.reshape(len(samples), -1))
-        return tested.reshape(-1, *samples.shape[1:])
 
 
 @dataclass(frozen=True)
@@ -196,8 +148,8 @@ class Tangent:
 
 
 @dataclass(frozen=True)
-class AirTangent:
-    """How the heat that leaves into the air changes with the temperatures.
+class SurfaceTangent:
+    """How the heat that leaves into the air and by the rim changes with the temperatures.
 
     Attributes
     ----------
@@ -205,10 +157,13 @@ class AirTangent:
         κ of the air at the sites (mW/(K µm)).
     taken_up : ndarray, shape (m, m), or None
         What the air takes up itself, see `hotlever.air.stores`; None at rest.
+    by_rim : ndarray, shape (points of the rim, n)
+        Slopes of what is radiated there (mW/K); no rows without radiation.
     """
 
     kappa: Array
-    taken_up: Array | None = None
+    taken_up: Array | None
+    by_rim: Array
 
 
 @dataclass(frozen=True)
@@ -292,6 +247,11 @@ class Space(ABC):
     elements: FiniteElements
     air: Any
 
+    @property
+    @abstractmethod
+    def rim(self) -> Rim:
+        """The surface at which the mesh ends."""
+
     def fields(self, x: Array) -> Fields:
         """Return the fields of states or of changes of them, (size + 1, n): T is the rise."""
         T = self.temperature.at_points(x)
@@ -342,7 +302,7 @@ class Space(ABC):
 
     @abstractmethod
     def factorised(
-        self, tangent: Tangent, air: AirTangent, constraint: Constraint, conductance: Array
+        self, tangent: Tangent, surface: SurfaceTangent, constraint: Constraint, conductance: Array
     ) -> Factors:
         """Put the Jacobians of all states together, the constraint last, and factorise.
 

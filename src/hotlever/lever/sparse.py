@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
 from hotlever.lever.elements import FiniteElements, sums_by_index
@@ -85,6 +85,22 @@ class SparseJacobian:
         entries = sums_by_index(self.slots, element, self._entries + 1)[: self._entries]
         entries[self._held_slots] += conductance
         return entries
+
+    def of_losses(self, element: Index, shares: Array) -> csr_matrix:
+        """Return the matrix (entries, points) from slopes of local losses to what they add.
+
+        Each point lies in an element, (points,), with its basis functions there, (points, nodes);
+        the slopes are by the temperature.
+        """
+        nodes = shares.shape[1]
+        slots = self.slots[element, :nodes, :nodes]
+        products = shares[:, :, None] * shares[:, None, :]
+        points = np.broadcast_to(np.arange(len(element))[:, None, None], slots.shape)
+        counted = (products != 0) & (slots < self._entries)
+        return csr_matrix(
+            (products[counted], (slots[counted], points[counted])),
+            shape=(self._entries, len(element)),
+        )
 
     def factorised(self, entries: Array, constraint: Constraint) -> SuperLU:
         """Factorise; the unknowns are already ordered for little fill."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from copy import copy
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -18,7 +19,9 @@ from scipy.optimize import nnls
 from hotlever.air.coupling import ReducedAir
 from hotlever.lever.films import at_some
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.space import AirTangent, Constraint, LinearMap, Space, Tangent
+from hotlever.lever.linear_map import LinearMap
+from hotlever.lever.rim import Rim
+from hotlever.lever.space import Constraint, Space, SurfaceTangent, Tangent
 from hotlever.types import Array, Index
 
 #: Random combinations of the training integrals that a cubature is made to reproduce.
@@ -180,6 +183,11 @@ class ReducedSpace(Space):
         space.films = tuple(film.among(points) for film in self.films)
         return space
 
+    @cached_property
+    def rim(self) -> Rim:
+        """The surface at which the mesh ends, all of its points."""
+        return self.full.rim.reduced(np.pad(self.modes[: self.count], ((0, 0), (0, 1))))
+
     def rises(self, x: Array) -> Array:
         """Return the rises of the temperature (K) at the hottest nodes, (places, n), of states."""
         return np.asarray(self._hot.T @ x[: self.count])
@@ -201,15 +209,18 @@ class ReducedSpace(Space):
         return np.concatenate([np.tensordot(orthonormal, free, axes=1), x[-1:]])
 
     def factorised(
-        self, tangent: Tangent, air: AirTangent, constraint: Constraint, conductance: Array
+        self, tangent: Tangent, surface: SurfaceTangent, constraint: Constraint, conductance: Array
     ) -> DenseFactors:
         """Put the Jacobians of all states together, the constraint last, and invert them."""
         states = tangent.sigma.shape[-1]
         matrices = np.zeros((states, self.size + 1, self.size + 1))
         for state in range(states):
             self._assemble(tangent.of(state), matrices[state])
-            of_air = self.air.matrix(air.kappa[:, state], air.taken_up)
-            matrices[state, : self.count, : self.count] += of_air
+            of_modes = matrices[state, : self.count, : self.count]
+            of_modes += self.air.matrix(surface.kappa[:, state], surface.taken_up)
+            if len(surface.by_rim):
+                at_rim = self.rim.temperature.matrix
+                of_modes += at_rim.T @ (surface.by_rim[:, [state]] * at_rim)
         matrices[:, -1] = 0.0
         matrices[:, -1, : self.count] = np.multiply.outer(constraint.tip, self.tip[1])
         matrices[:, -1, -1] = constraint.lever

@@ -132,6 +132,7 @@ def _file(lever: Lever, domain: ParameterDomain) -> Path | None:
     facts = {
         "shape": probe.shape.model_dump(),
         "tip": probe.tip and probe.tip.model_dump(),
+        "physics": probe.physics.effects,
         "base_temperature_K": lever.circuit.base_temperature_K,
         "gas_conductivity": probe.surroundings.gas_conductivity,
         "held": held,
