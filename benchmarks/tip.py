@@ -1,10 +1,11 @@
 """What a tip changes at the knee and in T(P), and whether it explains the paper's knee error.
 
-python benchmarks/tip.py [fitted|solid|air]
+python benchmarks/tip.py [fitted|solid|surface|air]
 
 fitted: the flat lever with an equivalent thickening, in vacuum and in air, there with the tip's
 surface, and a tipless model fitted to it. solid: the thickening against the cone as a real body, in
-vacuum. air: the tip's surface among the panels against the cone as a real body in air.
+vacuum. surface: what the knee moves by the tip's surface alone, and what moves that. air: the
+tip's surface among the panels against the cone as a real body in air.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from hotlever.lever import Lever, State
 from hotlever.lever.air_fields import AirFields
 from hotlever.lever3d import SolidLever
-from hotlever.probe import Probe, Tip
+from hotlever.probe import MeshOptions, Probe, Tip
 from hotlever.spieser2017 import KNEE_MEASURED_K, KNEE_PREDICTED_K
 from hotlever.studies.tip_effect import SIZES, TALL, tip_effects
 from problems import table
@@ -81,6 +82,30 @@ def solid() -> None:
     table(("height (µm)", "half-angle (°)", "model", *columns, "I_h (relative)"), rows)
 
 
+def surface() -> None:
+    """Print what the knee in air moves by the tip's surface, and what that depends on."""
+    probe = Probe.reference().in_medium("air")
+    jump = probe.with_(accommodation=0.9)
+    rows = []
+    for height, angle in ((1.0, 20), (5.0, 8), (5.0, 3)):
+        tip = Tip(height_um=height, half_angle_deg=angle)
+        perfect = tip.model_copy(update={"kappa": 30.0})
+        for name, one, of_tip, mesh in (
+            ("default", probe, tip, None),
+            ("panels / 1.4", probe, tip, MeshOptions(panels=1.4)),
+            ("the tip conducts perfectly", probe, perfect, None),
+            ("temperature jump, accommodation 0.9", jump, tip, None),
+        ):
+            knees = []
+            for in_air in (False, True):
+                changed = {"tip": of_tip.model_copy(update={"in_air": in_air})}
+                knees.append(Lever(one.model_copy(update=changed), mesh).branch().knee)
+            without, knee = knees
+            moved = knee.tip_K - without.tip_K, 1e3 * (knee.lever_V - without.lever_V)
+            rows.append((f"{height:g} µm, {angle:g}°", name, *(f"{value:+.3f}" for value in moved)))
+    table(("tip", "variant", "knee (K)", "V_l at the knee (mV)"), rows)
+
+
 def apex_temperature(state: State) -> float:
     """Return the temperature (K) of the tip's apex."""
     lever, layout = state.lever, state.lever.probe.layout()
@@ -138,7 +163,7 @@ def air() -> None:
 
 def main() -> None:
     """Print the tables asked for."""
-    questions = {"fitted": fitted, "solid": solid, "air": air}
+    questions = {"fitted": fitted, "solid": solid, "surface": surface, "air": air}
     for name in sys.argv[1:] or questions:
         print(f"\n## {name}\n")
         questions[name]()

@@ -175,5 +175,5 @@ def test_a_plate_with_a_cone_against_three_dimensions():
     air = OpenAir(mesh, centre, radius, order=3)
     _, heat = air.solve(np.ones(len(air.sites)))
     whole, of_cone = heats(with_cone(cone))
-    assert whole == pytest.approx(heat.sum(), rel=4e-3)
-    assert of_cone == pytest.approx(heat[air.sites[:, 2] < -0.2 - 1e-6].sum(), rel=0.015)
+    assert whole == pytest.approx(heat.sum(), rel=3e-3)
+    assert of_cone == pytest.approx(heat[air.sites[:, 2] < -0.2 - 1e-6].sum(), rel=0.012)

@@ -6,10 +6,14 @@ import meshio
 import numpy as np
 import pytest
 
+from documents import EXAMPLES
 from hotlever.errors import InputError
 from hotlever.figures import air_loss, save_figure
+from hotlever.lever import Lever
 from hotlever.lever.air_fields import AirFields
+from hotlever.lever.lever import COARSE
 from hotlever.materials.air import thermal_conductivity_of_air
+from hotlever.probe import Probe
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +35,15 @@ def test_flux_and_regions_add_up_to_the_heat_lost(in_air, states, fields):
     assert list(by_region) == [region.name for region in in_air.space.mesh.layout.regions]
     # the right leg carries no current: air takes heat to it from its hot neighbours
     assert by_region["right leg"] < 0 < by_region["heater"] < by_region["bridge"]
+
+
+def test_films_on_the_body_are_part_of_the_surface():
+    path = EXAMPLES / "palladium-on-nitride.toml"
+    lever = Lever(Probe.from_file(path).in_medium("air"), COARSE)
+    (state,) = lever.solve([0.3])
+    fields = AirFields(lever)
+    lost = sum(fields.heat_by_region(state).values())
+    assert 2 * (fields.flux(state) @ fields.panels.areas) == pytest.approx(lost, rel=1e-9)
 
 
 def test_air_at_the_lever_is_as_hot_as_the_lever_and_cold_far_away(in_air, states, fields):

@@ -11,13 +11,16 @@ from scipy.sparse import csr_matrix
 from hotlever.air.operator import PanelledAir
 from hotlever.air.stores import HeatInAir
 from hotlever.air.surface import PanelOptions
+from hotlever.lever import Lever
 from hotlever.lever.equations import LeverEquations
+from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import pulse, simulate, sine, step
 from hotlever.lever.transient.cyclic import cyclic_steady_state
 from hotlever.lever.transient.frequency_domain import harmonics, spectrum
 from hotlever.lever.transient.history import integrate
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
+from hotlever.probe import Probe, Tip
 
 BIAS = 4.0
 
@@ -83,6 +86,10 @@ def all_panels(state):
     return AllPanels(state)
 
 
+def answer(data):
+    return data.tip_per_bias_K_per_V * np.exp(1j * np.radians(data.tip_per_bias_deg))
+
+
 def test_small_signals_are_those_of_all_panels(state, all_panels, answering_at_once):
     frequency = np.array([1e4, 1e6])
     exact = all_panels.tip_by_bias(2e-6j * np.pi * frequency, state.lever.circuit)
@@ -90,13 +97,20 @@ def test_small_signals_are_those_of_all_panels(state, all_panels, answering_at_o
         spectrum(one, frequency) for one in (state, answering_at_once.solve([BIAS])[0])
     )
 
-    def complex_(data):
-        return data.tip_per_bias_K_per_V * np.exp(1j * np.radians(data.tip_per_bias_deg))
-
-    np.testing.assert_allclose(complex_(data), exact, rtol=2e-4)
+    np.testing.assert_allclose(answer(data), exact, rtol=2e-4)
     # 10 kHz is where the lever begins to lag
-    away = np.abs(complex_(at_once).values / exact - 1.0)
+    away = np.abs(answer(at_once).values / exact - 1.0)
     assert away[0] == pytest.approx(0.04, abs=0.01)
+
+
+@pytest.mark.slow
+def test_small_signals_with_a_tip_in_the_air_are_those_of_all_panels():
+    tip = Tip(height_um=1.0, half_angle_deg=30.0, in_air=True)
+    probe = Probe.reference().model_copy(update={"tip": tip}).in_medium("air")
+    (state,) = Lever(probe, COARSE).solve([BIAS])
+    frequency = np.array([1e4, 1e6])
+    exact = AllPanels(state).tip_by_bias(2e-6j * np.pi * frequency, probe.circuit)
+    np.testing.assert_allclose(answer(spectrum(state, frequency)), exact, rtol=2e-4)
 
 
 @pytest.mark.slow
