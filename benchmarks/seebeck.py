@@ -145,13 +145,15 @@ def by_the_rule(T: float, n: float, kind: str) -> float:
     return -size if kind == "n-silicon" else size
 
 
-def largest(n: float, r: float, kind: str = "n-silicon") -> tuple[float, float]:
+def largest(
+    n: float, r: float, kind: str = "n-silicon", p: float | None = None
+) -> tuple[float, float]:
     """Return where the majority's S is largest, from 300 to 1600 K, and S there."""
     sign = 1.0 if kind == "n-silicon" else -1.0
     top = minimize_scalar(
-        lambda T: sign * seebeck(float(T), n, r, kind), bounds=(300.0, 1600.0), method="bounded"
+        lambda T: sign * seebeck(float(T), n, r, kind, p), bounds=(300.0, 1600.0), method="bounded"
     )
-    return float(top.x), seebeck(float(top.x), n, r, kind)
+    return float(top.x), seebeck(float(top.x), n, r, kind, p)
 
 
 def main() -> None:

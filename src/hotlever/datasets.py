@@ -134,6 +134,18 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "surface_at_power_K": ("K", "largest change at the same power by the tip's surface in air"),
     "fitted_knee_K": ("K", "knee of a tipless lever fitted to the one with the tip"),
     "missed_K": ("K", "how far the knee lies above that of the fitted tipless lever"),
+    # thermoelectricity
+    "plain_um": ("µm", "place of the hot spot without thermoelectricity, from the heater's centre"),
+    "at_um": ("µm", "place of the hot spot, from the heater's centre"),
+    "moved_nm": ("nm", "shift of the hot spot in the direction of the current"),
+    "share_nm": ("nm", "share of the shift"),
+    "rest_nm": ("nm", "share of the shift by neither Thomson nor Peltier heat"),
+    "heat_mW": ("mW", "heat set free"),
+    "centre_rise_K": ("K", "rise of the temperature at the heater's centre"),
+    "highest_rise_K": ("K", "rise of the temperature at the hot spot"),
+    "rms_current_mA": ("mA", "root mean square of the current's residuals"),
+    "rms_reader_V": ("V", "root mean square of the reader voltage's residuals"),
+    "rms_tip_K": ("K", "root mean square of the tip temperature's residuals"),
     # simulation-based calibration
     "off_K": ("K", "tip temperature as calibrated less the true one"),
     "largest_K": ("K", "largest error of the tip temperature"),

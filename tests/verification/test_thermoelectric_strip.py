@@ -20,6 +20,7 @@ from hotlever.lever.space import LEVER
 from hotlever.materials.kinds import MetalFilm
 from hotlever.probe import Circuit, Layout, ProbeMesh, Region, Terminal
 from hotlever.probe.physics import Physics
+from hotlever.studies.thermoelectric_shift import SIDES, Heats
 
 LENGTH, THICK = 12.0, 0.4
 #: mA/(V µm) and mW/(K µm): of a resistivity of 1e-4 Ω cm, and of 0.5 W/(cm K).
@@ -139,6 +140,41 @@ def test_sections_of_even_coefficients_have_peltier_heat_at_their_joints(seebeck
     np.testing.assert_allclose(T, between(at_joints, exact, x), rtol=1e-9)
 
 
+@pytest.mark.parametrize("volts", [0.1, -0.1])
+@pytest.mark.parametrize("ends", [(0.0, 0.0), (0.4 * STRONG, -0.2 * STRONG)])
+def test_peltier_heat_at_the_borders_of_a_heater_is_that_by_hand(volts, ends):
+    """J T (S before − S after) is set free at a border: as heat, and as what flows off."""
+    seebeck = [ends[0], STRONG, ends[1]]
+    strip = Strip(tuple(map(film, seebeck)))
+    at_joints, j = of_sections(seebeck, volts, COLD)
+    by_hand = THICK * j * at_joints[1:3] * -np.diff(seebeck)
+    equations, x = strip.solved(volts)
+    before = (equations.space.elements.positions[0] < 0.5 * LENGTH)[:, None].astype(float)
+    heats = Heats(equations, strip.sections[1], {"supply": before, "ground": 1.0 - before})
+    tested = heats.tested(x, -equations.fluxes(x).charge)
+    peltier = [heats.power(tested["Peltier", side]) for side in SIDES]
+    np.testing.assert_allclose(peltier, by_hand, rtol=1e-4)
+    assert all(abs(heats.power(tested["Thomson", side])) < 1e-12 for side in SIDES)
+    # κ times the bend of the temperature, with the parabolas of Joule's heat on either side
+    at, T, _ = along(strip, volts)
+    joints, width = np.array([1.0, 2.0]) * LENGTH / 3.0, LENGTH / 3.0
+    slopes = np.array(
+        [
+            [
+                np.polynomial.Polynomial.fit(at[here], T[here], 2).deriv()(joint)
+                for here in (
+                    abs(at - joint + width / 2) <= width / 2,
+                    abs(at - joint - width / 2) <= width / 2,
+                )
+            ]
+            for joint in joints
+        ]
+    )
+    flows_off = THICK * KAPPA * (slopes[:, 0] - slopes[:, 1])
+    np.testing.assert_allclose(flows_off, by_hand, rtol=1e-4)
+    assert abs(by_hand).min() > 1e-2
+
+
 class Thomson(MetalFilm):
     """A metal whose Seebeck coefficient rises with the temperature, by 0.2 µV/K per kelvin."""
 
@@ -172,7 +208,7 @@ def test_a_coefficient_that_rises_with_temperature_has_thomson_heat(volts):
     kind = Thomson(resistivity=1e-4, tcr=0.0, kappa=0.5)
     exact, current = with_thomson(volts)
     errors = []
-    for elements in (8, 16, 32):
+    for elements in (4, 8, 16):
         x, T, j = along(Strip((kind,), elements, WARM), volts)
         errors.append(np.abs(T - exact(x)[0]).max())
     assert j == pytest.approx(current, rel=1e-6)

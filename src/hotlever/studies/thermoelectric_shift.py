@@ -27,10 +27,10 @@ from numpy.polynomial import Chebyshev
 from numpy.typing import ArrayLike
 
 from hotlever.datasets import labelled
-from hotlever.errors import ComputationError, InputError
-from hotlever.estimation import Measurement, fit
+from hotlever.errors import ComputationError
 from hotlever.lever import Lever, State
 from hotlever.lever.equations import LeverEquations
+from hotlever.lever.full_space import FullSpace
 from hotlever.lever.laws import LawsAtPoints
 from hotlever.lever.parametrisation import state_at_bias
 from hotlever.lever.space import TIP, Fluxes
@@ -50,7 +50,9 @@ POLARITIES = (1, -1)
 #: of the polynomial through their temperatures; it has no steps from element to element.
 _INNER, _POINTS, _DEGREE = 0.8, 81, 14
 #: Shares of S at which the linearised equations are looked at, and their weights: Gauss's rule.
-_GAUSS = [(0.5 + 0.5 * x, 0.5 * w) for x, w in zip(*np.polynomial.legendre.leggauss(3), strict=True)]
+_GAUSS = [
+    (0.5 + 0.5 * x, 0.5 * w) for x, w in zip(*np.polynomial.legendre.leggauss(3), strict=True)
+]
 
 
 # --- where it is hottest --------------------------------------------------------------------------
@@ -77,14 +79,13 @@ class Axis:
 
     Parameters
     ----------
-    equations : LeverEquations
-        Of a lever in full.
+    space : FullSpace
     taper : Taper
         Centre, direction and length of the heater.
     """
 
-    def __init__(self, equations: LeverEquations, taper: Taper) -> None:
-        self._equations, self._taper = equations, taper
+    def __init__(self, space: FullSpace, taper: Taper) -> None:
+        self._space = space
         half = 0.5 * _INNER * taper.length_um
         self._position = np.linspace(-half, half, _POINTS)
         along = np.outer(self._position, taper.axis)
@@ -95,7 +96,7 @@ class Axis:
 
         It counts from that of the base.
         """
-        values, position = self._equations.space.rise_at(self._places, x), self._position
+        values, position = self._space.rise_at(self._places, x), self._position
         domain = position[[0, -1]]
         return [Chebyshev.fit(position, column, _DEGREE, domain=domain) for column in values.T]
 
@@ -212,9 +213,7 @@ def _weakened(share: float) -> type[LawsAtPoints]:
     def weaker(properties: Properties) -> Properties:
         assert properties.beta is not None
         assert properties.gamma is not None
-        return replace(
-            properties, beta=share * properties.beta, gamma=share**2 * properties.gamma
-        )
+        return replace(properties, beta=share * properties.beta, gamma=share**2 * properties.gamma)
 
     return Weakened
 
@@ -227,7 +226,7 @@ class _Way:
         self.whole = self._at_share(1.0)
         taper, sides = _from_supply(lever)
         own = lever.probe.kinds[lever.probe.layout().heater.material]
-        self.axis, self.heats = Axis(self.whole, taper), Heats(self.whole, own, sides)
+        self.axis, self.heats = Axis(lever.space, taper), Heats(self.whole, own, sides)
 
     def _at_share(self, share: float) -> LeverEquations:
         probe, physics = self.lever.probe, Physics(thermoelectric=True)
@@ -239,16 +238,15 @@ class _Way:
         equations = self._at_share(share)
         return equations, state_at_bias(equations, self.lever.circuit, bias, guess)
 
-    def rates(self, equations: LeverEquations, x: Array, share: float) -> tuple[Array, Array]:
-        """Return how fast each heat, and all there is, moves the hot spot with the share (µm)."""
+    def rates(self, equations: LeverEquations, x: Array, share: float) -> Array:
+        """Return how fast each heat, and last all there is, moves the hot spot (µm)."""
         current = -equations.fluxes(x).charge
         each = list(self.heats.tested(x, current).values())
         causes = np.stack([*each, self._all(x, share)], axis=-1)
         changes = self._at_bias(equations, x, causes)[:, 0]
         rise, *risen = self.axis.temperatures(np.hstack([x, changes]))
         at = hot_spot(rise).at_um
-        moved = np.array([-change.deriv()(at) / rise.deriv(2)(at) for change in risen])
-        return moved[:-1], moved[-1]
+        return np.array([-change.deriv()(at) / rise.deriv(2)(at) for change in risen])
 
     def _all(self, x: Array, share: float) -> Array:
         """Return how the equations of a state change with the share, (size + 1, 1)."""
@@ -315,12 +313,12 @@ def shift_by_heat(lever: Lever, bias: ArrayLike) -> xr.Dataset:
     -------
     xarray.Dataset
         On the dimension ``bias`` where the hot spot is without thermoelectricity, ``plain_um`` from
-        the heater's centre towards ground. For either ``polarity``, 1 or −1: how far it is moved
-        **in the direction of the current**, ``moved_nm``; how much of that is neither Thomson nor
-        Peltier heat, ``rest_nm``; where it is, ``at_um``; the rises of the temperature at the centre
-        ``centre_K`` and at the hot spot ``highest_K``. By ``heat`` and by ``side`` of the heater's
-        centre, that of the supply or of ground: the share of the shift ``share_nm`` and the heat
-        ``heat_mW`` that is set free there, negative where it is taken up.
+        the heater's centre towards ground. For either ``polarity``, 1 or −1: how far it has moved
+        in the direction of the current, ``moved_nm``; how much of that is due to neither Thomson
+        nor Peltier heat, ``rest_nm``; where it is now, ``at_um``; and the rises of the temperature
+        at the heater's centre and at the hot spot, ``centre_rise_K`` and ``highest_rise_K``. By
+        ``heat`` and by ``side`` of the heater's centre, that of the supply or of ground:
+        ``share_nm`` of the shift, and ``heat_mW`` that is set free, negative where it is taken up.
 
     Raises
     ------
@@ -334,7 +332,7 @@ def shift_by_heat(lever: Lever, bias: ArrayLike) -> xr.Dataset:
     way = _Way(plain)
     rows = [[_shift(way, state, polarity) for state in states] for polarity in POLARITIES]
     columns: dict[str, Any] = {"plain_um": ("bias", [row["plain_um"] for row in rows[0]])}
-    for name in ("moved_nm", "rest_nm", "at_um", "centre_K", "highest_K"):
+    for name in ("moved_nm", "rest_nm", "at_um", "centre_rise_K", "highest_rise_K"):
         columns[name] = (("polarity", "bias"), [[row[name] for row in line] for line in rows])
     for name in ("share_nm", "heat_mW"):
         values = np.array([[row[name] for row in line] for line in rows])
@@ -352,22 +350,32 @@ def shift_by_heat(lever: Lever, bias: ArrayLike) -> xr.Dataset:
 def _shift(way: _Way, plain: State, polarity: int) -> dict[str, Any]:
     """Return a row of `shift_by_heat`."""
     before = hot_spot(way.axis.temperatures(plain.x)[0])
-    x, by_heat, by_all = plain.x, np.zeros(len(HEATS) * len(SIDES)), 0.0
+    x, moved = plain.x, np.zeros(len(HEATS) * len(SIDES) + 1)
     for share, weight in _GAUSS:
         equations, x = way.state(polarity * share, plain.bias_V, x)
-        moved, together = way.rates(equations, x, polarity * share)
-        by_heat, by_all = by_heat + weight * moved, by_all + weight * together
+        moved += weight * way.rates(equations, x, polarity * share)
     equations, x = way.state(polarity, plain.bias_V, x)
     after = hot_spot(way.axis.temperatures(x)[0])
     heats = way.heats.tested(x, -equations.fluxes(x).charge).values()
     return {
         "plain_um": before.at_um,
-        # with the share of S negative and the current as it was: the mirror image in charge
+        # S is reversed in place of the current, which is the mirror image in charge
         "moved_nm": 1e3 * polarity * (after.at_um - before.at_um),
-        "share_nm": 1e3 * by_heat,
-        "rest_nm": 1e3 * (by_all - by_heat.sum()),
+        "share_nm": 1e3 * moved[:-1],
+        "rest_nm": 1e3 * (moved[-1] - moved[:-1].sum()),
         "at_um": after.at_um,
-        "centre_K": after.centre_rise,
-        "highest_K": after.rise,
+        "centre_rise_K": after.centre_rise,
+        "highest_rise_K": after.rise,
         "heat_mW": [polarity * way.heats.power(heat) for heat in heats],
     }
+
+
+def of_p_silicon(probe: Probe) -> Probe:
+    """Return a probe doped with boron as it is with phosphorus: the same numbers, other carriers.
+
+    It is no possible probe of a file, so that it is not checked.
+    """
+    kinds = probe.kinds
+    own = kinds[LOW_DOPED].model_dump() | {"kind": "p-silicon"}
+    materials = {LOW_DOPED: PSilicon(**own), HIGH_DOPED: kinds[HIGH_DOPED]}
+    return probe.model_copy(update={"materials": materials})
