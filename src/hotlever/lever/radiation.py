@@ -57,8 +57,9 @@ class RimRadiation:
         rim = self._rim
         T = self._base + rim.rise(x)
         of_base = np.ones_like(T)
-        for name, rise in end_rises.items():
-            T += rise * rim.end_tests[name][:, None]
+        # a rim that does not count has none
+        for name in rim.end_tests.keys() & end_rises.keys():
+            T += end_rises[name] * rim.end_tests[name][:, None]
             of_base -= rim.end_tests[name][:, None]
         by = {name: np.zeros_like(T) for name in ("T", *names)}
         heat = np.zeros_like(T)
