@@ -253,6 +253,7 @@ def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
         "sliders": sliders,
         "medium": probe.surroundings.medium,
         "gap_um": probe.surroundings.surface_gap_um,
+        "physics": dict(probe.physics),
         "reduced": _can_be_reduced(probe),
     }
 

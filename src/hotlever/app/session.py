@@ -18,6 +18,7 @@ from hotlever.app.project import Project
 from hotlever.app.workers import Heard, Worker
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import json_text, output_folder, read_json, write_text
+from hotlever.probe.physics import Physics
 
 #: Seconds after which a process is made ready for the first task: the page comes first.
 _LATER_S = 1.5
@@ -26,12 +27,16 @@ CHOICES, SCHEMA = "choices.json", 1
 #: What a measurement was made in; empty for what its file says.
 Medium = Literal["", "vacuum", "air", "unknown"]
 _MEDIUM, _GAP = "medium", "surface_gap_um"
+# Values that are changed of a probe, by name: numbers, switches and words.
+Changes = dict[str, bool | float | str | None]
 
 
-def _fit_together(changes: dict[str, float | str | None]) -> dict[str, float | str | None]:
-    """Check that only what may be a word, or nothing, is one."""
+def _fit_together(changes: Changes) -> Changes:
+    """Check that only what may be a word, a switch or nothing is one."""
     for name, value in changes.items():
-        if name == _MEDIUM:
+        if name in Physics.model_fields:
+            fits = isinstance(value, bool)
+        elif name == _MEDIUM:
             fits = value in ("vacuum", "air")
         else:
             fits = isinstance(value, float) or (value is None and name == _GAP)
@@ -61,7 +66,7 @@ class Simulate(BaseModel):
     """The page Simulate: a probe, its sliders, the bias, and the slider's highest (V)."""
 
     probe: str | None = None
-    changes: Annotated[dict[str, float | str | None], AfterValidator(_fit_together)] = {}
+    changes: Annotated[Changes, AfterValidator(_fit_together)] = {}
     bias: float = 8.0
     most: float = 12.0
     view: Literal["rest", "time"] = "rest"

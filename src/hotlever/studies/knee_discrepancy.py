@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from hotlever import spieser2017 as paper
 from hotlever.datasets import labelled
@@ -39,7 +40,7 @@ SUSPECTS = (RAMAN, IN_VACUUM, IN_AIR, TOWARDS, AWAY, RADIATION, TOGETHER)
 LAYOUT, COVARIANCE = "layout", "covariance of the fit"
 
 
-def read_by_the_line(tip_K: Array) -> Array:
+def read_by_the_line(tip_K: ArrayLike) -> Array:
     """Return what the published line reads (K) where silicon's phonons soften anharmonically.
 
     The paper calibrated the line up to 900 K; the anharmonic law has Balkanski's constants.
@@ -50,7 +51,7 @@ def read_by_the_line(tip_K: Array) -> Array:
 
 
 def suspect_lever(probe: Probe, suspect: str) -> tuple[Probe, bool]:
-    """Return a probe with what a suspect has more than the paper's model, and if a line reads it."""
+    """Return a probe with what a suspect has beyond the paper's model, and if a line reads it."""
     everything = suspect == TOGETHER
     if suspect == IN_VACUUM or everything:
         probe = probe.model_copy(update={"tip": TIP})
@@ -91,9 +92,10 @@ def carried_by(probe: Probe, suspect: str) -> tuple[float, float]:
         raise ComputationError(f"the lever ({suspect}) has no knee below {branch.hottest_K:.0f} K")
     shown = knee.tip_K
     if by_line:
-        data, shown = replace(data, tip_K=read_by_the_line(data.tip_K)), read_by_the_line(shown)
+        data = replace(data, tip_K=read_by_the_line(data.tip_K))
+        shown = float(read_by_the_line(shown))
     fitted = fit(data, probe).probe
-    return float(shown) - knee_K(probe), float(shown) - knee_K(fitted)
+    return shown - knee_K(probe), shown - knee_K(fitted)
 
 
 def knee_K(probe: Probe) -> float:
@@ -126,7 +128,7 @@ def by_layout(probe: Probe, progress: Progress | None = None) -> float:
 
 def by_covariance(result: Fit) -> float:
     """Return the standard error (K) of the knee that a fit predicts, by its covariance."""
-    errors = {name: result.parameters[name].stderr for name in result.names}
+    errors = {name: result.parameters[name].stderr or 0.0 for name in result.names}
 
     def knee(**changes: float) -> float:
         branch = Lever(result.probe.with_(**changes), COARSE).branch()

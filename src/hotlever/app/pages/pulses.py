@@ -33,7 +33,11 @@ def stem(lever: dict[str, Any]) -> str:
 
 def settings(lever: dict[str, Any]) -> dict[str, Any]:
     """Return the options of a task that say what is changed of a probe."""
-    changes = {name: "none" if value is None else value for name, value in lever["changes"].items()}
+    texts = {None: "none", True: "true", False: "false"}
+    changes = {
+        name: texts[value] if value is None or isinstance(value, bool) else value
+        for name, value in lever["changes"].items()
+    }
     medium = changes.pop("medium", None)
     return {"medium": medium, "set": [f"{name}={changes[name]}" for name in sorted(changes)]}
 

@@ -9,14 +9,17 @@ import asyncio
 import math
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from nicegui import background_tasks, ui
+from nicegui.events import ValueChangeEventArguments
 
 from hotlever.app.pages.frame import flat_button, number_shown
 from hotlever.app.pages.page import Page
 from hotlever.app.pages.plots import LivePlots
 from hotlever.errors import HotleverError
+from hotlever.probe.physics import Physics
 
 _GROUPS = {"material": "Material", "dimensions": "Dimensions", "circuit": "Circuit"}
 #: Seconds that sliders rest before the full lever is asked.
@@ -53,6 +56,7 @@ class Sliders:
         self._moved = moved
         self.free = set[str]()
         self._show_surroundings()
+        self._show_physics()
         self._show_bias()
         self._of_probe = ui.column().classes("w-full gap-1")
 
@@ -73,6 +77,19 @@ class Sliders:
                 on_change=lambda event: self._change("surface_gap_um", event.value),
             ).props("clearable placeholder=none stack-label")
             self._gap.bind_visibility_from(self._medium, "value", value="air")
+
+    def _show_physics(self) -> None:
+        changes = self._chosen["changes"]
+        self._of_file = dict.fromkeys(Physics.model_fields, False)
+        self._effects = {}
+        with ui.row().classes("items-center w-full"):
+            for effect, meaning in Physics.description().items():
+                box = ui.checkbox(effect, value=changes.get(effect, False)).tooltip(meaning)
+                self._effects[effect] = box.props("dense")
+                box.on_value_change(partial(self._switch, effect))
+
+    def _switch(self, effect: str, event: ValueChangeEventArguments[bool | None]) -> None:
+        self._change(effect, bool(event.value), self._of_file[effect])
 
     def _show_bias(self) -> None:
         with ui.column().classes("w-full gap-0") as self.of_bias:
@@ -96,6 +113,9 @@ class Sliders:
             self._medium.set_value(probe["medium"])
         if probe["gap_um"] is not None and "surface_gap_um" not in self._chosen["changes"]:
             self._gap.set_value(probe["gap_um"])
+        self._of_file = probe["physics"]
+        for effect, box in self._effects.items():
+            box.set_value(self._chosen["changes"].get(effect, self._of_file[effect]))
         self._of_probe.clear()
         with self._of_probe:
             for group, title in _GROUPS.items():

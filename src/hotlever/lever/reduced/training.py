@@ -51,9 +51,11 @@ def can_be_reduced(probe: Probe, names: Collection[str]) -> bool:
     """Return whether a reduced lever serves: of one geometry, for parameters of its materials.
 
     With dimensions among the parameters it does not, since its modes are those of one geometry, nor
-    in another circuit than the paper's.
+    in another circuit than the paper's, nor with effects beyond the paper: with these the two
+    polarities differ, and a scale of κ changes more than the power.
     """
-    return set(names) <= set(of_materials(probe)) and probe.circuit.is_plain
+    plain = probe.circuit.is_plain and not probe.physics
+    return plain and set(names) <= set(of_materials(probe))
 
 
 @one_blas_thread
@@ -82,7 +84,9 @@ def reduce(
         If the lever cannot be reduced, see `can_be_reduced`.
     """
     if not can_be_reduced(lever.probe, names):
-        raise ValueError("a reduced lever is in the paper's circuit, for materials that vary")
+        raise ValueError(
+            "a reduced lever is in the paper's circuit and physics, for materials that vary"
+        )
     from scipy.stats import qmc  # takes long, and most commands reduce nothing
 
     options, domain = options or ReductionOptions(), ParameterDomain.of(lever.probe, names)
@@ -132,7 +136,6 @@ def _file(lever: Lever, domain: ParameterDomain) -> Path | None:
     facts = {
         "shape": probe.shape.model_dump(),
         "tip": probe.tip and probe.tip.model_dump(),
-        "physics": probe.physics.effects,
         "base_temperature_K": lever.circuit.base_temperature_K,
         "gas_conductivity": probe.surroundings.gas_conductivity,
         "held": held,

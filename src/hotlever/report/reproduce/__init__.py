@@ -8,11 +8,12 @@ from hotlever.lever import Lever
 from hotlever.materials import published
 from hotlever.probe import Probe
 from hotlever.report.page import Page
-from hotlever.report.reproduce import air, inference, vacuum
+from hotlever.report.reproduce import air, discrepancy, inference, vacuum
 from hotlever.report.reproduce.findings import Findings
 from hotlever.steps import each
 from hotlever.types import Progress
 
+REMAINS = "What remains of the 50 K that the knee is off"
 NEVER_SEEN = "A lever never seen: how wrong is its calibration?"
 #: Headings and sections, in the order of the page.
 SECTIONS: dict[str, Callable[[Findings], None]] = {
@@ -29,6 +30,7 @@ SECTIONS: dict[str, Callable[[Findings], None]] = {
     "Characteristics in air (Figs. 9 and 10)": air.characteristics_section,
     "Is air one factor of the power? (Fig. 10b)": air.scale_section,
     "Where the heat goes": air.map_section,
+    REMAINS: discrepancy.short_section,
     NEVER_SEEN: inference.few_levers_section,
     "Balances": vacuum.balance_section,
 }
@@ -37,6 +39,7 @@ LONG_SECTIONS: dict[str, Callable[[Findings], None]] = {
     "k by size, gap and pressure": air.geometry_section,
     "The missing tip": air.tip_section,
     "Mesh": vacuum.mesh_section,
+    REMAINS: discrepancy.discrepancy_section,
     NEVER_SEEN: inference.many_levers_section,
 }
 

@@ -41,7 +41,7 @@ _TOO_FEW = 0.85
 def fit_section(page: Findings) -> None:
     """Option III on the virtual lab's first lever."""
     page.say("fit")
-    result = fit(_example("lever-a.csv"), page.lever.probe)
+    result = fit(example("lever-a.csv"), page.lever.probe)
     add_fit(page, result)
     page.claim(
         "cost_of_a_fit",
@@ -56,7 +56,7 @@ def data_section(page: Findings) -> None:
     """Options I to III on both levers of the virtual lab (Figs. 3 and 4, Table I)."""
     page.say("options")
     for name in ("lever-a.csv", "lever-b.csv"):
-        _compare_options(page, _example(name))
+        _compare_options(page, example(name))
 
 
 def _compare_options(page: Findings, measurement: Measurement) -> None:
@@ -137,7 +137,7 @@ def _hot_error(result: Fit) -> float:
     return float(np.nanmax(np.abs(measured - result.band.tip_K.values)[measured > 850]))
 
 
-def _example(name: str) -> Measurement:
+def example(name: str) -> Measurement:
     with as_file(files("hotlever") / "examples" / name) as path:
         return read_measurement(path)
 

@@ -1,0 +1,61 @@
+"""What remains of the 50 K that the knee is off: the suspects, each computed."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from hotlever import figures
+from hotlever.estimation import fit
+from hotlever.report.reproduce.findings import Findings
+from hotlever.report.reproduce.inference import example
+from hotlever.studies.knee_discrepancy import IN_AIR, TOGETHER, knee_discrepancy
+
+#: Of a cell whose suspect does not count in the medium.
+_NOTHING = "–"
+
+
+def short_section(page: Findings) -> None:
+    """The suspects in vacuum, without the uncertain layout."""
+    _compare(page, ("vacuum",), layout=False)
+
+
+def discrepancy_section(page: Findings) -> None:
+    """The suspects in vacuum and in air."""
+    studies = _compare(page, ("vacuum", "air"), layout=True)
+    gap, carried = studies["air"].discrepancy_K, studies["air"].shift_K.sel(suspect=IN_AIR).item()
+    page.claim("tip_in_air", holds=carried > 0.75 * gap, gap=gap, carried=carried)
+
+
+def _compare(page: Findings, media: tuple[str, ...], *, layout: bool) -> dict[str, xr.Dataset]:
+    noisy = fit(example("lever-a.csv"), page.lever.probe)
+    studies = {
+        medium: knee_discrepancy(
+            page.lever.probe.in_medium(medium), noisy, layout=layout, progress=page.progress
+        )
+        for medium in media
+    }
+    page.draw("knee_discrepancy", figures.knee_discrepancy(studies))
+    rows = []
+    for suspect in studies[media[0]].suspect.values:
+        row = [str(suspect)]
+        for study in studies.values():
+            row += map(_shift, study[["moved_K", "shift_K"]].sel(suspect=suspect).values())
+        rows.append(row)
+    for name in studies[media[0]].uncertainty.values:
+        row = [str(name)]
+        for study in studies.values():
+            row += ["", f"± {study.stderr_K.sel(uncertainty=name).item():.1f}"]
+        rows.append(row)
+    left = [f"{study.left_K:.0f} ± {study.total_stderr_K:.0f}" for study in studies.values()]
+    rows.append(["what remains", *(cell for value in left for cell in ("", value))])
+    headings = [f"{way}, in {medium} (K)" for medium in media for way in ("not fitted", "fitted")]
+    gap = studies["vacuum"].discrepancy_K
+    page.tabulate("knee_discrepancy", ["suspect", *headings], rows, gap=gap)
+    together = studies["vacuum"].shift_K.sel(suspect=TOGETHER).item()
+    page.say("knee_discrepancy", gap=gap, together=together, left=studies["vacuum"].left_K)
+    return studies
+
+
+def _shift(value: xr.DataArray) -> str:
+    return _NOTHING if np.isnan(value.item()) else f"{value.item():+.1f}"
