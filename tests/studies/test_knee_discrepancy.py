@@ -84,7 +84,7 @@ def test_a_suspect_that_does_not_count_is_left_out_of_the_figure(tmp_path, monke
     monkeypatch.setattr(knee_discrepancy, "carried_by", lambda probe, suspect: carried[suspect])
     monkeypatch.setattr(knee_discrepancy, "by_covariance", lambda result: 3.0)
     monkeypatch.setattr(knee_discrepancy, "by_layout", lambda probe, progress: 4.0)
-    study = knee_discrepancy.knee_discrepancy(Probe.reference(), None)
+    study = knee_discrepancy.compare_suspects(Probe.reference(), None)
     assert np.isnan(study.shift_K.sel(suspect=IN_AIR))
     assert study.shift_K.sel(suspect=RAMAN).item() == 2.0
     assert study.left_K == pytest.approx(study.discrepancy_K - carried[TOGETHER][1])

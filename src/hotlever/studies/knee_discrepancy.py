@@ -142,7 +142,7 @@ def by_covariance(result: Fit) -> float:
     return float(np.sqrt(np.array(slopes) @ result.correlation @ slopes))
 
 
-def knee_discrepancy(
+def compare_suspects(
     probe: Probe, example: Fit, *, layout: bool = True, progress: Progress | None = None
 ) -> xr.Dataset:
     """Compute what each suspect carries of the knee's discrepancy, in one medium.

@@ -9,7 +9,7 @@ from hotlever import figures
 from hotlever.estimation import fit
 from hotlever.report.reproduce.findings import Findings
 from hotlever.report.reproduce.inference import example
-from hotlever.studies.knee_discrepancy import IN_AIR, TOGETHER, knee_discrepancy
+from hotlever.studies.knee_discrepancy import IN_AIR, TOGETHER, compare_suspects
 
 #: Of a cell whose suspect does not count in the medium.
 _NOTHING = "–"
@@ -30,7 +30,7 @@ def discrepancy_section(page: Findings) -> None:
 def _compare(page: Findings, media: tuple[str, ...], *, layout: bool) -> dict[str, xr.Dataset]:
     noisy = fit(example("lever-a.csv"), page.lever.probe)
     studies = {
-        medium: knee_discrepancy(
+        medium: compare_suspects(
             page.lever.probe.in_medium(medium), noisy, layout=layout, progress=page.progress
         )
         for medium in media
