@@ -12,6 +12,7 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
+from hotlever.materials import radiation
 from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, nuisances
 from hotlever.probe.tip import Tip
@@ -22,6 +23,8 @@ PROBES = {
     "u-shape": Probe.u_shape(),
     "with a tip": Probe.reference().model_copy(update={"tip": Tip(height_um=0.7)}),
 }
+
+RADIATING = ["emissivity", "base_temperature_K", *dimensions_of(PROBES["with a tip"])]
 
 
 def orders(lever, name):
@@ -49,6 +52,16 @@ def orders(lever, name):
 )
 def test_derivatives_by_dimensions_have_taylor_order_two(kind, name):
     found, rest = orders(Lever(PROBES[kind], COARSE), name)
+    assert np.all(found > 1.6)
+    assert rest.max() < 2e-3
+
+
+@pytest.mark.parametrize("name", RADIATING)
+def test_so_have_those_of_a_lever_that_radiates_most_of_its_heat(name, monkeypatch):
+    """From faces and edges, whose lengths and heights change."""
+    monkeypatch.setattr(radiation, "STEFAN_BOLTZMANN", 1000.0 * radiation.STEFAN_BOLTZMANN)
+    lever = Lever(PROBES["with a tip"].with_physics(("radiation",)), COARSE)
+    found, rest = orders(lever, name)
     assert np.all(found > 1.6)
     assert rest.max() < 2e-3
 

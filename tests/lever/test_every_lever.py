@@ -47,16 +47,21 @@ class One:
     @property
     def probe(self) -> Probe:
         """Its probe, or one that differs from it in nothing that matters, with option III."""
-        probe = getattr(self.lever, "probe", Probe.reference())
+        reduced = isinstance(self.lever, ReducedLever)
+        probe = self.lever.drawn if reduced else self.lever.probe
         material = MATERIAL.model_copy(update={"scattering_exponent": 0.3})
         return probe.model_copy(update={"material": material})
 
     @property
     def names(self) -> tuple[str, ...]:
         """The parameters of its materials."""
-        named = self.probe.materials.items()
+        if isinstance(self.lever, ReducedLever):
+            return self.lever.names
+        named, effects = self.probe.materials.items(), ()
         own = [f"{name}.{one}" for name, kind in named for one in kind.usual]
-        effects = ("n_hd", "scattering_exponent", "emissivity") if self.probe.physics else ()
+        if self.probe.physics:
+            effects = ("n_hd", "scattering_exponent", "emissivity")
+            own += [f"{name}.emissivity" for name in self.probe.materials]
         return tuple(own or [*PARAMETERS, *effects])
 
     @property
@@ -86,6 +91,13 @@ KINDS: dict[str, Callable[[pytest.FixtureRequest], One]] = {
     "all effects, in air": lambda _: One(Lever(ALL.in_medium("air"), COARSE), 9.5),
     "boron-doped, all effects": lambda _: One(
         Lever(p_type_probe().with_physics(Physics.model_fields), COARSE), 9.5
+    ),
+    "all effects, solid": lambda _: One(SolidLever(ALL, SOLID), 4.0),
+    "all effects, reduced": lambda _: One(
+        cached_reduction(Lever(ALL, COARSE), None, ("emissivity",)), 9.5
+    ),
+    "metal film, all effects": lambda _: One(
+        Lever(metal_film_probe().with_physics(Physics.model_fields), COARSE), 4.0
     ),
     "boron-doped": lambda _: One(Lever(p_type_probe(), COARSE), 9.5),
     "metal film": lambda _: One(Lever(metal_film_probe(), COARSE), 4.0),
