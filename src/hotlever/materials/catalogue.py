@@ -55,7 +55,7 @@ def _laws(name: str, example: Kind) -> list[Law]:
     """Return the laws of a kind, those of its options among them."""
     options = {"metal-film": {"kappa": 0.5}, "dielectric": {}}.get(name, {"c_kappa": "thickness"})
     other = example.model_copy(update=options)
-    return list(dict.fromkeys((*example.laws, *other.laws)))
+    return list(dict.fromkeys((*example.laws, *other.laws, *example.effects)))
 
 
 def curves() -> dict[str, tuple[Array, Array, Array | None]]:

@@ -98,6 +98,11 @@ class Kind(Record):
         """Of thermal and, if it conducts, electrical conductivity."""
 
     @property
+    def effects(self) -> tuple[Law, ...]:
+        """Laws of what counts beyond the paper's physics."""
+        return ()
+
+    @property
     def highest_K(self) -> float:
         """Temperature (K) at which it melts or its laws end."""
         return MELTING_POINT
@@ -227,6 +232,11 @@ class LowDopedSilicon(Silicon):
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
         return type(self).conductivity(T, n, self.p, self.impurity_exponent)
 
+    @property
+    def effects(self) -> tuple[Law, ...]:
+        """Of thermoelectricity."""
+        return (type(self).seebeck,)
+
     def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
         """Return β and γ, see `Kind.thermoelectric`."""
         exponents = self.p, self.impurity_exponent, self.scattering_exponent
@@ -289,6 +299,11 @@ class HighDopedSilicon(Silicon):
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
         return conductivity_high_doped(T, self.a0, self.a1)
+
+    @property
+    def effects(self) -> tuple[Law, ...]:
+        """Of thermoelectricity."""
+        return (thermoelectric_high_doped,)
 
     def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
         """Return β and γ, see `Kind.thermoelectric`."""

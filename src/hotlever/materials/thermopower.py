@@ -224,7 +224,7 @@ _SOURCE = (
 def thermoelectric_n_silicon(
     T: ArrayLike, n: ArrayLike, p: float, impurity_exponent: float, scattering_exponent: float
 ) -> Evaluated:
-    """β (A cm⁻¹ K⁻¹) and γ (W cm⁻¹ K⁻²) of n-doped silicon, (2, ...); see the module's text.
+    """Thermoelectricity of n-doped silicon, β (A cm⁻¹ K⁻¹) and γ (W cm⁻¹ K⁻²), (2, ...).
 
     From γ the bipolar part of pure silicon is taken off: κ of Eq. 4 was measured on pure silicon
     and has it. The phonons' drag on the carriers is left out; it adds to |S| of lightly doped
@@ -249,7 +249,7 @@ def thermoelectric_n_silicon(
 def thermoelectric_p_silicon(
     T: ArrayLike, n: ArrayLike, p: float, impurity_exponent: float, scattering_exponent: float
 ) -> Evaluated:
-    """β and γ of silicon doped with boron; see `thermoelectric_n_silicon`."""
+    """Thermoelectricity of p-doped silicon, β and γ; see `thermoelectric_n_silicon`."""
 
     def carried(T: Array, n: ArrayLike) -> list[Carried]:
         return carried_in_p_silicon(T, n, p, impurity_exponent)
@@ -261,7 +261,7 @@ def thermoelectric_p_silicon(
 def thermoelectric_high_doped(
     T: ArrayLike, a0: float, a1: float, n_hd: float, scattering_exponent: float, carrier: Carrier
 ) -> Evaluated:
-    """β and γ of high-doped silicon, whose carriers are those of its dopant alone."""
+    """Thermoelectricity of high-doped silicon, whose carriers are those of its dopant alone."""
     T = np.asarray(T, dtype=float)
     sigma, d_sigma = conductivity_high_doped.formula(T, a0, a1)
     carriers = np.full_like(T, n_hd), {"n_hd": np.ones_like(T)}
