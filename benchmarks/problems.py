@@ -18,13 +18,17 @@ import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.materials import Kind, full_name
+from hotlever.materials.kinds import PSilicon, Silicon
 from hotlever.probe import Probe, ProbeMesh
 from hotlever.probe.layout import BorderTaper, Region
 from hotlever.spieser2017 import RAMP
+from seebeck import reduced_seebeck_polynomial
 
 BIAS = RAMP
 EXAMPLE = Path(__file__).parents[1] / "src" / "hotlever" / "examples" / "lever-a.csv"
 PEER = Path(__file__).parent / "fenics" / "peer.py"
+#: Whether the peer's levers radiate from their edges too, where they radiate.
+EDGES_RADIATE = False
 DEBIAN_PYTHON = "/usr/bin/python3"
 
 
@@ -53,6 +57,7 @@ def peer_problem(
             name: {
                 "kind": kinds[name].kind,
                 "parameters": {own: full_name(name, own) for own in own_values},
+                **(_thermoelectric(kinds, name) if probe.physics.thermoelectric else {}),
             }
             for name, own_values in named.items()
         },
@@ -70,6 +75,8 @@ def peer_problem(
             name: getattr(probe.circuit, name)
             for name in ("series_resistance_ohm", "base_temperature_K", "swept")
         },
+        "physics": probe.physics.effects,
+        "edges_radiate": EDGES_RADIATE,
         "tip_um": layout.tip,
         "bias_V": list(bias),
         "quadrature_degree": quadrature,
@@ -97,6 +104,21 @@ def _stack(region: Region, thickness_um: float) -> dict[str, Any]:
     if region.taper is not None:
         films[0] |= {"dopant_from": region.dopant_from}
     return {"films": films}
+
+
+def _thermoelectric(kinds: dict[str, Kind], name: str) -> dict[str, Any]:
+    """Return what the peer takes as given of the Seebeck coefficient of one of the materials.
+
+    The Fermi integrals, and that high-doped silicon has the carriers of the silicon that it dopes.
+    """
+    kind = kinds[name]
+    if not isinstance(kind, Silicon):
+        return {}
+    holes = any(isinstance(other, PSilicon) for other in kinds.values())
+    return {
+        "sign": 1 if holes else -1,
+        "reduced_seebeck": reduced_seebeck_polynomial(kind.scattering_exponent),
+    }
 
 
 def _parameters(kind: Kind) -> dict[str, float]:

@@ -15,6 +15,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.polynomial.chebyshev import chebpts1
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
@@ -26,6 +29,10 @@ BOLTZMANN_EV, CHARGE_C = 8.617333262e-5, 1.6e-19
 PHONON_EXPONENT = {"n-silicon": 2.65, "p-silicon": 2.23}
 #: How far, in %, a measurement may be from what is computed to agree.
 AGREES = 15.0
+
+
+#: Carriers over states up to which there is a polynomial, and its degree: an error of 1e-10.
+DENSEST, DEGREE = 30.0, 18
 
 
 class Band(NamedTuple):
@@ -69,6 +76,27 @@ def reduced_seebeck(ratio: float, r: float) -> float:
     eta = fermi_level(ratio)
     mean = (r + 2.5) * fermi_integral(r + 1.5, eta) / fermi_integral(r + 0.5, eta)
     return mean - eta
+
+
+@cache
+def reduced_seebeck_polynomial(r: float) -> list[float]:
+    """Return the coefficients, from the constant on, of |S| e/k_B + ln(x) in ln(1 + x).
+
+    x is carriers over states, up to `DENSEST`.
+
+    Raises
+    ------
+    ValueError
+        If the polynomial is not as good as it should be.
+    """
+    end = math.log1p(DENSEST)
+    w = 0.5 * end * (chebpts1(3 * DEGREE) + 1.0)
+    ratios = np.expm1(w).tolist()
+    values = [reduced_seebeck(ratio, r) + math.log(ratio) for ratio in ratios]
+    polynomial = Polynomial.fit(w, values, DEGREE, domain=[0.0, end], window=[0.0, end])
+    if np.abs(polynomial(w) - values).max() > 1e-10:
+        raise ValueError(f"Fermi integrals of r = {r:g} are no polynomial of degree {DEGREE}")
+    return polynomial.coef.tolist()
 
 
 def bands(T: float, n: float, kind: str = "n-silicon", p: float | None = None) -> list[Band]:

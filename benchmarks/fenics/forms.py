@@ -2,7 +2,11 @@
 
 import dolfin as df
 import numpy as np
+import ufl
+from beyond import black_emission, thermoelectric
 from laws import LAWS, doping_in, enthalpy
+
+NOTHING = ufl.zero(2)  # of a vector
 
 
 def dolfin_mesh(points, triangles):
@@ -50,6 +54,43 @@ def conducts(stack, materials):
     return any(LAWS[materials[film["material"]]["kind"]][1] for film in stack["films"])
 
 
+def free_edges(mesh, problem):
+    """Return an edge function: the number of the stack on edges that are no terminal, 0 inside.
+
+    Numbers are one more than those of the stacks.
+    """
+    terminals = edge_markers(mesh, problem["terminals"])
+    markers = df.MeshFunction("size_t", mesh, 1, 0)
+    mesh.init(1, 2)
+    for edge in df.facets(mesh):
+        if edge.exterior() and not terminals[edge]:
+            markers[edge] = 1 + problem["stack"][edge.entities(2)[0]]
+    return markers
+
+
+def film_forms(film, problem, materials, state, position):
+    """Return kappa of a film, the current turned round, and the heat that it carries likewise.
+
+    All are times the thickness, and vectors but kappa.
+    """
+    temperature, voltage = state
+    material, stated = materials[film["material"]], problem["materials"][film["material"]]
+    thickness = df.Constant(film["thickness_um"])
+    heat, charge = LAWS[stated["kind"]]
+    kappa = heat(temperature, material)
+    if charge is None:
+        return thickness * kappa, NOTHING, NOTHING
+    doping = material.get("n_d")
+    if "taper" in film:
+        doping = doping_in(position, film["taper"], material, materials[film["dopant_from"]])
+    sigma = thickness * charge(temperature, material, doping)
+    if "thermoelectric" not in problem["physics"]:
+        return thickness * kappa, sigma * df.grad(voltage), NOTHING
+    seebeck, pairs = thermoelectric(stated, temperature, material, doping)
+    current = sigma * (df.grad(voltage) + seebeck * df.grad(temperature))
+    return thickness * (kappa + pairs), current, seebeck * temperature * current
+
+
 def coupled_forms(space, state, cells, problem, parameters, past=()):
     """Return the residual [mW and mA] of both equations and its exact derivative.
 
@@ -59,42 +100,42 @@ def coupled_forms(space, state, cells, problem, parameters, past=()):
     present and the last two states, the state and its weight [1/us] in the derivative of the
     enthalpy, which is that of silicon.
     """
-    temperature, voltage = df.split(state)
+    temperature, voltage = fields = df.split(state)
     temperature_test, voltage_test = df.TestFunctions(space)
-    dx = df.Measure(
-        "dx",
-        domain=space.mesh(),
-        subdomain_data=cells,
-        metadata={"quadrature_degree": problem["quadrature_degree"]},
-    )
-    position = df.SpatialCoordinate(space.mesh())
+    degree = {"quadrature_degree": problem["quadrature_degree"]}
+    mesh, radiates = space.mesh(), "radiation" in problem["physics"]
+    dx = df.Measure("dx", domain=mesh, subdomain_data=cells, metadata=degree)
+    if radiates:
+        edges = free_edges(mesh, problem)
+        ds = df.Measure("ds", domain=mesh, subdomain_data=edges, metadata=degree)
+    position = df.SpatialCoordinate(mesh)
     materials = {
         name: {own: parameters[full] for own, full in material["parameters"].items()}
         for name, material in problem["materials"].items()
     }
     residual = 0
     for tag, stack in enumerate(problem["stacks"]):
-        kappa, sigma = 0, 0
-        for film in stack["films"]:
-            material, thickness = materials[film["material"]], df.Constant(film["thickness_um"])
-            heat, charge = LAWS[problem["materials"][film["material"]]["kind"]]
-            kappa += thickness * heat(temperature, material)
-            if charge is None:
-                continue
-            doping = material.get("n_d")
-            if "taper" in film:
-                beside = materials[film["dopant_from"]]
-                doping = doping_in(position, film["taper"], material, beside)
-            sigma += thickness * charge(temperature, material, doping)
-        balance = kappa * df.inner(df.grad(temperature), df.grad(temperature_test))
-        if conducts(stack, problem["materials"]):
-            current = sigma * df.grad(voltage)
-            balance += df.inner(current, df.grad(voltage_test))
-            balance -= df.inner(current, df.grad(voltage)) * temperature_test
+        films = [
+            film_forms(film, problem, materials, fields, position) for film in stack["films"]
+        ]
+        kappa, current, carried = (sum(terms[1:], terms[0]) for terms in zip(*films, strict=True))
+        heat = kappa * df.grad(temperature) + carried
+        balance = df.inner(heat, df.grad(temperature_test))
+        balance += df.inner(current, df.grad(voltage_test))
+        balance -= df.inner(current, df.grad(voltage)) * temperature_test
         for known, weight in past:
             held = sum(film["thickness_um"] for film in stack["films"])
             balance += weight * held * enthalpy(df.split(known)[0]) * temperature_test
         residual += balance * dx(tag)
+        if radiates:
+            emissivities = [materials[film["material"]]["emissivity"] for film in stack["films"]]
+            thicknesses = [film["thickness_um"] for film in stack["films"]]
+            black = black_emission(temperature, problem["circuit"]["base_temperature_K"])
+            faces = emissivities[0] + emissivities[-1]
+            residual += faces * black * temperature_test * dx(tag)
+            if problem["edges_radiate"]:
+                rim = sum(e * t for e, t in zip(emissivities, thicknesses, strict=True))
+                residual += rim * black * temperature_test * ds(1 + tag)
     return residual, df.derivative(residual, state)
 
 

@@ -64,12 +64,16 @@ def high_doped_charge(temperature, material, doping):
     return MA_PER_V_UM_FROM_S_PER_CM / resistivity_ohm_cm
 
 
+def states(temperature):
+    """Return the effective density of states of a band, Eq. 7."""
+    return 2.70e19 * (temperature / REFERENCE_TEMPERATURE_K) ** 1.5
+
+
 def carriers(temperature, doping, narrowing_ev):
     """Return majority and minority carriers, Eqs. 6 and 7."""
-    relative = temperature / REFERENCE_TEMPERATURE_K
     band_gap_ev = 1.17 - 4.73e-4 * temperature**2 / (temperature + 636.0) - narrowing_ev
-    intrinsic = (
-        2.70e19 * relative**1.5 * ufl.exp(-band_gap_ev / (2.0 * BOLTZMANN_EV_PER_K * temperature))
+    intrinsic = states(temperature) * ufl.exp(
+        -band_gap_ev / (2.0 * BOLTZMANN_EV_PER_K * temperature)
     )
     majority = (doping + ufl.sqrt(doping**2 + 4.0 * intrinsic**2)) / 2.0
     return majority, intrinsic**2 / majority
@@ -92,20 +96,24 @@ def by_exponent(relative, material):
     return 1.0 if exponent is None else relative**exponent
 
 
-def n_silicon_charge(temperature, material, doping):
-    """Return sigma_ld of silicon doped with phosphorus, Eq. 5."""
+def n_silicon_carried(temperature, material, doping):
+    """Return the carriers of silicon doped with phosphorus, Eqs. 5 to 10.
+
+    Of each kind the sign of its charge, its density, and its conductivity [S/cm].
+    """
     narrowing_ev = 0.025 * (doping / 1e18) ** (1.0 / 3.0)
     electrons, holes = carriers(temperature, doping, narrowing_ev)
     ratios = IMPURITY_MOBILITY_RATIO, PHONON_MOBILITY_RATIO
-    s_per_cm = ELEMENTARY_CHARGE_C * (
-        electrons * mobility_beside_phosphorus(temperature, material, doping)
-        + holes * mobility_beside_phosphorus(temperature, material, doping, *ratios)
-    )
-    return MA_PER_V_UM_FROM_S_PER_CM * s_per_cm
+    of_electrons = electrons * mobility_beside_phosphorus(temperature, material, doping)
+    of_holes = holes * mobility_beside_phosphorus(temperature, material, doping, *ratios)
+    return [
+        (-1, electrons, ELEMENTARY_CHARGE_C * of_electrons),
+        (+1, holes, ELEMENTARY_CHARGE_C * of_holes),
+    ]
 
 
-def p_silicon_charge(temperature, material, doping):
-    """Return sigma of silicon doped with boron.
+def p_silicon_carried(temperature, material, doping):
+    """Return the carriers of silicon doped with boron, as of that with phosphorus.
 
     Holes: the resistivity at 23 C by the boron density N of Thurber et al., J. Electrochem. Soc.
     127, 2291 (1980), as in ASTM F723,
@@ -127,7 +135,21 @@ def p_silicon_charge(temperature, material, doping):
     # the sum is a resistivity where all carriers are those of the boron
     of_holes = holes / doping / (by_phonons + by_impurities)
     of_electrons = electrons * mobility_beside_phosphorus(temperature, material, doping)
-    return MA_PER_V_UM_FROM_S_PER_CM * (of_holes + ELEMENTARY_CHARGE_C * of_electrons)
+    return [(+1, holes, of_holes), (-1, electrons, ELEMENTARY_CHARGE_C * of_electrons)]
+
+
+# What carries a current in low-doped silicon of each kind.
+CARRIED = {"n-silicon": n_silicon_carried, "p-silicon": p_silicon_carried}
+
+
+def low_doped_charge(kind):
+    """Return the electrical conductivity of low-doped silicon of a kind, Eq. 5, as a function."""
+
+    def charge(temperature, material, doping):
+        carried = CARRIED[kind](temperature, material, doping)
+        return MA_PER_V_UM_FROM_S_PER_CM * sum(s_per_cm for _, _, s_per_cm in carried)
+
+    return charge
 
 
 # --- Films ----------------------------------------------------------------------------------
@@ -160,8 +182,8 @@ def dielectric_heat(temperature, material):
 
 # Thermal and electrical conductivity of each kind; None where it does not conduct.
 LAWS = {
-    "n-silicon": (silicon_heat, n_silicon_charge),
-    "p-silicon": (silicon_heat, p_silicon_charge),
+    "n-silicon": (silicon_heat, low_doped_charge("n-silicon")),
+    "p-silicon": (silicon_heat, low_doped_charge("p-silicon")),
     "high-doped-silicon": (silicon_heat, high_doped_charge),
     "metal-film": (metal_heat, metal_charge),
     "dielectric": (dielectric_heat, None),
