@@ -115,9 +115,7 @@ def coupled_forms(space, state, cells, problem, parameters, past=()):
     }
     residual = 0
     for tag, stack in enumerate(problem["stacks"]):
-        films = [
-            film_forms(film, problem, materials, fields, position) for film in stack["films"]
-        ]
+        films = [film_forms(film, problem, materials, fields, position) for film in stack["films"]]
         kappa, current, carried = (sum(terms[1:], terms[0]) for terms in zip(*films, strict=True))
         heat = kappa * df.grad(temperature) + carried
         balance = df.inner(heat, df.grad(temperature_test))
