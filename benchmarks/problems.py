@@ -27,8 +27,6 @@ from seebeck import reduced_seebeck_polynomial
 BIAS = RAMP
 EXAMPLE = Path(__file__).parents[1] / "src" / "hotlever" / "examples" / "lever-a.csv"
 PEER = Path(__file__).parent / "fenics" / "peer.py"
-#: Whether the peer's levers radiate from their edges too, where they radiate.
-EDGES_RADIATE = False
 DEBIAN_PYTHON = "/usr/bin/python3"
 
 
@@ -76,7 +74,6 @@ def peer_problem(
             for name in ("series_resistance_ohm", "base_temperature_K", "swept")
         },
         "physics": probe.physics.effects,
-        "edges_radiate": EDGES_RADIATE,
         "tip_um": layout.tip,
         "bias_V": list(bias),
         "quadrature_degree": quadrature,

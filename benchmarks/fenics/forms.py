@@ -121,19 +121,16 @@ def coupled_forms(space, state, cells, problem, parameters, past=()):
         balance = df.inner(heat, df.grad(temperature_test))
         balance += df.inner(current, df.grad(voltage_test))
         balance -= df.inner(current, df.grad(voltage)) * temperature_test
+        thicknesses = [film["thickness_um"] for film in stack["films"]]
         for known, weight in past:
-            held = sum(film["thickness_um"] for film in stack["films"])
-            balance += weight * held * enthalpy(df.split(known)[0]) * temperature_test
+            balance += weight * sum(thicknesses) * enthalpy(df.split(known)[0]) * temperature_test
         residual += balance * dx(tag)
         if radiates:
-            emissivities = [materials[film["material"]]["emissivity"] for film in stack["films"]]
-            thicknesses = [film["thickness_um"] for film in stack["films"]]
             black = black_emission(temperature, problem["circuit"]["base_temperature_K"])
-            faces = emissivities[0] + emissivities[-1]
-            residual += faces * black * temperature_test * dx(tag)
-            if problem["edges_radiate"]:
-                rim = sum(e * t for e, t in zip(emissivities, thicknesses, strict=True))
-                residual += rim * black * temperature_test * ds(1 + tag)
+            grey = [materials[film["material"]]["emissivity"] for film in stack["films"]]
+            edge = sum(e * t for e, t in zip(grey, thicknesses, strict=True))
+            residual += (grey[0] + grey[-1]) * black * temperature_test * dx(tag)
+            residual += edge * black * temperature_test * ds(1 + tag)
     return residual, df.derivative(residual, state)
 
 

@@ -10,7 +10,13 @@ Solves, on a lever of films that lie on one another,
 
     -div(K(T) grad T) = S(x, T) |grad V|^2,      div(S(x, T) grad V) = 0,
 
-where K and S are the sums of thickness times conductivity (laws.py).  T is the base temperature on
+where K and S are the sums of thickness times conductivity (laws.py); with thermoelectricity and
+radiation (beyond.py), of films with Seebeck coefficients A,
+
+    -div(K grad T + sum(A T I)) = I.grad V - e (T^4 - T_0^4),      div(I) = 0,
+
+with I the sum of S (grad V + A grad T), the current turned round, and heat that leaves free edges
+as well.  T is the base temperature on
 every terminal, or what that terminal says; V = 0 at ground; no current passes sense contacts; and
 the contact of each supply is an equipotential at an unknown V, fixed by what is behind it:
 (V_b - V) / R_s = I, or a given current.
