@@ -120,6 +120,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "best_k": ("1", "the one factor that leaves the smallest error"),
     "best_error_K": ("K", "largest error that the best factor leaves"),
     "unevenness": ("1", "growth of k − 1 from cold to hot"),
+    "gap_um": ("µm", "gap between a lever and a surface below it"),
     "loss": ("κ r ΔT", "heat lost by a disc between two planes"),
     "near": ("κ r ΔT", "the same for planes much nearer than the radius"),
     "far": ("κ r ΔT", "the same for planes far away"),
@@ -146,6 +147,19 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "rms_current_mA": ("mA", "root mean square of the current's residuals"),
     "rms_reader_V": ("V", "root mean square of the reader voltage's residuals"),
     "rms_tip_K": ("K", "root mean square of the tip temperature's residuals"),
+    # T(P) above the knee
+    "slope_K_per_mW": ("K/mW", "slope of a straight line"),
+    "offset_K": ("K", "rise where a straight line has no power"),
+    "straight_K": ("K", "how far a straight line is off"),
+    "proportional_K": ("K", "how far a line through the base temperature is off"),
+    "reach_K": ("K", "how far above the knee a straight line holds"),
+    "slope_ratio": ("1", "slope of T(P) at the end over that at the knee"),
+    "kappa_ratio": ("1", "κ of silicon at the end over that at the knee"),
+    "resistance_K_per_mW": ("K/mW", "thermal resistance of heater and legs, from their squares"),
+    "knee_share": ("1", "share of the power in the heater at the knee"),
+    "end_share": ("1", "share of the power in the heater at the end"),
+    # twins of one material
+    "true_value": ("of the parameter", "value of the lever that was measured"),
     # simulation-based calibration
     "off_K": ("K", "tip temperature as calibrated less the true one"),
     "largest_K": ("K", "largest error of the tip temperature"),

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 import xarray as xr
 from scipy.optimize import minimize_scalar
 
 from hotlever.datasets import labelled
 from hotlever.lever import Branch, Lever
+from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
+from hotlever.steps import each
+from hotlever.types import Progress
 
 #: Tip temperatures (K) at which k is compared.
 COLD, HOT = 330.0, 1006.0
 #: Tip temperatures at which k is found.
 _POINTS = 120
+#: Gaps (µm) between a lever and a surface below it, the last of which is none.
+GAPS_UM = (0.5, 1.0, 2.0, 5.0, 10.0, 50.0, np.inf)
 
 
 def find_scale_factor(vacuum: Branch, air: Branch, hottest_K: float = HOT) -> xr.Dataset:
@@ -56,7 +63,7 @@ def unevenness(factor: xr.Dataset) -> float:
 
 
 def surroundings_study(probe: Probe) -> xr.Dataset:
-    """Return k for other sizes of a lever, gaps to a surface and pressures of the air.
+    """Return k for other sizes of a lever and pressures of the air.
 
     Returns
     -------
@@ -68,17 +75,41 @@ def surroundings_study(probe: Probe) -> xr.Dataset:
         "all sizes × 0.5": _resized(probe, 0.5),
         "all sizes × 2": _resized(probe, 2.0),
     }
-    for gap in (10.0, 2.0, 0.5):
-        cases[f"surface {gap:g} µm below"] = probe.with_(surface_gap_um=gap)
     for pressure in (100.0, 10.0):
         thin = probe.with_(accommodation=0.9, pressure_mbar=pressure)
         cases[f"{pressure:g} mbar, accommodation 0.9"] = thin
+    return _scale_factors(cases, "case")
+
+
+def one_sided_study(
+    probe: Probe, gaps_um: Sequence[float] = GAPS_UM, progress: Progress | None = None
+) -> xr.Dataset:
+    """Return k with a cold surface below a lever, by the gap between them.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``k``, ``best_k``, ``best_error_K`` and ``unevenness`` on the dimension ``gap_um``;
+        infinite in free space.
+    """
+    cases = {gap: probe.with_(surface_gap_um=gap) if np.isfinite(gap) else probe for gap in gaps_um}
+    return _scale_factors(cases, "gap_um", progress)
+
+
+def _scale_factors(
+    cases: Mapping[str, Probe] | Mapping[float, Probe],
+    dimension: str,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Return k of some levers; that on coarse meshes is within 2e-3 of that on usual ones."""
     factors = []
-    for changed in cases.values():
-        vacuum, air = (Lever(changed.in_medium(medium)).branch() for medium in ("vacuum", "air"))
-        factors.append(find_scale_factor(vacuum, air))
-    data = xr.concat(factors, "case", combine_attrs="override").assign_coords(case=list(cases))
-    return data.assign(unevenness=("case", [unevenness(factor) for factor in factors]))
+    for probe in each(list(cases.values()), progress):
+        lever = Lever(probe.in_medium("vacuum"), COARSE)
+        factors.append(find_scale_factor(lever.branch(), lever.in_medium("air").branch()))
+    data = xr.concat(factors, dimension, combine_attrs="override")
+    return data.assign_coords({dimension: list(cases)}).assign(
+        unevenness=(dimension, [unevenness(factor) for factor in factors])
+    )
 
 
 def _resized(probe: Probe, factor: float) -> Probe:

@@ -99,22 +99,31 @@ def draw(
     Levers of even `number` have three legs, the others are U-shaped.
     """
     nominal = (Probe.reference() if number % 2 == 0 else Probe.u_shape()).in_medium(medium)
-    values = {
-        name: prior.at(float(rng.standard_normal()))
-        for name, prior in default_priors(nominal).items()
-        if name not in ("series_resistance_ohm", "impurity_exponent")
-    }
+    values = values_from_priors(nominal, rng)
     if "drawing" not in departures:
         values = {name: values[name] for name in values if name not in nominal.shape.dimensions()}
-    true = nominal.with_(**values)
-    height = float(rng.uniform(0.3, 0.8))
-    tip = Tip(height_um=height, half_angle_deg=float(rng.uniform(10, 25)))
+    true, tip = nominal.with_(**values), some_tip(rng)
     room = tip.base_radius_um < 0.45 * true.shape.layout().heater.sides.min()
     if "tip" in departures and room:
         true = true.model_copy(update={"tip": tip})
     if medium == "air" and "jump" in departures:
         true = true.with_(accommodation=0.9)
     return true, nominal
+
+
+def values_from_priors(nominal: Probe, rng: np.random.Generator) -> dict[str, float]:
+    """Return what a lever may have in place of the nominal values, drawn from the usual priors."""
+    return {
+        name: prior.at(float(rng.standard_normal()))
+        for name, prior in default_priors(nominal).items()
+        if name not in ("series_resistance_ohm", "impurity_exponent")
+    }
+
+
+def some_tip(rng: np.random.Generator) -> Tip:
+    """Return a tip of a plausible size."""
+    height = float(rng.uniform(0.3, 0.8))
+    return Tip(height_um=height, half_angle_deg=float(rng.uniform(10, 25)))
 
 
 def measure(

@@ -8,27 +8,33 @@ from hotlever.lever import Lever
 from hotlever.materials import published
 from hotlever.probe import Probe
 from hotlever.report.page import Page
-from hotlever.report.reproduce import air, discrepancy, inference, vacuum
+from hotlever.report.reproduce import air, claims, discrepancy, inference, vacuum
 from hotlever.report.reproduce.findings import Findings
 from hotlever.steps import each
 from hotlever.types import Progress
 
 REMAINS = "What remains of the 50 K that the knee is off"
 NEVER_SEEN = "A lever never seen: how wrong is its calibration?"
+OTHER_LEVERS = "T(P) above the knee on other levers (Eq. 12)"
+SAME_MATERIAL = "The same parameters from other levers? (Table II)"
+ONE_SIDED = "A surface on one side (Section V)"
 #: Headings and sections, in the order of the page.
 SECTIONS: dict[str, Callable[[Findings], None]] = {
     "The reference probe": vacuum.probe_section,
     "Published parameters and inversion temperatures (Tables I and II)": vacuum.parameter_section,
     "Published operating points": vacuum.operating_points_section,
     "Characteristics in vacuum (Figs. 5 and 6)": vacuum.characteristics_section,
+    OTHER_LEVERS: claims.few_linear_section,
     "Inside the heater (Fig. 7)": vacuum.heater_section,
     "Why the knee is not at the inversion temperature": vacuum.knee_section,
     "Material parameters from a measurement (option III)": inference.fit_section,
     "What each observable adds (options I to III, Figs. 3 and 4, Table I)": inference.data_section,
+    SAME_MATERIAL: claims.few_consistency_section,
     "The Raman thermometer (Fig. 2)": inference.thermometer_section,
     "Heat into air depends on the surroundings (Fig. 8)": air.disc_section,
     "Characteristics in air (Figs. 9 and 10)": air.characteristics_section,
     "Is air one factor of the power? (Fig. 10b)": air.scale_section,
+    ONE_SIDED: claims.few_one_sided_section,
     "Where the heat goes": air.map_section,
     REMAINS: discrepancy.short_section,
     NEVER_SEEN: inference.few_levers_section,
@@ -36,11 +42,14 @@ SECTIONS: dict[str, Callable[[Findings], None]] = {
 }
 #: Left out of the quick form, or shorter there.
 LONG_SECTIONS: dict[str, Callable[[Findings], None]] = {
-    "k by size, gap and pressure": air.geometry_section,
+    "k by size and pressure": air.geometry_section,
     "The missing tip": air.tip_section,
     "Mesh": vacuum.mesh_section,
     REMAINS: discrepancy.discrepancy_section,
     NEVER_SEEN: inference.many_levers_section,
+    OTHER_LEVERS: claims.linear_section,
+    SAME_MATERIAL: claims.consistency_section,
+    ONE_SIDED: claims.one_sided_section,
 }
 
 

@@ -113,7 +113,7 @@ def map_section(page: Findings) -> None:
 
 
 def geometry_section(page: Findings) -> None:
-    """How k depends on size, gap and pressure, and where it would be constant."""
+    """How k depends on size and pressure, and where it would be constant."""
     study = air_scaling.surroundings_study(page.lever.probe)
     curves = {str(case): study.k.sel(case=case) for case in study.case.values}
     page.draw("scale_factor_map", figures.scale_factor(curves, paper.K_IN_AIR))

@@ -1,0 +1,111 @@
+"""Figures of what the paper says of other levers: their T(P) above the knee, their parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hotlever.colours import BLACK, BLUE, ORANGE, VERMILION
+from hotlever.figures.style import COLOURS, axis_label, beside, figure, parameter_label
+from hotlever.studies.linear_branch import Regression
+from hotlever.studies.parameter_consistency import largest_deviation
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: Marker of each shape, colour of each type of the heater.
+_BY_SHAPE, _BY_DOPANT = {"three-leg": "o", "u-shape": "s"}, {"n": BLUE, "p": VERMILION}
+
+#: Slopes (K/mW) that are marked.
+_TICKS = (50, 100, 150, 200, 300, 400, 600, 800)
+
+
+def linear_branches(study: xr.Dataset, regression: Regression, spread_K: float) -> Figure:
+    """Draw how straight T(P) is above the knee on many levers, and what its slope follows.
+
+    Parameters
+    ----------
+    study : xarray.Dataset
+        See `hotlever.studies.linear_branch.linear_branch_study`.
+    regression : Regression
+        Of its slopes.
+    spread_K : float
+        How closely the paper's law is said to hold.
+    """
+    with figure(7.6, 3.6, 1, 2, letters=True) as (made, (off, slope)):
+        _by_kind(off, study, study.knee_K, study.straight_K, fill=True)
+        _by_kind(off, study, study.knee_K, study.proportional_K, fill=False)
+        off.axhline(spread_K, color="0.5", ls=":")
+        off.set(xlabel=axis_label("knee_K"), ylabel="largest distance from a line (K)")
+        off.set_ylim(0.0, 1.25 * float(study.proportional_K.max()))
+        handles = [
+            off.plot([], [], ls="none", marker="o", color="0.4", mfc=face, label=label)[0]
+            for face, label in (("0.4", "a line of its own"), ("none", "a line through T$_{RT}$"))
+        ]
+        off.legend(handles=handles, loc="upper right", ncols=2)
+        expected = regression.factor * np.prod(
+            [study[name] ** power for name, power in regression.exponents.items()], axis=0
+        )
+        _by_kind(slope, study, expected, study.slope_K_per_mW, fill=True)
+        ends = [np.nanmin(expected), np.nanmax(expected)]
+        slope.plot(ends, ends, color="0.5", lw=0.8)
+        slope.set(xscale="log", yscale="log")
+        ticks = [tick for tick in _TICKS if ends[0] < 1.2 * tick and tick < 1.2 * ends[1]]
+        for axis in (slope.xaxis, slope.yaxis):
+            axis.set_ticks(ticks, [f"{tick}" for tick in ticks])
+            axis.set_ticks([], minor=True)
+        slope.set(xlabel="slope by the regression (K/mW)", ylabel="slope (K/mW)")
+        for shape, mark in _BY_SHAPE.items():
+            for dopant, colour in _BY_DOPANT.items():
+                name = f"{shape}, {dopant}-type"
+                slope.plot([], [], ls="none", marker=mark, color=colour, label=name)
+        slope.legend(loc="upper left")
+    return made
+
+
+def _by_kind(axes: Axes, study: xr.Dataset, x: Any, y: Any, *, fill: bool) -> None:
+    """Mark points by shape and dopant."""
+    for shape, mark in _BY_SHAPE.items():
+        for dopant, colour in _BY_DOPANT.items():
+            here = ((study["shape"] == shape) & (study.dopant == dopant)).values
+            face = colour if fill else "none"
+            style: Any = {"ls": "none", "marker": mark, "color": colour, "mfc": face, "alpha": 0.8}
+            axes.plot(np.asarray(x)[here], np.asarray(y)[here], **style)
+
+
+def parameter_deviations(study: xr.Dataset, published: xr.Dataset, claimed: float) -> Figure:
+    """Draw how far levers of one material are from their mean, by parameter and model error.
+
+    Parameters
+    ----------
+    study, published : xarray.Dataset
+        See `hotlever.studies.parameter_consistency`.
+    claimed : float
+        The paper's limit, a share of the mean.
+    """
+    ours, theirs = 100 * largest_deviation(study), 100 * largest_deviation(published)
+    symbols = [parameter_label(name)[0].partition(" (")[0] for name in study.parameter.values]
+    place = np.arange(len(symbols))
+    with figure(8.4, 3.6, 1, study.sizes["doping"], letters=True, sharey=True) as (made, panels):
+        for axes, doping in zip(np.atleast_1d(panels), study.doping.values, strict=True):
+            columns = [
+                (str(name), ours.sel(error=name, doping=doping)) for name in study.error.values
+            ]
+            columns.append(("the paper's four levers", theirs.sel(doping=doping)))
+            colours = [*COLOURS[: len(columns) - 1], BLACK]
+            beside_each = np.linspace(-0.3, 0.3, len(columns))
+            for (name, values), colour, aside in zip(columns, colours, beside_each, strict=True):
+                style: Any = {"ls": "none", "marker": "_" if colour == BLACK else "o"}
+                axes.plot(
+                    place + aside, values.where(values > 0), color=colour, label=name, **style
+                )
+            axes.axhline(100 * claimed, color=ORANGE, ls=":")
+            axes.set_xticks(place, symbols)
+            axes.set_title(str(doping), loc="center")
+            axes.set_ylim(0.0, None)
+        np.atleast_1d(panels)[0].set(ylabel="largest distance from the mean (%)")
+        beside(np.atleast_1d(panels)[-1])
+    return made
