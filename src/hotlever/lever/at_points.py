@@ -83,20 +83,34 @@ class StatesAtPoints:
             self.rim, materials, circuit.base_temperature_K, self.motions
         )
         self._polarity = 1.0
-        self._latest: tuple[Array, tuple[Fields, Properties, Properties]] | None = None
+        self._latest: tuple[Array, tuple[Fields, Properties, Properties], Evaluated] | None = None
         self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]
         self.step_limit = np.where(space.is_temperature, 60.0, 5.0)[:, None]
 
     def at(self, x: Array) -> tuple[Fields, Properties, Properties]:
         """Return fields of states (size + 1, n), properties and those by T, at the points."""
+        return self._evaluated(x)[1]
+
+    def by_rim(self, x: Array, names: Sequence[str] = ()) -> Evaluated:
+        """Return what the rim radiates, see `hotlever.lever.radiation`."""
+        if names:
+            return self._radiation.heat(x, self.terminals.end_rises, names)
+        return self._evaluated(x)[2]
+
+    def _evaluated(
+        self, x: Array
+    ) -> tuple[Array, tuple[Fields, Properties, Properties], Evaluated]:
+        """Return states and what the laws say of them."""
         # residual, Jacobian and derivatives are asked for at the same states one by one
         if self._latest is None or not np.array_equal(self._latest[0], x):
             moved = self.space.fields(x)
             T = self.base_temperature_K + moved.T
             T, grad_T = self.terminals.warmed(T, moved.grad_T)
             properties, by = self.properties(T)
-            self._latest = x.copy(), (Fields(T, grad_T, moved.grad_V), properties, by["T"])
-        return self._latest[1]
+            at_points = Fields(T, grad_T, moved.grad_V), properties, by["T"]
+            by_rim = self._radiation.heat(x, self.terminals.end_rises)
+            self._latest = x.copy(), at_points, by_rim
+        return self._latest
 
     def properties(
         self, T: Array, names: Sequence[str] = ("T",)
@@ -161,10 +175,6 @@ class StatesAtPoints:
         rise = self.space.temperature.at_points(change)[0]
         faces = np.zeros_like(rise) if by_T is None else by_T * rise
         return Radiated(faces, self.by_rim(x)[1]["T"] * self.rim.rise(change))
-
-    def by_rim(self, x: Array, names: Sequence[str] = ()) -> Evaluated:
-        """Return what the rim radiates, see `hotlever.lever.radiation`."""
-        return self._radiation.heat(x, self.terminals.end_rises, names)
 
     def kirchhoff(self, x: Array) -> tuple[Array, Array]:
         """Return θ (mW/µm) and κ (mW/(K µm)) of the gas at the sites of the air operator."""
