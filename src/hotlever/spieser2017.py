@@ -117,3 +117,5 @@ OPERATING_POINTS = (
 )
 #: Tip temperature of the simulated knee (K).
 [KNEE_PREDICTED_K] = [point.tip_K for point in OPERATING_POINTS if point.tip_K is not None]
+#: Shift of the temperature by thermoelectricity that is not exceeded (nm), Section IV.
+SHIFT_NM = 500.0

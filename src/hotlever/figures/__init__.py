@@ -28,6 +28,6 @@ from hotlever.figures.lever import (
     temperature_power,
 )
 from hotlever.figures.raman import one_spectrum, raman_check, thermometry
-from hotlever.figures.studies import knee_discrepancy
+from hotlever.figures.studies import knee_discrepancy, thermoelectric_shift
 from hotlever.figures.style import save_figure
 from hotlever.figures.transient import harmonics, history_overview, small_signals

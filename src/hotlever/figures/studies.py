@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from hotlever.colours import BLACK, BLUE, ORANGE
-from hotlever.figures.style import figure
+from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILION
+from hotlever.figures.style import axis_label, figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,4 +48,38 @@ def knee_discrepancy(studies: Mapping[str, xr.Dataset]) -> Figure:
         axes.invert_yaxis()
         axes.set_xlabel("knee as read less that of the fitted model (K)")
         axes.legend(loc="center right")
+    return made
+
+
+def thermoelectric_shift(shift: xr.Dataset, other: xr.Dataset | None = None) -> Figure:
+    """Draw where the hot spot is for either polarity, and which heat moves it.
+
+    Parameters
+    ----------
+    shift : xarray.Dataset
+        From `hotlever.studies.thermoelectric_shift.shift_by_heat`.
+    other : xarray.Dataset, optional
+        The same of a lever with carriers of the other sign.
+    """
+    by_heat = shift.share_nm.sum("side").sel(polarity=1)
+    with figure(7.6, 3.4, 1, 2, letters=True) as (made, (place, moved)):
+        place.plot(shift.bias, shift.plain_um, ":", color=BLACK, label="without thermoelectricity")
+        for polarity, mark, colour in ((1, "o-", BLUE), (-1, "s-", ORANGE)):
+            label = f"{'positive' if polarity > 0 else 'negative'} bias"
+            at_um = shift.at_um.sel(polarity=polarity)
+            place.plot(shift.bias, at_um, mark, color=colour, label=label)
+        place.axhline(0.0, color=BLACK, lw=0.6)
+        place.set(xlabel="size of the bias (V)", ylabel="hot spot: supply ←   (µm)   → ground")
+        place.legend()
+        whole = shift.moved_nm.sel(polarity=1)
+        moved.plot(shift.bias, whole, "o-", color=BLUE, label="all")
+        for heat, colour in (("Peltier", VERMILION), ("Thomson", GREEN)):
+            values = by_heat.sel(heat=heat)
+            moved.plot(shift.bias, values, "--", color=colour, label=f"{heat} heat")
+        if other is not None:
+            values = other.moved_nm.sel(polarity=1)
+            moved.plot(other.bias, values, "^-", color=PURPLE, label="all, with boron")
+        moved.axhline(0.0, color=BLACK, lw=0.6)
+        moved.set(xlabel="bias (V)", ylabel=axis_label("moved_nm").replace(" in the", "\nin the"))
+        moved.legend()
     return made

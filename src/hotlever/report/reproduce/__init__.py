@@ -8,7 +8,7 @@ from hotlever.lever import Lever
 from hotlever.materials import published
 from hotlever.probe import Probe
 from hotlever.report.page import Page
-from hotlever.report.reproduce import air, claims, discrepancy, inference, vacuum
+from hotlever.report.reproduce import air, claims, discrepancy, inference, thermoelectricity, vacuum
 from hotlever.report.reproduce.findings import Findings
 from hotlever.steps import each
 from hotlever.types import Progress
@@ -44,6 +44,8 @@ SECTIONS: dict[str, Callable[[Findings], None]] = {
 LONG_SECTIONS: dict[str, Callable[[Findings], None]] = {
     "k by size and pressure": air.geometry_section,
     "The missing tip": air.tip_section,
+    "Thermoelectricity: which way the hot spot moves": thermoelectricity.shift_section,
+    "Thermoelectricity: what a fit gains by it": thermoelectricity.prediction_section,
     "Mesh": vacuum.mesh_section,
     REMAINS: discrepancy.discrepancy_section,
     NEVER_SEEN: inference.many_levers_section,
