@@ -222,22 +222,26 @@ def test_the_papers_material_has_each_parameter_of_its_two_kinds():
 
 def test_a_parameter_of_ones_own_is_a_row_and_a_field():
     row = Parameter(
-        *("emissivity", "ε", "1", 1.0, 0.01, 1.0), "of its faces", spread=0.2, usual=True, value=0.7
+        *("grain_size", "d", "1", 1.0, 0.01, 1.0),
+        "of its grains",
+        spread=0.2,
+        usual=True,
+        value=0.7,
     )
 
     class Shining(HighDopedSilicon):
-        family: ClassVar = OF_SILICON | {"emissivity": row}
-        emissivity: float = field_of(row)
+        family: ClassVar = OF_SILICON | {"grain_size": row}
+        grain_size: float = field_of(row)
 
     legs = Shining(c_kappa=0.7, a0=1e-3, a1=1e-6)
-    assert [*set(legs.parameters) - set(HighDopedSilicon.declared)] == ["emissivity"]
-    assert (legs.usual[-1], legs.emissivity) == ("emissivity", 0.7)
+    assert [*set(legs.parameters) - set(HighDopedSilicon.declared)] == ["grain_size"]
+    assert (legs.usual[-1], legs.grain_size) == ("grain_size", 0.7)
     probe = Probe.from_file("src/hotlever/examples/boron-lever.toml")
     probe = probe.model_copy(update={"materials": {**probe.materials, "legs": legs}})
-    assert parameters_of(probe)["legs.emissivity"].spread == 0.2
-    assert default_priors(probe)["legs.emissivity"].value == 0.7
-    with pytest.raises(InputError, match=r"emissivity = 3.0: input should be less"):
-        legs.with_(emissivity=3.0)
+    assert parameters_of(probe)["legs.grain_size"].spread == 0.2
+    assert default_priors(probe)["legs.grain_size"].value == 0.7
+    with pytest.raises(InputError, match=r"grain_size = 3.0: input should be less"):
+        legs.with_(grain_size=3.0)
 
 
 def test_the_paper_varies_six_parameters_and_every_kind_its_own():

@@ -32,10 +32,13 @@ def test_the_example_in_the_comments_is_a_valid_section(tmp_path):
     text = Probe.reference().to_toml()
     start = text.index("# [tip]")
     uncommented = text[:start] + "\n".join(
-        line.removeprefix("# ") for line in text[start:].splitlines()
+        line if line.startswith("# Without") else line.removeprefix("# ")
+        for line in text[start:].splitlines()
     )
     (tmp_path / "probe.toml").write_text(uncommented, encoding="utf-8")
-    assert Probe.from_file(tmp_path / "probe.toml").tip is not None
+    read = Probe.from_file(tmp_path / "probe.toml")
+    assert read.tip is not None
+    assert read.physics.effects == ("thermoelectric", "radiation")
 
 
 @pytest.mark.parametrize(

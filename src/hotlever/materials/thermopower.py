@@ -4,7 +4,7 @@ With thermoelectricity the current density is −σ∇V − β∇T and the heat 
 where σ, β = Σ σ_i S_i and γ = Σ σ_i S_i² are sums over carriers that conduct beside each other. The
 heat flux is −κ∇T + S T J with S = β/σ and κ = κ₀ + T(γ − β²/σ), whose last part is the bipolar one:
 electrons and holes that carry heat without a current (G. S. Nolas, J. Sharp and H. J. Goldsmid,
-Thermoelectrics, Springer 2001, sec. 2.3). Peltier and Thomson heat follow from the two fluxes.
+Thermoelectrics, Springer 2001). Peltier and Thomson heat follow from the two fluxes.
 
 Units are those of `hotlever.materials.silicon`; S is in V/K, β in A cm⁻¹ K⁻¹, γ in W cm⁻¹ K⁻².
 """
@@ -216,7 +216,7 @@ def _of_silicon(
 
 _SOURCE = (
     "Fermi integrals of parabolic bands with the carriers of Eqs. 5 to 10; Nolas, Sharp and "
-    "Goldsmid, Thermoelectrics (2001), secs. 2.2 and 2.3"
+    "Goldsmid, Thermoelectrics (2001)"
 )
 
 
