@@ -63,7 +63,7 @@ class _Cubic(NamedTuple):
         along = w / self.cell
         cell = np.minimum(along.astype(np.intp), self.coefficients.shape[1] - 1)
         along = along - cell
-        a, b, c, d = (each[cell] for each in self.coefficients)
+        a, b, c, d = (each.take(cell) for each in self.coefficients)
         value = a + along * (b + along * (c + along * d))
         return value, (b + along * (2.0 * c + along * 3.0 * d)) / self.cell
 
@@ -203,14 +203,16 @@ def _of_silicon(
     exponent: float,
 ) -> Evaluated:
     """Return β and γ of carriers by temperature and doping, less what κ of pure silicon has."""
-    states = density_of_states.formula(T)
-    values, by = _summed(carried(T, n), states, exponent)
-    pure, pure_by = _bipolar(_summed(carried(T, _PURE), states, exponent))
+    n = np.broadcast_to(np.asarray(n, dtype=float), np.broadcast_shapes(T.shape, np.shape(n)))
+    # pure silicon as the second of two dopings
+    both = np.stack([n, np.full_like(n, _PURE)])
+    summed, by = _summed(carried(T, both), density_of_states.formula(T), exponent)
+    pure, pure_by = _bipolar((summed[:, 1], {name: d[:, 1] for name, d in by.items()}))
     pure_by.pop("n")
-    values, by = values[1:], {name: d[1:].copy() for name, d in by.items()}
-    values[1] = values[1] - pure
+    values, by = summed[1:, 0], {name: d[1:, 0] for name, d in by.items()}
+    values[1] -= pure
     for name, d in pure_by.items():
-        by[name][1] = by[name][1] - d
+        by[name][1] -= d
     return values, by
 
 
