@@ -67,3 +67,9 @@ def test_k_with_a_surface_is_judged_by_what_the_best_one_leaves(page):
     [claim] = page.claims
     assert claim[2].startswith("does not hold here")
     assert "most at 1 µm" in claim[3]
+
+
+def test_radiation_is_judged_by_all_of_the_lever(page):
+    claims.radiation_section(page)
+    [claim] = page.claims
+    assert claim[2].startswith("does not hold here, because 1.1 µW is what the heater's faces")

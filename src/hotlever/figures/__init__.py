@@ -7,7 +7,7 @@ writes one as PNG, SVG or PDF.
 
 from hotlever.figures.air import air_loss, disc_between_planes, scale_factor, temperature_slices
 from hotlever.figures.calibration import calibration_curves, design_sweep, judged_calibrations
-from hotlever.figures.claims import linear_branches, parameter_deviations
+from hotlever.figures.claims import linear_branches, parameter_deviations, radiated_shares
 from hotlever.figures.drawing import outlines_drawing, probe_drawing
 from hotlever.figures.fit import (
     correlation_matrix,

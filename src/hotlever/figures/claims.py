@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -108,4 +109,25 @@ def parameter_deviations(study: xr.Dataset, published: xr.Dataset, claimed: floa
             axes.set_ylim(0.0, None)
         np.atleast_1d(panels)[0].set(ylabel="largest distance from the mean (%)")
         beside(np.atleast_1d(panels)[-1])
+    return made
+
+
+def radiated_shares(levers: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw how much of their power levers radiate, and how much cooler that makes their tips.
+
+    Parameters
+    ----------
+    levers : mapping of str to xarray.Dataset
+        See `hotlever.studies.radiated_heat.radiated_heat`.
+    """
+    with figure(7.6, 3.4, 1, 2, letters=True) as (made, (share, fall)):
+        for name, data in levers.items():
+            share.plot(data.tip, 100.0 * data.radiated_mW / data.power_mW, label=name)
+            fall.plot(data.tip, data.cooler_K, label=name)
+        share.set(ylabel="share of the power (%)")
+        fall.set(ylabel="fall of the tip at the same power (K)")
+        for axes in (share, fall):
+            axes.set(xlabel=axis_label("tip_K"), yscale="log")
+        share.set_ylim(top=10.0 * share.get_ylim()[1])  # for the legend
+        share.legend(loc="upper left")
     return made

@@ -16,6 +16,7 @@ from hotlever.types import Progress
 REMAINS = "What remains of the 50 K that the knee is off"
 NEVER_SEEN = "A lever never seen: how wrong is its calibration?"
 OTHER_LEVERS = "T(P) above the knee on other levers (Eq. 12)"
+RADIATION = "Radiation (Section IV)"
 SAME_MATERIAL = "The same parameters from other levers? (Table II)"
 ONE_SIDED = "A surface on one side (Section V)"
 #: Headings and sections, in the order of the page.
@@ -35,6 +36,7 @@ SECTIONS: dict[str, Callable[[Findings], None]] = {
     "Characteristics in air (Figs. 9 and 10)": air.characteristics_section,
     "Is air one factor of the power? (Fig. 10b)": air.scale_section,
     ONE_SIDED: claims.few_one_sided_section,
+    RADIATION: claims.radiation_section,
     "Where the heat goes": air.map_section,
     REMAINS: discrepancy.short_section,
     NEVER_SEEN: inference.few_levers_section,

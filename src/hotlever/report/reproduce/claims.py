@@ -29,6 +29,7 @@ from hotlever.studies.parameter_consistency import (
     largest_deviation,
     published_levers,
 )
+from hotlever.studies.radiated_heat import radiated_heat, sheet_emissivities
 from hotlever.studies.simulation_based_calibration import NOISE, RAMAN
 
 #: Of the quick form: every so many levers, the first geometries, errors of the model, gaps (µm).
@@ -212,3 +213,31 @@ def one_sided_section(page: Findings, gaps_um: Sequence[float] = GAPS_UM) -> Non
 def few_one_sided_section(page: Findings) -> None:
     """The same for fewer gaps."""
     one_sided_section(page, _FEW_GAPS_UM)
+
+
+def radiation_section(page: Findings) -> None:
+    """What the lever radiates, as a black body and as silicon."""
+    tip = paper.HOTTEST_TIP_K
+    black, grey = (radiated_heat(page.lever.probe, [tip], epsilon) for epsilon in (1.0, None))
+    sheets = sheet_emissivities(page.lever.probe, [paper.BASE_TEMPERATURE_K, tip]).emissivity
+    light, power = black.radiated_mW.item(), black.power_mW.item()
+    page.claim(
+        "radiation",
+        holds=power > 1e3 * light,
+        tip=tip,
+        light=1e3 * light,
+        ratio=power / light,
+        power=power,
+        heater=1e3 * black.heater_mW.item(),
+        share=light / power,
+        grey=1e3 * grey.radiated_mW.item(),
+        grey_ratio=grey.power_mW.item() / grey.radiated_mW.item(),
+        fall=black.cooler_K.item(),
+        grey_fall=grey.cooler_K.item(),
+    )
+    page.say(
+        "radiation",
+        edges=(black.edges_mW / black.radiated_mW).item(),
+        least=sheets.min().item(),
+        most=sheets.max().item(),
+    )
