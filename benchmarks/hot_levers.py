@@ -17,7 +17,7 @@ import numpy as np
 from hotlever.errors import ComputationError
 from hotlever.figures import radiated_shares, save_figure
 from hotlever.probe import Probe
-from hotlever.studies.radiated_heat import radiated_heat, sheet_emissivities
+from hotlever.studies.radiation import radiated_heat, sheet_emissivities
 
 TIPS = np.array([900.0, 1150.0, 1500.0])
 PALLADIUM = Path(__file__).parents[1] / "src/hotlever/examples/palladium-on-nitride.toml"

@@ -118,7 +118,7 @@ def radiated_shares(levers: Mapping[str, xr.Dataset]) -> Figure:
     Parameters
     ----------
     levers : mapping of str to xarray.Dataset
-        See `hotlever.studies.radiated_heat.radiated_heat`.
+        See `hotlever.studies.radiation.radiated_heat`.
     """
     with figure(7.6, 3.4, 1, 2, letters=True) as (made, (share, fall)):
         for name, data in levers.items():

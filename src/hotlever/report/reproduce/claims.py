@@ -29,7 +29,7 @@ from hotlever.studies.parameter_consistency import (
     largest_deviation,
     published_levers,
 )
-from hotlever.studies.radiated_heat import radiated_heat, sheet_emissivities
+from hotlever.studies.radiation import radiated_heat, sheet_emissivities
 from hotlever.studies.simulation_based_calibration import NOISE, RAMAN
 
 #: Of the quick form: every so many levers, the first geometries, errors of the model, gaps (µm).

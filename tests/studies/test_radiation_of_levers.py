@@ -12,7 +12,7 @@ from hotlever.materials.radiation import (
     sheet_emissivity,
 )
 from hotlever.probe import Probe
-from hotlever.studies.radiated_heat import radiated_heat, sheet_emissivities
+from hotlever.studies.radiation import radiated_heat, sheet_emissivities
 
 
 def test_a_black_lever_radiates_in_proportion_to_its_emissivity():
