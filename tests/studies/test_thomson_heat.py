@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from hotlever.errors import ComputationError
 from hotlever.materials import LOW_DOPED, REFERENCE
 from hotlever.materials.kinds import NSilicon, PSilicon
 from hotlever.studies.thermoelectric_strip import (
@@ -32,9 +33,11 @@ def test_thomson_heat_turns_where_the_seebeck_coefficient_is_largest(kind, n_d):
     assert (before > 0.0) == (own.carrier == "electron")
 
 
-def test_the_turn_and_the_largest_coefficient_of_the_references_doping():
+def test_the_turn_is_found_and_the_largest_coefficient_is_that_of_its_second_statement():
     own = silicon(NSilicon, 5.75e17)
     assert turn_of_thomson_heat(own) == pytest.approx(largest_seebeck(own), abs=20.0)
+    with pytest.raises(ComputationError, match="does not turn"):
+        turn_of_thomson_heat(silicon(NSilicon, 1e19))
     assert largest_seebeck(own) == pytest.approx(largest(5.75e17, 0.0, p=own.p)[0], abs=2.0)
 
 

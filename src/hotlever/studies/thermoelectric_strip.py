@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from hotlever.datasets import labelled
+from hotlever.errors import ComputationError
 from hotlever.lever import Lever
 from hotlever.materials.kinds import LowDopedSilicon
 from hotlever.probe import Probe, Taper
@@ -22,8 +23,8 @@ _LENGTH, _WIDTH, _THICK = 8.0, 1.0, 0.4
 #: Between ends that differ by so much (K), at a current (mA) that hardly heats it, from a supply
 #: that is as good as one of a current (Ω).
 _DIFFERENCE_K, _CURRENT_MA, _STIFF = 20.0, 0.05, 1e6
-#: Where a turn is looked for (K): leg ends have limits; and how exactly.
-_RANGE_K, _EXACT_K = (350.0, 985.0), 2.0
+#: Where a turn is looked for (K), in these steps: leg ends have limits; and how exactly.
+_LOOKED_AT_K, _EXACT_K = np.arange(425.0, 986.0, 80.0).tolist(), 2.0
 #: Of the self-heated strip (Ω): every temperature has one state.
 _R_S = 20_000.0
 
@@ -70,16 +71,22 @@ def odd_rise(silicon: LowDopedSilicon, T: float) -> float:
 
 @one_blas_thread
 def turn_of_thomson_heat(silicon: LowDopedSilicon) -> float:
-    """Return the temperature (K) at which Thomson heat turns its sign in a strip that is solved.
+    """Return the lowest temperature (K) at which Thomson heat turns its sign in a solved strip.
 
     Raises
     ------
-    ValueError
-        If it does not below 985 K.
+    ComputationError
+        If it does not turn.
     """
     from scipy.optimize import brentq
 
-    return float(brentq(lambda T: odd_rise(silicon, T), *_RANGE_K, xtol=_EXACT_K))
+    at, before = _LOOKED_AT_K[0], odd_rise(silicon, _LOOKED_AT_K[0])
+    for T in _LOOKED_AT_K[1:]:
+        after = odd_rise(silicon, T)
+        if before * after < 0.0:
+            return float(brentq(lambda T: odd_rise(silicon, T), at, T, xtol=_EXACT_K))
+        at, before = T, after
+    raise ComputationError(f"Thomson heat does not turn its sign below {at:.0f} K")
 
 
 @one_blas_thread
