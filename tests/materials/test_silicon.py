@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from hotlever.materials.laws import limited_temperature
+from hotlever.materials.minimos import minimos_mobility
 from hotlever.materials.silicon import (
     band_gap,
     carrier_density,
@@ -20,7 +21,6 @@ from hotlever.materials.silicon import (
     impurity_mobility,
     intrinsic_density,
     inversion_temperature,
-    minimos_mobility,
     mobility,
     phonon_mobility,
     thermal_conductivity,

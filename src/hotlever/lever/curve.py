@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from math import comb
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from hotlever.types import Array
 
@@ -63,8 +64,9 @@ class Piecewise:
 
     def roots(self) -> Array:
         """Return where a single quantity is zero between the first and the last node, rising."""
-        roots = []
-        for coefficients, left, width in zip(self.c.T, self.x, np.diff(self.x), strict=False):
+        roots, widths = [np.empty(0)], np.diff(self.x)
+        for piece in np.flatnonzero(_may_vanish(self.c, widths)).tolist():
+            coefficients, left, width = self.c[:, piece], self.x[piece], widths[piece]
             away = np.roots(coefficients)
             real = away.real[np.abs(away.imag) <= _ROUNDING * width]
             inside = (real >= -_ROUNDING * width) & (real <= width * (1 + _ROUNDING))
@@ -73,6 +75,21 @@ class Piecewise:
         # one at a node belongs to the polynomials on both sides of it
         again = np.diff(rising, prepend=-np.inf) <= 2 * _ROUNDING * np.ptp(self.x)
         return np.asarray(rising[~again])
+
+
+def _may_vanish(c: Array, widths: Array) -> NDArray[np.bool_]:
+    """Return which polynomials may have a root: those whose Bernstein coefficients differ in sign.
+
+    A polynomial lies between its smallest and its largest one. Most pieces have no root, and each
+    that may have one costs the eigenvalues of a matrix.
+    """
+    degree = len(c) - 1
+    orders = range(degree + 1)
+    to_bernstein = [[comb(i, j) / comb(degree, j) for j in orders] for i in orders]
+    powers = c[::-1] * widths ** np.arange(degree + 1)[:, None]
+    bernstein = np.array(to_bernstein) @ powers
+    clear = _ROUNDING * np.abs(bernstein).max(axis=0)
+    return np.asarray((bernstein.min(axis=0) <= clear) & (bernstein.max(axis=0) >= -clear))
 
 
 def smooth_curve(u: Array, values: Array, slopes: Array, steps: Array | tuple = ()) -> Piecewise:
