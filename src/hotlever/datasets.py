@@ -199,11 +199,14 @@ class Measurand(NamedTuple):
         return QUANTITIES[self.name][1]
 
 
-_BIAS = ("vb", "ub", "vbias", "ubias", "bias", "biasvoltage")
-_LEVER = ("vl", "ul", "vlever", "ulever", "lever", "levervoltage")
-_CURRENT = ("ih", "i", "current", "heatercurrent", "levercurrent")
-_READER = ("vr", "ur", "vreader", "ureader", "reader", "readervoltage")
-_TIP = ("ttip", "tip", "tiptemperature")
+_BIAS = ("vb", "ub", "vbias", "ubias", "bias", "biasvoltage", "vorspannung", "versorgungsspannung")
+_LEVER = ("vl", "ul", "vlever", "ulever", "lever", "levervoltage", "hebelspannung")
+_CURRENT = (
+    *("ih", "i", "current", "heatercurrent", "levercurrent"),
+    *("strom", "heizstrom", "heizerstrom", "hebelstrom"),
+)
+_READER = ("vr", "ur", "vreader", "ureader", "reader", "readervoltage", "readerspannung")
+_TIP = ("ttip", "tip", "tiptemperature", "spitzentemperatur")
 #: Everything that a measurement may hold, by symbol; ``d`` begins that of a standard error.
 MEASURANDS = {
     measurand.symbol: measurand
@@ -219,6 +222,10 @@ MEASURANDS = {
         Measurand("dV_r", "reader_error_V", "V", ("dvr", "δvr")),
     )
 }
+_BUFFER = ("source", "sourcevalue", "value", "reading")
+#: Headings that say no more than the unit does: what a file has of this unit counts as the
+#: quantity where it is the only one.
+PLAIN = {"V_b": ("voltage", "spannung", "u", *_BUFFER), "I_h": _BUFFER}
 #: What a fit compares, by the name that users give it.
 OBSERVABLES = {
     "current": MEASURANDS["I_h"],

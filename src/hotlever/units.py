@@ -61,7 +61,7 @@ _UNIT_WORDS = {
 #: Of settings alone: in a heading `V_s` is no voltage in seconds.
 _OF_SETTINGS = {"s", "Hz"}
 #: Headings that name a time; of these alone a unit of time is one.
-TIMES = {"t", "time", "relative time", "elapsed time"}
+TIMES = {"t", "time", "relative time", "elapsed time", "zeit", "relative zeit"}
 _CELSIUS = {"°C", "degC", "C", "oC", "celsius", "Celsius", "degreesC", "degreesCelsius"}
 #: What µ, Ω and °C of other encodings (UTF-8 read twice, DOS, GBK, Shift-JIS, Mac) look like when
 #: a file is read as Windows' Latin-1; what is part of another stands behind it.

@@ -34,7 +34,7 @@ REFUSED = {
     "no units": lab("V_b,I_h\n1,0.14\n"),
     "another unit": lab("V_b (V),I_h (mW)\n1,0.14\n"),
     "a unit to evaluate": lab("V_b (V),I_h (9**9**9**9)\n1,0.14\n"),
-    "voltage of what": lab("Voltage (V),Current (A)\n" + rows(BIAS, AMPS)),
+    "voltage of what": lab("Voltage (V),Gate (V),Current (A)\n" + rows(BIAS, BIAS, AMPS)),
     "two currents": lab("V_b (V),Current (mA),I (mA)\n" + rows(BIAS, CURRENT, CURRENT)),
     "numbers alone": lab(rows(BIAS, CURRENT)),
     "lever voltage alone": lab("# R_s: 5.6 kOhm\nV_l (V),T_tip (K)\n1,300\n"),

@@ -226,9 +226,8 @@ def test_impossible_settings_are_refused(tmp_path, comment, message):
 def test_a_column_like_a_known_one_is_named_with_what_it_may_be(tmp_path):
     data = read(tmp_path, "V_b (V),I_h (mA),T apex (K),U (mV),time (s)\n1,0.1,300,50,0\n")
     assert [note.split(": ", 1)[1] for note in data.notes] == [
-        "column 'T apex (K)' is not used; if it is T_tip, name it 'T_tip (K)'",
-        "column 'U (mV)' is not used; if it is V_r, name it 'V_r (mV)'",
-        "column 'time (s)' is not used",
+        "columns 'T apex (K)', 'U (mV)', 'time (s)' are not used; if one is T_tip, say "
+        "--column 'T_tip=T apex (K)'; if one is V_r, say --column 'V_r=U (mV)'"
     ]
 
 
@@ -242,8 +241,8 @@ def test_written_nan_is_noted_and_empty_cells_are_not(tmp_path):
 
 
 def test_a_thousand_notes_are_cut_short(tmp_path):
-    names = ",".join(f"x{i}" for i in range(1000))
-    data = read(tmp_path, f"V_b (V),I_h (mA),{names}\n1,0.1{',0' * 1000}\n")
+    unclear = "# R_s: 5.6\n" * 1000
+    data = read(tmp_path, f"{unclear}V_b (V),I_h (mA)\n1,0.1\n")
     assert len(data.notes) == 21
     assert data.notes[-1].endswith("980 more such notes")
 

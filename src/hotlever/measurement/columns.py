@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hotlever.datasets import MEASURANDS, OBSERVABLES
+from hotlever.datasets import MEASURANDS, OBSERVABLES, PLAIN
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_bytes
 from hotlever.measurement.data import LEVER, MEASURED, TIME
@@ -27,6 +27,8 @@ _SYMBOLS = {
 BRIEF = 1e4
 #: First heading of a B1500's table, whose units are those of SI without a prefix.
 _IN_SI = "DataName"
+#: Unused columns that a note names, and of those how many it says more of.
+_MOST_NAMES, _MOST_HINTS = 6, 2
 #: Bytes of a file of column names.
 _LARGEST = 100_000
 
@@ -62,7 +64,11 @@ def symbol_of(name: str) -> str | None:
     >>> symbol_of("Vb"), symbol_of("I_h"), symbol_of("Voltage")
     ('V_b', 'I_h', None)
     """
-    return _SYMBOLS.get(re.sub(r"[\W_]+", "", name[:40]).lower())
+    return _SYMBOLS.get(_bare(name))
+
+
+def _bare(name: str) -> str:
+    return re.sub(r"[\W_]+", "", name[:40]).lower()
 
 
 def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
@@ -123,7 +129,8 @@ def is_heading(name: str, assigned: Mapping[str, str]) -> bool:
     """Whether a heading is that of a known quantity, or of a column that one is assigned."""
     bare = name_and_unit(name)[0]
     headings = {heading.casefold() for heading in assigned.values()}
-    return symbol_of(bare) is not None or bool({name.casefold(), bare.casefold()} & headings)
+    named = symbol_of(bare) is not None or any(_bare(bare) in plain for plain in PLAIN.values())
+    return named or bool({name.casefold(), bare.casefold()} & headings)
 
 
 def find_columns(
@@ -176,8 +183,26 @@ def find_columns(
         columns[symbol] = _column(table, symbol, first, None)
     if TIME in columns and not (in_time or _are_brief(table, columns[TIME])):
         del columns[TIME]
+    if not driven:
+        _take_the_only_ones(table, columns)
     _require(table, columns, driven)
     return columns
+
+
+def _take_the_only_ones(table: TextTable, columns: dict[str, Column]) -> None:
+    """Let a plain heading be the bias, or the current, if nothing else in its unit may be it."""
+    for symbol, headings in PLAIN.items():
+        used = {column.index for column in columns.values()}
+        unit = MEASURANDS[symbol].unit
+        may_be = [
+            index
+            for index, heading in enumerate(table.names)
+            if index not in used and conversion(name_and_unit(heading)[1] or "", unit)
+        ]
+        missing = symbol not in columns and not (symbol == "V_b" and LEVER in columns)
+        plain = [i for i in may_be if _bare(name_and_unit(table.names[i])[0]) in headings]
+        if missing and plain == may_be and len(plain) == 1:
+            columns[symbol] = _column(table, symbol, plain[0], None)
 
 
 def _column(table: TextTable, symbol: str, index: int, assigned: str | None) -> Column:
@@ -209,6 +234,10 @@ def _contradicts(written: str, inside: str, difference: bool, scale: tuple[float
     return any(conversion(written, measurand.unit) for measurand in MEASURANDS.values())
 
 
+def _told(symbol: str, heading: str) -> str:
+    return f"--column '{symbol}={shown(heading)}'"
+
+
 def _assignment(symbol: str, heading: str = "HEADING") -> str:
     return f"--column '{MEASURANDS[symbol].heading}={shown(heading)}'"
 
@@ -226,7 +255,7 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
     if driven and TIME not in columns:
         raise InputError(
             f"{table.where(-1)}: no column of the time, expected one like 'time (us)' beside a "
-            "wave form"
+            f"wave form; another name with --column 't (s)={shown(table.names[0]) or 1}'"
         )
     observed = {
         *(column.symbol for column in OBSERVABLES.values()),
@@ -246,17 +275,40 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
     )
 
 
-def unused_columns(table: TextTable, columns: Mapping[str, Column]) -> list[str]:
-    """Return a note on each column that is no quantity, with the one that it may be."""
+def is_taken_as_bias(columns: Mapping[str, Column], assigned: Mapping[str, str]) -> bool:
+    """Whether the bias is a voltage that nobody calls so."""
+    told = {_quantity(quantity, assigned=True)[0] for quantity in assigned}
+    bias = columns.get("V_b")
+    return bias is not None and "V_b" not in told and _quantity(bias.heading)[0] != "V_b"
+
+
+def notes_on_columns(
+    table: TextTable, columns: Mapping[str, Column], assigned: Mapping[str, str]
+) -> list[str]:
+    """Say which heading was taken as the bias without naming it, and which columns are not used."""
     notes = []
+    bias = columns.get("V_b")
+    if bias is not None and is_taken_as_bias(columns, assigned):
+        notes.append(
+            f"{table.path}: {bias.origin} is the only voltage and counts as the bias; if it is "
+            f"that over the lever, say {_assignment(LEVER, bias.heading)}"
+        )
     used = {column.index for column in columns.values()}
+    unused = [
+        (heading, name_and_unit(heading)[1] or "")
+        for index, heading in enumerate(table.names)
+        if index not in used and heading != _IN_SI and heading.strip()
+    ]
     missing = [measurand for measurand in MEASURED if measurand.symbol not in columns]
-    for index, heading in enumerate(table.names):
-        if index not in used and heading != _IN_SI and heading.strip():
-            unit = name_and_unit(heading)[1] or ""
-            likely = next(
-                (column.symbol for column in missing if conversion(unit, column.unit)), None
-            )
-            hint = f"; if it is {likely}, name it '{likely} ({unit})'" if likely else ""
-            notes.append(f"{table.path}: column '{shown(heading)}' is not used{hint}")
+    hints = []
+    for heading, unit in unused:
+        likely = next((column for column in missing if conversion(unit, column.unit)), None)
+        if likely is not None:
+            hints.append(f"if one is {likely.symbol}, say {_told(likely.symbol, heading)}")
+    if unused:
+        names = [f"'{shown(heading)}'" for heading, _ in unused]
+        more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+        what = f"columns {', '.join(names[:_MOST_NAMES])}{more} are"
+        what = what if len(names) > 1 else f"column {names[0]} is"
+        notes.append(f"{table.path}: {'; '.join([f'{what} not used', *hints[:_MOST_HINTS]])}")
     return notes

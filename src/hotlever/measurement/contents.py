@@ -103,8 +103,10 @@ def colder_than_base(tip_K: Array, error_K: Array, base_K: float) -> Mask:
     return np.asarray(tip_K < base_K - margin)
 
 
-def check(contents: Contents, *, signed: bool = False) -> None:
+def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) -> None:
     """Refuse what no lever can show, and note what it hardly can.
+
+    `series_ohm` is in series with the lever if the file does not say what is.
 
     What may be of either sign is asked less: in time a current goes on or off before the bias is
     known to, and other supplies drive a current of their own.
@@ -137,13 +139,13 @@ def check(contents: Contents, *, signed: bool = False) -> None:
         f"T_tip is below the base temperature ({base:g} K), perhaps in another unit",
     )
     if not signed:
-        _check_lever_voltage(contents)
+        _check_lever_voltage(contents, series_ohm)
 
 
-def _check_lever_voltage(contents: Contents) -> None:
+def _check_lever_voltage(contents: Contents, series_ohm: float) -> None:
     """Refuse rows whose series resistor leaves no voltage for the lever."""
     bias, current = contents.values["V_b"], contents.values["I_h"]
-    ohm = contents.settings.values.get("series_resistance_ohm", 0.0)
+    ohm = contents.settings.values.get("series_resistance_ohm", series_ohm)
     lever = Circuit(series_resistance_ohm=ohm).lever_voltage(bias, current)
     below = lever < -NOISE * bias.max()
     if below.any():

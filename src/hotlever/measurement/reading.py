@@ -16,8 +16,9 @@ from hotlever.measurement.bias import check_times, find_bias, find_waveform, lea
 from hotlever.measurement.columns import (
     find_columns,
     is_heading,
+    is_taken_as_bias,
+    notes_on_columns,
     parse_columns,
-    unused_columns,
 )
 from hotlever.measurement.contents import Contents, check
 from hotlever.measurement.data import MEASURED, TIME, Measurement
@@ -86,8 +87,11 @@ def read_measurement(
         waveform, order = _complete_in_time(contents, circuit, waveform)
     else:
         signed = signed or (circuit is not None and circuit.lowest_bias_V < 0.0)
-        order = _complete_at_rest(contents, circuit, symmetric=not signed)
-    notes = contents.notes + unused_columns(table, quantities)
+        # behind the probe's resistor a lever's own voltage, taken for the bias, leaves none
+        assumed = circuit is not None and is_taken_as_bias(quantities, assigned)
+        series_ohm = circuit.series_resistance_ohm if circuit and assumed else 0.0
+        order = _complete_at_rest(contents, circuit, series_ohm, symmetric=not signed)
+    notes = contents.notes + notes_on_columns(table, quantities, assigned)
     more = len(notes) - _MOST_NOTES
     if more > 0:
         notes[_MOST_NOTES:] = [f"{path}: {more} more such notes"]
@@ -121,13 +125,15 @@ def _complete_in_time(
     return waveform, f"in time, {len(contents.table.rows)} rows; {waveform.text}"
 
 
-def _complete_at_rest(contents: Contents, circuit: Circuit | None, *, symmetric: bool) -> str:
+def _complete_at_rest(
+    contents: Contents, circuit: Circuit | None, series_ohm: float, *, symmetric: bool
+) -> str:
     """Complete a slow sweep, of either polarity; return the order of its rows in words."""
     find_bias(contents, circuit, None)
     bias = contents.values["V_b"]
     if symmetric:
         mirror(contents)
-    check(contents, signed=not symmetric)
+    check(contents, signed=not symmetric, series_ohm=series_ohm)
     sweeps = sweeps_of(bias)
     order = described(bias, sweeps)
     if len(sweeps) > 1:

@@ -36,9 +36,12 @@ _OF_THE_PROBE = ("series_resistance_ohm", "base_temperature_K", "medium")
 #: Their names as people write them, without case, blanks and underscores.
 _SPELLINGS = {
     **dict.fromkeys(
-        ("rs", "rseries", "seriesresistance", "seriesresistor"), "series_resistance_ohm"
+        ("rs", "rseries", "seriesresistance", "seriesresistor", "vorwiderstand"),
+        "series_resistance_ohm",
     ),
-    **dict.fromkeys(("basetemperature", "basetemp", "tbase", "t0"), "base_temperature_K"),
+    **dict.fromkeys(
+        ("basetemperature", "basetemp", "tbase", "t0", "basistemperatur"), "base_temperature_K"
+    ),
     **dict.fromkeys(("medium", "gas", "atmosphere", "environment", "surroundings"), "medium"),
     "p": "pressure_mbar",
 }
@@ -48,7 +51,7 @@ _BETWEEN = re.compile(r";\s|, (?=(?:[^,=:]|,(?! ))*[=:])|\t(?=[^\t=:]*[=:])")
 _LIKE_A_SETTING = re.compile(
     r"(?:series.?resist|base.?temp|(?:medium|pressure)\b)"
     r"|(?:(?:r_?s(?:eries)?|t_?(?:base|0))\b(?!-)|t\s*[=:]).*\d"
-    r"|[^=:;\t]*(?:resist(?:or|ance)|temp(?:erature)?)\b.*\d",
+    r"|[^=:;\t]*(?:resist(?:or|ance)|widerstand|temp(?:eratur(?:e)?)?)\b.*\d",
     re.I,
 )
 #: Media by their names; other gases, whose conductivity is another; and all of these.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from itertools import groupby
 
 import numpy as np
 
@@ -20,7 +21,12 @@ _MOST_ABOVE, _NEAR, _LONGEST_HEADING = 2000, 20, 100
 #: First cells of what stands between the sweeps of LabVIEW and of B1500 files, up to the next
 #: header row; and of a row with the units of the columns.
 _BETWEEN = {"channels", "setuptitle", "labview measurement"}
-_UNIT_ROWS = ("y_unit_label", "unit", "units")
+_UNIT_ROWS = ("y_unit_label", "vertical units", "unit", "units")
+#: LabVIEW's column of times, which may stand before that of each channel.
+_X = "X_Value"
+#: Headings of a column that has the unit of the one before it, and what Keithley writes there.
+_UNIT_COLUMNS = {"unit", "units"}
+_OF_BUFFERS = {"Volt DC": "V", "Amp DC": "A", "VDC": "V", "ADC": "A"}
 #: LabVIEW's last column, for remarks, which most rows leave out.
 _REMARKS = "comment"
 #: Marks of a comment, around it, and quotes.
@@ -65,12 +71,12 @@ def headings_in(line: str) -> list[str]:
     >>> headings_in("# V_b (V), I_h (mA)"), headings_in("V_b (V)  I_h / mA")
     (['V_b (V)', 'I_h (mA)'], ['V_b (V)', 'I_h / mA'])
     """
-    line = line.strip(_MARKS)
-    separator = separator_in(line)
-    if separator is not None and (cells := Dialect(separator).cells(line)) is not None:
-        return cells
+    separator = separator_in(line.strip(_MARKS))
+    text = unquoted(line.strip(_MARKS.replace('"', "")))
+    if separator is not None and (cells := Dialect(separator).cells(text)) is not None:
+        return [cells[0].strip(_MARKS), *cells[1:]]
     names: list[str] = []
-    for word in line.split():
+    for word in line.strip(_MARKS).split():
         if names and (word[0] in "([{</" or names[-1].endswith("/")):
             names[-1] += f" {word}"
         else:
@@ -105,11 +111,42 @@ def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int 
                 return index
             named.append(index)
     else:
-        return (named or plain)[0]
+        return named[0] if named else _above_the_rows(lines, plain)
     texts = plain[:order]
     if len(texts) > 1 and any(map(is_unit, headings_in(lines[texts[-1]][1]))):
         texts.pop()
     return next(iter(named or texts[-1:]), None)
+
+
+def _above_the_rows(lines: Sequence[Line], plain: Sequence[int]) -> int:
+    """Return the index of the line above the longest run of as many cells, with a number each."""
+    widths = []
+    for index in plain[:_MOST_ABOVE]:
+        cells = headings_in(lines[index][1])
+        widths.append(len(cells) if len(cells) > 1 and any(map(begins_number, cells)) else 0)
+    ends, longest, start = 0, 0, 0
+    for width, run in groupby(widths):
+        count = len(list(run))
+        if width and count > longest:
+            longest, start = count, ends
+        ends += count
+    above = start - 1
+    if above > 0 and any(map(is_unit, headings_in(lines[plain[above]][1]))):
+        above -= 1
+    return plain[max(above, 0)]
+
+
+def unquoted(line: str) -> str:
+    """Return a line without quotes that stand around all its cells together.
+
+    Examples
+    --------
+    >>> unquoted('"DCV[V];Flag"'), unquoted('"DCV[V]";"Flag"')
+    ('DCV[V];Flag', '"DCV[V]";"Flag"')
+    """
+    text = line.strip()
+    around = len(text) > 1 and text[0] == text[-1] == '"' and text.count('"') == 2
+    return text[1:-1] if around else line
 
 
 def begins_other_lines(cells: Sequence[str]) -> bool:
@@ -140,11 +177,34 @@ def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
     >>> with_units(["V_b", "I_h (mA)", "note"], ["V", "A"])
     ['V_b (V)', 'I_h (mA)', 'note']
     """
+    if list(names).count(_X) > 1 and any(map(is_unit, units[2:3])):
+        # units of the channels alone, where each has times of its own
+        of_channels = iter(units[1:])
+        units = ["" if name == _X else next(of_channels, "") for name in names]
     units = [*units, *[""] * (len(names) - len(units))]
     return [
         f"{name} ({unit})" if is_unit(unit) and name_and_unit(name)[1] is None else name
         for name, unit in zip(names, units, strict=False)
     ]
+
+
+def units_beside(names: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return the unit of each column that stands in the cells of the next one, '' for others.
+
+    Raises
+    ------
+    ValueError
+        With a row's index and the units there and above, if they differ.
+    """
+    units = [""] * len(names)
+    for index, name in enumerate(names[1:], start=1):
+        if name.casefold() in _UNIT_COLUMNS:
+            written = [row[index] for row in rows]
+            other = next((row for row, cell in enumerate(written) if cell != written[0]), None)
+            if other is not None:
+                raise ValueError(other, written[other], written[0])
+            units[index - 1] = _OF_BUFFERS.get(written[0], written[0])
+    return units
 
 
 def names_above(above: Sequence[Line], dialect: Dialect, width: int) -> tuple[list[str], int]:

@@ -25,9 +25,12 @@ from hotlever.tables.headings import (
     names_above,
     row_of_numbers,
     separator_in,
+    units_beside,
+    unquoted,
     with_units,
     without_marks,
 )
+from hotlever.tables.layouts import below_a_header
 from hotlever.tables.table import TextTable
 from hotlever.types import Array
 from hotlever.units import NUMBER, is_unit, key_and_value
@@ -66,6 +69,8 @@ def read_table(
     """
     raw = read_bytes(path)
     lines = filled_lines(raw, str(path))
+    if is_heading is not None and lines:
+        lines = below_a_header(lines)
     first = next((i for i, (_, line) in enumerate(lines) if not is_comment(line)), None)
     if first is None:
         raise InputError(f"{path}: no header row and no rows, expected {expected}")
@@ -121,7 +126,7 @@ class _Reader:
         self.remarks: list[Line] = []
         self.skipping = 0  # the line since which the next header row is waited for
         self._units: list[str] = []
-        self._header, line = lines[0]
+        self._header, line = lines[0][0], unquoted(lines[0][1])
         self._named_by = line if named else None
         separator = separator_in(line)
         if not named or is_comment(line):
@@ -193,7 +198,16 @@ class _Reader:
         rows += [
             self._cells(*line, self._separator) for line in comments if is_row_of_units(line[1])
         ]
-        return with_units(self.names, next((row for row in rows if any(map(is_unit, row))), []))
+        names = with_units(self.names, next((row for row in rows if any(map(is_unit, row))), []))
+        cells = [self._cells(*line, self._separator) for line in self.rows]
+        try:
+            return with_units(names, units_beside(names, cells))
+        except ValueError as error:
+            row, unit, above = error.args
+            raise InputError(
+                f"{self._path}: line {self.rows[row][0]}: the unit is '{shown(unit)}', expected "
+                f"'{shown(above)}' as above"
+            ) from None
 
     def dialect(self, rows: list[Line]) -> Dialect:
         """Return how the rows are written: with decimal commas, if any number has one."""
