@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hotlever.errors import unknown_name
 from hotlever.text import NOT_DETERMINED, aligned, significant, value_with_error
 
 NUMBERS = st.floats(-14, 22).map(lambda power: 10.0**power)
@@ -87,3 +88,12 @@ def test_two_digits_count(size):
 def test_cells_stand_below_each_other():
     assert aligned([["a", "10"], ["bb", "2"]]) == ["a   10", "bb  2"]
     assert aligned([["a", "10"], ["bb", "2"]], right=True) == [" a  10", "bb   2"]
+
+
+def test_of_many_names_the_nearest_are_named():
+    names = [f"length_{index}_um" for index in range(49)] + ["n_d"]
+    far = str(unknown_name("name", "kind", names))
+    assert "did you mean" not in far
+    assert "and 45 more" in far
+    near = str(unknown_name("name", "nd", names))
+    assert "did you mean 'n_d'? (expected one of: n_d, " in near

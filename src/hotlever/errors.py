@@ -8,6 +8,8 @@ from typing import Any
 
 #: Characters that an error quotes of what was found.
 _QUOTED = 40
+#: Names up to which all are listed to choose from, and how many of more.
+_MOST_CHOICES, _NEAREST = 30, 5
 
 
 class HotleverError(Exception):
@@ -105,7 +107,10 @@ def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") 
     "unknown parameter 'c_kapa': did you mean 'c_kappa'? (expected one of: c_kappa, delta)"
     """
     known = list(choices)
-    near = difflib.get_close_matches(name[:_QUOTED], known, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(name[:_QUOTED], known, n=1)
+    if len(known) > _MOST_CHOICES:
+        nearest = difflib.get_close_matches(name[:_QUOTED], known, n=_NEAREST, cutoff=0.0)
+        known = [*nearest, f"and {len(known) - len(nearest)} more"]
     hint = f"did you mean '{near[0]}'? " if near else ""
     prefix = f"{where}: " if where else ""
     return InputError(

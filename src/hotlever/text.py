@@ -100,6 +100,17 @@ def significant(value: float) -> str:
     return f"{value:.{max(0, 1 - int(power))}f}"
 
 
+def with_unit(text: str, unit: str) -> str:
+    """Return the text of a value with its unit, of which a pure number has none.
+
+    Examples
+    --------
+    >>> with_unit("5", "mA"), with_unit("1", "1")
+    ('5 mA', '1')
+    """
+    return text if unit in ("", "1") else f"{text} {unit}"
+
+
 def aligned(rows: Sequence[Sequence[str]], right: bool = False) -> list[str]:
     """Return rows of cells as lines, each column as wide as its widest cell.
 

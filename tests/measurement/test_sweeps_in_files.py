@@ -11,7 +11,7 @@ from test_lab_files import write
 from hotlever.errors import InputError
 from hotlever.estimation import fit, read_measurement
 from hotlever.measurement import parse_columns, with_measured_circuit
-from hotlever.measurement.rows import sweeps_of
+from hotlever.measurement.rows import disagreements, sweeps_of
 from hotlever.measurement.settings import NITROGEN
 from hotlever.probe import Circuit, Probe
 
@@ -91,6 +91,20 @@ def test_sweeps_that_differ_beyond_noise_are_told(tmp_path, noise, shift, told):
         assert (
             "I_h of sweep 2 differs from that of sweep 1 by 1.3% of its largest value" in notes[1]
         )
+
+
+@pytest.mark.parametrize(("share", "least"), [(0.0, 0), (0.003, 34), (0.005, 40)])
+def test_a_hysteresis_of_three_times_the_noise_is_told(share, least):
+    rng, up = np.random.default_rng(3), np.linspace(0.0, 8.0, 41)
+    bias = np.concatenate((up, up[-2::-1]))
+    largest = current_at(8.0)
+    told = 0
+    for _ in range(40):
+        current = current_at(bias) + 1e-3 * largest * rng.normal(size=bias.size)
+        current[41:] += share * largest * np.sin(np.pi * bias[41:] / 8.0)
+        told += bool(disagreements(bias, sweeps_of(bias), {"I_h": current}))
+    assert told >= least
+    assert told <= 2 or share > 0.0
 
 
 # --- polarities --------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ import numpy as np
 
 from hotlever.materials.parameters import parameter_named
 from hotlever.probe import Probe
+from hotlever.text import with_unit
 from hotlever.types import Array
 
 #: A current that stands at its highest value in so many rows, within this share, is clipped, if it
@@ -199,8 +200,8 @@ def _of_a_parameter(probe: Probe, name: str) -> Hypothesis:
     parameter, whose = parameter_named(name), "doping" if name == "n_d" else "drawing"
     return Hypothesis(
         lambda value: (
-            f"is the {whose} another, with {parameter.symbol} rather {value:.3g} than {stated:.3g} "
-            f"{parameter.unit}?"
+            f"is the {whose} another, with {parameter.symbol} rather {value:.3g} than "
+            f"{with_unit(f'{stated:.3g}', parameter.unit)}?"
         ),
         parameter=name,
     )

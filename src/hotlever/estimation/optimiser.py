@@ -22,6 +22,7 @@ from hotlever.estimation.objective import Objective
 from hotlever.estimation.options import SearchOptions
 from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe import Probe
+from hotlever.text import with_unit
 from hotlever.types import Array, Progress
 
 #: Branches that most searches need, for a progress bar to fill.
@@ -306,7 +307,7 @@ class Optimiser:
             if not parameter.lower <= value <= parameter.upper:
                 raise InputError(
                     f"{parameter.name} = {value:g} to start from, expected a value between "
-                    f"{parameter.lower:g} and {parameter.upper:g} {parameter.unit}"
+                    f"{parameter.lower:g} and {with_unit(f'{parameter.upper:g}', parameter.unit)}"
                 )
 
     def _is_near(self, left: float) -> bool:

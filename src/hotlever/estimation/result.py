@@ -46,7 +46,7 @@ from hotlever.probe import Probe
 from hotlever.probe.parameters import parameter_of, parameters_of, usual_parameters
 from hotlever.probe.priors import Prior, PriorUse, priors_of
 from hotlever.records import Number, stored_as
-from hotlever.text import value_with_error
+from hotlever.text import value_with_error, with_unit
 from hotlever.types import Array
 
 #: Variables of a fit's band at rest.
@@ -67,8 +67,7 @@ class FittedParameter:
 
     def __str__(self) -> str:
         """Return the value with its error, as far as there is one, and its unit."""
-        text = value_with_error(self.value, self.stderr)
-        return text if self.unit == "1" else f"{text} {self.unit}"
+        return with_unit(value_with_error(self.value, self.stderr), self.unit)
 
 
 @dataclass(frozen=True)

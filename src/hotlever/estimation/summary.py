@@ -11,7 +11,7 @@ from hotlever.estimation.result import Fit
 from hotlever.materials.parameters import scale_of, scaled_unit
 from hotlever.probe.parameters import of_materials, parameters_of
 from hotlever.probe.priors import PriorUse
-from hotlever.text import NOT_DETERMINED, aligned, value_with_error
+from hotlever.text import NOT_DETERMINED, aligned, value_with_error, with_unit
 
 #: A prior is named as leaned on where its data narrow it to no less than this share, and as moved
 #: where they move it by so many of its standard deviations.
@@ -105,12 +105,11 @@ def undetermined(fit: Fit) -> list[str]:
                 texts.append(f"{name}: no standard error could be estimated")
         elif fitted.stderr >= abs(fitted.value):
             value = value_with_error(fitted.value, fitted.stderr, bounds=bounds)
-            unit = "" if fitted.unit == "1" else f" {fitted.unit}"
             texts.append(
                 f"{name} is not determined by these data: its standard error is larger than its "
                 "value"
                 if value == NOT_DETERMINED
-                else f"{name} is only bounded by these data: {value}{unit} (95 %)"
+                else f"{name} is only bounded by these data: {with_unit(value, fitted.unit)} (95 %)"
             )
         elif (share := fitted.stderr / abs(fitted.value)) > _POOR:
             texts.append(
@@ -119,8 +118,8 @@ def undetermined(fit: Fit) -> list[str]:
             )
     of_material = [name for name in of_materials(fit.probe, in_time=True) if name in fit.names]
     texts += [
-        f"{name} ended at the bound of what it may be, {bound:g} {declared[name].unit}: these "
-        "data would have it beyond"
+        f"{name} ended at the bound of what it may be, "
+        f"{with_unit(f'{bound:g}', declared[name].unit)}: these data would have it beyond"
         for name in of_material
         for bound in declared[name].bounds
         if abs(fit.parameters[name].value - bound) < _AT_THE_BOUND * abs(bound)

@@ -19,7 +19,7 @@ from hotlever.files import json_text
 from hotlever.materials.parameters import heading, scale_of
 from hotlever.probe.parameters import parameters_of
 from hotlever.processes import PROCESSORS, local_processes
-from hotlever.text import BAND, aligned
+from hotlever.text import BAND, aligned, with_unit
 from hotlever.types import Array, Progress
 
 #: A parameter is called undetermined if this share of the samples lies within the second share
@@ -247,8 +247,7 @@ def _about(fit: Fit, name: str, values: Array) -> list[str]:
     undetermined = f"{name} is not determined by these data: its posterior"
     for bound in (parameter.lower, parameter.upper):
         if np.mean(np.abs(values - bound) < _NEAR * span) > _AT_BOUND:
-            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-            return [f"{undetermined} reaches its bound {bound:g}{unit}"]
+            return [f"{undetermined} reaches its bound {with_unit(f'{bound:g}', parameter.unit)}"]
     prior = fit.stated_priors.get(name)
     if prior is not None and np.std([*map(prior.deviation, values)]) > _AS_KNOWN:
         return [f"{name} is as known before: these data do not tell"]

@@ -23,9 +23,10 @@ from hotlever.types import Array, Index, Mask
 _BACK = 0.1
 #: Sweeps of fewer rows are none.
 _FEWEST = 3
-#: Sweeps differ if they do so by this part of the largest value, this many times the scatter of
-#: the differences between neighbours, at so many rows.
-_DIFFERENT, _BEYOND_NOISE, _ENOUGH = 0.003, 2.5, 8
+#: Sweeps differ if they do so by this part of the largest value, and by more than noise, at so many
+#: rows. Noise has von Neumann's ratio of 1 within so many of its standard deviations, 1/√n (Ann.
+#: Math. Stat. 12, 367 (1941)): half the mean square between neighbours over that of all.
+_DIFFERENT, _DEVIATIONS, _ENOUGH = 0.001, 3.0, 8
 #: Rows up to which all are used as they are, and steps of the bias in which more are averaged.
 MANY, STEPS = 2000, 1000
 #: For a robust fit a datum is left out of its mean beyond so many standard deviations
@@ -115,9 +116,10 @@ def _difference(along: Array, values: Array, first: slice, other: slice, largest
     difference = difference[np.isfinite(difference)]
     if difference.size < _ENOUGH:
         return 0.0
-    noise = np.sqrt(0.5 * np.mean(np.diff(difference) ** 2))
-    size = float(np.sqrt(np.mean(difference**2)))
-    return size if size > max(_BEYOND_NOISE * noise, _DIFFERENT * largest) else 0.0
+    noise, square = 0.5 * np.mean(np.diff(difference) ** 2), np.mean(difference**2)
+    beyond = square - noise > _DEVIATIONS / np.sqrt(difference.size) * square
+    size = float(np.sqrt(square))
+    return size if beyond and size > _DIFFERENT * largest else 0.0
 
 
 def _rising(x: Array, y: Array) -> tuple[Array, Array]:

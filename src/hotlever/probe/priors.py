@@ -26,6 +26,7 @@ from hotlever.materials.parameters import PUBLISHED_SCATTER, Parameter
 from hotlever.probe.parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.parts import ProbeParts
 from hotlever.records import Number
+from hotlever.text import with_unit
 
 ALL_DIMENSIONS = "dimensions"
 #: Scales of what is shown, and the observable that each belongs to.
@@ -280,7 +281,7 @@ def _check(prior: Prior, parameter: Parameter, where: str, written: Written) -> 
     if not parameter.lower <= prior.value <= parameter.upper:
         raise InputError(
             f"{where} = {prior.value:g}, expected a value from {parameter.lower:g} to "
-            f"{parameter.upper:g} {parameter.unit}"
+            f"{with_unit(f'{parameter.upper:g}', parameter.unit)}"
         )
     if prior.relative and prior.value == 0:
         raise InputError(f"{where}: a relative spread needs a value above 0")

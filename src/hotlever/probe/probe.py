@@ -124,7 +124,10 @@ class Probe(ProbeParts):
         probe = cls.from_values(parts, where)
         probe.circuit.check(probe.layout().terminal_names, probe.surroundings.medium, where)
         if "material" in values and not probe.has_plain_silicon:
-            raise InputError(f"{where}: [material]: no layer is made of it, expected none")
+            raise InputError(
+                f"{where}: [material]: no layer is made of it, expected no "
+                "such section, or a layer without a material of its own"
+            )
         priors_of(probe.stated_priors, probe, f"{where}: [prior]")
         return probe
 

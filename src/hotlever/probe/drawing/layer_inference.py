@@ -61,7 +61,7 @@ def infer_layers(sheet: Sheet, tolerance: float) -> LayerInference:
     touched = len(best.cutters) + len(best.touching)
     inferred.reasons[SILICON] = (
         f"{best.shape.area:.4g} µm²; {touched} other layer{'s' * (touched != 1)} lie"
-        f"{'s' * (touched == 1)} across it or touch its outline"
+        f"{'s' * (touched == 1)} across it or touch{'es' * (touched == 1)} its outline"
     )
     if len(best.pieces) > 1:
         inferred.doubts.append(
