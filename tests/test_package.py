@@ -29,7 +29,7 @@ MODULES = sorted(
 #: on the floors of single modules.
 FLOORS = {
     "ground": ("colours", "errors", "memory", "threads", "types"),
-    "numbers and files": ("files", "records", "spieser2017", "steps", "units"),
+    "numbers and files": ("files", "piecewise", "records", "spieser2017", "steps", "units"),
     "texts": ("cache", "datasets", "text", "unforeseen"),
     "tables and processes": ("cluster", "processes", "tables"),
     "materials": ("materials",),

@@ -125,6 +125,69 @@ def conversion(unit: str, inside: str, difference: bool = False) -> tuple[float,
     return 10.0 ** (theirs.power - ours.power) * (theirs.factor / ours.factor), 0.0
 
 
+#: What one of a unit is of the products of V, A, ohm, K and cm that properties of materials have.
+_FACTORS = {
+    **{symbol: ({symbol: 1}, 1.0) for symbol in ("V", "A", "K", "s")},
+    **dict.fromkeys(("Ω", "ohm", "Ohm"), ({"V": 1, "A": -1}, 1.0)),
+    "S": ({"A": 1, "V": -1}, 1.0),
+    "W": ({"V": 1, "A": 1}, 1.0),
+    "J": ({"V": 1, "A": 1, "s": 1}, 1.0),
+    "m": ({"cm": 1}, 100.0),
+    "1": ({}, 1.0),
+    "%": ({}, 0.01),
+}
+_FACTOR = re.compile(r"([^\d\s^*·./()-]+|%|1(?!\d))(?:\^|\*\*)?([+-]?\d+)?")
+_RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+
+
+def product_conversion(unit: str, inside: str) -> float | None:
+    """Return the factor from one product of units to another; None if they are of other kinds.
+
+    Examples
+    --------
+    >>> product_conversion("W/(m K)", "W cm⁻¹ K⁻¹"), product_conversion("µΩcm", "Ω cm")
+    (0.01, 1e-06)
+    >>> product_conversion("W m^-1 K^-1", "W cm⁻¹ K⁻¹"), product_conversion("W/mK", "Ω cm")
+    (0.01, None)
+    """
+    theirs, ours = _product(unit), _product(inside)
+    if theirs is None or ours is None or theirs[0] != ours[0]:
+        return None
+    return float(f"{theirs[1] / ours[1]:.12g}")
+
+
+def _product(text: str) -> tuple[dict[str, int], float] | None:
+    """Return the powers of V, A, K, s and cm in a product of units, and what one of it is."""
+    text = unicodedata.normalize("NFKC", text.translate(_RAISED)).strip()
+    # written together: metres or centimetres, and kelvins
+    text = re.sub(r"(ohm|Ω)(c?m)\b", r"\1 \2", text)
+    text = re.sub(r"\b([cmµμ]?m(?:\^?[23])?)K\b", r"\1 K", text)
+    above, slash, below = text.partition("/")
+    powers: dict[str, int] = {}
+    scale = 1.0
+    for part, sign in ((above, 1), (below.strip(" ()") if slash else "", -1)):
+        rest = _FACTOR.sub("", part).strip(" *·.()")
+        if rest or "/" in part:
+            return None
+        for symbol, exponent in _FACTOR.findall(part):
+            found = next(
+                (
+                    (_FACTORS[symbol[len(prefix) :]], power)
+                    for prefix, power in _PREFIXES.items()
+                    if symbol.startswith(prefix) and symbol[len(prefix) :] in _FACTORS
+                ),
+                None,
+            )
+            if found is None:
+                return None
+            (of, one), power = found
+            times = sign * int(exponent or 1)
+            scale *= (one * 10.0**power) ** times
+            for name, each in of.items():
+                powers[name] = powers.get(name, 0) + times * each
+    return {name: power for name, power in powers.items() if power}, scale
+
+
 def unknown_unit(unit: str, inside: str, where: str) -> InputError:
     """Return the error for a unit that `conversion` does not know."""
     return InputError(

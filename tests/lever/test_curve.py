@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import PPoly
 
-from hotlever.lever.curve import Piecewise, hermite_weights, smooth_curve, spline_through
+from hotlever.lever.curve import hermite_weights, smooth_curve, spline_through
+from hotlever.piecewise import Piecewise
 
 
 @pytest.mark.parametrize("degree", range(6))

@@ -15,8 +15,9 @@ from itertools import pairwise
 import numpy as np
 
 from hotlever.lever.branch import TIP_RISE, Branch
-from hotlever.lever.curve import Piecewise, crossing, spline_through
+from hotlever.lever.curve import crossing, spline_through
 from hotlever.lever.sensitivities import at_fixed_bias
+from hotlever.piecewise import Piecewise
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array, Index
 

@@ -21,12 +21,12 @@ from numpy.typing import ArrayLike
 
 from hotlever.errors import BranchEndError
 from hotlever.lever.by_power import ByPower
-from hotlever.lever.curve import Piecewise
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.newton import NewtonResult
 from hotlever.lever.parametrisation import NATURAL, UNIT_K, UNIT_V, Parametrisation, PseudoArclength
 from hotlever.lever.ramp import Reading, slow_ramp
 from hotlever.lever.solved_states import SolvedStates
+from hotlever.piecewise import Piecewise
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 

@@ -11,8 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
-from hotlever.lever.curve import Piecewise, crossing, smooth_curve
+from hotlever.lever.curve import crossing, smooth_curve
 from hotlever.lever.solved_states import SolvedStates
+from hotlever.piecewise import Piecewise
 from hotlever.types import Array
 
 

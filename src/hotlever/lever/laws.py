@@ -141,7 +141,7 @@ class FilmLaws:
 
 def names_in_laws(material: str, kind: Kind) -> dict[str, str]:
     """Return what the laws of a material call each parameter, by its name in the probe."""
-    own = {full_name(material, name): name for name in kind.declared}
+    own = {full_name(material, name): name for name in kind.parameters}
     return {"T": "T", BASE: "surroundings_K"} | own
 
 

@@ -14,10 +14,10 @@ from typing import Protocol
 import numpy as np
 
 from hotlever.errors import NewtonError
-from hotlever.lever.curve import Piecewise
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
 from hotlever.lever.space import TIP, Constraint, Factors, Space
+from hotlever.piecewise import Piecewise
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array, Index
 

@@ -11,7 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from hotlever.lever.curve import Piecewise, crossing
+from hotlever.lever.curve import crossing
+from hotlever.piecewise import Piecewise
 from hotlever.types import Array
 
 

@@ -1,6 +1,7 @@
 """Material laws, the doping profile, and the published parameter sets."""
 
-from hotlever.materials.kinds import KINDS, Kind
+from hotlever.materials.kind import Kind
+from hotlever.materials.kinds import KINDS
 from hotlever.materials.parameters import (
     HIGH_DOPED,
     LOW_DOPED,

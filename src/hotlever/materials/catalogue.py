@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hotlever.materials.kinds import KINDS, Kind
+from hotlever.materials.kind import Kind
+from hotlever.materials.kinds import KINDS
 from hotlever.materials.laws import Law
 from hotlever.materials.presets import PRESETS
 from hotlever.materials.sections import material_of

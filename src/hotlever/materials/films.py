@@ -6,10 +6,13 @@ its temperature coefficient below: both are for a fit to find.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hotlever.materials.laws import Evaluated, law
+from hotlever.types import Array
 
 #: Temperature (K) at which a metal's resistivity is stated.
 STATED_AT_K = 293.0
@@ -68,7 +71,21 @@ def wiedemann_franz(
     68.2
     """
     T = np.asarray(T, dtype=float)
-    sigma, by = metal_conductivity.formula(T, resistivity, tcr)
+    return _by_electrons(T, metal_conductivity.formula(T, resistivity, tcr), lorenz_ratio)
+
+
+@law(meant_for=(250.0, 800.0), source="Wiedemann and Franz, Ann. Phys. 165, 497 (1853)")
+def wiedemann_franz_of(
+    T: ArrayLike, conductivity: Callable[[Array], Evaluated], lorenz_ratio: float = 1.0
+) -> Evaluated:
+    """Thermal conductivity by a law of the electrical one (S cm⁻¹), see `wiedemann_franz`."""
+    T = np.asarray(T, dtype=float)
+    return _by_electrons(T, conductivity(T), lorenz_ratio)
+
+
+def _by_electrons(T: Array, conductivity: Evaluated, lorenz_ratio: float) -> Evaluated:
+    """Return κ = L σ T, see `wiedemann_franz`."""
+    sigma, by = conductivity
     lorenz = SOMMERFELD * lorenz_ratio
     kappa = lorenz * sigma * T
     return kappa, {
@@ -76,6 +93,13 @@ def wiedemann_franz(
         "T": lorenz * (sigma + T * by["T"]),
         "lorenz_ratio": kappa / lorenz_ratio,
     }
+
+
+def reciprocal(resistivity: Evaluated) -> Evaluated:
+    """Return σ = 1/ρ of a resistivity and its derivatives."""
+    rho, by = resistivity
+    sigma = 1.0 / rho
+    return sigma, {name: -sigma * sigma * slope for name, slope in by.items()}
 
 
 @law(meant_for=(200.0, 1300.0), source="a constant, as stated in the probe file")

@@ -11,33 +11,18 @@ have it: what a fit may vary, probe files and ``[material]`` follow from these.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field
 
-from hotlever.errors import InputError
-from hotlever.materials.films import (
-    constant_conductivity,
-    dielectric_conductivity,
-    metal_conductivity,
-    wiedemann_franz,
-)
-from hotlever.materials.heat import enthalpy, enthalpy_by_capacity
-from hotlever.materials.laws import FORMULA_TO, Evaluated, Law
+from hotlever.materials.film_kinds import Dielectric, MetalFilm
+from hotlever.materials.heat import enthalpy
+from hotlever.materials.kind import Kind
+from hotlever.materials.laws import Evaluated, Law
 from hotlever.materials.p_silicon import conductivity_p, inversion_temperature_p
-from hotlever.materials.parameters import (
-    OF_DIELECTRIC,
-    OF_METAL,
-    OF_SILICON,
-    Parameter,
-    field_of,
-)
-from hotlever.materials.radiation import grey_emission
+from hotlever.materials.parameters import OF_SILICON, field_of
 from hotlever.materials.silicon import (
-    MELTING_POINT,
     Carrier,
     conductivity_high_doped,
     conductivity_low_doped,
@@ -47,106 +32,15 @@ from hotlever.materials.silicon import (
 )
 from hotlever.materials.thermopower import (
     thermoelectric_high_doped,
-    thermoelectric_metal,
     thermoelectric_n_silicon,
     thermoelectric_p_silicon,
 )
-from hotlever.records import Record
 from hotlever.types import Array
 
 #: In place of c_κ: κ follows from the thickness.
 BY_THICKNESS = "thickness"
 #: Share of its resistivity at 300 K that high-doped silicon has when it is colder.
 _LEAST_LEFT = 0.1
-
-
-class Kind(Record):
-    """A material of one kind (section ``[materials.NAME]`` of a probe file)."""
-
-    #: The parameters of its family, of which it has those that are its fields.
-    family: ClassVar[dict[str, Parameter]]
-    #: All parameters that one of this kind may have, by name.
-    declared: ClassVar[dict[str, Parameter]]
-    #: Those that a fit varies unless it is told otherwise.
-    usual: ClassVar[tuple[str, ...]]
-    #: Whether it carries a current.
-    conducts: ClassVar[bool] = True
-
-    kind: str
-    emissivity: float
-
-    @classmethod
-    def __pydantic_init_subclass__(cls, **options: Any) -> None:
-        """Find the parameters among the fields."""
-        super().__pydantic_init_subclass__(**options)
-        family = getattr(cls, "family", {})
-        cls.declared = {name: family[name] for name in family if name in cls.model_fields}
-        cls.usual = tuple(name for name, parameter in cls.declared.items() if parameter.usual)
-
-    @property
-    def parameters(self) -> dict[str, Parameter]:
-        """Those of the declared parameters that are numbers here."""
-        return {
-            name: parameter
-            for name, parameter in self.declared.items()
-            if isinstance(getattr(self, name), float)
-        }
-
-    @property
-    @abstractmethod
-    def laws(self) -> tuple[Law, ...]:
-        """Of thermal and, if it conducts, electrical conductivity."""
-
-    @property
-    def effects(self) -> tuple[Law, ...]:
-        """Laws of what counts beyond the paper's physics."""
-        return ()
-
-    @property
-    def highest_K(self) -> float:
-        """Temperature (K) at which it melts or its laws end."""
-        return MELTING_POINT
-
-    def end(self, name: str) -> str:
-        """Say what happens to a material of this name above its highest temperature."""
-        return f"the laws of '{name}' end"
-
-    def impossible(self, coldest_K: float) -> str:
-        """Say why its laws make no sense from a temperature (K) on; empty if they do."""
-        return ""
-
-    @abstractmethod
-    def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
-        """Return κ (W cm⁻¹ K⁻¹) of a film, with its derivatives.
-
-        They are by ``T``, by parameters, and by ``thickness_um`` where κ depends on it.
-        """
-
-    @abstractmethod
-    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
-        """Return σ (S cm⁻¹), with its derivatives by ``T``, by parameters and by ``n``.
-
-        The doping `n` (cm⁻³) matters to a `LowDopedSilicon` only.
-        """
-
-    @abstractmethod
-    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
-        """Return β (A cm⁻¹ K⁻¹) and γ (W cm⁻¹ K⁻²), (2, ...), with their derivatives.
-
-        They are Σ σ S and Σ σ S² of the carriers, see `hotlever.materials.thermopower`; those of
-        high-doped silicon are of the kind `carrier`.
-        """
-
-    def emission(self, T: Array, surroundings_K: float) -> Evaluated:
-        """Return what a face radiates less what it takes up (W cm⁻²), with its derivatives."""
-        return grey_emission(T, self.emissivity, surroundings_K)
-
-    @abstractmethod
-    def enthalpy(self, T: Array) -> Evaluated:
-        """Return the heat held above that at 298.15 K (J cm⁻³), with its derivatives.
-
-        They are by ``T`` and by parameters.
-        """
 
 
 class Silicon(Kind):
@@ -163,8 +57,8 @@ class Silicon(Kind):
     scattering_exponent: float = field_of(OF_SILICON["scattering_exponent"])
     emissivity: float = field_of(OF_SILICON["emissivity"])
 
-    def end(self, name: str) -> str:
-        """Say what happens to a material of this name above its highest temperature."""
+    def melting(self, name: str) -> str:
+        """Say what happens to a material of this name above the temperature at which it melts."""
         return "silicon melts"
 
     @property
@@ -181,31 +75,6 @@ class Silicon(Kind):
         held, by = enthalpy(T)
         scale = self.heat_capacity_scale
         return scale * held, {"T": scale * by["T"], "heat_capacity_scale": held}
-
-
-class Stored(Kind):
-    """What materials have in common whose heat capacity is a number."""
-
-    heat_capacity: float | None = Field(
-        default=None,
-        ge=0.5,
-        le=10.0,
-        description="heat capacity (J cm⁻³ K⁻¹), which counts in time",
-    )
-
-    def enthalpy(self, T: Array) -> Evaluated:
-        """Return the heat held (J cm⁻³), see `Kind.enthalpy`.
-
-        Raises
-        ------
-        InputError
-            If no heat capacity was given.
-        """
-        if self.heat_capacity is None:
-            raise InputError(
-                f"a {self.kind} without heat_capacity (J cm⁻³ K⁻¹) cannot be followed in time"
-            )
-        return enthalpy_by_capacity(T, self.heat_capacity)
 
 
 class LowDopedSilicon(Silicon):
@@ -309,100 +178,6 @@ class HighDopedSilicon(Silicon):
         """Return β and γ, see `Kind.thermoelectric`."""
         own = self.a0, self.a1, self.n_hd, self.scattering_exponent
         return thermoelectric_high_doped(T, *own, carrier)
-
-
-class MetalFilm(Stored):
-    """A metal film; the values of a bulk metal are where a fit may start."""
-
-    family: ClassVar = OF_METAL
-
-    kind: Literal["metal-film"] = "metal-film"
-    preset: str | None = Field(default=None, description="metal whose values those left out are")
-    resistivity: float = field_of(OF_METAL["resistivity"])
-    tcr: float = field_of(OF_METAL["tcr"])
-    lorenz_ratio: float = field_of(OF_METAL["lorenz_ratio"])
-    kappa: float | None = field_of(
-        OF_METAL["kappa"],
-        default=None,
-        description="thermal conductivity (W cm⁻¹ K⁻¹); left out: by Wiedemann and Franz",
-    )
-    seebeck: float = field_of(OF_METAL["seebeck"])
-    emissivity: float = field_of(OF_METAL["emissivity"])
-    melting_point_K: float = Field(default=MELTING_POINT, ge=400, le=4000, description="K")
-
-    @property
-    def parameters(self) -> dict[str, Parameter]:
-        """Those of the declared parameters that count here."""
-        other = "kappa" if self.kappa is None else "lorenz_ratio"
-        return {name: parameter for name, parameter in self.declared.items() if name != other}
-
-    @property
-    def laws(self) -> tuple[Law, ...]:
-        """Of thermal and electrical conductivity."""
-        heat = wiedemann_franz if self.kappa is None else constant_conductivity
-        return heat, metal_conductivity
-
-    @property
-    def highest_K(self) -> float:
-        """Temperature (K) at which it melts or its laws end."""
-        return min(self.melting_point_K, FORMULA_TO)
-
-    def end(self, name: str) -> str:
-        """Say what happens to a material of this name above its highest temperature."""
-        return f"'{name}' melts" if self.melting_point_K < FORMULA_TO else super().end(name)
-
-    def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
-        """Return κ (W cm⁻¹ K⁻¹), see `Kind.thermal_conductivity`."""
-        if self.kappa is not None:
-            return constant_conductivity(T, self.kappa)
-        return wiedemann_franz(T, self.resistivity, self.tcr, self.lorenz_ratio)
-
-    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
-        """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
-        return metal_conductivity(T, self.resistivity, self.tcr)
-
-    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
-        """Return β and γ, see `Kind.thermoelectric`."""
-        return thermoelectric_metal(T, self.resistivity, self.tcr, self.seebeck)
-
-
-class Dielectric(Stored):
-    """An insulator, which carries heat alone."""
-
-    family: ClassVar = OF_DIELECTRIC
-    conducts: ClassVar = False
-
-    kind: Literal["dielectric"] = "dielectric"
-    preset: str | None = Field(
-        default=None, description="dielectric whose values those left out are"
-    )
-    kappa: float = field_of(OF_DIELECTRIC["kappa"])
-    kappa_exponent: float = field_of(OF_DIELECTRIC["kappa_exponent"])
-    emissivity: float = field_of(OF_DIELECTRIC["emissivity"])
-
-    @property
-    def laws(self) -> tuple[Law, ...]:
-        """Of the thermal conductivity."""
-        return (dielectric_conductivity,)
-
-    @property
-    def highest_K(self) -> float:
-        """Temperature (K) at which its laws end."""
-        return FORMULA_TO
-
-    def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
-        """Return κ (W cm⁻¹ K⁻¹), see `Kind.thermal_conductivity`."""
-        return dielectric_conductivity(T, self.kappa, self.kappa_exponent)
-
-    def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
-        """Return σ (S cm⁻¹), zero."""
-        nothing = 0.0 * T
-        return nothing, {"T": nothing}
-
-    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
-        """Return β and γ, zero."""
-        nothing = np.zeros((2, *T.shape))
-        return nothing, {"T": nothing}
 
 
 KINDS: dict[str, type[Kind]] = {

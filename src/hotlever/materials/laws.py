@@ -32,10 +32,25 @@ LEVELLING = 100.0
 class Law(Protocol):
     """A material law, ``value, partials = law(T, ...)``; the rest is what `law` notes."""
 
-    temperature_range: tuple[float, float]
-    steps: tuple[float, ...]
-    formula: Callable[..., Evaluated]
-    source: str
+    @property
+    def temperature_range(self) -> tuple[float, float]:
+        """See `law`."""
+        ...
+
+    @property
+    def steps(self) -> tuple[float, ...]:
+        """See `law`."""
+        ...
+
+    @property
+    def source(self) -> str:
+        """See `law`."""
+        ...
+
+    @property
+    def formula(self) -> Callable[..., Evaluated]:
+        """What it is within the range of its formula."""
+        ...
 
     def __call__(self, *args: Any, **kwargs: Any) -> Evaluated:
         """Evaluate the law and its partial derivatives."""

@@ -119,6 +119,12 @@ def _emissivity(value: float) -> Parameter:
     )
 
 
+def _scale(of: str, symbol: str) -> Parameter:
+    """Return the row of the scale of a law that a probe file states."""
+    meaning = f"scale of {of} where that is a table or a formula"
+    return Parameter(f"{of}_scale", symbol, "1", 1.0, 0.2, 5.0, meaning, spread=_FILM, usual=True)
+
+
 #: All parameters of silicon: first the six that the paper fits, in its order.
 OF_SILICON = _table(
     *(
@@ -176,12 +182,14 @@ OF_METAL = _table(
         spread=_FILM,
         usual=True,
     ),
+    _scale("resistivity", "c_ρ"),
     Parameter(
         *("lorenz_ratio", "L/L₀", "1", 1.0, 0.2, 5.0),
         "heat carried over what Wiedemann and Franz give",
         value=1.0,
     ),
     Parameter("kappa", "κ", "W cm⁻¹ K⁻¹", 0.01, 0.01, 5.0, "thermal conductivity"),
+    _scale("kappa", "c_κ"),
     Parameter(
         *("seebeck", "S", "µV K⁻¹", 1.0, -100.0, 100.0),
         "Seebeck coefficient, which counts with thermoelectricity",
@@ -204,8 +212,34 @@ OF_DIELECTRIC = _table(
         "power of the temperature in it",
         value=0.0,
     ),
+    _scale("kappa", "c_κ"),
     _emissivity(0.15),
 )
+
+#: Units and bounds of what a table or a formula may state: far wider than those of numbers, since
+#: not only metals follow them.
+STATED: dict[str, tuple[str, tuple[float, float]]] = {
+    "resistivity": ("Ω cm", (1e-7, 1e2)),
+    "kappa": ("W cm⁻¹ K⁻¹", (1e-5, 50.0)),
+    "heat_capacity": ("J cm⁻³ K⁻¹", (0.01, 20.0)),
+    "seebeck": ("µV K⁻¹", (-2000.0, 2000.0)),
+    "emissivity": ("1", (0.0, 1.0)),
+}
+#: Parameters that classes of materials made in Python declare, by name.
+OF_CLASSES: dict[str, Parameter] = {}
+
+
+def constant_of(name: str, value: float) -> Parameter:
+    """Return the parameter that a number is which a formula names: it stays within a factor of 5.
+
+    Examples
+    --------
+    >>> constant_of("beta", -2e-7).bounds
+    (-1e-06, -4e-08)
+    """
+    lower, upper = sorted((value / 5.0, value * 5.0)) if value else (-1.0, 1.0)
+    scale = abs(value) or 1.0
+    return Parameter(name, name, "1", scale, lower, upper, "number in a formula", value=value)
 
 
 def field_of(parameter: Parameter, **others: Any) -> Any:
@@ -214,15 +248,21 @@ def field_of(parameter: Parameter, **others: Any) -> Any:
     The bounds are twice as wide as a fit's; those of what may be negative, or are exact, are the
     fit's own.
     """
-    widened = 1.0 if parameter.lower < 0 or parameter.exact else 2.0
+    least, most = field_bounds(parameter)
     stated = {
         "description": f"{parameter.meaning}, {parameter.symbol} ({parameter.unit})",
-        "ge": parameter.lower / widened,
-        "le": widened * parameter.upper,
+        "ge": least,
+        "le": most,
     }
     if not math.isnan(parameter.value):
         stated["default"] = parameter.value
     return Field(**{**stated, **others})
+
+
+def field_bounds(parameter: Parameter) -> tuple[float, float]:
+    """Return the bounds of a parameter's field, see `field_of`."""
+    widened = 1.0 if parameter.lower < 0 or parameter.exact else 2.0
+    return parameter.lower / widened, widened * parameter.upper
 
 
 # --- names --------------------------------------------------------------------------------------
@@ -276,7 +316,7 @@ def parameter_named(name: str) -> Parameter:
     if name in OF_SILICON:
         return OF_SILICON[name]
     material, _, own = name.rpartition(".")
-    if material and (declared := (OF_DIELECTRIC | OF_METAL | OF_SILICON).get(own)):
+    if material and (declared := (OF_CLASSES | OF_DIELECTRIC | OF_METAL | OF_SILICON).get(own)):
         return declared._replace(
             name=name,
             symbol=f"{declared.symbol} ({material})",

@@ -14,14 +14,14 @@ STEFAN_BOLTZMANN = 5.670374419e-12
 FREE_SPACE_OHM = 376.730313668
 
 
-def grey_emission(T: ArrayLike, emissivity: float, surroundings_K: float) -> Evaluated:
+def grey_emission(T: ArrayLike, emissivity: float | Array, surroundings_K: float) -> Evaluated:
     """Return what a grey face radiates less what it takes up from around, ε σ (T⁴ − T₀⁴).
 
     Parameters
     ----------
     T : array_like
         K.
-    emissivity : float
+    emissivity : float or ndarray
         ε, the same at all wavelengths and directions, and with it the share that is taken up.
     surroundings_K : float
         T₀ of black surroundings.

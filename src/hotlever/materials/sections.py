@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping
+from pathlib import Path
 from typing import Any
 
 from hotlever.errors import InputError, quoted, shown, unknown_name
-from hotlever.materials.kinds import KINDS, Kind
+from hotlever.materials.kind import Kind
+from hotlever.materials.kinds import KINDS
 from hotlever.materials.parameters import HIGH_DOPED, LOW_DOPED
 from hotlever.materials.presets import PRESETS, usual_values
+from hotlever.materials.table_files import with_tables
 
 #: Names of materials.
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
@@ -21,7 +24,12 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 LAWS = "laws"
 
 
-def material_of(values: Mapping[str, Any], where: str) -> Kind:
+def material_of(
+    values: Mapping[str, Any],
+    where: str,
+    folder: Path | None = None,
+    like: Kind | None = None,
+) -> Kind:
     """Make a material of a section of a probe file.
 
     Parameters
@@ -31,6 +39,10 @@ def material_of(values: Mapping[str, Any], where: str) -> Kind:
         silicon those of the reference probe.
     where : str
         Names the section in an error.
+    folder : path, optional
+        What names of files of tables are relative to.
+    like : Kind, optional
+        One of the same kind whose class it is to have, with laws of its own.
 
     Raises
     ------
@@ -47,12 +59,24 @@ def material_of(values: Mapping[str, Any], where: str) -> Kind:
         raise InputError(f"{where}: kind is missing (one of: {', '.join(KINDS)})")
     if not isinstance(kind, str) or kind not in KINDS:
         raise unknown_name("kind", str(kind), KINDS, where)
-    given = {**usual_values(kind), **_preset(values.get("preset"), kind, where), **values}
-    return KINDS[kind].from_values(given, where)
+    usual = {**usual_values(kind), **_preset(values.get("preset"), kind, where)}
+    made = type(like) if like is not None and like.kind == kind else KINDS[kind]
+    try:
+        stated = with_tables(values, folder)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    # of a metal that follows a table the coefficient of a preset has no use
+    useless = made.without_use({**usual, **stated})
+    usual = {name: value for name, value in usual.items() if name not in useless}
+    return made.from_values({**usual, **stated}, where)
 
 
 def materials_of(
-    sections: Mapping[str, Any], where: str, reserved: Collection[str]
+    sections: Mapping[str, Any],
+    where: str,
+    reserved: Collection[str],
+    folder: Path | None = None,
+    like: Mapping[str, Kind] | None = None,
 ) -> dict[str, Kind]:
     """Make all materials of the section ``[materials]`` of a probe file.
 
@@ -64,6 +88,10 @@ def materials_of(
         Names the file in an error.
     reserved : collection of str
         Names that no material may have.
+    folder : path, optional
+        What names of files are relative to.
+    like : mapping of str to Kind, optional
+        Materials whose classes those of the same name and kind are to have.
 
     Raises
     ------
@@ -80,7 +108,7 @@ def materials_of(
         here = f"{where}: [materials.{name}]"
         if not isinstance(section, dict):
             raise InputError(f"{here} must be a section, found {quoted(section)}")
-        materials[name] = material_of(section, here)
+        materials[name] = material_of(section, here, folder, (like or {}).get(name))
     return materials
 
 
@@ -122,16 +150,3 @@ def refuse_own_laws(values: Mapping[str, Any], where: str) -> None:
             f"{where}: '{shown(str(name))}' follows laws of its own, those of the Python class "
             f"{shown(str(law), 80)}, which no file holds: expected the probe made in Python"
         )
-
-
-def with_laws_of(before: Any, probe: Any) -> Any:
-    """Return a probe whose materials follow the laws that those of the same name had before."""
-    if not own_laws(before.kinds):
-        return probe
-    materials = dict(probe.materials)
-    for name, kind in materials.items():
-        old = before.materials.get(name)
-        if old is not None and old.kind == kind.kind:
-            materials[name] = type(old).from_values(kind.model_dump(), name)
-    material = type(before.material).from_values(probe.material.model_dump(), "material")
-    return probe.model_copy(update={"material": material, "materials": materials})

@@ -268,6 +268,12 @@ def thermoelectric_high_doped(
     sigma, d_sigma = conductivity_high_doped.formula(T, a0, a1)
     carriers = np.full_like(T, n_hd), {"n_hd": np.ones_like(T)}
     S, d_S = seebeck_of_band(carriers, density_of_states.formula(T), scattering_exponent, carrier)
+    return of_one_carrier((sigma, d_sigma), (S, d_S))
+
+
+def of_one_carrier(conductivity: Evaluated, seebeck: Evaluated) -> Evaluated:
+    """Return β and γ by σ (S cm⁻¹) and S (V/K) of one kind of carrier, and their derivatives."""
+    (sigma, d_sigma), (S, d_S) = conductivity, seebeck
     by: Partials = {}
     _add(by, d_sigma, np.stack([S, S**2]))
     _add(by, d_S, np.stack([sigma, 2.0 * sigma * S]))

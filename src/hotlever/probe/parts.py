@@ -86,9 +86,10 @@ class ProbeParts(Record):
 
     @model_validator(mode="after")
     def _laws_make_sense_at_the_base(self) -> Self:
-        for kind in self.made_of.values():
+        for name, kind in self.made_of.items():
             if reason := kind.impossible(self.circuit.base_temperature_K):
-                raise ValueError(reason)
+                of = f"{name}: " if name in self.materials else ""
+                raise ValueError(of + reason)
         return self
 
     def __hash__(self) -> int:
@@ -197,6 +198,9 @@ class ProbeParts(Record):
         if dot and section not in records:
             raise unknown_name("section", section, [*SECTIONS, *named, *wired])
         keys = {part: [*record.model_fields] for part, record in records.items()}
+        # and the numbers that formulas name
+        for material, kind in self.materials.items():
+            keys[material] += kind.model_extra or {}
         # in [probe] those of all shapes, its own first
         keys["probe"] += [key for shape in PARAMETRIC.values() for key in shape.model_fields]
         own = [part for part in PARTS if getattr(self, part)]

@@ -11,7 +11,7 @@ from typing import Any
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_text, write_text
 from hotlever.materials import REFERENCE, Kind
-from hotlever.materials.sections import LAWS, materials_of, own_laws, refuse_own_laws, with_laws_of
+from hotlever.materials.sections import LAWS, materials_of, own_laws, refuse_own_laws
 from hotlever.probe.parts import MATERIALS, PARTS, SECTIONS, ProbeParts
 from hotlever.probe.physics import Physics
 from hotlever.probe.priors import priors_of
@@ -81,7 +81,13 @@ class Probe(ProbeParts):
         raise InputError(f"found {type(probe).__name__}, expected a Probe or a probe file")
 
     @classmethod
-    def from_sections(cls, values: dict[str, Any], where: str, folder: Path | None = None) -> Probe:
+    def from_sections(
+        cls,
+        values: dict[str, Any],
+        where: str,
+        folder: Path | None = None,
+        like: Probe | None = None,
+    ) -> Probe:
         """Make a probe of the sections of a probe file.
 
         Parameters
@@ -91,7 +97,9 @@ class Probe(ProbeParts):
         where : str
             Names the file in an error.
         folder : path, optional
-            What the name of a drawing's file is relative to.
+            What names of files, of a drawing and of tables, are relative to.
+        like : Probe, optional
+            One whose materials of the same names have the classes that these are to have.
 
         Raises
         ------
@@ -106,7 +114,8 @@ class Probe(ProbeParts):
                 raise InputError(f"{where}: [{name}] must be a section, found {quoted(section)}")
         if "probe" not in values:
             raise InputError(f"{where}: section [probe] is missing")
-        materials = materials_of(values.get(MATERIALS, {}), where, SECTIONS)
+        before = None if like is None else like.materials
+        materials = materials_of(values.get(MATERIALS, {}), where, SECTIONS, folder, before)
         drawn = {name: values[name] for name in SHAPE_SECTIONS if name in values}
         shape = shape_of(drawn, where, folder, materials)
         for name in materials:
@@ -118,6 +127,8 @@ class Probe(ProbeParts):
         parts: dict[str, Any] = {"shape": shape, MATERIALS: materials}
         usual = {"material": REFERENCE.model_dump()}
         for name, part in PARTS.items():
+            if name == "material" and like is not None:
+                part = type(like.material)
             if name in values:
                 section = {**usual.get(name, {}), **values[name]}
                 parts[name] = part.from_values(section, f"{where}: [{name}]")
@@ -184,13 +195,16 @@ class Probe(ProbeParts):
             for part in [MATERIALS] if section in self.materials else above:
                 inside = inside.setdefault(part, {})
             inside.setdefault(last, {})[key] = value
+            if section in self.materials:
+                useless = type(self.materials[section]).without_use(inside[last])
+                for other in {*useless} - {own for _, own, _ in map(self.field, changes)}:
+                    inside[last].pop(other, None)
         sections = {name: with_values(section) for name, section in sections.items()}
         shape = PARAMETRIC.get(str(sections["probe"]["shape"]))
         if shape is not None and not isinstance(self.shape, shape):
             own = sections["probe"].items()
             sections["probe"] = {key: value for key, value in own if key in shape.model_fields}
-        changed: Probe = with_laws_of(self, Probe.from_sections(sections, "probe"))
-        return changed
+        return Probe.from_sections(sections, "probe", like=self)
 
     def __repr__(self) -> str:
         # the probe file without its comments

@@ -36,7 +36,8 @@ from hotlever.lever.parametrisation import state_at_bias
 from hotlever.lever.space import TIP, Fluxes
 from hotlever.lever.transport import Properties, dot
 from hotlever.materials import HIGH_DOPED, LOW_DOPED
-from hotlever.materials.kinds import Kind, LowDopedSilicon, PSilicon
+from hotlever.materials.kind import Kind
+from hotlever.materials.kinds import LowDopedSilicon, PSilicon
 from hotlever.probe import Probe, Taper
 from hotlever.probe.physics import Physics
 from hotlever.threads import one_blas_thread

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, get_args
 
 from hotlever.errors import InputError, quoted, shown
-from hotlever.units import LEAST_BIAS, MOST_BIAS, setting
+from hotlever.units import LEAST_BIAS, MOST_BIAS, NUMBER, setting
 
 if TYPE_CHECKING:
     from hotlever.calibration.pulses import PulseTiming
@@ -103,13 +103,16 @@ def parse_settings(texts: Sequence[str] | None, probe: Probe) -> dict[str, Any]:
         keys.add((section, key))
         field = record.model_fields.get(key)
         # a key of another shape than the probe's is a dimension
-        kind = field.annotation if field is not None else float if section == "probe" else str
+        number = section == "probe" or section in probe.materials
+        kind = field.annotation if field is not None else float if number else str
         values[name] = _as_kind(text, (kind, *get_args(kind)), f"--set {name}")
     return values
 
 
 def _as_kind(text: str, kinds: tuple[Any, ...], where: str) -> Any:
     """Return a text as one of the kinds of value that a key of a probe file has."""
+    from hotlever.materials.stated import StatedLaw
+
     if bool in kinds:
         if text not in ("true", "false"):
             raise InputError(f"{where}: found {quoted(text)}, expected true or false")
@@ -118,6 +121,8 @@ def _as_kind(text: str, kinds: tuple[Any, ...], where: str) -> Any:
         return None
     if any(text in get_args(kind) for kind in kinds):
         return text
+    if StatedLaw in kinds and not NUMBER.fullmatch(text.strip()):
+        return text.strip("\"'")  # a formula, or the name of a table's file
     return parse_number(text, where) if float in kinds else text.strip("\"'")
 
 

@@ -1,0 +1,84 @@
+"""Polynomials between nodes, in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hotlever.types import Array
+
+#: Part of the distance between two nodes by which a root may be off.
+_ROUNDING = 1e-10
+
+
+@dataclass(frozen=True)
+class Piecewise:
+    """Polynomials between nodes; the outer ones go on beyond the ends.
+
+    Like ``scipy.interpolate.PPoly``, whose import takes longer than that of all levers.
+
+    Attributes
+    ----------
+    c : ndarray, shape (degree + 1, k - 1, ...)
+        Coefficients of the distance from the node before, the highest power first.
+    x : ndarray, shape (k,)
+        Nodes, rising.
+
+    Examples
+    --------
+    >>> halves = Piecewise(np.array([[1.0, -1.0], [0.0, 1.0]]), np.array([0.0, 1.0, 3.0]))
+    >>> halves([0.5, 1.5, 4.0]).tolist(), halves(2.5, 1).item(), halves.roots().tolist()
+    ([0.5, 0.5, -2.0], -1.0, [0.0, 2.0])
+    """
+
+    c: Array
+    x: Array
+
+    def __call__(self, u: ArrayLike, derivative: int = 0) -> Array:
+        """Return values or a derivative at some places: their shape, and that of a value."""
+        if derivative:
+            return self.derivative()(u, derivative - 1)
+        u = np.asarray(u, dtype=float)
+        before = np.clip(np.searchsorted(self.x, u, side="right") - 1, 0, self.x.size - 2)
+        away = (u - self.x[before]).reshape((*u.shape, *(1,) * (self.c.ndim - 2)))
+        values = self.c[0][before]
+        for coefficients in self.c[1:]:
+            values = values * away + coefficients[before]
+        return np.asarray(values)
+
+    def derivative(self) -> Piecewise:
+        """Return the first derivative."""
+        powers = np.arange(len(self.c) - 1, 0, -1).reshape(-1, *(1,) * (self.c.ndim - 1))
+        return Piecewise(self.c[:-1] * powers, self.x)
+
+    def roots(self) -> Array:
+        """Return where a single quantity is zero between the first and the last node, rising."""
+        roots, widths = [np.empty(0)], np.diff(self.x)
+        for piece in np.flatnonzero(_may_vanish(self.c, widths)).tolist():
+            coefficients, left, width = self.c[:, piece], self.x[piece], widths[piece]
+            away = np.roots(coefficients)
+            real = away.real[np.abs(away.imag) <= _ROUNDING * width]
+            inside = (real >= -_ROUNDING * width) & (real <= width * (1 + _ROUNDING))
+            roots.append(left + real[inside])
+        rising = np.unique(np.clip(np.concatenate(roots), self.x[0], self.x[-1]))
+        # one at a node belongs to the polynomials on both sides of it
+        again = np.diff(rising, prepend=-np.inf) <= 2 * _ROUNDING * np.ptp(self.x)
+        return np.asarray(rising[~again])
+
+
+def _may_vanish(c: Array, widths: Array) -> NDArray[np.bool_]:
+    """Return which polynomials may have a root: those whose Bernstein coefficients differ in sign.
+
+    A polynomial lies between its smallest and its largest one. Most pieces have no root, and each
+    that may have one costs the eigenvalues of a matrix.
+    """
+    degree = len(c) - 1
+    orders = range(degree + 1)
+    to_bernstein = [[comb(i, j) / comb(degree, j) for j in orders] for i in orders]
+    powers = c[::-1] * widths ** np.arange(degree + 1)[:, None]
+    bernstein = np.array(to_bernstein) @ powers
+    clear = _ROUNDING * np.abs(bernstein).max(axis=0)
+    return np.asarray((bernstein.min(axis=0) <= clear) & (bernstein.max(axis=0) >= -clear))
