@@ -96,7 +96,7 @@ def test_many_files_have_the_same_names_and_a_fit_by_other_names_is_made_anew(ru
         (("--column", "I_h (uA)=Storm"), "line 2: unknown column 'Storm': did you mean 'Strom'"),
         (("--column", "I_x (uA)=Strom"), "unknown quantity 'I_x': did you mean 'I_h'"),
         (("--column", "I_h (uA)=Strom", "--column", "Ih (A)=2"), "I_h is given twice"),
-        ((), "expected 'V_b (V)' and at least one of 'I_h (mA)'"),
+        ((), "line 2: column 'Strom' has no unit, expected 'I_h (mA)' or another unit"),
     ],
 )
 @pytest.mark.parametrize("command", ["fit", "calibrate"])

@@ -93,9 +93,6 @@ KINDS: dict[str, Callable[[pytest.FixtureRequest], One]] = {
         Lever(p_type_probe().with_physics(Physics.model_fields), COARSE), 9.5
     ),
     "all effects, solid": lambda _: One(SolidLever(ALL, SOLID), 4.0),
-    "all effects, reduced": lambda _: One(
-        cached_reduction(Lever(ALL, COARSE), None, ("emissivity",)), 9.5
-    ),
     "metal film, all effects": lambda _: One(
         Lever(metal_film_probe().with_physics(Physics.model_fields), COARSE), 4.0
     ),

@@ -9,6 +9,7 @@ import hotlever
 from hotlever import Lever, Probe
 from hotlever.errors import InputError
 from hotlever.lever.lever import COARSE
+from hotlever.lever.reduced.training import can_be_reduced
 from hotlever.lever.transient import pulse, spectrum, step
 from hotlever.lever3d import SolidLever
 from hotlever.probe.solid import SolidMeshOptions
@@ -98,3 +99,10 @@ def test_black_faces_radiate_half_a_per_cent_and_the_balance_is_closed():
     assert out.item() == pytest.approx(sweep.power_mW.item(), rel=1e-6)
     # the paper has of the order of 1 µW, of some 4 mW; the legs radiate more than the heater
     assert 0.01 < sweep.radiated_mW.item() < 0.03
+
+
+def test_a_lever_with_effects_is_not_reduced():
+    """Modes of one polarity and a scale of the power would be wrong with them."""
+    assert can_be_reduced(Probe.reference(), ())
+    assert not can_be_reduced(THERMOELECTRIC, ())
+    assert not can_be_reduced(Probe.reference().with_physics(("radiation",)), ())

@@ -50,13 +50,13 @@ def test_reader_senses_the_voltage_across_the_second_leg(sweep):
 
 def test_no_current_flows_into_the_reader_branch(lever, sweep):
     (state,) = lever.solve([8.0])
-    fields, laws = lever.equations.at(state.x)
-    heat = laws.sigma * (fields.grad_V**2).sum(axis=0) * lever.space.weights
+    fields, sheet, _ = lever.equations.at(state.x)
+    heat = sheet.sigma * (fields.grad_V**2).sum(axis=0) * lever.space.weights
     branch = heat[lever.space.parts["reader branch"]].sum()
     assert 0 <= branch < 2e-3 * heat.sum()
     # next to the bridge the current fringes into the leg; behind the reader none is left
     behind = np.repeat(lever.space.mesh.region == 4, lever.space.elements.per_element)
-    assert np.abs(laws.sigma[behind] * fields.grad_V[:, behind]).max() < 1e-9
+    assert np.abs(sheet.sigma[behind] * fields.grad_V[:, behind]).max() < 1e-9
 
 
 @pytest.mark.parametrize("point", OPERATING_POINTS, ids=lambda point: point.name)
