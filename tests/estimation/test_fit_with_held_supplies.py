@@ -112,9 +112,12 @@ def test_a_fit_finds_what_a_file_of_both_polarities_was_made_with(coarse, tmp_pa
 def test_a_file_is_mirrored_only_where_polarities_are_alike(tmp_path):
     path = tmp_path / "both.csv"
     path.write_text("V_b (V),I_h (mA)\n-2,-0.35\n-1,-0.2\n1,0.07\n2,0.21\n")
-    held = wired("held voltage").circuit
+    held, plain = wired("held voltage"), Probe.reference()
     assert read_measurement(path).bias_V.tolist() == [2.0, 1.0, 1.0, 2.0]
     assert given_measurement(path, held).bias_V.tolist() == [-2.0, -1.0, 1.0, 2.0]
+    assert given_measurement(path, plain).bias_V.tolist() == [2.0, 1.0, 1.0, 2.0]
+    charged = plain.with_physics(("thermoelectric",))
+    assert given_measurement(path, charged).bias_V.tolist() == [-2.0, -1.0, 1.0, 2.0]
 
 
 def test_a_fit_in_time_is_refused():

@@ -25,12 +25,12 @@ from hotlever.calibration.summary import calibration_text
 from hotlever.calibration.table import STATED, TABLE_COLUMNS
 from hotlever.datasets import OBSERVABLES, QUANTITIES
 from hotlever.errors import InputError
-from hotlever.estimation import Fit, read_fit, read_measurement
+from hotlever.estimation import Fit, read_fit
 from hotlever.estimation.summary import parameter_rows
 from hotlever.lever.meshing import chosen_space
 from hotlever.lever.transient.waveform_texts import waveform_from_text
 from hotlever.materials.parameters import sentence
-from hotlever.measurement import parse_columns
+from hotlever.measurement import parse_columns, read_measurement, read_measurement_of
 from hotlever.probe import Layout, Probe
 from hotlever.probe.probe import read_sections
 from hotlever.probe.shapes import PARAMETRIC
@@ -55,12 +55,11 @@ def understood(
     """
     told = told or {}
     probe = _probe(folder, told.get("probe"))
-    circuit, signed = probe.circuit, probe.lowest_bias_V < 0.0
     columns = parse_columns(told.get("columns") or [])
     pulse = told.get("waveform")
     waveform = waveform_from_text("pulse", pulse) if pulse else None
-    measurement = read_measurement(folder / name, columns, circuit, waveform, signed=signed)
-    data = measurement.dataset(circuit)
+    measurement = read_measurement_of(probe, folder / name, columns, waveform)
+    data = measurement.dataset(probe.circuit)
     (along,) = data.sizes
     data = data.isel({along: slice(None, None, data.sizes[along] // _POINTS + 1)})
     in_time = {"time_us": data.time.values.tolist()} if along == "time" else {}

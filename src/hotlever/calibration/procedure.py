@@ -93,7 +93,7 @@ def calibrate(
     else:
         route = "probe" if law is None else "power law"
         origin = Probe.reference() if probe is None else Probe.coerce(probe)
-    whole = given_measurement(measurement, origin.circuit)
+    whole = given_measurement(measurement, origin)
     measured = averaged(whole, robust=True)
     measured.need_rest("a calibration")
     notes = note_on_averages(whole, measured)

@@ -18,7 +18,7 @@ from hotlever.estimation.result import Fit, FitFile
 from hotlever.files import Outputs, output_folder, without_nan, write_text
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced
-from hotlever.measurement import Measurement, read_measurement, with_measured_circuit
+from hotlever.measurement import Measurement, read_measurement_of, with_measured_circuit
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, Workers, guarded, local_workers, run_all
 from hotlever.types import Progress
@@ -127,8 +127,7 @@ def fit_many(
 
     for name, path in data.items():
         try:
-            signed = probe.lowest_bias_V < 0.0
-            measurement = read_measurement(path, columns, probe.circuit, signed=signed)
+            measurement = read_measurement_of(probe, path, columns)
             measurement.need_rest("a fit of several levers")
             if reading is not None:
                 reading(measurement)

@@ -66,7 +66,7 @@ def fit(
     """
     options = chosen_options(options, choices)
     given = Probe.reference() if probe is None else Probe.coerce(probe)
-    whole = given_measurement(measurement, given.circuit)
+    whole = given_measurement(measurement, given)
 
     def fitted(medium: Any) -> tuple[Estimate, Fit]:
         within = replace(options, medium=medium)

@@ -7,7 +7,7 @@ and the order of the rows.
 
 from hotlever.measurement.columns import parse_columns
 from hotlever.measurement.data import MEASURED, Measurement, with_measured_circuit
-from hotlever.measurement.reading import given_measurement, read_measurement
+from hotlever.measurement.reading import given_measurement, read_measurement, read_measurement_of
 
 __all__ = [
     "MEASURED",
@@ -15,5 +15,6 @@ __all__ = [
     "given_measurement",
     "parse_columns",
     "read_measurement",
+    "read_measurement_of",
     "with_measured_circuit",
 ]

@@ -24,7 +24,7 @@ from hotlever.measurement.contents import Contents, check
 from hotlever.measurement.data import MEASURED, TIME, Measurement
 from hotlever.measurement.rows import described, disagreements, sweeps_of
 from hotlever.measurement.settings import Settings
-from hotlever.probe import Circuit
+from hotlever.probe import Circuit, Probe
 from hotlever.tables import read_table
 
 _MOST_NOTES = 20
@@ -161,10 +161,24 @@ def _understood(contents: Contents, order: str) -> tuple[tuple[str, ...], ...]:
     return (*rows, *contents.settings.understood())
 
 
-def given_measurement(
-    measurement: Measurement | str | os.PathLike[str], circuit: Circuit | None = None
+def read_measurement_of(
+    probe: Probe,
+    path: str | os.PathLike[str],
+    columns: Mapping[str, str] | None = None,
+    waveform: Waveform | None = None,
 ) -> Measurement:
-    """Return a measurement as it is, or read one that was made in a circuit from its file.
+    """Read a measurement of a probe's lever: its circuit and its polarity count.
+
+    See `read_measurement`.
+    """
+    signed = probe.lowest_bias_V < 0.0
+    return read_measurement(path, columns, probe.circuit, waveform, signed=signed)
+
+
+def given_measurement(
+    measurement: Measurement | str | os.PathLike[str], probe: Probe
+) -> Measurement:
+    """Return a measurement as it is, or read one of a probe's lever from its file.
 
     Raises
     ------
@@ -174,7 +188,7 @@ def given_measurement(
     if isinstance(measurement, Measurement):
         return measurement
     if isinstance(measurement, str | os.PathLike):
-        return read_measurement(measurement, circuit=circuit)
+        return read_measurement_of(probe, measurement)
     raise InputError(
         f"found {type(measurement).__name__}, expected a Measurement or a measurement file"
     )

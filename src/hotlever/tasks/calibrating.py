@@ -6,8 +6,9 @@ from hotlever.calibration.power_law import read_power_law
 from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.summary import calibration_text
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation import read_fit, read_measurement
+from hotlever.estimation import read_fit
 from hotlever.files import write_text
+from hotlever.measurement import read_measurement_of
 from hotlever.tasks.files import draw
 from hotlever.tasks.measured_requests import CalibrateRequest
 from hotlever.tasks.probes import read_probe
@@ -30,7 +31,7 @@ def calibrate_file(reporter: Reporter, request: CalibrateRequest) -> None:
     fit = None if request.fit is None else read_fit(request.fit)
     like = fit.probe if fit else request.with_physics(read_probe(reporter, request.probe))
     priors = parse_priors(request.prior, like)
-    measurement = read_measurement(data, columns, like.circuit, signed=like.lowest_bias_V < 0.0)
+    measurement = read_measurement_of(like, data, columns)
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes)
     if "current" not in measurement.observables:

@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.estimation import FitOptions, Measurement, fit, read_measurement
+from hotlever.estimation import FitOptions, Measurement, fit
 from hotlever.estimation.batch import Batch, fit_many
 from hotlever.estimation.experiment import Prediction
 from hotlever.estimation.levers import compare_levers, levers_csv, levers_text
 from hotlever.estimation.summary import fit_text
 from hotlever.estimation.uncertainty import Uncertainty, examine
 from hotlever.files import write_text
+from hotlever.measurement import read_measurement_of
 from hotlever.probe import Probe
 from hotlever.tasks.measured_requests import FitRequest
 from hotlever.tasks.probes import read_probe
@@ -53,9 +54,7 @@ def _fit_one(
     samples = request.samples if request.posterior else None
     outputs.file(request.output, ".json")
     outputs.folder(request.report)
-    measurement = read_measurement(
-        data, columns, probe.circuit, waveform, signed=probe.lowest_bias_V < 0.0
-    )
+    measurement = read_measurement_of(probe, data, columns, waveform)
     if samples or request.profiles:
         measurement.need_rest("--posterior" if samples else "--profiles")
     reporter.tell_table(measurement.understood)
