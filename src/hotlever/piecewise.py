@@ -69,6 +69,21 @@ class Piecewise:
         return np.asarray(rising[~again])
 
 
+def hermite_cubic(x: Array, y: Array, slopes: Array) -> Piecewise:
+    """Return the piecewise cubic through values and slopes at rising nodes, (k,) each.
+
+    Examples
+    --------
+    >>> x = np.array([0.0, 1.0, 3.0])
+    >>> hermite_cubic(x, x**3, 3 * x**2)(2.0).item()
+    8.0
+    """
+    h = np.diff(x)
+    rise, low, high = np.diff(y) / h, slopes[:-1], slopes[1:]
+    bend = (3.0 * rise - 2.0 * low - high) / h
+    return Piecewise(np.stack([(low + high - 2.0 * rise) / h**2, bend, low, y[:-1]]), x)
+
+
 def _may_vanish(c: Array, widths: Array) -> NDArray[np.bool_]:
     """Return which polynomials may have a root: those whose Bernstein coefficients differ in sign.
 

@@ -31,7 +31,9 @@ def test_the_cubic_is_scipys(widths, values):
     x = np.cumsum([300.0, *widths])
     y = np.array(values[: x.size])
     at = np.linspace(x[0], x[-1], 101)
-    ours, theirs = monotone_cubic(x, y), PchipInterpolator(x, y)
+    ours = monotone_cubic(x, y)
+    with np.errstate(over="ignore"):
+        theirs = PchipInterpolator(x, y)
     np.testing.assert_allclose(ours(at), theirs(at), rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(ours(at[1:-1], 1), theirs(at[1:-1], 1), rtol=1e-7, atol=1e-7)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hotlever.piecewise import Piecewise
+from hotlever.piecewise import Piecewise, hermite_cubic
 from hotlever.types import Array
 
 
@@ -35,13 +35,13 @@ def monotone_cubic(x: Array, y: Array) -> Piecewise:
         one, other = 2.0 * h[1:] + h[:-1], h[1:] + 2.0 * h[:-1]
         same = left * right > 0.0
         safe_left, safe_right = np.where(same, left, 1.0), np.where(same, right, 1.0)
-        harmonic = (one + other) / (one / safe_left + other / safe_right)
+        with np.errstate(over="ignore"):
+            # beside a rise of next to nothing the curve is level
+            harmonic = (one + other) / (one / safe_left + other / safe_right)
         slopes[1:-1] = np.where(same, harmonic, 0.0)
         slopes[0] = _end(h[0], h[1], rise[0], rise[1])
         slopes[-1] = _end(h[-1], h[-2], rise[-1], rise[-2])
-    low, high = slopes[:-1], slopes[1:]
-    bend = (3.0 * rise - 2.0 * low - high) / h
-    return Piecewise(np.stack([(low + high - 2.0 * rise) / h**2, bend, low, y[:-1]]), x)
+    return hermite_cubic(x, y, slopes)
 
 
 def _end(h: float, next_h: float, rise: float, next_rise: float) -> float:

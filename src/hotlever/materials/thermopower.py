@@ -32,6 +32,7 @@ from hotlever.materials.silicon import (
     conductivity_high_doped,
     density_of_states,
 )
+from hotlever.piecewise import hermite_cubic
 from hotlever.types import Array
 
 #: Charge of the carriers, in elementary charges.
@@ -44,7 +45,10 @@ _DENSEST, _DEGREE, _POINTS, _CELLS = 1e4, 60, 6000, 2000
 
 
 class _Cubic(NamedTuple):
-    """A function by cubics on even cells from 0 on: coefficients (4, cells) by powers."""
+    """A function by cubics on even cells from 0 on, looked up without a search.
+
+    The coefficients (4, cells) are those of a `Piecewise`.
+    """
 
     cell: float
     coefficients: Array
@@ -53,19 +57,15 @@ class _Cubic(NamedTuple):
     def of(cls, function: Chebyshev) -> _Cubic:
         """Return a smooth function's, with its values and slopes at the ends of the cells."""
         ends, cell = np.linspace(0.0, function.domain[1], _CELLS + 1, retstep=True)
-        value, slope = function(ends), cell * function.deriv()(ends)
-        rise = np.diff(value)
-        square, cube = 3 * rise - 2 * slope[:-1] - slope[1:], slope[:-1] + slope[1:] - 2 * rise
-        return cls(float(cell), np.stack([value[:-1], slope[:-1], square, cube]))
+        return cls(float(cell), hermite_cubic(ends, function(ends), function.deriv()(ends)).c)
 
     def __call__(self, w: Array) -> tuple[Array, Array]:
         """Return the function and its slope."""
-        along = w / self.cell
-        cell = np.minimum(along.astype(np.intp), self.coefficients.shape[1] - 1)
-        along = along - cell
-        a, b, c, d = (each.take(cell) for each in self.coefficients)
+        cell = np.minimum((w / self.cell).astype(np.intp), self.coefficients.shape[1] - 1)
+        along = w - cell * self.cell
+        d, c, b, a = (each[cell] for each in self.coefficients)
         value = a + along * (b + along * (c + along * d))
-        return value, (b + along * (2.0 * c + along * 3.0 * d)) / self.cell
+        return value, b + along * (2.0 * c + along * 3.0 * d)
 
 
 class _Reduced(NamedTuple):
