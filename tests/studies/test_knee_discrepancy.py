@@ -81,7 +81,7 @@ def test_the_covariance_of_a_fit_gives_the_knee_a_standard_error_that_goes_with_
 
 def test_a_suspect_that_does_not_count_is_left_out_of_the_figure(tmp_path, monkeypatch):
     carried = {suspect: (1.0 + k, 2.0 + k) for k, suspect in enumerate(SUSPECTS)}
-    monkeypatch.setattr(knee_discrepancy, "carried_by", lambda probe, suspect: carried[suspect])
+    monkeypatch.setattr(knee_discrepancy, "carried_by", lambda probe, suspect, _: carried[suspect])
     monkeypatch.setattr(knee_discrepancy, "by_covariance", lambda result: 3.0)
     monkeypatch.setattr(knee_discrepancy, "by_layout", lambda probe, progress: 4.0)
     study = knee_discrepancy.compare_suspects(Probe.reference(), None)

@@ -7,7 +7,13 @@ writes one as PNG, SVG or PDF.
 
 from hotlever.figures.air import air_loss, disc_between_planes, scale_factor, temperature_slices
 from hotlever.figures.calibration import calibration_curves, design_sweep, judged_calibrations
-from hotlever.figures.claims import linear_branches, parameter_deviations, radiated_shares
+from hotlever.figures.claims import (
+    knee_discrepancy,
+    linear_branches,
+    parameter_deviations,
+    radiated_shares,
+    thermoelectric_shift,
+)
 from hotlever.figures.drawing import outlines_drawing, probe_drawing
 from hotlever.figures.fit import (
     correlation_matrix,
@@ -28,6 +34,5 @@ from hotlever.figures.lever import (
     temperature_power,
 )
 from hotlever.figures.raman import one_spectrum, raman_check, thermometry
-from hotlever.figures.studies import knee_discrepancy, thermoelectric_shift
 from hotlever.figures.style import save_figure
 from hotlever.figures.transient import harmonics, history_overview, small_signals

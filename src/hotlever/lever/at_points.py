@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from hotlever.lever.transport import Properties, fluxes_of, tangent_of
 from hotlever.materials import Kind
 from hotlever.materials.air import kirchhoff_variable
 from hotlever.materials.laws import Evaluated
+from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit
 from hotlever.probe.physics import THE_PAPERS, Physics
 from hotlever.types import Array
@@ -86,6 +87,11 @@ class StatesAtPoints:
         self._latest: tuple[Array, tuple[Fields, Properties, Properties], Evaluated] | None = None
         self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]
         self.step_limit = np.where(space.is_temperature, 60.0, 5.0)[:, None]
+
+    @classmethod
+    def of_probe(cls, space: Space, probe: Probe, **options: Any) -> Self:
+        """Return those of a probe's materials, circuit and physics; options as above."""
+        return cls(space, probe.kinds, probe.circuit, probe.physics, **options)
 
     def at(self, x: Array) -> tuple[Fields, Properties, Properties]:
         """Return fields of states (size + 1, n), properties and those by T, at the points."""

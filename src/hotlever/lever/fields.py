@@ -79,7 +79,7 @@ class FieldMapper:
         middle = centres, np.full(centres.shape[1], 0.5 / cuts**2)
         elements = FiniteElements(mesh.elements, element, middle)
         space = FullSpace(mesh, elements, lever.space.wiring)
-        self._centres = LeverEquations(space, lever.probe.kinds, lever.circuit, lever.probe.physics)
+        self._centres = LeverEquations.of_probe(space, lever.probe)
 
     def map(self, state: State) -> FieldMap:
         """Return the fields of a state of the lever."""

@@ -126,9 +126,9 @@ class FilmLaws:
     ) -> None:
         """Add a law to the sheet's, and its derivatives to theirs."""
         film, points, (value, by_own) = self.film, self.film.points, evaluated
-        total.named[law][points] += sheet * value
+        getattr(total, law)[points] += sheet * value
         for name, changes in by.items():
-            change, own = changes.named[law], self.own.get(name)
+            change, own = getattr(changes, law), self.own.get(name)
             if own in by_own:
                 change[points] += sheet * by_own[own]
             if "n" in by_own and name in self.doping_by:

@@ -85,9 +85,7 @@ class Lever:
         self._prepare()
 
     def _prepare(self) -> None:
-        self.equations = LeverEquations(
-            self.space, self.probe.kinds, self.circuit, self.probe.physics
-        )
+        self.equations = LeverEquations.of_probe(self.space, self.probe)
         self._branch: Branch | None = None
 
     def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:

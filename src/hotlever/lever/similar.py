@@ -98,7 +98,7 @@ class SimilarLevers:
         space = self._space(probe, names)
         dimensions = [name for name in names if name in dimensions_of(probe)]
         motions = {name: motion_of(space, self._moving.movement(name)) for name in dimensions}
-        return LeverEquations(space, probe.kinds, probe.circuit, probe.physics, motions)
+        return LeverEquations.of_probe(space, probe, motions=motions)
 
     def for_any_parameters(self) -> Self:
         """See `BranchSolver`."""

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from hotlever import spieser2017 as paper
 from hotlever.datasets import labelled
-from hotlever.errors import ComputationError
 from hotlever.estimation import Fit, Measurement, fit
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -26,6 +25,8 @@ from hotlever.probe import Probe, Tip
 from hotlever.probe.parameters import nuisances, parameters_of
 from hotlever.raman.calibration import published_raman_calibration
 from hotlever.steps import each
+from hotlever.studies.knee_reasons import knee_of
+from hotlever.studies.thermoelectric_fit import ramp_of
 from hotlever.types import Array, Progress
 
 #: A tip of the usual size of lithography probes.
@@ -65,10 +66,11 @@ def suspect_lever(probe: Probe, suspect: str) -> tuple[Probe, bool]:
     return probe.with_physics(effects), suspect in (RAMAN, TOGETHER)
 
 
-def carried_by(probe: Probe, suspect: str) -> tuple[float, float]:
+def carried_by(probe: Probe, suspect: str, own_K: float | None = None) -> tuple[float, float]:
     """Return how far the knee of a suspect's lever is read above two predictions (K).
 
-    That of the model with the lever's own parameters, and that of the model fitted to it.
+    That of the model with the lever's own parameters, which may be given where it is known, and
+    that of the model fitted to it.
 
     Raises
     ------
@@ -76,26 +78,16 @@ def carried_by(probe: Probe, suspect: str) -> tuple[float, float]:
         If one of the levers has no knee.
     """
     true, by_line = suspect_lever(probe, suspect)
-    lever, sign = Lever(true), -1.0 if suspect == AWAY else 1.0
-    sweep = lever.sweep(sign * paper.RAMP)
-    data = Measurement.of_sweep(sweep)
-    # an instrument of the paper knows no polarity
-    data = replace(
-        data,
-        bias_V=sign * data.bias_V,
-        current_mA=sign * data.current_mA,
-        reader_V=sign * data.reader_V,
-    )
-    branch = lever.branch() if sign > 0 else lever.branch_to(0.0, lowest=-paper.RAMP[-1]).mirrored
-    knee = branch.knee
-    if knee is None:
-        raise ComputationError(f"the lever ({suspect}) has no knee below {branch.hottest_K:.0f} K")
-    shown = knee.tip_K
+    lever, away = Lever(true), suspect == AWAY
+    data = Measurement.of_sweep(ramp_of(lever, -1 if away else 1))
+    branch = lever.branch_to(0.0, lowest=-paper.RAMP[-1]).mirrored if away else lever.branch()
+    shown = knee_of(branch, f"the lever ({suspect})").tip_K
     if by_line:
         data = replace(data, tip_K=read_by_the_line(data.tip_K))
         shown = float(read_by_the_line(shown))
     fitted = fit(data, probe).probe
-    return shown - knee_K(probe), shown - knee_K(fitted)
+    own_K = knee_K(probe) if own_K is None else own_K
+    return shown - own_K, shown - knee_K(fitted)
 
 
 def knee_K(probe: Probe) -> float:
@@ -106,10 +98,7 @@ def knee_K(probe: Probe) -> float:
     ComputationError
         If it has none.
     """
-    branch = Lever(probe).branch()
-    if branch.knee is None:
-        raise ComputationError(f"the lever has no knee below {branch.hottest_K:.0f} K")
-    return branch.knee.tip_K
+    return knee_of(Lever(probe).branch()).tip_K
 
 
 def by_layout(probe: Probe, progress: Progress | None = None) -> float:
@@ -171,10 +160,10 @@ def compare_suspects(
     ComputationError
         If a lever has no knee, or a fit does not come to an end.
     """
-    shifts = []
+    shifts, own_K = [], knee_K(probe)
     for suspect in each(SUSPECTS, progress):
         counts = suspect != IN_AIR or probe.surroundings.medium == "air"
-        shifts.append(carried_by(probe, suspect) if counts else (np.nan, np.nan))
+        shifts.append(carried_by(probe, suspect, own_K) if counts else (np.nan, np.nan))
     own, fitted = np.transpose(shifts)
     errors = {COVARIANCE: by_covariance(example)}
     if layout:

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError
-from hotlever.lever import Branch, Lever
+from hotlever.lever import Branch, Lever, OperatingPoint
 from hotlever.materials.silicon import inversion_temperature
 
 #: Diffusion length (µm) of a heater with uniform doping: far below the mesh size.
@@ -71,6 +71,19 @@ def steps_to_the_knee(reasons: xr.Dataset) -> list[tuple[str, float]]:
         ("the doping is not uniform", knee["no leg resistance"] - knee["neither"]),
         ("the legs have a resistance", knee["as it is"] - knee["no leg resistance"]),
     ]
+
+
+def knee_of(branch: Branch, which: str = "the lever") -> OperatingPoint:
+    """Return the knee of a branch.
+
+    Raises
+    ------
+    ComputationError
+        If it has none, saying of which lever.
+    """
+    if branch.knee is None:
+        raise ComputationError(f"{which} has no knee below {branch.hottest_K:.0f} K")
+    return branch.knee
 
 
 def _highest(branch: Branch, name: str) -> tuple[float, float]:

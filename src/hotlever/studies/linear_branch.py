@@ -26,6 +26,7 @@ from hotlever.datasets import labelled
 from hotlever.lever import Branch, Lever
 from hotlever.lever.dataset import dataset_of_branch
 from hotlever.lever.lever import COARSE, HOTTEST
+from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
 from hotlever.materials.silicon import thermal_conductivity
 from hotlever.probe import Probe
 from hotlever.probe.shapes import Shape, ThreeLeg, UShape
@@ -39,8 +40,6 @@ SPAN_K = HOTTEST_TIP_K - KNEE_PREDICTED_K
 WITHIN_K = 10.0
 #: Points of a line, and steps (K) in which its reach is found.
 _POINTS, _STEP_K = 60, 10.0
-#: W/(cm K) times µm in mW/K.
-_TO_MW_PER_K = 0.1
 #: Values of single dimensions (µm) and parameters in place of the shape's own.
 _VARIED = {
     "heater_length_um": (3.0, 3.5, 5.0, 6.0),
@@ -234,7 +233,7 @@ def _row(case: Case) -> dict[str, float]:
     slopes = branch.tip_slope(branch.power(ends))
     parts = dataset_of_branch(case.probe, branch, branch.u_at(ends))
     shares = (parts.heater_ohm / (parts.heater_ohm + parts.legs_ohm)).values
-    thickness = _TO_MW_PER_K * conducted[1] * case.probe.layout().thickness_um
+    thickness = PER_CM_TO_MILLI_PER_UM * conducted[1] * case.probe.layout().thickness_um
     return {
         "knee_K": knee,
         "end_K": end,

@@ -26,6 +26,17 @@ def fits_with_and_without(measurement: Measurement, probe: Probe) -> dict[bool, 
     }
 
 
+def ramp_of(lever: Lever, polarity: int) -> xr.Dataset:
+    """Return the paper's ramp of a lever as an instrument shows it that is wired either way round.
+
+    With −1 the current flows the other way, and all that is shown is positive.
+    """
+    sweep = lever.sweep([polarity * bias for bias in RAMP])
+    for name in ("bias_V", "lever_V", "current_mA", "reader_V"):
+        sweep[name] = polarity * sweep[name]
+    return sweep
+
+
 def described_without(probe: Probe) -> xr.Dataset:
     """Fit a model without thermoelectricity to a lever that has it, without noise.
 
@@ -44,10 +55,7 @@ def described_without(probe: Probe) -> xr.Dataset:
     lever, plain = Lever(probe.with_physics((EFFECT,))), probe.with_physics(())
     rows = []
     for polarity in POLARITIES:
-        sweep = lever.sweep([polarity * bias for bias in RAMP])
-        # an instrument that is wired the other way round shows positive values
-        for name in ("bias_V", "lever_V", "current_mA", "reader_V"):
-            sweep[name] = polarity * sweep[name]
+        sweep = ramp_of(lever, polarity)
         result = fit(Measurement.of_sweep(sweep), plain)
         off = abs(result.band.tip_K.values - sweep.tip_K.values)
         rms = {f"rms_{name}": value for name, value in result.residual_rms.items()}

@@ -39,7 +39,6 @@ from hotlever.materials import HIGH_DOPED, LOW_DOPED
 from hotlever.materials.kind import Kind
 from hotlever.materials.kinds import LowDopedSilicon, PSilicon
 from hotlever.probe import Probe, Taper
-from hotlever.probe.physics import Physics
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -230,9 +229,8 @@ class _Way:
         self.axis, self.heats = Axis(lever.space, taper), Heats(self.whole, own, sides)
 
     def _at_share(self, share: float) -> LeverEquations:
-        probe, physics = self.lever.probe, Physics(thermoelectric=True)
-        laws = _weakened(share)
-        return LeverEquations(self.lever.space, probe.kinds, probe.circuit, physics, laws=laws)
+        probe = self.lever.probe.with_physics(("thermoelectric",))
+        return LeverEquations.of_probe(self.lever.space, probe, laws=_weakened(share))
 
     def state(self, share: float, bias: float, guess: Array) -> tuple[LeverEquations, Array]:
         """Return the equations with a share of S, and their state at a bias (V)."""

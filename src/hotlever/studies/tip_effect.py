@@ -16,11 +16,11 @@ import numpy as np
 import xarray as xr
 
 from hotlever.datasets import labelled
-from hotlever.errors import ComputationError
 from hotlever.estimation import Measurement, fit
-from hotlever.lever import Branch, Lever, OperatingPoint
+from hotlever.lever import Branch, Lever
 from hotlever.probe import Probe, Tip
 from hotlever.spieser2017 import RAMP
+from hotlever.studies.knee_reasons import knee_of
 
 #: Plausible tips of lithography probes, cones: height (µm) and half-angle (degrees).
 SIZES = ((0.5, 15.0), (0.5, 30.0), (0.7, 20.0), (1.0, 15.0), (1.0, 30.0))
@@ -55,7 +55,7 @@ def tip_effects(probe: Probe, sizes: Sequence[tuple[float, float]] = SIZES) -> x
         If one of the levers has no knee.
     """
     bare = Lever(probe).branch()
-    without = _knee(bare)
+    without = knee_of(bare)
     rows = []
     for height, angle in sizes:
         tip = Tip(height_um=height, half_angle_deg=angle, in_air=True)
@@ -66,8 +66,8 @@ def tip_effects(probe: Probe, sizes: Sequence[tuple[float, float]] = SIZES) -> x
         if lever.medium == "air":
             conducts = tip.model_copy(update={"in_air": False})
             conducting = Lever(probe.model_copy(update={"tip": conducts})).branch()
-        fitted = _knee(Lever(fit(data, probe).probe).branch()).tip_K
-        knee, by_conduction = _knee(branch), _knee(conducting)
+        fitted = knee_of(Lever(fit(data, probe).probe).branch()).tip_K
+        knee, by_conduction = knee_of(branch), knee_of(conducting)
         rows.append(
             {
                 "height_um": height,
@@ -86,12 +86,6 @@ def tip_effects(probe: Probe, sizes: Sequence[tuple[float, float]] = SIZES) -> x
         )
     columns = {name: [row[name] for row in rows] for name in rows[0]}
     return labelled(columns, "tip", without_K=without.tip_K, without_V=without.lever_V)
-
-
-def _knee(branch: Branch) -> OperatingPoint:
-    if branch.knee is None:
-        raise ComputationError(f"the lever has no knee below {branch.hottest_K:.0f} K")
-    return branch.knee
 
 
 def _at_same_power(without: Branch, with_tip: Branch, hottest_K: float) -> float:

@@ -205,7 +205,7 @@ def harmonics(
         )
     (rest,) = lever.solve([offset_V])
     space = space_of_modes(lever, _steps(lever, rest, amplitude_V), rest.x)
-    equations = LeverEquations(space, lever.probe.kinds, lever.circuit, lever.probe.physics)
+    equations = LeverEquations.of_probe(space, lever.probe)
     start = space.coordinates(rest.x)
     balance = HarmonicBalance(equations, lever.circuit, start, offset_V, amplitude_V)
     answers = []

@@ -54,10 +54,7 @@ def reduced_in_time(lever: Lever, snapshots: Array) -> Lever:
     other = copy(lever)
     space = every.at_points(points, few)
     other.space = cast("Any", space)
-    probe = lever.probe
-    other.equations = LeverEquations(
-        space, probe.kinds, probe.circuit, probe.physics, laws=TabulatedLaws
-    )
+    other.equations = LeverEquations.of_probe(space, lever.probe, laws=TabulatedLaws)
     return other
 
 

@@ -6,9 +6,7 @@ import numpy as np
 import xarray as xr
 
 from hotlever import figures
-from hotlever.estimation import fit
 from hotlever.report.reproduce.findings import Findings
-from hotlever.report.reproduce.inference import example
 from hotlever.studies.knee_discrepancy import IN_AIR, TOGETHER, compare_suspects
 
 #: Of a cell whose suspect does not count in the medium.
@@ -28,10 +26,12 @@ def discrepancy_section(page: Findings) -> None:
 
 
 def _compare(page: Findings, media: tuple[str, ...], *, layout: bool) -> dict[str, xr.Dataset]:
-    noisy = fit(example("lever-a.csv"), page.lever.probe)
     studies = {
         medium: compare_suspects(
-            page.lever.probe.in_medium(medium), noisy, layout=layout, progress=page.progress
+            page.lever.probe.in_medium(medium),
+            page.fitted_example,
+            layout=layout,
+            progress=page.progress,
         )
         for medium in media
     }

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
+from functools import cached_property
+from importlib.resources import as_file, files
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from hotlever.estimation import Fit, Measurement, fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.report.page import Linked, Page
 from hotlever.spieser2017 import DOI, RAMP
@@ -52,6 +54,11 @@ class Findings(Page):
         self.lever, self.air, self.progress = lever, lever.in_medium("air"), progress
         self.claims: list[tuple[str, str, str, str]] = []
 
+    @cached_property
+    def fitted_example(self) -> Fit:
+        """Option III on the virtual lab's first lever."""
+        return fit(example("lever-a.csv"), self.lever.probe)
+
     def say(self, name: str, /, **numbers: Any) -> None:
         """Add the paragraph of a name."""
         self.text(_TEXTS["paragraphs"][name].format(**numbers))
@@ -88,3 +95,9 @@ class Findings(Page):
         self.claims.append(
             (Linked(text["where"], self.anchor), text["claim"], verdict, text["ours"])
         )
+
+
+def example(name: str) -> Measurement:
+    """Return a measurement among the package's examples."""
+    with as_file(files("hotlever") / "examples" / name) as path:
+        return read_measurement(path)

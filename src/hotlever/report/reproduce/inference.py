@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from hotlever.estimation import Fit, Measurement, fit, read_measurement
+from hotlever.estimation import Fit, Measurement, fit
 from hotlever.estimation.summary import parameter_rows
 from hotlever.figures import correlation_matrix, judged_calibrations, raman_check, thermometry
 from hotlever.materials import PARAMETERS
 from hotlever.raman import Thermometer, calibrate_from, measure, read_lines, read_spectra
 from hotlever.report.fit_pages import add_fit
-from hotlever.report.reproduce.findings import Findings
+from hotlever.report.reproduce.findings import Findings, example
 from hotlever.report.reproduce.vacuum import PARAMETER_COLUMNS
 from hotlever.spieser2017 import NOMINAL_DOPING
 from hotlever.steps import each
@@ -41,7 +41,7 @@ _TOO_FEW = 0.85
 def fit_section(page: Findings) -> None:
     """Option III on the virtual lab's first lever."""
     page.say("fit")
-    result = fit(example("lever-a.csv"), page.lever.probe)
+    result = page.fitted_example
     add_fit(page, result)
     page.claim(
         "cost_of_a_fit",
@@ -135,11 +135,6 @@ def _hot_error(result: Fit) -> float:
     order = np.argsort(result.measurement.bias_V)
     measured = result.measurement.tip_K[order]
     return float(np.nanmax(np.abs(measured - result.band.tip_K.values)[measured > 850]))
-
-
-def example(name: str) -> Measurement:
-    with as_file(files("hotlever") / "examples" / name) as path:
-        return read_measurement(path)
 
 
 def thermometer_section(page: Findings) -> None:

@@ -10,8 +10,7 @@ from hotlever import spieser2017 as paper
 from hotlever.estimation import Fit
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
-from hotlever.report.reproduce.findings import Findings
-from hotlever.report.reproduce.inference import example
+from hotlever.report.reproduce.findings import Findings, example
 from hotlever.report.reproduce.vacuum import published_biases
 from hotlever.studies.thermoelectric_fit import described_without, fits_with_and_without
 from hotlever.studies.thermoelectric_shift import of_p_silicon, shift_by_heat
