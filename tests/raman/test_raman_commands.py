@@ -224,7 +224,11 @@ BAD = {
         ["raman", "tip", "--calibrate-from", "plate", "--temperatures", "log.csv", "-o", "log.csv"],
         "is an input",
     ),
-    "one name twice": (["raman", "tip", "-o", "a.svg", "--plot", "a.svg"], "two outputs"),
+    "table of another type": (["raman", "tip", "-o", "a.svg"], "'.svg', expected .csv"),
+    "calibration of another type": (
+        ["raman", "tip", "--calibrate-from", "plate", "--save-calibration", "cal.csv"],
+        "'.csv', expected .json",
+    ),
     "output folder": (["raman", "tip", "-o", "none/t.csv"], "the folder none does not exist"),
     "output is a folder": (["raman", "tip", "-o", "empty"], "is a folder"),
     "no spectra": (["raman"], "FILE_OR_DIR"),

@@ -35,6 +35,7 @@ def new(
 
     if shape not in _NEW:
         raise unknown_name("shape", shape, _NEW)
+    Outputs().file(output, ".toml")
     probe = getattr(Probe, _NEW[shape])()
     if output is None:
         terminal.give(probe.to_toml())

@@ -107,7 +107,7 @@ def join_command(request: JoinRequest) -> None:
 
     bias_log, spectra, output = request.bias_log, request.spectra, request.output
     outputs = Outputs(bias_log, *spectra, *request.files)
-    outputs.file(output)
+    outputs.file(output, ".csv")
     log = read_bias_log(bias_log)
     setup = set_up(terminal, request)
     if setup.thermometer is None:
@@ -141,7 +141,7 @@ def raman_check_command(request: CheckRequest) -> None:
     calibration, plot, output = request.calibration, request.plot, request.output
     outputs = Outputs(calibration)
     outputs.file(plot, *FIGURE_TYPES)
-    outputs.file(output)
+    outputs.file(output, ".json")
     check = paper_check(calibration_named(calibration))
     said = conclusion(check)
     with outputs.together():

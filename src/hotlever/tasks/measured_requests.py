@@ -176,7 +176,7 @@ class CalibrateRequest(PlotRequest, MeasuredRequest):
     def outputs(self) -> Outputs:
         """Check the files that are written, none of which is read."""
         outputs = Outputs(self.data, self.fit, self.probe, self.power_law, *self.column_files)
-        outputs.file(self.output)
+        outputs.file(self.output, ".json")
         outputs.file(self.table, ".csv")
         outputs.file(self.plot, *FIGURE_TYPES)
         return outputs
@@ -265,6 +265,6 @@ class RamanRequest(ThermometerRequest):
         """Check the files that are written, none of which is read."""
         outputs = Outputs(*self.spectra, *self.files)
         outputs.file(self.plot, *FIGURE_TYPES)
-        outputs.file(self.save_calibration)
-        outputs.file(self.output)
+        outputs.file(self.save_calibration, ".json")
+        outputs.file(self.output, ".csv")
         return outputs
