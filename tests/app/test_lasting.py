@@ -21,7 +21,8 @@ from hotlever.app import live, showing
 from hotlever.app.jobs import Task
 from hotlever.app.pages.page import MEDIA
 from hotlever.app.project import EXAMPLES, Project
-from hotlever.app.session import CHOICES, SCHEMA, Session
+from hotlever.app.session import Session
+from hotlever.app.state import CHOICES, SCHEMA
 from hotlever.probe import Probe
 
 DROPPED = "dropped own.gds"
@@ -87,7 +88,7 @@ def test_a_drawing_that_comes_again_leaves_an_edited_probe_file_alone(
         press(user, "Propose anew")
         await until(lambda: path.read_text() != edited)
         await until(lambda: "thickness_um = 0.4 " in of(user, ui.textarea).value)
-        press(user, "Undo")
+        press(user, "What the app wrote")
         words = "hotlever probe import own.gds -o own.toml --plot own.svg"
         await user.should_see(words)
         # two were made: the last button of the name is of the first, which made the file
@@ -244,9 +245,9 @@ def test_every_medium_of_the_pages_is_kept(tmp_path: Path, page: str, medium: st
     chosen = {page: {"medium": medium}}
     hidden = tmp_path / ".hotlever"
     hidden.mkdir()
-    (hidden / CHOICES).write_text(json.dumps({"schema": SCHEMA, "chosen": chosen}))
+    (hidden / CHOICES).write_text(json.dumps({"schema": SCHEMA, "history": [chosen]}))
     session = Session(Project(tmp_path))
-    assert (session.chosen, session.remark) == (chosen, "")
+    assert (session.choices(page)["medium"], session.remark) == (medium, "")
 
 
 CHOSEN: dict[str, Any] = {
@@ -286,7 +287,12 @@ def test_what_was_chosen_is_there_after_a_restart(tmp_path: Path) -> None:
     session.chosen["calibrate"]["run"] = True  # of this very moment
     session.keep()
     again = Session(Project(tmp_path))
-    assert (again.chosen, again.remark) == (CHOSEN, "")
+    assert again.remark == ""
+    assert again.chosen.pop("dark")
+    for page, chosen in CHOSEN.items():
+        if page != "dark":
+            assert chosen.items() <= again.choices(page).items()
+    assert "run" not in again.chosen["calibrate"]
 
 
 def test_pages_after_a_restart_show_what_was_chosen(
@@ -330,8 +336,11 @@ def test_pages_after_a_restart_show_what_was_chosen(
     [
         ("{", "not valid JSON"),
         ("[]", "expected an object"),
-        ('{"schema": 7, "chosen": {}}', "found schema 7, expected 1"),
-        ('{"schema": 1}', "chosen: input should be"),
+        ('{"schema": 2}', "history: field required"),
+        ('{"schema": 2, "history": []}', "history: list should have at least 1 item"),
+        ('{"schema": 2, "history": [{}], "shown": -1}', "shown: input should be"),
+        ('{"schema": 7, "chosen": {}}', "found schema 7, expected 2"),
+        ('{"schema": 1}', "history.0: input should be"),
         ('{"schema": 1, "chosen": {"fit": {"robust": "perhaps"}}}', "fit.robust"),
         ('{"schema": 1, "chosen": {"lever": {"shape": "round"}}}', "lever.shape"),
         ('{"schema": 1, "chosen": {"simulate": {"changes": {"n_d": "air"}}}}', "n_d = air"),
@@ -373,10 +382,10 @@ def test_the_line_on_an_unread_file_of_choices_is_shown_once(tmp_path: Path) -> 
 def test_what_is_unknown_in_a_file_of_choices_is_left_out(tmp_path: Path) -> None:
     hidden = tmp_path / ".hotlever"
     hidden.mkdir()
-    chosen = {"fit": {"robust": True, "later": 1}, "another": 2}
-    (hidden / CHOICES).write_text(json.dumps({"schema": 1, "chosen": chosen}))
+    chosen = {"dark": True, "fit": {"robust": True, "later": 1}, "another": 2}
+    (hidden / CHOICES).write_text(json.dumps({"schema": 1, "chosen": chosen}))  # of version 1
     session = Session(Project(tmp_path))
-    assert (session.chosen, session.remark) == ({"fit": {"robust": True}}, "")
+    assert (session.chosen, session.remark) == ({"dark": True, "fit": {"robust": True}}, "")
 
 
 def test_a_chosen_file_that_is_gone_gives_no_other_numbers(tmp_path: Path) -> None:

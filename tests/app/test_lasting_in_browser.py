@@ -92,7 +92,7 @@ def edits_stay(page: Page, folder: Path, drawings: Path) -> None:
     button(page, "Propose anew").click()
     expect(page.get_by_text("What the drawing holds")).to_be_visible(timeout=_WORK)
     assert (folder / "own.toml").read_text() != edited
-    page.get_by_label("Undo", exact=True).click()
+    page.get_by_label("What the app wrote", exact=True).click()
     expect(page.get_by_text("What the app wrote", exact=True)).to_be_visible()
     picture(page, "undo")
     with page.expect_navigation():

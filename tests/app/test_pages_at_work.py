@@ -21,7 +21,8 @@ from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import ErrorBanner
 from hotlever.app.pages.pulses import Pulses
 from hotlever.app.project import CALIBRATION, EXAMPLES
-from hotlever.app.session import Session, Simulate
+from hotlever.app.session import Session
+from hotlever.app.state import Simulate
 from hotlever.app.work import run
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.calibration.power_law import EQ12

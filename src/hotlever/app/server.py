@@ -120,9 +120,11 @@ def _page(session: Session, fill: Callable[[Session], Awaitable[None]]) -> Any:
         client = ui.context.client
 
         async def filled() -> None:
+            session.keep()  # what led here, as a step of its own
             try:
                 with client:
                     await fill(session)
+                session.settle()
             except RuntimeError:
                 # a page that was closed before it was filled has lost its elements
                 if not client.is_deleted:

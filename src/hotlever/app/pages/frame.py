@@ -27,6 +27,8 @@ PAGES = {
     "calibrate": ("Calibrate", "straighten"),
     "levers": ("Levers", "table_rows"),
 }
+#: What else of the state of a project pages show, beside what has their name.
+_ALSO = {"simulate": {"pulse"}, "fit": {"files"}, "calibrate": {"files", "asked"}}
 #: Types of files that figures leave as.
 FIGURE_FILES = (".svg", ".png", ".pdf")
 #: Changes that are listed, and files of each that are named; refused files that are named.
@@ -68,9 +70,13 @@ def framed(session: Session, page: str) -> Iterator[ErrorBanner]:
                 link.classes("q-px-sm" + (" bg-white/25" if here else ""))
         ui.space()
         ui.label(str(session.project.folder)).classes("text-xs ellipsis gt-sm")
-        undo = flat_button("", partial(_list_changes, session), icon="undo", label="Undo")
-        undo.props("color=white").tooltip("Undo what the app wrote")
-        flat_button("", switch, icon="contrast", label="Light or dark").props("color=white")
+        for label, icon, click in (
+            ("Undo", "undo", partial(_step, session, page, -1)),
+            ("Redo", "redo", partial(_step, session, page, 1)),
+            ("What the app wrote", "history", partial(_list_changes, session)),
+            ("Light or dark", "contrast", switch),
+        ):
+            flat_button("", click, icon=icon, label=label).props("color=white").tooltip(label)
     if session.remark:
         remark = session.remark.replace(f"{session.project.folder}/", "")
         ui.label(remark).classes("text-sm remark w-full").props("role=status")
@@ -274,6 +280,17 @@ def opened_dialog(title: str, width: str) -> Iterator[ui.row]:
             flat_button("", dialog.close, icon="close", label="Close")
         yield buttons
     dialog.on("hide", dialog.delete)
+
+
+def _step(session: Session, page: str, by: int) -> None:
+    """Undo or redo a step of what is chosen; the page that shows it is opened anew."""
+    changed = session.step(by)
+    if not changed:
+        ui.notify(session.remark)
+        session.remark = ""
+        return
+    shows = {name: {name, *_ALSO.get(name, ())} & changed for name in (page, *PAGES)}
+    ui.navigate.to("/" + next((name for name, parts in shows.items() if parts), page))
 
 
 def _list_changes(session: Session) -> None:

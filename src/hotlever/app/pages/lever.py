@@ -21,7 +21,8 @@ from hotlever.app.pages.frame import (
 from hotlever.app.pages.page import Page, Work
 from hotlever.app.pages.probe_files import Dimensions, Drawings, Picture, ProbeFile
 from hotlever.app.project import DRAWINGS
-from hotlever.app.session import Lever, Session, Simulate
+from hotlever.app.session import Session
+from hotlever.app.state import Lever, Simulate
 from hotlever.errors import HotleverError, InputError
 
 _SHAPES = {"three-leg": "three legs", "u-shape": "two legs (U)"}
@@ -215,7 +216,8 @@ class LeverPage(Page):
 
     async def _simulate(self) -> None:
         if await self._write():
-            self.session.chosen["simulate"] = Simulate(probe=self._name.value).model_dump()
+            first = Simulate(probe=self._name.value).model_dump()
+            self.session.choices("simulate").update(first)
             ui.navigate.to("/simulate")
 
     async def _give(self, suffix: str) -> None:

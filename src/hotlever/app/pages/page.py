@@ -48,7 +48,7 @@ class Page:
     name : str
         Its address, under which also its work runs, and what was chosen is kept.
     chosen : dict
-        What was chosen last, in whatever tab; see `hotlever.app.session.Choices`.
+        What was chosen last, in whatever tab; see `hotlever.app.state.Choices`.
     """
 
     name = ""

@@ -22,7 +22,7 @@ from hotlever.files import read_text
 class ProbeFile:
     """The text of a probe file that is edited, and the file of its name: no edits are lost.
 
-    What is chosen of it on the page is told by `hotlever.app.session.Lever`.
+    What is chosen of it on the page is told by `hotlever.app.state.Lever`.
     """
 
     def __init__(self, page: Page) -> None:

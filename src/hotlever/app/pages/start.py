@@ -22,7 +22,8 @@ from hotlever.app.pages.frame import (
 )
 from hotlever.app.pages.page import Page
 from hotlever.app.project import DRAWINGS, EXAMPLES
-from hotlever.app.session import Session, Simulate
+from hotlever.app.session import Session
+from hotlever.app.state import Simulate
 from hotlever.errors import HotleverError
 
 _SENTENCES = (

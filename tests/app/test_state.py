@@ -1,0 +1,134 @@
+"""What is chosen is a record, its history a list: undone, redone, there at the next start."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from nicegui import ui
+from nicegui.testing import User
+from test_app_pages import shown, until, visit
+from test_lasting import of, press
+
+from hotlever.app import state as state_module
+from hotlever.app.session import Session
+from hotlever.app.state import CHOICES, State
+
+
+def moved(state: State, page: str, **values: Any) -> None:
+    """Choose, and have that be a step of its own."""
+    state.choices(page).update(values)
+    state.keep()
+
+
+def test_steps_are_undone_and_redone_in_the_dictionaries_that_pages_hold(tmp_path: Path) -> None:
+    state = State(tmp_path)
+    held, of_fit = state.choices("simulate"), state.choices("fit")
+    moved(state, "simulate", changes={"n_d": 5e17})
+    moved(state, "simulate", bias=6.0)
+    moved(state, "fit", robust=True)
+    assert state.step(-1) == {"fit"}
+    assert state.remark == "Undone: fit, robust."
+    assert (of_fit["robust"], held["bias"]) == (False, 6.0)
+    assert state.step(-1) == {"simulate"}
+    assert state.step(-1) == {"simulate"}
+    assert (held["bias"], held["changes"]) == (8.0, {})
+    assert state.step(-1) == set()
+    assert state.remark == "There is nothing to undo."
+    assert state.step(1) == {"simulate"}
+    assert held["changes"] == {"n_d": 5e17}
+    # who chooses something else has nothing to redo
+    moved(state, "simulate", bias=7.0)
+    assert state.step(1) == set()
+    assert state.step(-1) == {"simulate"}
+    assert (held["bias"], held["changes"]) == (8.0, {"n_d": 5e17})
+
+
+def test_a_slider_that_moves_is_one_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr(state_module.time, "monotonic", lambda: now[0])
+    state = State(tmp_path)
+    for bias in (6.0, 6.1, 6.2, 6.3):
+        now[0] += 1.0
+        moved(state, "simulate", bias=bias)
+    now[0] += 60.0
+    moved(state, "simulate", bias=9.0)
+    assert state.step(-1)
+    assert state.choices("simulate")["bias"] == 6.3
+    assert state.step(-1)
+    assert state.choices("simulate")["bias"] == 8.0
+    assert not state.step(-1)
+    # one that comes back to where it was is none
+    now[0] += 60.0
+    moved(state, "simulate", bias=7.0)
+    moved(state, "simulate", bias=8.0)
+    assert not state.step(-1)
+
+
+def test_the_history_is_there_after_a_restart_where_it_was_left(tmp_path: Path) -> None:
+    state = State(tmp_path)
+    state.choices("fit")  # a page that is opened chooses nothing
+    state.keep()
+    assert not (tmp_path / CHOICES).exists()
+    moved(state, "fit", priors="n_d=±15%")
+    moved(state, "lever", text="[probe]", name="own.toml")
+    state.told_of("mine.csv")["columns"] = ["V_b (V)=a"]
+    state.keep()
+    state.step(-1)
+    again = State(tmp_path)
+    assert again.told_of("mine.csv")["columns"] == []
+    assert again.choices("lever")["text"] == "[probe]"
+    assert again.step(1) == {"files"}
+    assert again.told_of("mine.csv")["columns"] == ["V_b (V)=a"]
+    for _ in range(3):
+        assert again.step(-1)
+    assert again.choices("fit")["priors"] == ""
+
+
+def test_what_a_page_chooses_by_itself_is_no_step(tmp_path: Path) -> None:
+    state = State(tmp_path)
+    moved(state, "fit", robust=True)
+    state.choices("fit")["data"] = "mine.csv"  # the first of the folder
+    state.settle()
+    assert state.step(-1)
+    assert (state.choices("fit")["robust"], state.choices("fit")["data"]) == (False, None)
+    # and takes nothing from what can be redone
+    state.choices("fit")["data"] = "mine.csv"
+    state.settle()
+    assert state.step(1)
+    assert state.choices("fit")["robust"]
+
+
+def test_the_oldest_steps_are_forgotten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(state_module, "_MOST", 4)
+    state = State(tmp_path)
+    for step in range(10):
+        moved(state, "fit", priors=f"{step}", robust=bool(step % 2), drift=step % 4 > 1)
+        moved(state, "fit", profiles=bool(step % 2))
+    steps = 0
+    while state.step(-1):
+        steps += 1
+    assert steps == 3
+    monkeypatch.setattr(state_module, "_MOST_TEXT", 1000)
+    moved(state, "lever", text="x" * 2000)  # longer than all may be: it is kept alone
+    assert len(json.loads((tmp_path / CHOICES).read_text())["history"]) == 1
+
+
+def test_a_page_shows_what_was_undone(tmp_path: Path) -> None:
+    async def story(user: User, session: Session) -> None:
+        await user.open("/lever")
+        await until(lambda: "length_um = 54.4" in of(user, ui.textarea).value)
+        field = of(user, ui.number, "length_um")
+        field.set_value(60.0)
+        await until(lambda: "length_um = 60" in of(user, ui.textarea).value)
+        press(user, "Undo")
+        await user.open("/lever")
+        assert shown(user, "role=status") == "Undone: lever, length um."
+        await until(lambda: "length_um = 54.4" in of(user, ui.textarea).value)
+        press(user, "Redo")
+        await user.open("/lever")
+        await until(lambda: "length_um = 60" in of(user, ui.textarea).value)
+
+    visit(tmp_path, story)
