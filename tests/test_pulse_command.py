@@ -6,8 +6,13 @@ import csv
 import io
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 import xarray as xr
+from PIL import Image
+
+from hotlever.lever import State
+from hotlever.tasks.simulating import _Frames
 
 
 def rows(text: str) -> list[dict[str, str]]:
@@ -46,6 +51,27 @@ def test_a_pulse_writes_table_figure_and_fields(run, tmp_path):
     )
     assert all((tmp_path / "fields" / part.get("file", "")).is_file() for part in series)
     assert (tmp_path / "a.png").stat().st_size > 5000
+
+
+def test_a_film_has_a_frame_for_each_time_asked(run, tmp_path):
+    words = ("pulse", "--pulse", "10V,2us", "--at", "1us,2us,2.5us", "-o", "a.csv")
+    assert run(*words, "--film", "a.gif")[0] == 0
+    with Image.open(tmp_path / "a.gif") as film:
+        assert film.n_frames == 3
+    # what cannot be written is known before anything is solved
+    status, _, err = run(*words, "--film", "a.mp4")
+    assert (status, err) == (2, "hotlever: a.mp4: unknown file type '.mp4', expected .gif\n")
+
+
+def test_frames_lie_on_straight_lines_between_the_times_reported(coarse):
+    states = [State(coarse, np.full((coarse.space.size + 1, 1), x)) for x in (0.0, 2.0, 3.0)]
+    frames = _Frames([0.0, 0.5, 1.0, 4.0])
+    for t, state in zip((0.0, 1.0, 5.0), states, strict=True):
+        frames.keep(t, state)
+    assert [(t, state.x[0, 0]) for t, state in frames.states] == [
+        *[(0.0, 0.0), (0.5, 1.0)],
+        *[(1.0, 2.0), (4.0, 2.75)],
+    ]
 
 
 def test_a_file_gives_the_bias(run, tmp_path):

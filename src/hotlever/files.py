@@ -21,8 +21,8 @@ from hotlever.errors import HotleverError, InputError
 
 Name = str | os.PathLike[str]
 
-#: What a figure can be written as.
-FIGURE_TYPES = (".png", ".svg", ".pdf")
+#: What a figure can be written as, and a film.
+FIGURE_TYPES, FILM_TYPES = (".png", ".svg", ".pdf"), (".gif",)
 #: Bytes that a text file may have, unless its reader says otherwise.
 LARGEST_TEXT = 64 * 2**20
 #: Seconds to wait for a pipe that says nothing.

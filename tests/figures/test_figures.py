@@ -14,7 +14,8 @@ from hotlever.errors import InputError
 from hotlever.estimation import Measurement
 from hotlever.figures import save_figure
 from hotlever.files import FIGURE_TYPES
-from hotlever.lever.fields import FieldMapper, heater_profile
+from hotlever.lever.fields import heater_profile, seen_from_above
+from hotlever.lever.transient import pulse, simulate
 from hotlever.probe import Probe
 from hotlever.report.page import Page
 
@@ -38,7 +39,8 @@ def made(coarse):
         "resistances": figures.resistances(sweep),
         "doping": figures.doping_profile(profiles["knee"]),
         "profiles": figures.heater_profiles(profiles),
-        "maps": figures.field_maps(FieldMapper(coarse).map(states[1]), layout),
+        "maps": figures.field_maps(states[1]),
+        "map": figures.temperature_map(states[1]),
         "fit": figures.data_and_model(data, sweep, ("current", "tip")),
         "correlation": figures.correlation_matrix(
             ["c_kappa", "p"], np.array([[1, -0.9], [-0.9, 1]])
@@ -51,7 +53,7 @@ def made(coarse):
 
 
 NAMES = ["probe", "u_shape", "overview", "iv", "temperature_power", "resistances"]
-NAMES += ["doping", "profiles", "maps", "fit", "correlation", "band", "judged"]
+NAMES += ["doping", "profiles", "maps", "map", "fit", "correlation", "band", "judged"]
 
 
 def texts(figure):
@@ -80,6 +82,29 @@ def test_probe_drawing_marks_all_named_parts(made):
     text = texts(made["probe"])
     for word in ("supply", "ground", "reader", "heater", "tip", "high-doped"):
         assert word in text
+
+
+def test_maps_name_probe_and_medium_and_mark_the_hottest_place(made, coarse):
+    for name in ("maps", "map"):
+        assert "three-leg lever in vacuum, bias 8.3 V, tip at 899 K" in texts(made[name])
+    assert "hottest, 9" in texts(made["map"])
+
+
+def test_each_frame_of_a_film_is_its_state(coarse):
+    states = []
+    history = simulate(
+        coarse, pulse(8.0, 1.0), at=[0.5, 2.0], callback=lambda t, state: states.append((t, state))
+    )
+    film = figures.pulse_film(history, states)
+    surface = seen_from_above(coarse, 1)
+    for frame, (t, state) in enumerate(states):
+        image, now, at = film._func(frame)
+        assert image.get_array() == pytest.approx(surface.sampling @ state.nodal[0], abs=1e-3)
+        assert now.get_xydata() == pytest.approx(np.array([[t, history.tip_K.values[frame]]]))
+        assert at.get_text().startswith(f"{t:g} µs: bias ")
+    film._draw_was_started = True  # or matplotlib warns that nobody saw it
+    with pytest.raises(InputError, match="no states"):
+        figures.pulse_film(history, [])
 
 
 def test_iv_curve_names_the_knee(made):

@@ -25,7 +25,6 @@ from hotlever.figures.fit import (
 )
 from hotlever.figures.lever import (
     doping_profile,
-    field_maps,
     heater_profiles,
     iv_curves,
     material_curves,
@@ -33,6 +32,7 @@ from hotlever.figures.lever import (
     sweep_overview,
     temperature_power,
 )
+from hotlever.figures.maps import field_maps, pulse_film, save_film, temperature_map
 from hotlever.figures.raman import one_spectrum, raman_check, thermometry
 from hotlever.figures.style import save_figure
 from hotlever.figures.transient import harmonics, history_overview, small_signals

@@ -94,7 +94,8 @@ def outlines(axes: Axes, layout: Layout) -> None:
     """Draw the regions and the tip of a lever over a map of it."""
     for region in layout.regions:
         axes.add_patch(_patch(region, fill=False, edgecolor="0.45", lw=0.4))
-    axes.plot(*layout.tip, marker="^", mfc="white", mec="black", ms=4)
+    tip: Any = {"marker": "^", "mfc": "white", "mec": "black", "ms": 4, "ls": "none"}
+    axes.plot(*layout.tip, label="tip", **tip)
     _plane(axes)
     axes.grid(False)
 

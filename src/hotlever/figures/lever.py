@@ -1,4 +1,4 @@
-"""Figures of a lever: what it is made of, its fields, and what a sweep gives."""
+"""Figures of a lever: what it is made of, and what a sweep gives."""
 
 from __future__ import annotations
 
@@ -7,14 +7,11 @@ from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.tri import Triangulation
 
 from hotlever.calibration.power_law import EQ12, PowerLaw
-from hotlever.colours import BLACK, BLUE, GREEN, HEAT, ORANGE, VERMILION
-from hotlever.figures.drawing import outlines
+from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, VERMILION
 from hotlever.figures.style import (
     COLOURS,
     LINES,
@@ -25,17 +22,11 @@ from hotlever.figures.style import (
     from_zero,
     marker,
 )
-from hotlever.probe import Layout
 from hotlever.spieser2017 import BASE_TEMPERATURE_K, POWER_LAW_SPREAD_K, PublishedPoint
 from hotlever.types import Array
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from hotlever.lever.fields import FieldMap
-
-#: Most of the lever that is magnified, as a share of its length.
-_MAGNIFIED = 0.3
 
 
 def material_curves(curves: Mapping[str, tuple[Array, Array, Array | None]]) -> Figure:
@@ -55,36 +46,6 @@ def material_curves(curves: Mapping[str, tuple[Array, Array, Array | None]]) -> 
         left.set(xlabel="temperature (K)", ylabel="thermal conductivity (W m⁻¹ K⁻¹)")
         right.set(xlabel="temperature (K)", ylabel="resistivity (Ω cm)")
         made.legend(loc="outside lower center", ncols=4)
-    return made
-
-
-def field_maps(fields: FieldMap, layout: Layout, title: str = "") -> Figure:
-    """Draw temperature, potential and current density, whole lever and magnified heater."""
-    mesh = Triangulation(fields.points[:, 0], fields.points[:, 1], fields.triangles)
-    density = np.linalg.norm(fields.current_density, axis=1)
-    strong = max(density.max(), 1e-9)
-    density = np.maximum(density, strong * 1e-3)
-    maps = (
-        ("temperature (K)", fields.temperature, HEAT, None),
-        ("potential (V)", fields.potential, "viridis", None),
-        ("current density (mA/µm²)", density, "cividis", LogNorm(strong * 1e-3, strong)),
-    )
-    what, size, centre = "heater", layout.heater.sides.max(), layout.heater.box.mean(axis=0)
-    most = _MAGNIFIED * np.ptp(layout.box, axis=0).max()
-    if size > most:  # where all of the conductor heats
-        what, size, centre = "tip", most, np.array(layout.tip)
-    with figure(7.0, 6.8, 3, 2, width_ratios=(1.75, 1.0)) as (made, grid):
-        for row, (label, values, colours, norm) in zip(grid, maps, strict=True):
-            shading = "gouraud" if values.size == len(fields.points) else "flat"
-            style: Any = {"cmap": colours, "norm": norm, "shading": shading, "rasterized": True}
-            for axes in row:
-                image = axes.tripcolor(mesh, values, **style)
-                outlines(axes, layout)
-            row[1].set_xlim(centre[0] + np.array([-0.85, 0.85]) * size)
-            row[1].set_ylim(centre[1] + np.array([-0.65, 0.65]) * size)
-            made.colorbar(image, ax=row[1], label=label, extend="min" if norm else "neither")
-        grid[0, 0].set_title(title)
-        grid[0, 1].set_title(f"{what}, magnified")
     return made
 
 

@@ -44,7 +44,8 @@ _SYMBOLS = {
     "power_mW": "power P$_l$",
 }
 
-_STYLE: Any = {
+#: How figures are drawn, in terms of matplotlib's settings.
+STYLE: Any = {
     "font.size": 9,
     "axes.labelsize": 9,
     "axes.titlesize": 9,
@@ -82,7 +83,7 @@ def figure(
     **subplots
         As matplotlib's ``Figure.subplots`` has them.
     """
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         made = Figure(figsize=(width, height), layout="constrained")
         axes: Any = made.subplots(*shape, **subplots)
         if letters:
@@ -103,7 +104,7 @@ def save_figure(made: Figure, path: str | os.PathLike[str]) -> None:
         raise InputError(
             f"{path}: unknown figure type '{suffix}', expected one of {', '.join(FIGURE_TYPES)}"
         )
-    with mpl.rc_context(_STYLE), whole_file(path) as temporary:
+    with mpl.rc_context(STYLE), whole_file(path) as temporary:
         # no dates: the same figure gives the same file
         metadata = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
         made.savefig(temporary, metadata=metadata.get(suffix))

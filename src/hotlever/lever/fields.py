@@ -17,9 +17,11 @@ import meshio
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 from skfem import MeshTri
 
 from hotlever.datasets import labelled
+from hotlever.errors import InputError
 from hotlever.files import whole_file, write_text
 from hotlever.lever.air_fields import AirFields
 from hotlever.lever.elements import FiniteElements
@@ -66,16 +68,52 @@ class FieldMap:
     resistivity: Array
 
 
+@dataclass(frozen=True)
+class Surface:
+    """A lever seen from above, as triangles.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        µm.
+    triangles : ndarray of int, shape (m, 3)
+    sampling : csr_matrix, shape (n, nodes)
+        From values at the nodes of the lever's elements to those at the points.
+    """
+
+    points: Array
+    triangles: NDArray[np.intp]
+    sampling: csr_matrix
+
+
+@singledispatch
+def seen_from_above(lever: Lever, cuts: int = 3) -> Surface:
+    """Return a lever as it is drawn: every triangle of its mesh is cut into ``cuts²`` of them."""
+    reference = _cut_triangle(cuts)
+    rule = reference.p, np.full(reference.p.shape[1], 1.0)
+    mesh, element = lever.space.mesh, lever.space.elements.basis.elem
+    corners = FiniteElements(mesh.elements, element, rule)
+    offsets = corners.per_element * np.arange(len(corners.dofs))[:, None, None]
+    triangles = (offsets + reference.t.T).reshape(-1, 3)
+    return Surface(corners.positions.T, triangles, corners.sampling[: corners.weights.size])
+
+
 class FieldMapper:
-    """Draws states of one lever: every triangle of the mesh is cut into ``cuts²`` smaller ones."""
+    """Draws states of one lever: every triangle of the mesh is cut into ``cuts²`` smaller ones.
+
+    Raises
+    ------
+    InputError
+        If it is one of tetrahedra.
+    """
 
     def __init__(self, lever: Lever, cuts: int = 3) -> None:
+        if lever.space.mesh.elements.dim() != 2:
+            raise InputError("found a lever of tetrahedra, expected a flat one")
         reference = _cut_triangle(cuts)
-        self._cell = reference.t.T
+        self._surface = seen_from_above(lever, cuts)
         mesh, element = lever.space.mesh, lever.space.elements.basis.elem
-        corners = reference.p, np.full(reference.p.shape[1], 1.0)
         centres = reference.p[:, reference.t].mean(axis=1)
-        self._corners = FiniteElements(mesh.elements, element, corners)
         middle = centres, np.full(centres.shape[1], 0.5 / cuts**2)
         elements = FiniteElements(mesh.elements, element, middle)
         space = FullSpace(mesh, elements, lever.space.wiring)
@@ -83,13 +121,11 @@ class FieldMapper:
 
     def map(self, state: State) -> FieldMap:
         """Return the fields of a state of the lever."""
-        corners, space = self._corners, self._centres.space
-        T, V = (corners.sampling[: corners.weights.size] @ values for values in state.nodal)
-        elements = len(corners.dofs)
+        surface, space = self._surface, self._centres.space
+        T, V = (surface.sampling @ values for values in state.nodal)
         # where nothing conducts there is no potential
         conducting = state.lever.space.conducting
-        V[np.repeat(~conducting, corners.per_element)] = np.nan
-        offsets = corners.per_element * np.arange(elements)[:, None, None]
+        V[np.repeat(~conducting, T.size // conducting.size)] = np.nan
         properties, fluxes = self._centres.at(state.x)[1], self._centres.fluxes(state.x)
 
         def per_triangle(vectors: Array) -> Array:
@@ -97,11 +133,11 @@ class FieldMapper:
 
         return FieldMap(
             bias=state.bias_V,
-            points=corners.positions.T,
-            triangles=(offsets + self._cell).reshape(-1, 3),
+            points=surface.points,
+            triangles=surface.triangles,
             temperature=T,
             potential=V,
-            region=np.repeat(state.lever.space.mesh.region, len(self._cell)),
+            region=np.repeat(state.lever.space.mesh.region, space.elements.per_element),
             current_density=per_triangle(-fluxes.charge),
             heat_flux=per_triangle(-fluxes.heat),
             resistivity=_resistivity(space.thickness_um, properties.sigma),

@@ -9,12 +9,13 @@ from pathlib import Path
 import meshio
 import numpy as np
 import xarray as xr
+from scipy.sparse import csr_matrix
 
 from hotlever.air.chip import lever_axes
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file
-from hotlever.lever.fields import DrawSlices, fields_file, write_fields
+from hotlever.lever.fields import DrawSlices, Surface, fields_file, seen_from_above, write_fields
 from hotlever.lever.lever import State
 from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
 from hotlever.lever3d.lever import SolidLever, surface_nodes
@@ -34,6 +35,19 @@ def _(lever: SolidLever, states: Sequence[State], folder: Path, draw_slices: Dra
         write_solid_vtu(state, fields_file(folder, state, ".vtu"))
         if lever.medium == "air":
             draw_slices(temperature_slices(state), fields_file(folder, state, ".png"))
+
+
+@seen_from_above.register
+def _(lever: SolidLever, cuts: int = 1) -> Surface:
+    """See its upper side, whose triangles are not cut."""
+    mesh, elements = lever.solid.elements, lever.space.elements
+    facets = mesh.facets[:, mesh.boundary_facets()]
+    height = mesh.p[2, facets].min(axis=0)
+    vertices, triangles = np.unique(facets[:, height == height.max()], return_inverse=True)
+    ones = np.ones(vertices.size), elements.basis.nodal_dofs[0, vertices]
+    rows = np.arange(vertices.size + 1)
+    sampling = csr_matrix((*ones, rows), shape=(vertices.size, elements.size))
+    return Surface(mesh.p[:2, vertices].T, triangles.reshape(3, -1).T, sampling)
 
 
 def write_solid_vtu(state: State, path: str | os.PathLike[str]) -> None:

@@ -97,6 +97,12 @@ class ProbeParts(Record):
         return hash((self.shape, tuple(self.materials.items()), *parts))
 
     @property
+    def title(self) -> str:
+        """What it is in a few words: its shape, medium, and effects beyond the paper."""
+        own = f"{self.shape.title} in {self.surroundings.medium}"
+        return ", ".join([own, *self.physics.effects])
+
+    @property
     def stated_priors(self) -> dict[str, str]:
         """What its file says of its priors, by name."""
         return {} if self.prior is None else self.prior.model_extra or {}

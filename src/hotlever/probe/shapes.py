@@ -53,6 +53,11 @@ class Shape(Record):
     shape: str
 
     @property
+    def title(self) -> str:
+        """What it is in a few words."""
+        return f"{self.shape} lever"
+
+    @property
     def materials(self) -> tuple[str, ...]:
         """The names of the materials, beside ``[material]``, that it says it is made of."""
         return ()

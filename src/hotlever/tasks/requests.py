@@ -114,6 +114,9 @@ class SweepRequest(TableRequest, LeverRequest):
         help="flat: the lever in its plane; full-3d: its true thickness and the air around it "
         "(minutes; goes on where it was stopped).",
     )
+    map: File = option(
+        None, help="Draw the temperature at the highest tip temperature to this file, as --plot."
+    )
     fields: File = option(None, help="Write the fields at each bias as VTU to this folder.")
 
 
@@ -173,6 +176,10 @@ class PulseRequest(TableRequest, LeverRequest, DriveRequest):
         None, metavar="TIME,...", help="Times to report; where the solver stepped if left out."
     )
     fields: File = option(None, help="Write the fields as a series of VTU to this folder.")
+    film: File = option(
+        None,
+        help="Animate temperature and tip to this file: .gif; a frame for each of --at, or 120.",
+    )
     report: File = option(
         None, help="Folder for a page of the lever in time; goes without a wave form."
     )
@@ -180,7 +187,7 @@ class PulseRequest(TableRequest, LeverRequest, DriveRequest):
     def need_no_waveform(self) -> None:
         """Refuse what does not go with a page, which has wave forms of its own."""
         others = {"--until": self.until, "--at": self.at, "--output": self.output}
-        others |= {"--plot": self.plot, "--fields": self.fields}
+        others |= {"--plot": self.plot, "--fields": self.fields, "--film": self.film}
         for name in (*self.drive, *(name for name, value in others.items() if value)):
             raise InputError(f"{name}: does not go with --report, which has wave forms of its own")
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections import deque
+from collections.abc import Sequence
 from itertools import count as count_up
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from hotlever.errors import HistoryEndError
-from hotlever.files import Outputs, output_folder
+from hotlever.files import FILM_TYPES, Outputs, output_folder
 from hotlever.lever import State
 from hotlever.lever.fields import write_fields_in_time
 from hotlever.lever.transient import (
+    Waveform,
     history_csv,
     simulate,
     with_times,
@@ -23,9 +27,12 @@ from hotlever.tasks.files import draw
 from hotlever.tasks.probes import make_lever
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.requests import PulseRequest
+from hotlever.types import Array
 
-#: Points of a curve for each step of the solver.
-_CURVE = 8
+#: Points of a curve for each step of the solver, and frames of a film where no times are asked.
+_CURVE, _FRAMES = 8, 120
+#: Share of the tip's rise by which straight lines between frames may be off, without a note.
+_COARSE = 0.25
 
 
 def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
@@ -43,7 +50,9 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
     waveform, until, times = request.required_waveform(), request.end_us, request.times_us
     outputs = request.outputs(request.probe, request.waveform)
     outputs.folder(request.fields)
+    outputs.file(request.film, *FILM_TYPES)
     lever = make_lever(reporter, request.read_probe(reporter))
+    frames = None if request.film is None else _Frames(times or _even(waveform, until))
     failure: HistoryEndError | None = None
     # figures and rise times are of smooth curves, the table of the steps alone
     per_step = _CURVE if times is None else 1
@@ -55,6 +64,8 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
 
         def keep(t: float, state: State) -> None:
             ends[1:] = [state]
+            if frames is not None:
+                frames.keep(t, state)
             if next(told) % per_step == 0 and request.fields is not None:
                 kept_at.append(t)
                 states.append(state)
@@ -76,10 +87,57 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
             draw(request.plot, lambda figures: figures.history_overview(curve))
         if request.fields is not None:
             write_fields_in_time(lever, kept_at, states, output_folder(request.fields))
+        if frames is not None and request.film is not None and frames.states:
+            _draw_film(reporter, curve, frames.states, request.film)
     if request.output is None:
         reporter.give(history_csv(data))
     if failure is not None:
         raise failure
+
+
+class _Frames:
+    """States at some times (µs), from those that are reported, on straight lines between them."""
+
+    def __init__(self, times: Sequence[float]) -> None:
+        self._times = deque(times)
+        self._before: tuple[float, Array] | None = None
+        self.states: list[tuple[float, State]] = []
+
+    def keep(self, t: float, state: State) -> None:
+        """Keep the states up to the next time that is reported."""
+        before, x = self._before or (t, state.x)
+        while self._times and self._times[0] <= t:
+            at = self._times.popleft()
+            share = (at - before) / (t - before) if t > before else 1.0
+            self.states.append((at, State(state.lever, x + share * (state.x - x))))
+        self._before = t, state.x
+
+
+def _even(waveform: Waveform, until: float | None) -> list[float]:
+    """Return times (µs) even on the axis on which a history is drawn, and of some corners."""
+    end = waveform.usual_end if until is None else until
+    times = np.linspace(0.0, end, _FRAMES)
+    if np.ptp(waveform.bias(times)) == 0.0:
+        times = np.geomspace(1e-4 * end, end, _FRAMES)
+    corners = [piece.end for piece in waveform.pieces(end)]
+    return np.union1d(times, corners if len(corners) < _FRAMES else []).tolist()
+
+
+def _draw_film(
+    reporter: Reporter, curve: xr.Dataset, states: Sequence[tuple[float, State]], path: Path
+) -> None:
+    """Draw a film; what comes and goes between its frames is told."""
+    from hotlever import figures
+
+    shown = np.interp(curve.time, *np.transpose([(t, state.tip_K) for t, state in states]))
+    off, rise = np.abs(shown - curve.tip_K).max().item(), np.ptp(curve.tip_K.values)
+    if off > _COARSE * rise:
+        reporter.note(
+            f"the {len(states)} frames of {path} are too few for all that the tip does: between "
+            f"them it is up to {off:.0f} K elsewhere (--until or --at choose others)"
+        )
+    with reporter.progress("film") as update:
+        figures.save_film(figures.pulse_film(curve, states), path, update)
 
 
 def _write_page(reporter: Reporter, request: PulseRequest, folder: Path) -> None:

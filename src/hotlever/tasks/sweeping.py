@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hotlever.errors import as_far_as_possible
-from hotlever.files import output_folder
+from hotlever.files import FIGURE_TYPES, output_folder
 from hotlever.lever import State, sweep_csv, write_sweep
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import make_lever
@@ -21,6 +21,7 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
         If it has no state at some of them; what was reached is written.
     """
     outputs = request.outputs(request.probe)
+    outputs.file(request.map, *FIGURE_TYPES)
     outputs.folder(request.fields)
     probe = request.read_probe(reporter)
     biases = parse_bias(request.bias, probe.lowest_bias_V)
@@ -33,11 +34,14 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
         if request.fields is not None:
             states, ended = as_far_as_possible(lambda: lever.solve(data.bias_V.values, update))
             failure = failure or ended
+        if request.map is not None:
+            (hottest,) = lever.solve([data.bias_V[data.tip_K.argmax()].item()])
     reporter.note(*filter(None, data.attrs["notes"].split("\n")))
     with outputs.together():
         if request.output is not None:
             write_sweep(data, request.output)
         draw(request.plot, lambda figures: figures.sweep_overview(data))
+        draw(request.map, lambda figures: figures.temperature_map(hottest))
         if request.fields is not None:
             # what draws or writes fields is imported where it is needed: a sweep is there at once
             from hotlever.lever.fields import write_fields

@@ -115,6 +115,11 @@ class Drawing(DrawingFile, Shape):
         self.layout()
         return self
 
+    @property
+    def title(self) -> str:
+        """What it is in a few words."""
+        return f"lever of {Path(self.file).name}" if self.file else "drawn lever"
+
     def dimensions(self) -> dict[str, float]:
         """Return the thickness: the outline is as it is drawn."""
         return {"thickness_um": self.thickness_um}

@@ -9,7 +9,7 @@ from hotlever import figures
 from hotlever import spieser2017 as paper
 from hotlever.calibration.power_law import EQ12, PowerLaw, fit_power_law
 from hotlever.lever import Lever
-from hotlever.lever.fields import FieldMapper, heater_profile
+from hotlever.lever.fields import heater_profile
 from hotlever.materials import PARAMETERS, PUBLISHED
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import MeshOptions
@@ -154,9 +154,7 @@ def heater_section(page: Findings) -> None:
     )
     page.draw("heater_profiles", figures.heater_profiles(profiles))
     knee = states[names.index("knee")]
-    fields = FieldMapper(page.lever).map(knee)
-    title = f"bias {knee.bias_V:.2f} V (knee)"
-    page.draw("field_maps", figures.field_maps(fields, layout, title))
+    page.draw("field_maps", figures.field_maps(knee))
 
 
 def knee_section(page: Findings) -> None:

@@ -1,0 +1,241 @@
+"""Maps of what is inside a lever: its fields, its temperature alone, and that in time as a film.
+
+States come from `hotlever.lever.lever.Lever.solve`, or from the ``callback`` of
+`hotlever.lever.transient.simulate`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.collections import TriMesh
+from matplotlib.colors import LogNorm, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
+from PIL import Image
+
+from hotlever.colours import HEAT, VERMILION
+from hotlever.errors import InputError
+from hotlever.figures.drawing import outlines
+from hotlever.figures.style import STYLE, curve, figure, settled
+from hotlever.files import FILM_TYPES, whole_file
+from hotlever.lever.fields import FieldMapper, Surface, seen_from_above
+from hotlever.types import Array, Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hotlever.lever.lever import Lever, State
+
+#: Most of the lever that is magnified, as a share of its length.
+_MAGNIFIED = 0.3
+#: Frames of a film per second, and how fine these are (dots per inch).
+_PER_SECOND, _DPI = 20, 100
+#: Colours of a film: those of the scale, and from black and that of the trace to white.
+_COLOURS = np.concatenate(
+    [
+        mpl.colormaps[HEAT](np.linspace(0.0, 1.0, 204))[:, :3],
+        np.linspace((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 32),
+        np.linspace(to_rgb(VERMILION), (1.0, 1.0, 1.0), 20),
+    ]
+)
+
+
+def field_maps(state: State) -> Figure:
+    """Draw temperature, potential and current density, whole lever and magnified heater.
+
+    Parameters
+    ----------
+    state : State
+        Of a flat lever.
+
+    Raises
+    ------
+    InputError
+        If it is one of a `SolidLever`.
+    """
+    fields, layout = FieldMapper(state.lever).map(state), state.lever.probe.layout()
+    mesh = Triangulation(fields.points[:, 0], fields.points[:, 1], fields.triangles)
+    density = np.linalg.norm(fields.current_density, axis=1)
+    strong = max(density.max(), 1e-9)
+    density = np.maximum(density, strong * 1e-3)
+    maps = (
+        ("temperature (K)", fields.temperature, HEAT, None),
+        ("potential (V)", fields.potential, "viridis", None),
+        ("current density (mA/µm²)", density, "cividis", LogNorm(strong * 1e-3, strong)),
+    )
+    what, size, centre = "heater", layout.heater.sides.max(), layout.heater.box.mean(axis=0)
+    most = _MAGNIFIED * np.ptp(layout.box, axis=0).max()
+    if size > most:  # where all of the conductor heats
+        what, size, centre = "tip", most, np.array(layout.tip)
+    with figure(7.0, 6.8, 3, 2, width_ratios=(1.75, 1.0)) as (made, grid):
+        for row, (label, values, colours, norm) in zip(grid, maps, strict=True):
+            shading = "gouraud" if values.size == len(fields.points) else "flat"
+            style: Any = {"cmap": colours, "norm": norm, "shading": shading, "rasterized": True}
+            for axes in row:
+                image = axes.tripcolor(mesh, values, **style)
+                outlines(axes, layout)
+            row[1].set_xlim(centre[0] + np.array([-0.85, 0.85]) * size)
+            row[1].set_ylim(centre[1] + np.array([-0.65, 0.65]) * size)
+            made.colorbar(image, ax=row[1], label=label, extend="min" if norm else "neither")
+        grid[0, 1].set_title(f"{what}, magnified")
+        made.suptitle(_title(state), x=0.01, ha="left")
+    return made
+
+
+def temperature_map(state: State) -> Figure:
+    """Draw the temperature of a lever from above, with its tip and its hottest place.
+
+    Parameters
+    ----------
+    state : State
+        Of a flat lever, or of a `SolidLever`, whose upper side is drawn.
+    """
+    surface = seen_from_above(state.lever)
+    T = surface.sampling @ state.nodal[0]
+    hottest = surface.points[T.argmax()]
+    with figure(7.0, _height(state.lever) + 0.4) as (made, axes):
+        _map(axes, state.lever, surface, T, (state.lever.circuit.base_temperature_K, T.max()))
+        style: Any = {"ls": "none", "marker": "x", "color": "black", "ms": 5}
+        axes.plot(*hottest, label=f"hottest, {T.max():.0f} K", **style)
+        made.legend(loc="outside lower center", ncols=2)
+        made.suptitle(_title(state), x=0.01, ha="left")
+    return made
+
+
+def pulse_film(history: xr.Dataset, states: Sequence[tuple[float, State]]) -> FuncAnimation:
+    """Animate a lever in time: a map of its temperature above the trace of the tip.
+
+    Parameters
+    ----------
+    history : xarray.Dataset
+        From `hotlever.lever.transient.simulate`.
+    states : sequence of (float, State)
+        A frame each: the time (µs) and the state there, such as its ``callback`` is given.
+
+    Returns
+    -------
+    matplotlib.animation.FuncAnimation
+        For `save_film`, or for a notebook (``to_jshtml``).
+
+    Raises
+    ------
+    InputError
+        If there are no states.
+
+    Examples
+    --------
+    >>> from hotlever import Lever, Probe, simulate
+    >>> from hotlever.lever.transient import pulse
+    >>> states = []
+    >>> history = simulate(
+    ...     Lever(Probe.reference()),
+    ...     pulse(10.0, 5.0),
+    ...     at=[2.0, 5.0, 8.0],
+    ...     callback=lambda t, state: states.append((t, state)),
+    ... )
+    >>> save_film(pulse_film(history, states), "pulse.gif")  # doctest: +SKIP
+    """
+    if not states:
+        raise InputError("found no states, expected one for each frame of a film")
+    lever = states[0][1].lever
+    surface = seen_from_above(lever, 1)
+    frames = np.array([surface.sampling @ state.nodal[0] for _, state in states], dtype=np.float32)
+    limits = lever.circuit.base_temperature_K, float(frames.max())
+    data = history.isel(time=history.time > 0) if settled(history) else history
+    bias = np.interp([t for t, _ in states], history.time, history.bias_V)
+    high = _height(lever), 2.2
+    with figure(7.0, sum(high), 2, 1, height_ratios=high) as (made, (above, below)):
+        image = _map(above, lever, surface, frames[-1], limits)
+        curve(below, data, "time", "tip_K", color=VERMILION)
+        if settled(history):
+            below.set_xscale("log")
+        (now,) = below.plot([], [], "o", color="black", ms=6)
+        made.suptitle(f"{lever.probe.title}, {history.attrs['waveform']}", x=0.01, ha="left")
+        at = above.set_title(f"{states[-1][0]:.4g} µs")
+        made.draw_without_rendering()
+        made.set_layout_engine("none")  # from here on nothing but the state changes
+
+    def show(frame: int) -> tuple[Any, ...]:
+        t, state = states[frame]
+        image.set_array(frames[frame])
+        now.set_data([t], [state.tip_K])
+        at.set_text(f"{t:.4g} µs: bias {bias[frame]:.3g} V, tip at {state.tip_K:.1f} K")
+        return image, now, at
+
+    return FuncAnimation(made, show, frames=len(states), interval=1000 / _PER_SECOND)
+
+
+def save_film(
+    film: FuncAnimation, path: str | os.PathLike[str], progress: Progress | None = None
+) -> None:
+    """Write a film as GIF, whole or not at all.
+
+    Parameters
+    ----------
+    film : FuncAnimation
+        From `pulse_film`.
+    path : path
+    progress : callable, optional
+        Called with the frames drawn and their number.
+
+    Raises
+    ------
+    InputError
+        If the suffix is another, or the file cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in FILM_TYPES:
+        raise InputError(f"{path}: unknown film type '{suffix}', expected {FILM_TYPES[0]}")
+
+    def told(frame: int, frames: int) -> None:
+        if progress is not None:
+            progress(frame + 1, frames)
+
+    with mpl.rc_context(STYLE), whole_file(path) as temporary:
+        film.save(temporary, _Writer(_PER_SECOND), dpi=_DPI, progress_callback=told)
+
+
+class _Writer(PillowWriter):
+    """Writes frames in the same colours, which of their own would flicker."""
+
+    _frames: list[Image.Image]
+
+    def finish(self) -> None:
+        """Write the film."""
+        colours = Image.new("P", (1, 1))
+        colours.putpalette((255 * _COLOURS).round().astype(np.uint8).tobytes())
+        self._frames = [
+            frame.convert("RGB").quantize(palette=colours, dither=Image.Dither.NONE)
+            for frame in self._frames
+        ]
+        super().finish()
+
+
+def _height(lever: Lever) -> float:
+    """Return how high (inches) axes of a lever are, with their labels."""
+    length, width = np.ptp(lever.probe.layout().box, axis=0)
+    return float(np.clip(5.2 * width / length + 0.9, 1.6, 6.0))
+
+
+def _map(
+    axes: Axes, lever: Lever, surface: Surface, T: Array, limits: tuple[float, float]
+) -> TriMesh:
+    """Draw temperatures (K) on a lever between some limits, with their scale."""
+    mesh = Triangulation(surface.points[:, 0], surface.points[:, 1], surface.triangles)
+    style: Any = {"cmap": HEAT, "shading": "gouraud", "rasterized": True}
+    image = axes.tripcolor(mesh, T, vmin=limits[0], vmax=limits[1], **style)
+    outlines(axes, lever.probe.layout())
+    axes.figure.colorbar(image, ax=axes, label="temperature (K)")
+    return image
+
+
+def _title(state: State) -> str:
+    return f"{state.lever.probe.title}, bias {state.bias_V:.3g} V, tip at {state.tip_K:.0f} K"
