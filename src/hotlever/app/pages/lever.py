@@ -19,8 +19,9 @@ from hotlever.app.pages.frame import (
     two_columns,
 )
 from hotlever.app.pages.page import Page, Work
+from hotlever.app.pages.probe_fields import ProbeFields
 from hotlever.app.pages.probe_files import Dimensions, Drawings, Picture, ProbeFile
-from hotlever.app.project import DRAWINGS
+from hotlever.app.project import DATA, DRAWINGS
 from hotlever.app.session import Session
 from hotlever.app.state import Lever, Simulate
 from hotlever.errors import HotleverError, InputError
@@ -28,7 +29,9 @@ from hotlever.errors import HotleverError, InputError
 _SHAPES = {"three-leg": "three legs", "u-shape": "two legs (U)"}
 _FILE = "a probe file or a drawing"
 _NEW = Lever().name
-_DROP = "Drop a drawing here (GDSII, OASIS, DXF), or a probe file"
+#: Pages that go on with the probe.
+_ON = {"simulate": "tune", "calibrate": "straighten"}
+_DROP = "Drop a drawing here (GDSII, OASIS, DXF) or a probe file, and tables of materials"
 
 
 class LeverPage(Page):
@@ -49,6 +52,7 @@ class LeverPage(Page):
                 shape = self.chosen["shape"]
                 self._shape = ui.toggle(_SHAPES, value=shape, on_change=self._take_shape)
                 self._dimensions = Dimensions(self._change)
+                self._fields = ProbeFields(self, self._set)
             with right:
                 self._work = Work(session, self.name, self._ended)
                 self._drawings = Drawings(self, self._begin, self._show)
@@ -56,8 +60,9 @@ class LeverPage(Page):
                 with ui.row().classes("items-center w-full"):
                     self._name = ui.input("Save as", value=self.chosen["name"])
                     ui.button("Save", icon="save", on_click=self._write)
-                    go = ui.button("Simulate", icon="tune", on_click=self._simulate)
-                    go.props("outline")
+                    for page, icon in _ON.items():
+                        go = ui.button(page.capitalize(), icon=icon)
+                        go.props("outline").on_click(partial(self._go_on, page))
                     for suffix in FIGURE_FILES:
                         flat_button(suffix[1:].upper(), partial(self._give, suffix))
                 with ui.expansion("The probe file"):
@@ -105,6 +110,7 @@ class LeverPage(Page):
         text = chosen["text"]
         if text == "":  # nothing is open
             self._picture.clear()
+            await self._fields.show("", "")
             return
         try:
             if text is not None:
@@ -123,18 +129,23 @@ class LeverPage(Page):
                 self._dimensions.show(drawn["values"])
         self._dimensions.mark(self._fault)
         self.banner.say(self._fault)
+        await self._fields.show(text or "", self._fault)
         self.show_command()
 
     # --- a file -----------------------------------------------------------------------------------
 
     async def _dropped(self, names: list[str]) -> None:
         self._pick.set_options(self._files)
-        if names[-1] not in self._files:
-            raise InputError(f"{names[-1]}: unknown type of file, expected {_FILE}")
-        if self._pick.value == names[-1]:  # dropped again
-            await self._open(names[-1])
+        opened = [name for name in names if name in self._files]
+        if opened and self._pick.value == opened[-1]:  # dropped again
+            await self._open(opened[-1])
+        elif opened:
+            self._pick.set_value(opened[-1])
+        elif names[-1].lower().endswith(DATA):
+            ui.notify(f"{names[-1]} is kept: a property of a material may name it")
+            await self._draw()
         else:
-            self._pick.set_value(names[-1])
+            raise InputError(f"{names[-1]}: unknown type of file, expected {_FILE}")
 
     async def _open(self, name: str | None) -> None:
         """Show a probe file, or the probe of a drawing."""
@@ -185,6 +196,13 @@ class LeverPage(Page):
         self._shape.set_value(None)
         return self._draw()
 
+    async def _set(self, text: str) -> None:
+        """Take a text in which a field was set."""
+        self.chosen["text"] = text
+        self._work.hide()
+        self._quietly(text)
+        await self._draw()
+
     def _quietly(self, text: str) -> None:
         """Show a probe file that nobody typed."""
         self._shown_text = text
@@ -214,11 +232,15 @@ class LeverPage(Page):
             return True
         return False
 
-    async def _simulate(self) -> None:
+    async def _go_on(self, page: str) -> None:
+        """Go on with the probe on another page."""
         if await self._write():
-            first = Simulate(probe=self._name.value).model_dump()
-            self.session.choices("simulate").update(first)
-            ui.navigate.to("/simulate")
+            name = self._name.value
+            set_up = {"rests": f"probe:{name}"}
+            if page == "simulate":
+                set_up = Simulate(probe=name).model_dump()
+            self.session.choices(page).update(set_up)
+            ui.navigate.to(f"/{page}")
 
     async def _give(self, suffix: str) -> None:
         if await self._write():

@@ -1,0 +1,162 @@
+"""What can be set in a probe file: layers, materials, numbers. Runs in a worker process."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from hotlever.app.edits import LayerRow, Section
+from hotlever.app.project import file_stamp
+from hotlever.app.workers import Report
+from hotlever.errors import InputError
+
+#: Numbers of other sections that can be set: keys, in the order in which they are shown.
+_OTHERS = {
+    "probe": ("thickness_um", "tip_um"),
+    "circuit": ("series_resistance_ohm", "base_temperature_K"),
+}
+_WORDS = {"melting_point_K": "melting point (K)"}
+_TITLES = {"probe": "The lever", "circuit": "Circuit"}
+_LAST = ("heat_capacity", "heat_capacity_scale", "emissivity", "melting_point_K")
+#: Layers of a drawing that are listed.
+_MOST_LAYERS = 40
+
+
+def fields(report: Report, folder: Path, text: str) -> dict[str, Any]:
+    """Return what can be set in a probe file: layers, materials, thickness, tip and circuit.
+
+    Nothing, if the text is no probe file that could be edited so.
+    """
+    try:
+        values = tomllib.loads(text)
+        sections = {name: values.get(name, {}) for name in ("probe", "layers", "terminals")}
+        materials = values.get("materials", {})
+        if not all(isinstance(part, dict) for part in (*sections.values(), *materials.values())):
+            return {}
+    except (ValueError, RecursionError, AttributeError):
+        return {}
+    is_drawing = sections["probe"].get("shape") == "drawing"
+    cards = [_card(("materials", name), section, folder) for name, section in materials.items()]
+    others = ["circuit", *(["probe"] if is_drawing else [])]
+    return {
+        "layers": _rows(sections, folder) if is_drawing else [],
+        "materials": list(materials),
+        "cards": [_other(name, values.get(name, {})) for name in reversed(others)] + cards,
+        "new": _new_materials(),
+    }
+
+
+def _rows(sections: Mapping[str, Any], folder: Path) -> list[LayerRow]:
+    rows = []
+    for part in ("layers", "terminals"):
+        for name, given in sections[part].items():
+            inner = given if isinstance(given, dict) else {}
+            drawn = inner.get("drawn", inner.get("area")) if inner else given
+            label = drawn if isinstance(drawn, str) else f"{name} (points)"
+            thickness = inner.get("thickness_um")
+            material = str(inner.get("material", ""))
+            rows.append(LayerRow(label, drawn, part, name, material, thickness))
+    probe = sections["probe"]
+    if isinstance(file := probe.get("file"), str):
+        used = {row.label for row in rows}
+        path = folder / file
+        unit = probe.get("unit_um")
+        try:
+            asked = (path, file_stamp(path), probe.get("cell"), unit)
+            rows += [LayerRow(name, name) for name in _layers(*asked) if name not in used]
+        except InputError:
+            pass  # the drawing of the probe says what is wrong
+    return sorted(rows, key=lambda row: row.part or "z")[:_MOST_LAYERS]
+
+
+@lru_cache(maxsize=8)
+def _layers(path: Path, stamp: float, cell: Any, unit_um: Any) -> tuple[str, ...]:
+    from hotlever.probe.drawing.shape import TOLERANCE_UM
+    from hotlever.probe.drawing.sheet import read_sheet
+
+    number = unit_um if isinstance(unit_um, int | float) else None
+    name = cell if isinstance(cell, str) else None
+    return tuple(read_sheet(path, name, unit_um=number, tolerance_um=TOLERANCE_UM).layers)
+
+
+def _new_materials() -> dict[str, str]:
+    """Return what a new material may be, by what `with_layer` takes."""
+    from hotlever.materials.kinds import KINDS
+    from hotlever.materials.presets import PRESETS
+
+    new = {f"+{kind}": f"new: {kind.replace('-', ' ')}" for kind in KINDS}
+    for name, preset in PRESETS.items():
+        new[f"+{preset.kind}/{name}"] = f"new: {name} ({preset.kind.replace('-', ' ')})"
+    return new
+
+
+def _other(name: str, section: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the numbers of a section that is no material."""
+    from hotlever.probe.circuit import Circuit
+
+    meaning = {
+        "thickness_um": "thickness of the body (µm)",
+        "tip_um": "place of the tip: x, y (µm)",
+        "series_resistance_ohm": "series resistance R_s (Ω)",
+        "base_temperature_K": "temperature of the leg ends (K)",
+    }
+    shown = [
+        _field((name,), key, section, _number(getattr(Circuit(), key, "")), meaning[key])
+        for key in _OTHERS[name]
+    ]
+    return {"section": (name,), "title": _TITLES[name], "fields": shown}
+
+
+def _card(path: Section, section: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the parameters of a material: of its kind, and those that formulas name."""
+    from hotlever.materials.kinds import KINDS
+    from hotlever.materials.parameters import STATED
+    from hotlever.materials.presets import PRESETS, usual_values
+    from hotlever.materials.stated import names_stated
+    from hotlever.materials.table_files import with_tables
+
+    kind = KINDS.get(str(section.get("kind")))
+    words = [str(section.get(key)).replace("-", " ") for key in ("kind", "preset")]
+    like = f", else as {words[1]}" if "preset" in section else ""
+    card: dict[str, Any] = {"section": path, "title": f"{path[-1]}: {words[0]}{like}"}
+    if kind is None:
+        return {**card, "fields": []}
+    preset = PRESETS.get(str(section.get("preset")))
+    usual = usual_values(kind.model_fields["kind"].default) | dict(preset.values if preset else {})
+    try:
+        given = with_tables(section, folder)
+    except InputError:
+        given = dict(section)
+    useless = kind.without_use({**usual, **given})
+    shown = []
+    # what every material has counts least
+    for key in sorted(kind.model_fields, key=lambda own: own in _LAST):
+        if key in ("kind", "preset"):
+            continue
+        field = kind.model_fields[key]
+        default = usual.get(key, field.default if isinstance(field.default, float) else "")
+        meaning = _WORDS.get(key, field.description or "")
+        one = _field(path, key, section, _number(default), meaning)
+        shown.append({**one, "used": key not in useless or key in section})
+    named = names_stated({key: value for key, value in given.items() if key in STATED})
+    for key in sorted({*named, *section} - kind.model_fields.keys()):
+        shown.append(_field(path, key, section, "", f"{key}, a number in a formula"))
+    return {**card, "fields": shown}
+
+
+def _field(
+    path: Section, key: str, section: Mapping[str, Any], default: str, meaning: str
+) -> dict[str, Any]:
+    value = section.get(key)
+    if isinstance(value, list):
+        value = ", ".join(map(_number, value))
+    field = {"section": path, "key": key, "meaning": meaning, "used": True}
+    shown = None if isinstance(value, dict) else "" if value is None else _number(value)
+    return {**field, "default": default, "value": shown}
+
+
+def _number(value: Any) -> str:
+    return f"{value:.12g}" if isinstance(value, int | float) else str(value)

@@ -1,0 +1,150 @@
+"""Layers and materials of a probe file as fields, each with what is wrong with it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Awaitable, Callable
+from functools import partial
+from typing import Any
+
+from nicegui import ui
+
+from hotlever.app.edits import (
+    FILM,
+    TERMINALS,
+    LayerRow,
+    Section,
+    same,
+    typed,
+    with_layer,
+    with_value,
+)
+from hotlever.app.pages.frame import caption
+from hotlever.app.pages.page import Page
+
+_ROLES = {"": "not used", "body": "outline of the lever", FILM: "film or part"}
+_ROLES |= {name: f"terminal: {name}" for name in TERMINALS}
+_SILICON = "silicon of [material]"
+_LAWS = (
+    "A property is a number, a formula of T in K such as 0.032*(T/300)**-1.2, or the name of a "
+    "table (CSV) in the folder; drop tables above. Grey: what counts where nothing is said."
+)
+
+
+class ProbeFields:
+    """What can be set in the probe file that is open; `edited` is told its new text."""
+
+    def __init__(self, page: Page, edited: Callable[[str], Awaitable[None]]) -> None:
+        self._session, self._edited = page.session, edited
+        self._text, self._turn = "", 0
+        self._built: Any = None
+        self._inputs: dict[tuple[Section, str], ui.input] = {}
+        self._cards: dict[Section, ui.element] = {}
+        self._column = ui.column().classes("w-full gap-1")
+
+    async def show(self, text: str, fault: str) -> None:
+        """Show what can be set in a text, and what is wrong; nothing if nothing is open."""
+        self._turn += 1
+        turn, self._text = self._turn, text
+        found = await self._session.ask("quick", "fields:fields", text) if text else {}
+        if turn != self._turn:
+            return
+        rows = found.get("layers", [])
+        layers = [(row.label, row.name, row.role, row.material) for row in rows]
+        built = layers, [(card["section"], card["title"]) for card in found.get("cards", [])]
+        if built != self._built:
+            self._built = built
+            self._build(found, rows)
+        for card in found.get("cards", []):
+            for field in card["fields"]:
+                self._show_field(field, card["section"])
+        for row in rows:
+            if row.role == FILM and row.material:
+                shown = "" if row.thickness_um is None else f"{row.thickness_um:.12g}"
+                self._set(("layers", row.name), "thickness_um", shown)
+        self._mark(fault)
+
+    def _build(self, found: dict[str, Any], rows: list[LayerRow]) -> None:
+        self._column.clear()
+        self._inputs, self._cards = {}, {}
+        with self._column:
+            if rows:
+                ui.label("Layers of the drawing").classes("text-bold")
+            materials = {"": _SILICON, **{name: name for name in found.get("materials", [])}}
+            for row in rows:
+                self._row(row, materials | found["new"])
+            for card in found.get("cards", []):
+                ui.label(card["title"]).classes("text-bold")
+                self._cards[card["section"]] = ui.element("div").classes("w-full fields")
+            if found.get("materials"):
+                caption(_LAWS)
+
+    def _row(self, row: LayerRow, materials: dict[str, str]) -> None:
+        """Show what a layer is, what it is made of, and how thick it is if it lies on the body."""
+        with ui.row().classes("w-full items-center gap-1"):
+            roles = _ROLES if row.role in _ROLES else {**_ROLES, row.role: row.role}
+            role = ui.select(roles, label=f"layer {row.label}", value=row.role)
+            role.classes("col min-w-36")
+            role.on_value_change(lambda event: self._set_layer(row, role=event.value))
+            if row.role in (*TERMINALS, *({row.name} if row.part == "terminals" else ())):
+                return
+            shown = materials if row.role else {**materials, "": "–"}
+            made_of = ui.select(shown, label="made of", value=row.material, with_input=True)
+            made_of.classes("col min-w-36").props(f'aria-label="layer {row.label} is made of"')
+            made_of.on_value_change(lambda event: self._set_layer(row, material=event.value))
+            if row.role == FILM and row.material:
+                section = ("layers", row.name)
+                made = self._input(section, "thickness_um", "thickness (µm)", f"{row.label}: ")
+                made.props('placeholder="a part of the body" stack-label').classes("w-full")
+
+    def _set_layer(
+        self, row: LayerRow, role: str | None = None, material: str | None = None
+    ) -> Awaitable[None] | None:
+        if role is None and material is None:
+            return None
+        if material is not None and not row.role:
+            role = FILM
+        role = row.role if role is None else role
+        material = row.material if material is None else material
+        return self._edited(with_layer(self._text, row, role, material, row.thickness_um))
+
+    # --- values -----------------------------------------------------------------------------------
+
+    def _show_field(self, field: dict[str, Any], card: Section) -> None:
+        """Show a value in its field, which is made if it is not there."""
+        section, key, value = field["section"], field["key"], field["value"]
+        if (section, key) not in self._inputs:
+            with self._cards[card]:
+                made = self._input(section, key, field["meaning"])
+                if field["default"]:
+                    made.props(f'placeholder="{field["default"]}" stack-label')
+                if value is None:
+                    made.props('readonly placeholder="as the probe file says" stack-label')
+        self._inputs[section, key].set_visibility(field["used"])
+        self._set(section, key, value or "")
+
+    def _input(self, section: Section, key: str, meaning: str, of: str = "") -> ui.input:
+        known = self._session.project.data if section[0] == "materials" else None
+        made = ui.input(meaning, autocomplete=known)
+        made.props(f'debounce=300 hide-bottom-space aria-label="{of}{meaning}"')
+        made.tooltip(".".join((*section, key)))
+        made.on_value_change(partial(self._typed, section, key))
+        self._inputs[section, key] = made
+        return made
+
+    def _set(self, section: Section, key: str, value: str) -> None:
+        made = self._inputs[section, key]
+        if typed(key, made.value or "") != typed(key, value):
+            made.set_value(value)
+
+    def _typed(self, section: Section, key: str, event: Any) -> Awaitable[None] | None:
+        value = typed(key, event.value or "")
+        text = with_value(self._text, section, key, value)
+        return None if same(text, self._text) else self._edited(text)
+
+    def _mark(self, fault: str) -> None:
+        """Say at its field what is wrong, where a line names section and key."""
+        words = set(re.findall(r"\w+", fault))
+        for (section, key), made in self._inputs.items():
+            named = f"[{'.'.join(section)}]" in fault and key in words
+            made.error = fault.partition("]: ")[2] if named else None
