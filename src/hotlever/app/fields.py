@@ -129,7 +129,7 @@ def _card(path: Section, section: Mapping[str, Any], folder: Path) -> dict[str, 
     try:
         given = with_tables(section, folder)
     except InputError:
-        given = dict(section)
+        given = {}
     useless = kind.without_use({**usual, **given})
     shown = []
     # what every material has counts least
@@ -140,7 +140,7 @@ def _card(path: Section, section: Mapping[str, Any], folder: Path) -> dict[str, 
         default = usual.get(key, field.default if isinstance(field.default, float) else "")
         meaning = _WORDS.get(key, field.description or "")
         one = _field(path, key, section, _number(default), meaning)
-        shown.append({**one, "used": key not in useless or key in section})
+        shown.append({**one, "used": key not in useless or key in section or not given})
     named = names_stated({key: value for key, value in given.items() if key in STATED})
     for key in sorted({*named, *section} - kind.model_fields.keys()):
         shown.append(_field(path, key, section, "", f"{key}, a number in a formula"))

@@ -90,9 +90,11 @@ def with_tables(values: Mapping[str, Any], folder: Path | None) -> dict[str, Any
     InputError
         If a file holds no table of the property.
     """
-    return {
-        name: read_law((folder or Path()) / value, name, value)
-        if name in STATED and isinstance(value, str) and _FILE.fullmatch(value.strip())
-        else value
-        for name, value in values.items()
-    }
+    read = dict(values)
+    for name, value in values.items():
+        if name in STATED and isinstance(value, str) and _FILE.fullmatch(value.strip()):
+            try:
+                read[name] = read_law((folder or Path()) / value, name, value)
+            except InputError as error:
+                raise InputError(f"{name}: {error}") from None
+    return read

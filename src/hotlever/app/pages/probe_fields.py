@@ -106,7 +106,7 @@ class ProbeFields:
             role = FILM
         role = row.role if role is None else role
         material = row.material if material is None else material
-        return self._edited(with_layer(self._text, row, role, material, row.thickness_um))
+        return self._edit(with_layer(self._text, row, role, material, row.thickness_um))
 
     # --- values -----------------------------------------------------------------------------------
 
@@ -140,11 +140,23 @@ class ProbeFields:
     def _typed(self, section: Section, key: str, event: Any) -> Awaitable[None] | None:
         value = typed(key, event.value or "")
         text = with_value(self._text, section, key, value)
-        return None if same(text, self._text) else self._edited(text)
+        return None if same(text, self._text) else self._edit(text)
+
+    def _edit(self, text: str) -> Awaitable[None]:
+        # at once: the next field may be set before what this one does is shown
+        self._text = text
+        return self._edited(text)
 
     def _mark(self, fault: str) -> None:
-        """Say at its field what is wrong, where a line names section and key."""
-        words = set(re.findall(r"\w+", fault))
-        for (section, key), made in self._inputs.items():
-            named = f"[{'.'.join(section)}]" in fault and key in words
-            made.error = fault.partition("]: ")[2] if named else None
+        """Say at its field what is wrong: at the first that a line about its section names."""
+        folder = f"{self._session.project.folder}/"
+        about, _, reason = fault.replace(folder, "").partition("]: ")
+        words = re.findall(r"\w+", reason)
+        at_fault = [
+            (words.index(key), made)
+            for (section, key), made in self._inputs.items()
+            if about.endswith(f"[{'.'.join(section)}") and key in words
+        ]
+        wrong = min(at_fault, key=lambda one: one[0], default=(0, None))[1]
+        for made in self._inputs.values():
+            made.error = reason if made is wrong else None
