@@ -17,7 +17,7 @@ from nicegui import ui
 from nicegui.testing import User, user_simulation
 from PIL import Image
 
-from hotlever.app import live, showing, spectra
+from hotlever.app import fields, live, showing, spectra
 from hotlever.app.jobs import Jobs, Task
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.server import add_pages
@@ -41,7 +41,7 @@ class Here(Report):
         self.sent.append((kind, content))
 
     async def call(self, function: str, *arguments: Any, heard: Any = None) -> Any:
-        modules = {"live": live, "showing": showing, "spectra": spectra}
+        modules = {"fields": fields, "live": live, "showing": showing, "spectra": spectra}
         module = modules[function.split(":")[0].split(".")[-1]]
         self.sent = []
         result = getattr(module, function.split(":")[1])(self, *arguments)

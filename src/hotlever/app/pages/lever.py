@@ -142,8 +142,8 @@ class LeverPage(Page):
         elif opened:
             self._pick.set_value(opened[-1])
         elif names[-1].lower().endswith(DATA):
-            ui.notify(f"{names[-1]} is kept: a property of a material may name it")
             await self._draw()
+            self.banner.say(f"{names[-1]}: kept in the folder; a material's property may name it")
         else:
             raise InputError(f"{names[-1]}: unknown type of file, expected {_FILE}")
 
