@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -12,6 +11,7 @@ from hotlever.app.edits import LayerRow, Section
 from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
 from hotlever.errors import InputError
+from hotlever.probe.probe import sections_of
 
 #: Numbers of other sections that can be set: keys, in the order in which they are shown.
 _OTHERS = {
@@ -31,12 +31,12 @@ def fields(report: Report, folder: Path, text: str) -> dict[str, Any]:
     Nothing, if the text is no probe file that could be edited so.
     """
     try:
-        values = tomllib.loads(text)
+        values = sections_of(text, "")
         sections = {name: values.get(name, {}) for name in ("probe", "layers", "terminals")}
         materials = values.get("materials", {})
         if not all(isinstance(part, dict) for part in (*sections.values(), *materials.values())):
             return {}
-    except (ValueError, RecursionError, AttributeError):
+    except (InputError, AttributeError):
         return {}
     is_drawing = sections["probe"].get("shape") == "drawing"
     cards = [_card(("materials", name), section, folder) for name, section in materials.items()]

@@ -280,7 +280,17 @@ def read_sections(path: str | os.PathLike[str]) -> dict[str, Any]:
     InputError
         If the file cannot be read or is not TOML.
     """
-    text = read_text(path, largest=_LARGEST)
+    return sections_of(read_text(path, largest=_LARGEST), str(path))
+
+
+def sections_of(text: str, path: str) -> dict[str, Any]:
+    """Return the sections of the text of a probe file; `path` names it in an error.
+
+    Raises
+    ------
+    InputError
+        If it is not TOML.
+    """
     for number, line in enumerate(text.splitlines(), start=1):
         if len(line) > _LONGEST_LINE:
             raise InputError(
