@@ -25,7 +25,7 @@ _LAST = ("heat_capacity", "heat_capacity_scale", "emissivity", "melting_point_K"
 _MOST_LAYERS = 40
 
 
-def fields(report: Report, folder: Path, text: str) -> dict[str, Any]:
+def settable(report: Report, folder: Path, text: str) -> dict[str, Any]:
     """Return what can be set in a probe file: layers, materials, thickness, tip and circuit.
 
     Nothing, if the text is no probe file that could be edited so.

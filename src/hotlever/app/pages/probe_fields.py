@@ -46,7 +46,7 @@ class ProbeFields:
         """Show what can be set in a text, and what is wrong; nothing if nothing is open."""
         self._turn += 1
         turn, self._text = self._turn, text
-        found = await self._session.ask("quick", "fields:fields", text) if text else {}
+        found = await self._session.ask("quick", "fields:settable", text) if text else {}
         if turn != self._turn:
             return
         rows = found.get("layers", [])
