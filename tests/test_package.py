@@ -35,6 +35,7 @@ FLOORS = {
     "materials": ("materials",),
     "probe": ("probe",),
     "air": ("air",),
+    "contact": ("contact",),
     "lever": ("lever",),
     "measurement": ("lever3d", "measurement", "raman"),
     "estimation": ("estimation",),

@@ -30,7 +30,7 @@ CACHE_VARIABLE = "HOTLEVER_CACHE"
 #: Environment variable with the largest size of the cache (GB), and the size without it.
 SIZE_VARIABLE, _SIZE_GB = "HOTLEVER_CACHE_GB", 2.0
 #: Packages whose code makes what is kept.
-_MAKERS = ("tables", "materials", "probe", "air", "lever", "lever3d")
+_MAKERS = ("tables", "materials", "probe", "air", "contact", "lever", "lever3d")
 
 Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")

@@ -43,7 +43,18 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "end_heat_mW": ("mW", "heat leaving by the leg ends"),
     "air_heat_mW": ("mW", "heat leaving into the air"),
     "radiated_mW": ("mW", "heat leaving by radiation"),
+    "into_tip_mW": ("mW", "heat leaving into a tip in contact"),
     "sensitivity": ("of the observable by the parameter", "derivative at fixed bias"),
+    # a tip in contact
+    "apex_K": ("K", "temperature of the apex"),
+    "sample_mW": ("mW", "heat into the sample through the contact"),
+    "beside_mW": ("mW", "heat from the tip's side into the sample through air"),
+    "tip_K_per_mW": ("K/mW", "thermal resistance of the tip"),
+    "interface_K_per_mW": ("K/mW", "thermal resistance of the interface"),
+    "spreading_K_per_mW": ("K/mW", "thermal resistance of the sample"),
+    "current_change_mA": ("mA", "change of the heater current by the contact"),
+    "tip_change_K": ("K", "change of the tip temperature by the contact"),
+    "current_by_resistance": ("mA mW/K", "change of the heater current by the resistances"),
     # in time
     "time": ("µs", "time"),
     "time_us": ("µs", "time"),

@@ -12,6 +12,12 @@ from typing import NamedTuple
 from hotlever.errors import InputError, shown
 
 ZERO_CELSIUS_K = 273.15
+#: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
+PER_CM_TO_MILLI_PER_UM = 0.1
+#: W/cm² to mW/µm².
+PER_CM2_TO_MILLI_PER_UM2 = 1e-5
+#: J/cm³ to nJ/µm³; with times in µs, nJ are mW µs.
+PER_CM3_TO_NANO_PER_UM3 = 1e-3
 LARGEST_NUMBER = 1e30  #: no quantity is larger in any unit
 #: Between these (V) a lever has a current that can be told from none, and no spark.
 LEAST_BIAS, MOST_BIAS = 1e-6, 1e4

@@ -18,10 +18,10 @@ from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file
 from hotlever.lever.lever import Lever, State
-from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
 from hotlever.lever.surroundings import plate_of
 from hotlever.materials.air import temperature_from_kirchhoff
 from hotlever.types import Array
+from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
 
 class AirFields:

@@ -9,11 +9,12 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from hotlever.air.stores import HeatInAir
+from hotlever.contact.law import ContactLaw, contact_of
 from hotlever.lever.laws import LawsAtPoints
 from hotlever.lever.motion import Motion
 from hotlever.lever.radiation import RimRadiation
 from hotlever.lever.rim import Rim
-from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM, Fields, Fluxes, Space, Tangent
+from hotlever.lever.space import Fields, Fluxes, Space, Tangent
 from hotlever.lever.terminals import Terminals
 from hotlever.lever.transport import Properties, fluxes_of, tangent_of
 from hotlever.materials import Kind
@@ -23,6 +24,7 @@ from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit
 from hotlever.probe.physics import THE_PAPERS, Physics
 from hotlever.types import Array
+from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
 
 class Radiated(NamedTuple):
@@ -48,6 +50,8 @@ class StatesAtPoints:
         Of the dimensions by which derivatives may be asked for.
     laws : type of LawsAtPoints
         How the laws are evaluated.
+    contact : ContactLaw, optional
+        What a tip takes that touches a sample.
 
     Raises
     ------
@@ -61,6 +65,8 @@ class StatesAtPoints:
     laws : LawsAtPoints
     rim : Rim
         What radiates where the mesh ends; nothing without radiation.
+    footprint : Rim
+        Where heat enters a tip in contact; nothing without.
     scale, step_limit : ndarray, shape (size + 1, 1)
         For Newton's method: the size of one unit of each unknown, by which kelvin and volts
         compare, and the largest step.
@@ -74,6 +80,7 @@ class StatesAtPoints:
         physics: Physics = THE_PAPERS,
         motions: Mapping[str, Motion] | None = None,
         laws: type[LawsAtPoints] = LawsAtPoints,
+        contact: ContactLaw | None = None,
     ) -> None:
         self.space, self.materials, self.motions = space, materials, motions or {}
         self.circuit, self.base_temperature_K = circuit, circuit.base_temperature_K
@@ -83,6 +90,8 @@ class StatesAtPoints:
         self._radiation = RimRadiation(
             self.rim, materials, circuit.base_temperature_K, self.motions
         )
+        self.contact = contact
+        self.footprint = Rim.nothing(space.size) if contact is None else space.footprint
         self._polarity = 1.0
         self._latest: tuple[Array, tuple[Fields, Properties, Properties], Evaluated] | None = None
         self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]
@@ -90,7 +99,8 @@ class StatesAtPoints:
 
     @classmethod
     def of_probe(cls, space: Space, probe: Probe, **options: Any) -> Self:
-        """Return those of a probe's materials, circuit and physics; options as above."""
+        """Return those of a probe's materials, circuit, physics and contact; options as above."""
+        options = {"contact": contact_of(probe), **options}
         return cls(space, probe.kinds, probe.circuit, probe.physics, **options)
 
     def at(self, x: Array) -> tuple[Fields, Properties, Properties]:
@@ -102,6 +112,22 @@ class StatesAtPoints:
         if names:
             return self._radiation.heat(x, self.terminals.end_rises, names)
         return self._evaluated(x)[2]
+
+    def into_tip(self, x: Array, names: Sequence[str] = ()) -> Evaluated:
+        """Return the heat that enters the tip at the points of its footprint (mW), (points, n).
+
+        With its derivatives by ``T``, the temperature there, and by parameters.
+        """
+        rise, shares = self.footprint.rise(x), self.footprint.weights
+        if self.contact is None:
+            return rise, dict.fromkeys(("T", *names), rise)
+        heat, by = self.contact.heat(rise, names)
+        return shares * heat, {name: shares * slope for name, slope in by.items()}
+
+    def losses(self, x: Array, names: Sequence[str] = ()) -> dict[str, Evaluated]:
+        """Return what leaves at the points of ``rim`` and ``footprint``, of those that count."""
+        every = {"rim": (self.rim, self.by_rim), "footprint": (self.footprint, self.into_tip)}
+        return {name: leaves(x, names) for name, (at, leaves) in every.items() if len(at.weights)}
 
     def _evaluated(
         self, x: Array

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hotlever.lever.at_points import Radiated
@@ -12,7 +14,7 @@ from hotlever.probe.circuit import Wiring
 from hotlever.types import Array, Index
 
 #: What `balance_columns` returns: heat made in heater and legs (mW; NaN without legs), current to
-#: ground (mA), heat through the leg ends, into the air and radiated (mW).
+#: ground (mA), heat through the leg ends, into the air, radiated and into a tip in contact (mW).
 BALANCES = (
     "heater_mW",
     "leg1_mW",
@@ -21,6 +23,7 @@ BALANCES = (
     "end_heat_mW",
     "air_heat_mW",
     "radiated_mW",
+    "into_tip_mW",
 )
 
 
@@ -51,21 +54,20 @@ def balance_columns(equations: LeverEquations, x: Array) -> Array:
     Currents and heats at terminals are consistent fluxes: reactions of the weak form at the nodes
     of each. The names are `balance_names`.
     """
-    theta, radiated = equations.kirchhoff(x)[0], equations.radiated(x)
-    return _balances(equations, x, equations.fluxes(x), theta, radiated)
+    return _balances(equations, x, equations.fluxes(x), _leaving(equations, x))
 
 
 def balance_slopes(equations: LeverEquations, x: Array, slopes: Array) -> Array:
     """Return how the `balance_columns` of states change with changes (size + 1, n) of them."""
     theta = equations.kirchhoff(x)[1] * equations.space.air.rise(slopes)
-    radiated = equations.radiated_change(x, slopes)
-    return _balances(equations, slopes, equations.flux_changes(x, slopes), theta, radiated)
+    into_tip = equations.into_tip(x)[1]["T"] * equations.footprint.rise(slopes)
+    leaving = _Leaving(theta, equations.radiated_change(x, slopes), into_tip)
+    return _balances(equations, slopes, equations.flux_changes(x, slopes), leaving)
 
 
 def heat_left(equations: LeverEquations, x: Array) -> Array:
-    """Return the heat that leaves states by the leg ends, into the air and as light (mW), (n,)."""
-    theta, radiated = equations.kirchhoff(x)[0], equations.radiated(x)
-    return np.asarray(sum(_heat_out(equations, equations.fluxes(x), theta, radiated)))
+    """Return all heat that leaves states: by the leg ends and from the surface (mW), (n,)."""
+    return np.asarray(sum(_heat_out(equations, equations.fluxes(x), _leaving(equations, x))))
 
 
 def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
@@ -75,27 +77,40 @@ def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
     return heat.sum(axis=0), space.end_test[0] @ heat
 
 
+class _Leaving(NamedTuple):
+    """What leaves the surface: θ at the sites of the air, light, and heat into the tip (mW)."""
+
+    theta: Array
+    radiated: Radiated
+    into_tip: Array
+
+
+def _leaving(equations: LeverEquations, x: Array) -> _Leaving:
+    theta, _ = equations.kirchhoff(x)
+    return _Leaving(theta, equations.radiated(x), equations.into_tip(x)[0])
+
+
 def _heat_out(
-    equations: LeverEquations, fluxes: Fluxes, theta: Array, radiated: Radiated
-) -> tuple[Array, Array, Array]:
-    """Return the heat through the leg ends, into the air, and radiated."""
+    equations: LeverEquations, fluxes: Fluxes, leaving: _Leaving
+) -> tuple[Array, Array, Array, Array]:
+    """Return the heat through the leg ends, into the air, radiated, and into the tip."""
+    theta, radiated, into_tip = leaving
     space, rim = equations.space, equations.rim
     heat = space.weighted(np.concatenate([fluxes.heat_source[None], fluxes.heat]))
     by_ends = -np.einsum("dp,dpn->n", space.end_test, heat)
     into_air, at_ends = space.air.heat(theta)
     at_ends = at_ends + rim.end_test @ radiated.by_rim
     by_faces = (space.weights * radiated.faces).sum(axis=0)
-    return by_ends - at_ends, into_air, by_faces + radiated.by_rim.sum(axis=0)
+    light = by_faces + radiated.by_rim.sum(axis=0)
+    return by_ends - at_ends, into_air, light, into_tip.sum(axis=0)
 
 
-def _balances(
-    equations: LeverEquations, x: Array, fluxes: Fluxes, theta: Array, radiated: Radiated
-) -> Array:
-    """Return the balances of states, fluxes, θ at the sites of the air, light; all linear."""
+def _balances(equations: LeverEquations, x: Array, fluxes: Fluxes, leaving: _Leaving) -> Array:
+    """Return the balances of states, fluxes, and what leaves the surface; all linear."""
     space = equations.space
     assert isinstance(space, FullSpace)  # a reduced lever has no ends
-    end_heat, air_heat, light = _heat_out(equations, fluxes, theta, radiated)
-    made = space.weights * (radiated.faces - fluxes.heat_source)
+    heats = _heat_out(equations, fluxes, leaving)
+    made = space.weights * (leaving.radiated.faces - fluxes.heat_source)
     charge = space.weighted(fluxes.charge)
     of_parts = [_made(made, space.parts[part]) for part in ("heater", "leg 1", "leg 2")]
     into = {
@@ -103,14 +118,14 @@ def _balances(
         for name in space.wiring.conducting
     }
     grounds = [name for name in into if equations.circuit.contact(name).kind == "ground"]
-    ground = -sum((into[name] for name in grounds), start=np.zeros_like(end_heat))
+    ground = -sum((into[name] for name in grounds), start=np.zeros_like(heats[0]))
     volts = [
         np.tensordot(weights, x[unknowns], axes=1)
         for name in _measured(space.wiring)
         for unknowns, weights in [space.potential_at(name)]
     ]
     currents = [into[name] for name in _unusual(space.wiring)]
-    return np.stack([*of_parts, ground, end_heat, air_heat, light, *volts, *currents], axis=-1)
+    return np.stack([*of_parts, ground, *heats, *volts, *currents], axis=-1)
 
 
 def _made(heat: Array, points: Index) -> Array:

@@ -36,6 +36,7 @@ SWEEP_COLUMNS = (
 _MORE = (
     *("leg1_ohm", "leg2_ohm", "lever_ohm", "max_K"),
     *("ground_current_mA", "end_heat_mW", "air_heat_mW", "radiated_mW"),
+    "into_tip_mW",
 )
 
 

@@ -26,6 +26,7 @@ import numpy as np
 from hotlever.lever.at_points import StatesAtPoints
 from hotlever.lever.laws import BASE, GAS
 from hotlever.lever.newton import refined
+from hotlever.lever.rim import Rim
 from hotlever.lever.space import (
     LEVER,
     TIP,
@@ -59,7 +60,8 @@ class LeverEquations(StatesAtPoints):
         """Return the residuals of heat and charge, and last the current I_h (mA), (size + 1, n)."""
         weak = self.space.weak_form(self.fluxes(x))
         self.terminals.add_currents(weak, x)
-        self.rim.add_heat(weak, self.by_rim(x)[0])
+        for points, (heat, _) in self.losses(x).items():
+            getattr(self, points).add_heat(weak, heat)
         return weak + self.space.air.weak_form(self.kirchhoff(x)[0])
 
     def balance_in(self, circuit: Circuit, x: Array, bias_V: Array | float) -> Array:
@@ -79,7 +81,8 @@ class LeverEquations(StatesAtPoints):
             stored = per_us * self.laws.heat_density(self.at(x)[0].T)[1]
             tangent = replace(tangent, heat_source_T=tangent.heat_source_T + stored)
         taken_up = self.heat_in_air.taken_up(per_us) if per_us else None
-        surface = SurfaceTangent(self.kirchhoff(x)[1], taken_up, self.by_rim(x)[1]["T"])
+        slopes = {points: by["T"] for points, (_, by) in self.losses(x).items()}
+        surface = SurfaceTangent(self.kirchhoff(x)[1], taken_up, slopes)
         return self.space.factorised(tangent, surface, constraint, self.terminals.conductance)
 
     # --- derivatives --------------------------------------------------------------------------
@@ -95,10 +98,11 @@ class LeverEquations(StatesAtPoints):
         """Return how `balance` changes with the unknowns: the Jacobian times changes."""
         weak = self.space.weak_form(self.flux_changes(x, change))
         self.terminals.add_current_changes(weak, change)
-        kappa, slope = self.kirchhoff(x)[1], self.by_rim(x)[1]["T"]
-        if change.ndim > 2:
-            kappa, slope = kappa[..., None], slope[..., None]
-        self.rim.add_heat(weak, slope * self.rim.rise(change))
+        more = (..., *(None,) * (change.ndim - 2))
+        kappa = self.kirchhoff(x)[1][more]
+        for name, (_, by) in self.losses(x).items():
+            points: Rim = getattr(self, name)
+            points.add_heat(weak, by["T"][more] * points.rise(change))
         return weak + self.space.air.weak_form(kappa * self.space.air.rise(change))
 
     def balance_change_in(self, circuit: Circuit, x: Array, change: Array) -> Array:
@@ -122,8 +126,9 @@ class LeverEquations(StatesAtPoints):
             columns.append(change)
         changes = Fluxes(*(np.stack(column, axis=-1) for column in zip(*columns, strict=True)))
         weak = self.space.weak_form(changes)
-        by_rim = self.by_rim(x, names)[1]
-        self.rim.add_heat(weak, np.stack([by_rim[name] for name in names], axis=-1))
+        for points, (_, by_loss) in self.losses(x, names).items():
+            stacked = np.stack([by_loss[name] for name in names], axis=-1)
+            getattr(self, points).add_heat(weak, stacked)
         air, (theta, kappa_air) = self.space.air, self.kirchhoff(x)
         for column, name in enumerate(names):
             if name == GAS:

@@ -28,10 +28,10 @@ from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever, State
-from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.kinds import HighDopedSilicon
 from hotlever.types import Array
+from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
 
 @dataclass(frozen=True)

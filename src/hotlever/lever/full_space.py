@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix
 from hotlever.air.coupling import AirLoss
 from hotlever.air.operator import AirOperator
 from hotlever.air.stores import HeatInAir
-from hotlever.lever.elements import FiniteElements
+from hotlever.lever.elements import FacetPoints, FiniteElements
 from hotlever.lever.films import placed_films
 from hotlever.lever.linear_map import LinearMap
 from hotlever.lever.rim import Rim
@@ -88,6 +88,7 @@ class FullSpace(Space):
         self.held = {name: int(self._V[self.contact_nodes[name][0]]) for name in self.wiring.held}
         unknowns = np.stack([self._T, self._V])
         self._jacobian = SparseJacobian(self.elements, unknowns, self.size, self.held, self.tip)
+        self._losses: dict[str, csr_matrix] = {}
         self.air = AirLoss.nothing(self.size + 1)
         measurable = "reader" in self.wiring.measurable
         self.reader = self.potential_at("reader") if measurable else None
@@ -173,9 +174,19 @@ class FullSpace(Space):
         return Rim.of(self.mesh, self.elements, self._selection(self._T), self.end_nodes)
 
     @cached_property
-    def _losses_at_rim(self) -> csr_matrix:
-        places = self.rim.places
-        return self._jacobian.of_losses(places.elements, places.shares)
+    def footprint(self) -> Rim:
+        """Points of the circle on which the tip stands, whose weights are shares of its area."""
+        layout = self.mesh.layout
+        if layout.cone is None:
+            return Rim.nothing(self.size)
+        return Rim.under_a_cone(layout, self.elements, self._selection(self._T))
+
+    def _losses_at(self, name: str) -> csr_matrix:
+        """Return the matrix from slopes of what leaves at the rim or footprint to the entries."""
+        if name not in self._losses:
+            places: FacetPoints = getattr(self, name).places
+            self._losses[name] = self._jacobian.of_losses(places.elements, places.shares)
+        return self._losses[name]
 
     # --- the air ----------------------------------------------------------------------------------
 
@@ -228,8 +239,8 @@ class FullSpace(Space):
             kappa = surface.kappa[:, state]
             entries = self._jacobian.entries(tangent.of(state), conductance)
             entries += self.air.local_entries(kappa)
-            if len(surface.by_rim):
-                entries += self._losses_at_rim @ surface.by_rim[:, state]
+            for name, slopes in surface.at_points.items():
+                entries += self._losses_at(name) @ slopes[:, state]
             factors = self._jacobian.factorised(entries, constraint.among(state))
             solvers.append(self.air.solver(factors, kappa, surface.taken_up))
         return SparseFactors(solvers)

@@ -15,12 +15,7 @@ import numpy as np
 from hotlever.errors import ComputationError
 from hotlever.lever.films import PlacedFilm
 from hotlever.lever.motion import Motion
-from hotlever.lever.space import (
-    PER_CM2_TO_MILLI_PER_UM2,
-    PER_CM3_TO_NANO_PER_UM3,
-    PER_CM_TO_MILLI_PER_UM,
-    Space,
-)
+from hotlever.lever.space import Space
 from hotlever.lever.transport import Properties
 from hotlever.materials import Kind, full_name
 from hotlever.materials.air import thermal_conductivity_of_air
@@ -30,6 +25,11 @@ from hotlever.materials.laws import Evaluated
 from hotlever.materials.silicon import Carrier
 from hotlever.probe.physics import Physics
 from hotlever.types import Array
+from hotlever.units import (
+    PER_CM2_TO_MILLI_PER_UM2,
+    PER_CM3_TO_NANO_PER_UM3,
+    PER_CM_TO_MILLI_PER_UM,
+)
 
 #: Parameters of no material: how many times as well as air the gas conducts, and what moves all
 #: temperatures and that of the surroundings.

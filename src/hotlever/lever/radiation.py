@@ -13,10 +13,10 @@ import numpy as np
 from hotlever.lever.laws import BASE, names_in_laws
 from hotlever.lever.motion import Motion
 from hotlever.lever.rim import Rim
-from hotlever.lever.space import PER_CM2_TO_MILLI_PER_UM2
 from hotlever.materials import Kind
 from hotlever.materials.laws import Evaluated
 from hotlever.types import Array
+from hotlever.units import PER_CM2_TO_MILLI_PER_UM2
 
 
 class RimRadiation:

@@ -2,7 +2,7 @@
 
 Of a flat lever these are the edges of its outline, as high as each film that ends there; its faces
 are where its quadrature points are. Of a solid the rim is all of the surface. Terminals are not
-part of it.
+part of it. Points under a tip in contact, where heat enters it, are of the same kind.
 """
 
 from __future__ import annotations
@@ -19,6 +19,9 @@ from hotlever.lever.linear_map import LinearMap
 from hotlever.probe.layout import Layout
 from hotlever.probe.mesh import ProbeMesh
 from hotlever.types import Array, Index
+
+#: Rings of points in the circle under a cone, and points in a ring.
+_RINGS, _AROUND = 4, 12
 
 
 @dataclass(frozen=True)
@@ -86,20 +89,35 @@ class Rim:
         facets = np.setdiff1d(mesh.elements.boundary_facets(), ends)
         places = elements.on_facets(facets)
         nodes = elements.dofs[places.elements]
-        rows = np.broadcast_to(np.arange(len(nodes))[:, None], nodes.shape)
-        shape = (len(nodes), elements.size)
-        sampling = csr_matrix((places.shares.ravel(), (rows.ravel(), nodes.ravel())), shape=shape)
         tests = {
             name: np.where(np.isin(nodes, of_end), places.shares, 0.0).sum(axis=1)
             for name, of_end in end_nodes.items()
         }
         return cls(
-            LinearMap(sampling @ selection, 1),
+            _values(places, elements, selection),
             places.weights[:, None],
             _films(mesh.layout, mesh.region[places.elements], places.positions),
             tests,
             places,
         )
+
+    @classmethod
+    def under_a_cone(cls, layout: Layout, elements: FiniteElements, selection: csr_matrix) -> Rim:
+        """Return the circle on which a layout's tip stands; weights are shares of its area."""
+        cone = layout.cone
+        assert cone is not None
+        nodes, weights = np.polynomial.legendre.leggauss(_RINGS)
+        angle = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
+        # Gauss's points in the square of the radius, which the area goes with
+        radius = cone.base_radius_um * np.sqrt((1.0 + nodes) / 2.0)
+        at = np.multiply.outer(radius, [np.cos(angle), np.sin(angle)]).swapaxes(1, 2)
+        flat = at.reshape(-1, 2) + layout.tip
+        bottom = np.full((len(flat), len(elements.positions) - 2), -layout.thickness_um / 2.0)
+        positions = np.hstack([flat, bottom])
+        element, shares, _ = elements.at_points(positions)
+        share = np.repeat(weights / (2.0 * _AROUND), _AROUND)
+        places = FacetPoints(np.empty(0, dtype=np.intp), element, shares, share, positions.T)
+        return cls(_values(places, elements, selection), share[:, None], (), {}, places)
 
     def reduced(self, modes: Array) -> Rim:
         """Return the same for states that are combinations of modes (modes, size + 1)."""
@@ -127,6 +145,15 @@ class Rim:
     def end_test(self) -> Array:
         """The function that is one at all leg ends."""
         return np.asarray(sum(self.end_tests.values(), start=np.zeros(len(self.weights))))
+
+
+def _values(places: FacetPoints, elements: FiniteElements, selection: csr_matrix) -> LinearMap:
+    """Return the map from unknowns to the temperature at some points."""
+    nodes = elements.dofs[places.elements]
+    rows = np.broadcast_to(np.arange(len(nodes))[:, None], nodes.shape)
+    shape = (len(nodes), elements.size)
+    sampling = csr_matrix((places.shares.ravel(), (rows.ravel(), nodes.ravel())), shape=shape)
+    return LinearMap(sampling @ selection, 1)
 
 
 def _films(layout: Layout, region: Index, positions: Array) -> tuple[RimFilm, ...]:

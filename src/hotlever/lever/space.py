@@ -23,13 +23,6 @@ from hotlever.lever.linear_map import LinearMap
 from hotlever.lever.rim import Rim
 from hotlever.types import Array, Index
 
-#: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
-PER_CM_TO_MILLI_PER_UM = 0.1
-#: W/cm² to mW/µm².
-PER_CM2_TO_MILLI_PER_UM2 = 1e-5
-#: J/cm³ to nJ/µm³; with times in µs, nJ are mW µs.
-PER_CM3_TO_NANO_PER_UM3 = 1e-3
-
 
 class Factors(Protocol):
     """Factorised Jacobians of some states, the last row being that of the constraint."""
@@ -149,7 +142,7 @@ class Tangent:
 
 @dataclass(frozen=True)
 class SurfaceTangent:
-    """How the heat that leaves into the air and by the rim changes with the temperatures.
+    """How the heat that leaves at points of the surface changes with the temperatures.
 
     Attributes
     ----------
@@ -157,13 +150,13 @@ class SurfaceTangent:
         κ of the air at the sites (mW/(K µm)).
     taken_up : ndarray, shape (m, m), or None
         What the air takes up itself, see `hotlever.air.stores`; None at rest.
-    by_rim : ndarray, shape (points of the rim, n)
-        Slopes of what is radiated there (mW/K); no rows without radiation.
+    at_points : dict of str to ndarray, shape (points, n)
+        Slopes of what leaves at each point of ``rim`` or ``footprint`` (mW/K); those that count.
     """
 
     kappa: Array
     taken_up: Array | None
-    by_rim: Array
+    at_points: Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -251,6 +244,11 @@ class Space(ABC):
     @abstractmethod
     def rim(self) -> Rim:
         """The surface at which the mesh ends."""
+
+    @property
+    @abstractmethod
+    def footprint(self) -> Rim:
+        """Points of the circle on which the tip stands, whose weights are shares of its area."""
 
     def fields(self, x: Array) -> Fields:
         """Return the fields of states or of changes of them, (size + 1, n): T is the rise."""

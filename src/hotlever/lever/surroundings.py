@@ -18,12 +18,12 @@ from hotlever.air.panels import PanelOptions
 from hotlever.air.stores import AirStores, HeatInAir, stores_of
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.space import PER_CM3_TO_NANO_PER_UM3, PER_CM_TO_MILLI_PER_UM
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
 from hotlever.probe import Layout, Probe
 from hotlever.probe.surroundings import Surroundings
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+from hotlever.units import PER_CM3_TO_NANO_PER_UM3, PER_CM_TO_MILLI_PER_UM
 
 #: Modes of the lever, and how fine the panels are: twice as many change a history by less than
 #: what its steps are off by.

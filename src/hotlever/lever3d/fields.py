@@ -17,12 +17,12 @@ from hotlever.errors import InputError
 from hotlever.files import whole_file
 from hotlever.lever.fields import DrawSlices, Surface, fields_file, seen_from_above, write_fields
 from hotlever.lever.lever import State
-from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
 from hotlever.lever3d.lever import SolidLever, surface_nodes
 from hotlever.lever3d.still_air import ngsolve
 from hotlever.materials.air import temperature_from_kirchhoff
 from hotlever.probe.solid import AIR, material_names
 from hotlever.types import Array
+from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
 #: Points along each side of a slice.
 _SLICE_POINTS = 161

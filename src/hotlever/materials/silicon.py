@@ -105,6 +105,38 @@ def thermal_conductivity_of_layer(T: ArrayLike, thickness_um: ArrayLike) -> Eval
     }
 
 
+@law(
+    meant_for=(290.0, 1300.0),
+    source="Matthiessen's rule, Λ of Ju and Goodson, Appl. Phys. Lett. 74, 3005 (1999); Eq. 4",
+    steps=(_STEP,),
+)
+def thermal_conductivity_of_wire(T: ArrayLike, diameter_um: ArrayLike) -> Evaluated:
+    """Thermal conductivity of silicon along a round wire, in W cm⁻¹ K⁻¹.
+
+    Bulk and surface scatter the phonons independently (Matthiessen), the surface once a diameter:
+    1/Λ + 1/d in place of 1/Λ, with Λ as in `thermal_conductivity_of_layer`. As that falls as κ
+    does, the surface adds the same to 1/κ at any temperature.
+
+    Examples
+    --------
+    Of wires of 37 nm at room temperature it is stated that they conduct about 87 % less than bulk
+    silicon (arXiv:1712.05188, Introduction); the rule says 89 %:
+
+    >>> kappa, _ = thermal_conductivity_of_wire(300.0, [0.037, 0.3, 1e3])
+    >>> (100 * kappa).round(1).tolist()  # W/(m K)
+    [15.5, 70.7, 141.4]
+    """
+    diameter = np.asarray(diameter_um, dtype=float)
+    bulk, bulk_by = thermal_conductivity.formula(T)
+    cold, _ = thermal_conductivity.formula(300.0)
+    by_surface = MEAN_FREE_PATH_UM / (cold * diameter)
+    kappa = 1.0 / (1.0 / bulk + by_surface)
+    return kappa, {
+        "T": bulk_by["T"] * (kappa / bulk) ** 2,
+        "diameter_um": kappa**2 * by_surface / diameter,
+    }
+
+
 def _share(depth: Array) -> tuple[Array, Array]:
     """Sondheimer's Eq. 12 with diffuse surfaces, by thickness over Λ, and its derivative."""
     # loaded where it is wanted, as every command loads this module

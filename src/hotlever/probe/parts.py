@@ -14,6 +14,7 @@ from hotlever.errors import unknown_name
 from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind, Material, full_name
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.probe.circuit import Circuit, Contact, Wiring
+from hotlever.probe.contact import SampleContact
 from hotlever.probe.layout import Layout
 from hotlever.probe.physics import THE_PAPERS, Physics
 from hotlever.probe.shapes import PARAMETRIC, SHAPE_SECTIONS, Shape
@@ -36,6 +37,7 @@ PARTS: dict[str, type[Record]] = {
     "material": Material,
     "surroundings": Surroundings,
     "tip": Tip,
+    "contact": SampleContact,
     "physics": Physics,
     "prior": PriorTexts,
 }
@@ -53,6 +55,7 @@ class ProbeParts(Record):
     materials: dict[str, SerializeAsAny[Kind]] = Field(default_factory=dict)
     surroundings: Surroundings = Surroundings()
     tip: Tip | None = None
+    contact: SampleContact | None = None
     physics: Physics = THE_PAPERS
     prior: PriorTexts | None = None
 
@@ -65,6 +68,23 @@ class ProbeParts(Record):
                     f"the tip's base has a radius of {self.tip.base_radius_um:.4g} µm, expected "
                     f"less than {room:.4g} µm, half the heater's narrow side"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _contact_is_the_tips(self) -> Self:
+        if self.contact is None:
+            return self
+        if self.tip is None:
+            raise ValueError("[contact] means nothing without a section [tip]")
+        if self.surroundings.medium == "air":
+            gap, height = self.surroundings.surface_gap_um, self.tip.height_um
+            if gap is None or not math.isclose(gap, height, rel_tol=1e-6):
+                raise ValueError(
+                    f"surface_gap_um = {'none' if gap is None else f'{gap:g}'}: expected the "
+                    f"height of the tip in contact, {height:g}"
+                )
+            if self.tip.in_air:
+                raise ValueError("in_air: the air beside a tip in contact counts by itself")
         return self
 
     @model_validator(mode="after")

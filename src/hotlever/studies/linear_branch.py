@@ -26,13 +26,13 @@ from hotlever.datasets import labelled
 from hotlever.lever import Branch, Lever
 from hotlever.lever.dataset import dataset_of_branch
 from hotlever.lever.lever import COARSE, HOTTEST
-from hotlever.lever.space import PER_CM_TO_MILLI_PER_UM
 from hotlever.materials.silicon import thermal_conductivity
 from hotlever.probe import Probe
 from hotlever.probe.shapes import Shape, ThreeLeg, UShape
 from hotlever.spieser2017 import HOTTEST_TIP_K, KNEE_PREDICTED_K
 from hotlever.steps import each
 from hotlever.types import Array, Progress
+from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
 #: How far above its knee (K) each lever is followed: as far as the paper's was.
 SPAN_K = HOTTEST_TIP_K - KNEE_PREDICTED_K

@@ -188,6 +188,11 @@ class ReducedSpace(Space):
         """The surface at which the mesh ends, all of its points."""
         return self.full.rim.reduced(np.pad(self.modes[: self.count], ((0, 0), (0, 1))))
 
+    @cached_property
+    def footprint(self) -> Rim:
+        """Points of the circle on which the tip stands."""
+        return self.full.footprint.reduced(np.pad(self.modes[: self.count], ((0, 0), (0, 1))))
+
     def rises(self, x: Array) -> Array:
         """Return the rises of the temperature (K) at the hottest nodes, (places, n), of states."""
         return np.asarray(self._hot.T @ x[: self.count])
@@ -218,9 +223,9 @@ class ReducedSpace(Space):
             self._assemble(tangent.of(state), matrices[state])
             of_modes = matrices[state, : self.count, : self.count]
             of_modes += self.air.matrix(surface.kappa[:, state], surface.taken_up)
-            if len(surface.by_rim):
-                at_rim = self.rim.temperature.matrix
-                of_modes += at_rim.T @ (surface.by_rim[:, [state]] * at_rim)
+            for name, slopes in surface.at_points.items():
+                seen = getattr(self, name).temperature.matrix
+                of_modes += seen.T @ (slopes[:, [state]] * seen)
         matrices[:, -1] = 0.0
         matrices[:, -1, : self.count] = np.multiply.outer(constraint.tip, self.tip[1])
         matrices[:, -1, -1] = constraint.lever

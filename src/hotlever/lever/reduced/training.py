@@ -51,10 +51,10 @@ def can_be_reduced(probe: Probe, names: Collection[str]) -> bool:
     """Return whether a reduced lever serves: of one geometry, for parameters of its materials.
 
     With dimensions among the parameters it does not, since its modes are those of one geometry, nor
-    in another circuit than the paper's, nor with effects beyond the paper: with these the two
-    polarities differ, and a scale of κ changes more than the power.
+    in another circuit than the paper's, nor with effects beyond the paper or a tip in contact: with
+    these a scale of κ changes more than the power, and the two polarities may differ.
     """
-    plain = probe.circuit.is_plain and not probe.physics
+    plain = probe.circuit.is_plain and not probe.physics and probe.contact is None
     return plain and set(names) <= set(of_materials(probe))
 
 

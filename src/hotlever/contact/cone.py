@@ -1,0 +1,110 @@
+"""Heat along the cone of a tip, from its flat end up to the lever, and from its side to the sample.
+
+In one dimension, with the conductivity of a wire of the local diameter. Air between the side and
+the sample conducts along arcs about the edge of the contact: for a sharp cone, whose arcs are
+circles about the apex, that is exact. Temperatures jump at both surfaces, and near the contact it
+is the jumps that limit the heat.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from hotlever.materials.air import kirchhoff_variable
+from hotlever.materials.silicon import MEAN_FREE_PATH_UM, thermal_conductivity_of_wire
+from hotlever.probe.tip import Tip
+from hotlever.types import Array
+from hotlever.units import PER_CM_TO_MILLI_PER_UM
+
+#: Steps up the cone, evenly spaced in the logarithm of the distance, and nodes along an arc.
+_STEPS, _NODES = 160, 16
+
+
+class AirBeside(NamedTuple):
+    """The air between the side of a tip and the sample."""
+
+    gas_conductivity: float  #: over that of air
+    jump_um: float  #: temperature jump length at the tip
+    jump_at_sample_um: float
+
+    def conductance(self, tip: Tip, height_um: Array) -> Array:
+        """Return the heat that passes per height (µm) and θ: a number for each height."""
+        half_angle = math.radians(tip.half_angle_deg)
+        nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+        width = (math.pi / 2.0 - half_angle) / 2.0
+        angles = half_angle + width * (1.0 + nodes)
+        away, end = height_um / math.cos(half_angle), tip.apex_radius_um
+        along = away * (width * weights / (end + away[..., None] * np.sin(angles))).sum(axis=-1)
+        jumps = self.jump_um / (end + away * math.sin(half_angle))
+        jumps = jumps + self.jump_at_sample_um / (end + away)
+        return np.asarray(2.0 * math.pi / math.cos(half_angle) / (along + jumps))
+
+
+def up_the_cone(
+    tip: Tip,
+    apex_K: Array,
+    apex_mW: Array,
+    base_temperature_K: float,
+    air: AirBeside | None = None,
+) -> tuple[Array, Array]:
+    """Return temperature (K) and heat (mW) where a cone meets the lever, by those at its flat end.
+
+    Heat flows down. What its side gives to the air goes to the sample, which is at the base
+    temperature.
+
+    Parameters
+    ----------
+    tip : Tip
+    apex_K, apex_mW : ndarray, shape (n,)
+    base_temperature_K : float
+    air : AirBeside, optional
+        None in vacuum.
+    """
+    # the radius and, where air matters, the jumps set the scale of what happens near the end
+    scale = tip.apex_radius_um
+    position = np.linspace(0.0, math.log1p(tip.height_um / scale), 2 * _STEPS + 1)
+    height = scale * np.expm1(position)
+    per_step = (height + scale) * (position[-1] / _STEPS)
+    radius = tip.apex_radius_um + tip.slope * height
+    lost = None if air is None else air.conductance(tip, height)
+
+    def slopes(at: int, state: Array) -> Array:
+        T, heat = state
+        kappa, _ = thermal_conductivity_of_wire(T, 2.0 * radius[at])
+        rise = heat / (PER_CM_TO_MILLI_PER_UM * kappa * math.pi * radius[at] ** 2)
+        more = np.zeros_like(heat)
+        if air is not None and lost is not None:
+            theta, _ = kirchhoff_variable(T, base_temperature_K)
+            more = PER_CM_TO_MILLI_PER_UM * air.gas_conductivity * lost[at] * theta
+        return np.asarray(per_step[at] * np.stack([rise, more]))
+
+    state = np.stack([apex_K, apex_mW])
+    for at in range(0, 2 * _STEPS, 2):  # classical Runge-Kutta
+        first = slopes(at, state)
+        second = slopes(at + 1, state + first / 2.0)
+        third = slopes(at + 1, state + second / 2.0)
+        state = state + (first + 2.0 * (second + third) + slopes(at + 2, state + third)) / 6.0
+    T, heat = state
+    return T, heat
+
+
+def cold_resistance(tip: Tip, T: float) -> float:
+    """Return the resistance of a cone (K/mW) all of which is at one temperature (K), in vacuum.
+
+    In closed form: with a bulk of conductivity κ and what the surface adds to 1/κ, in proportion
+    to 1/d.
+
+    Examples
+    --------
+    >>> tip = Tip(height_um=0.7, half_angle_deg=20, apex_radius_um=0.005)
+    >>> round(cold_resistance(tip, 300.0))
+    19791
+    """
+    end, base = tip.apex_radius_um, tip.base_radius_um
+    bulk, cold = (float(thermal_conductivity_of_wire(K, math.inf)[0]) for K in (T, 300.0))
+    by_bulk = (1.0 / end - 1.0 / base) / bulk
+    by_surface = MEAN_FREE_PATH_UM / (4.0 * cold) * (1.0 / end**2 - 1.0 / base**2)
+    return (by_bulk + by_surface) / (PER_CM_TO_MILLI_PER_UM * math.pi * tip.slope)

@@ -1,0 +1,152 @@
+"""What a tip in contact takes from its lever, by the temperature at its base: one law.
+
+Resistances in series: the cone, the interface, and spreading in the sample; and air beside the
+cone. Heat flows as at rest: the cone follows within 0.1 µs, and the sample within the time in which
+heat spreads over a few radii, or through the films.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hotlever.contact.cone import AirBeside, cold_resistance, up_the_cone
+from hotlever.contact.spreading import spreading_resistance
+from hotlever.materials.laws import Evaluated
+from hotlever.probe import Probe
+from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+#: Rises of the temperature at the base between which the law is tabulated, and how often.
+_LOWEST_K, _HIGHEST_K, _TABULATED = -60.0, 1500.0, 120
+#: Share of a parameter, or of all resistances, by which it is changed for a derivative.
+_STEP = 1e-3
+#: By this name the interface stands in probe files and fits.
+INTERFACE = "interface_K_per_mW"
+#: What else of a probe the law depends on.
+_NUMBERS = ("height_um", "half_angle_deg", "apex_radius_um", "base_temperature_K")
+#: Accommodation at the tip and the sample beside it where none is stated: near the contact the gap
+#: is always below the mean free path.
+_ACCOMMODATION = 1.0
+
+
+class AtTheContact(NamedTuple):
+    """Where heat goes in some states, shape (n,) each."""
+
+    apex_K: Array
+    sample_mW: Array  #: through the contact
+    beside_mW: Array  #: from the side of the cone through the air to the sample
+
+
+class ContactLaw:
+    """The heat that enters a tip in contact, by the temperature at its base.
+
+    Parameters
+    ----------
+    probe : Probe
+        With a tip and a contact.
+
+    Attributes
+    ----------
+    interface_K_per_mW, spreading_K_per_mW : float
+        Resistances of interface and sample.
+    """
+
+    def __init__(self, probe: Probe) -> None:
+        tip, contact = probe.tip, probe.contact
+        assert tip is not None
+        assert contact is not None
+        self._probe, self._tip = probe, tip
+        self._base_K = probe.circuit.base_temperature_K
+        layers = contact.layers
+        self.interface_K_per_mW = contact.interface_K_per_mW
+        self.spreading_K_per_mW = spreading_resistance(
+            tip.apex_radius_um,
+            [layer.kappa for layer in layers],
+            [layer.thickness_um for layer in layers if layer.thickness_um is not None],
+        )
+        self._air: AirBeside | None = None
+        around = probe.surroundings
+        if around.medium == "air":
+            met = around.with_(accommodation=around.accommodation or _ACCOMMODATION)
+            jumps = map(met.jump_length_um, (around.jump_temperature_K, self._base_K))
+            self._air = AirBeside(around.gas_conductivity, *jumps)
+
+    @cached_property
+    def _table(self) -> CubicSpline:
+        """Heat at the base, at the apex, and rise of the apex, by the rise at the base."""
+        from scipy.interpolate import CubicSpline  # takes long, and few levers are in contact
+
+        below = self.interface_K_per_mW + self.spreading_K_per_mW
+        above = cold_resistance(self._tip, self._base_K)
+        # where nothing else conducts and the cone is cold, this is the rise at the base
+        driving = np.linspace(_LOWEST_K, _HIGHEST_K, _TABULATED)
+        for _ in range(2):
+            at_apex = driving / (1.0 + above / below) if below > 0 else np.zeros_like(driving)
+            heat = driving / (below + above)
+            base, air = self._base_K, self._air
+            T, into_tip = up_the_cone(self._tip, base + at_apex, heat, base, air)
+            rise = T - base
+            # a hot cone resists more: no more of the table than is of use
+            highest = np.interp(_HIGHEST_K, rise, driving)
+            driving = np.linspace(_LOWEST_K, highest, _TABULATED)
+        return CubicSpline(rise, np.stack([into_tip, heat, at_apex], axis=1))
+
+    def heat(self, rise: Array, names: Sequence[str] = ()) -> Evaluated:
+        """Return the heat (mW) that enters the tip at rises (K) of its base.
+
+        With its derivatives by the temperature, ``T``, and by numbers of the probe at the same
+        rise: those of `names`, and zero by any others.
+        """
+        inside = np.clip(rise, self._table.x[0], self._table.x[-1])
+        slope = self._table(inside, 1)[..., 0]
+        by = {
+            name: self._by(name, rise) if name in self.names else np.zeros_like(rise)
+            for name in names
+        }
+        value = self._table(inside)[..., 0] + slope * (rise - inside)
+        return value, {**by, "T": slope}
+
+    def at(self, tip_K: Array) -> AtTheContact:
+        """Return where heat goes at temperatures (K) of the tip's base."""
+        into_tip, heat, apex = np.moveaxis(self._table(np.asarray(tip_K) - self._base_K), -1, 0)
+        return AtTheContact(self._base_K + apex, heat, into_tip - heat)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The numbers of a probe on which the law depends."""
+        return (INTERFACE, *_NUMBERS, *(("gas_conductivity",) if self._air else ()))
+
+    def _by(self, name: str, rise: Array) -> Array:
+        """Return how the heat changes with a number of the probe."""
+        (value,) = self._probe.values([name])
+        step = _STEP * value
+        if name == INTERFACE:
+            step = _STEP * (value + self.spreading_K_per_mW)
+        low, high = (self._changed(name, value + way * step).heat(rise)[0] for way in (-1.0, 1.0))
+        return np.asarray((high - low) / (2.0 * step))
+
+    def _changed(self, name: str, value: float) -> ContactLaw:
+        key = name, value
+        if key not in self._others:
+            self._others[key] = ContactLaw(self._probe.replace({name: value}))
+        return self._others[key]
+
+    @cached_property
+    def _others(self) -> dict[tuple[str, float], ContactLaw]:
+        return {}
+
+
+def contact_of(probe: Probe) -> ContactLaw | None:
+    """Return the law of a probe's contact; None if it touches nothing."""
+    return None if probe.contact is None else _law(probe)
+
+
+@lru_cache(maxsize=16)
+def _law(probe: Probe) -> ContactLaw:
+    return ContactLaw(probe)
