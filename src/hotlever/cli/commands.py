@@ -22,6 +22,7 @@ _MODULES = {
     "app": "browser",
     "cache": "cache",
     "calibrate": "estimate",
+    "contact": "levers",
     "design": "design",
     "fit": "estimate",
     "join": "raman",

@@ -1,4 +1,4 @@
-"""``hotlever sweep``, ``pulse`` and ``spectrum``: a lever at rest, in time, at small signals."""
+"""``hotlever sweep``, ``contact``, ``pulse`` and ``spectrum``: a lever at rest or not."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from hotlever.cli.options import command
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import make_lever
 from hotlever.tasks.requests import (
+    ContactRequest,
     LeverRequest,
     PulseRequest,
     SweepRequest,
@@ -33,6 +34,14 @@ def pulse_command(request: PulseRequest) -> None:
     from hotlever.tasks.simulating import simulate_in_time
 
     simulate_in_time(terminal, request)
+
+
+@command("contact", ContactRequest)
+def contact_command(request: ContactRequest) -> None:
+    """Touch a sample with the tip: apex, heat into the sample, change of the current."""
+    from hotlever.tasks.contacting import touch
+
+    touch(terminal, request)
 
 
 @dataclass(kw_only=True)

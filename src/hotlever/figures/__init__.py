@@ -14,6 +14,7 @@ from hotlever.figures.claims import (
     radiated_shares,
     thermoelectric_shift,
 )
+from hotlever.figures.contact import contact_overview
 from hotlever.figures.drawing import outlines_drawing, probe_drawing
 from hotlever.figures.fit import (
     correlation_matrix,

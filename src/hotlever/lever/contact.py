@@ -24,8 +24,8 @@ _OF_THE_CONTACT = (
     *("tip_K_per_mW", "interface_K_per_mW", "spreading_K_per_mW", "current_change_mA"),
 )
 #: Columns of a file, by bias and in time.
-CONTACT_COLUMNS = ("bias_V", "current_mA", *_OF_THE_CONTACT)
-HISTORY_COLUMNS = ("time_us", *CONTACT_COLUMNS)
+CONTACT_COLUMNS: tuple[str, ...] = ("bias_V", "current_mA", *_OF_THE_CONTACT)
+HISTORY_COLUMNS: tuple[str, ...] = ("time_us", *CONTACT_COLUMNS)
 #: A heat (mW) that is none but for rounding: nothing is said of resistances without.
 _NOTHING_MW = 1e-12
 
@@ -126,10 +126,8 @@ def _columns(lever: Lever, tip_K: Array) -> dict[str, Any]:
     """Return what is between tip and sample, by the tip temperature."""
     law = law_of(lever)
     contact = law.at(tip_K)
-    nothing = np.full_like(tip_K, np.nan)
-    resistance = np.divide(
-        tip_K - contact.apex_K, contact.sample_mW, out=nothing, where=contact.sample_mW > _NOTHING_MW
-    )
+    flows = np.where(contact.sample_mW > _NOTHING_MW, contact.sample_mW, np.nan)
+    resistance = (tip_K - contact.apex_K) / flows
     return {
         **contact._asdict(),
         "tip_K_per_mW": resistance,

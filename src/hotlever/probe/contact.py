@@ -77,7 +77,7 @@ def parsed_layers(text: str, where: str) -> tuple[Layer, ...]:
     parts = [part.strip() for part in text.split(",")]
     materials, thicknesses = parts[::2], parts[1::2]
     for part in materials:
-        if not part or _length(part) is not None:
+        if not part or length_um(part) is not None:
             raise InputError(
                 f"{where}: found '{shown(part)}', expected the material of a layer, as in "
                 "polymer, 100nm, silicon"
@@ -85,7 +85,7 @@ def parsed_layers(text: str, where: str) -> tuple[Layer, ...]:
     kappas = [sample_conductivity(part, where) for part in materials]
     lengths: list[float | None] = []
     for material, part in zip(materials, thicknesses, strict=False):
-        length = _length(part)
+        length = length_um(part)
         if length is None or not _THINNEST <= length <= _THICKEST:
             raise InputError(
                 f"{where}: found '{shown(part)}', expected the thickness of {shown(material)}, "
@@ -100,7 +100,7 @@ def parsed_layers(text: str, where: str) -> tuple[Layer, ...]:
     return tuple(map(Layer, materials, kappas, [*lengths, None]))
 
 
-def _length(text: str) -> float | None:
+def length_um(text: str) -> float | None:
     """Return a length in µm; None if it is none."""
     value, unit = quantity(text)
     factor = product_conversion(unit, "m") if unit else None

@@ -168,13 +168,34 @@ class DriveRequest:
 
 
 @dataclass(kw_only=True)
-class PulseRequest(TableRequest, LeverRequest, DriveRequest):
-    """A lever in time."""
+class TimesRequest(DriveRequest):
+    """A wave form, and the times that matter."""
 
     until: str | None = option(None, metavar="TIME", help="When to stop.")
     at: str | None = option(
         None, metavar="TIME,...", help="Times to report; where the solver stepped if left out."
     )
+
+    @property
+    def end_us(self) -> float | None:
+        """When to stop (µs), if that is asked."""
+        return None if self.until is None else setting(self.until, "us", "--until")
+
+    @property
+    def times_us(self) -> list[float] | None:
+        """Times to report (µs), if these are asked."""
+        if self.at is None:
+            return None
+        times = [setting(time, "us", "--at") for time in self.at.split(",")]
+        if len(times) > MOST_TIMES:
+            raise InputError(f"--at: found {len(times)} times, expected at most {MOST_TIMES}")
+        return times
+
+
+@dataclass(kw_only=True)
+class PulseRequest(TableRequest, LeverRequest, TimesRequest):
+    """A lever in time."""
+
     fields: File = option(None, help="Write the fields as a series of VTU to this folder.")
     film: File = option(
         None,
@@ -191,20 +212,28 @@ class PulseRequest(TableRequest, LeverRequest, DriveRequest):
         for name in (*self.drive, *(name for name, value in others.items() if value)):
             raise InputError(f"{name}: does not go with --report, which has wave forms of its own")
 
-    @property
-    def end_us(self) -> float | None:
-        """When to stop (µs), if that is asked."""
-        return None if self.until is None else setting(self.until, "us", "--until")
 
-    @property
-    def times_us(self) -> list[float] | None:
-        """Times to report (µs), if these are asked."""
-        if self.at is None:
-            return None
-        times = [setting(time, "us", "--at") for time in self.at.split(",")]
-        if len(times) > MOST_TIMES:
-            raise InputError(f"--at: found {len(times)} times, expected at most {MOST_TIMES}")
-        return times
+@dataclass(kw_only=True)
+class ContactRequest(TableRequest, LeverRequest, TimesRequest):
+    """A lever whose tip touches a sample, at rest or in time."""
+
+    sample: str | None = option(
+        None,
+        metavar="LAYER,...",
+        help="From the top, such as polymer,100nm,silicon: materials or their W/(m K), each but "
+        "the last with its thickness; what the probe file says if left out.",
+    )
+    radius: str | None = option(
+        None, metavar="LENGTH", help="Of the contact, the tip's flat end, such as 5nm."
+    )
+    interface: str | None = option(
+        None, metavar="RESISTANCE", help="Such as 1e7K/W, or for an area 1e-8m2K/W; none at first."
+    )
+    bias: str | None = option(
+        None,
+        metavar="START:STOP:COUNT",
+        help="In volts, ends included; 1:11:25 if neither this nor a wave form is given.",
+    )
 
 
 @dataclass(kw_only=True)

@@ -1,0 +1,128 @@
+"""Levers whose tip touches a sample: a table and a figure, at rest or in time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hotlever.datasets import csv_text, write_dataset
+from hotlever.errors import InputError, shown
+from hotlever.probe.contact import interface_of, length_um, parsed_layers
+from hotlever.tasks.files import draw
+from hotlever.tasks.probes import make_lever
+from hotlever.tasks.reporter import Reporter
+from hotlever.tasks.requests import ContactRequest
+from hotlever.tasks.texts import parse_bias
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hotlever.probe import Probe
+
+#: The cone where a probe file has none: the example of its section [tip] (µm, degrees).
+_CONE = {"height_um": 0.7, "half_angle_deg": 20.0, "apex_radius_um": 0.02}
+_BIAS = "1:11:25"
+#: Radii that a contact may have (µm).
+_SMALLEST, _LARGEST = 1e-4, 10.0
+#: How well a change of the current is known, for the note on what it tells, over the current.
+_CURRENT_KNOWN = 1e-4
+
+
+def touch(reporter: Reporter, request: ContactRequest) -> None:
+    """Solve a lever in contact over a range of bias, or in time."""
+    from hotlever.lever.contact import (
+        CONTACT_COLUMNS,
+        HISTORY_COLUMNS,
+        history_in_contact,
+        sweep_in_contact,
+    )
+
+    outputs = request.outputs(request.probe, request.waveform)
+    waveform = request.read_waveform()
+    if waveform is not None and request.bias is not None:
+        raise InputError("--bias: does not go with a wave form, which has biases of its own")
+    for name, given in (("--until", request.until), ("--at", request.at)):
+        if waveform is None and given is not None:
+            raise InputError(f"{name}: goes with a wave form, such as --pulse")
+    probe = probe_in_contact(reporter, request)
+    biases = parse_bias(request.bias or _BIAS, probe.lowest_bias_V)
+    lever = make_lever(reporter, probe)
+    with reporter.progress("contact") as update:
+        options: Any = {"progress": update}
+        if waveform is None:
+            data, columns = sweep_in_contact(lever, biases, **options), CONTACT_COLUMNS
+        else:
+            times = waveform, request.end_us, request.times_us
+            data, columns = history_in_contact(lever, *times, **options), HISTORY_COLUMNS
+    reporter.note(*filter(None, data.attrs["notes"].split("\n")))
+    if waveform is None and (told := what_the_current_tells(data)):
+        reporter.note(told)
+    with outputs.together():
+        if request.output is not None:
+            write_dataset(data, request.output, columns)
+        draw(request.plot, lambda figures: figures.contact_overview(data, probe))
+    if request.output is None:
+        reporter.give(csv_text(data, columns))
+
+
+def probe_in_contact(reporter: Reporter, request: ContactRequest) -> Probe:
+    """Read the probe, and have its tip touch the sample.
+
+    Raises
+    ------
+    InputError
+        If there is no sample, or what is asked for cannot be.
+    """
+    probe = request.read_probe(reporter)
+    changes: dict[str, Any] = {}
+    if probe.tip is None:
+        changes |= {f"tip.{name}": value for name, value in _CONE.items()}
+        reporter.note(
+            "the probe has no [tip]: a cone {height_um:g} µm high, of half-angle "
+            "{half_angle_deg:g}°".format(**_CONE)
+        )
+    height, radius = (
+        _CONE[name] if probe.tip is None else float(getattr(probe.tip, name))
+        for name in ("height_um", "apex_radius_um")
+    )
+    if request.radius is not None:
+        stated = length_um(request.radius)
+        if stated is None or not _SMALLEST <= stated <= _LARGEST:
+            raise InputError(
+                f"--radius: found '{shown(request.radius)}', expected a length from "
+                f"{1e3 * _SMALLEST:g} nm to {_LARGEST:g} µm, such as 5nm"
+            )
+        changes["tip.apex_radius_um"] = radius = stated
+    if request.sample is not None:
+        parsed_layers(request.sample, "--sample")
+        changes["sample"] = request.sample
+    elif probe.contact is None:
+        raise InputError(
+            "--sample: found none, expected layers such as polymer,100nm,silicon, or a probe file "
+            "with a section [contact]"
+        )
+    if request.interface is not None:
+        resistance = interface_of(request.interface, radius, "--interface")
+        changes["interface_K_per_mW"] = resistance
+    if probe.surroundings.medium == "air" and probe.surroundings.surface_gap_um is None:
+        changes["surface_gap_um"] = height
+    return probe.with_(**changes) if changes else probe
+
+
+def what_the_current_tells(data: xr.Dataset) -> str:
+    """Say how well the sum of resistances is known by the current, where it tells most of it."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error = _CURRENT_KNOWN * data.current_mA / np.abs(data.current_by_resistance)
+        whole = (data.tip_K - data.apex_K) / data.sample_mW
+        whole = whole + data.interface_K_per_mW + data.spreading_K_per_mW
+        relative = (error / whole).values
+    if not np.isfinite(relative).any():
+        return ""
+    best = int(np.nanargmin(relative))
+    share = relative[best]
+    known = f"to {share:.2g} of it" if share < 1 else f"no better than {share:.2g} times over"
+    return (
+        f"a change of I_h known to {_CURRENT_KNOWN:g} of I_h tells the sum of resistances, "
+        f"{1e3 * whole.values[best]:.3g} K/W, best at {data.bias_V.values[best]:.4g} V: {known}"
+    )
