@@ -30,7 +30,7 @@ _PREFIXES |= {"a": -18, "da": 1, "h": 2, "k": 3, "K": 3, "M": 6, "G": 9, "T": 12
 _PREFIX_WORDS = {"": 0, "milli": -3, "micro": -6, "nano": -9, "pico": -12, "kilo": 3, "mega": 6}
 #: Quantity (its unit), and what one of a unit is of it.
 _SYMBOLS = {
-    **{symbol: (symbol, 1.0) for symbol in ("V", "A", "K", "s", "Hz", "bar")},
+    **{symbol: (symbol, 1.0) for symbol in ("V", "A", "W", "K", "s", "Hz", "bar")},
     **dict.fromkeys(("ohm", "Ohm", "OHM", "Ω"), ("ohm", 1.0)),
     **dict.fromkeys(("torr", "Torr"), ("bar", 1.01325 / 760.0)),
     "Pa": ("bar", 1e-5),
@@ -65,7 +65,7 @@ _UNIT_WORDS = {
     for word, (quantity, factor) in _WORDS.items()
 }
 #: Of settings alone: in a heading `V_s` is no voltage in seconds.
-_OF_SETTINGS = {"s", "Hz"}
+_OF_SETTINGS = {"s", "Hz", "W"}
 #: Headings that name a time; of these alone a unit of time is one.
 TIMES = {"t", "time", "relative time", "elapsed time", "zeit", "relative zeit"}
 _CELSIUS = {"°C", "degC", "C", "oC", "celsius", "Celsius", "degreesC", "degreesCelsius"}

@@ -20,6 +20,7 @@ from hotlever.cli import main
 from hotlever.errors import InputError
 from hotlever.files import json_text
 from hotlever.lever import Branch
+from hotlever.report.calibration_pages import calibration_page
 from synthetic_curves import measured_curve
 
 ERRORS = ("tip_stderr_K", "tip_low_K", "tip_high_K")
@@ -115,7 +116,7 @@ def test_the_rows_that_no_lever_shows_are_drawn(refused):
 
 
 def test_the_page_has_no_errors(refused):
-    page = showing._calibration_page(refused)
+    page = calibration_page(refused)
     table = next(block for block in page.blocks if block["kind"] == "table")
     assert table["caption"] == "Some rows of the table of the nearest lever, not for an instrument."
     assert not any("error" in column for column in table["columns"])

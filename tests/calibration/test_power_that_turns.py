@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from hotlever import figures
-from hotlever.app import showing
 from hotlever.calibration.calibration import Calibration, read_calibration
 from hotlever.calibration.knee import IVCurve
 from hotlever.calibration.procedure import calibrate
@@ -18,6 +17,7 @@ from hotlever.errors import InputError
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
+from hotlever.report.calibration_pages import calibration_page
 from synthetic_curves import measurement_of
 
 #: A heater that is no longer than its border is wide, all within what a fit may vary: its heat
@@ -102,7 +102,7 @@ def test_words_page_and_figure_go_by_bias(calibrated):
     assert "P_l (mW)" not in text
     labels = {line.get_label() for line in figures.calibration_curves(calibrated).axes[0].lines}
     assert "power law at P$_l$/k" not in labels
-    page = showing._calibration_page(calibrated)
+    page = calibration_page(calibrated)
     assert any("read by bias" in block.get("text", "") for block in page.blocks)
 
 

@@ -63,7 +63,7 @@ def workers() -> list[psutil.Process]:
 
 
 def found(batch: Batch) -> list[float]:
-    return [fit.parameters["c_kappa"].value for fit in batch.fits.values()]
+    return [fit.parameters["c_kappa"].value for fit in batch.results.values()]
 
 
 def test_killing_a_worker_loses_nothing(levers, tmp_path):
@@ -77,7 +77,7 @@ def test_killing_a_worker_loses_nothing(levers, tmp_path):
     batch = fit_many(levers, tmp_path / "out", None, OPTIONS, processes=2, progress=kill_one)
     assert len(killed) == 1
     assert batch.exit_status == 0
-    assert list(batch.fits) == ["lever-0", "lever-1", "lever-2"]
+    assert list(batch.results) == ["lever-0", "lever-1", "lever-2"]
     assert found(batch) == pytest.approx(TRUTHS, abs=1e-3)
     assert workers() == []
 
@@ -101,7 +101,7 @@ def test_what_was_stopped_goes_on_and_bad_files_are_said(levers, run, tmp_path):
     assert status == 2
     assert "bad.csv: line 2: I_h: found 'high', expected a number" in err
     assert "few.csv: no values of tip" in err
-    assert "2 of 5 levers were fitted before" in err
+    assert "2 of 5 levers have their fits from before" in err
     assert "Traceback" not in err
     assert {path: path.read_text() for path in written} == written
     for path, truth in zip(levers, TRUTHS, strict=True):
@@ -243,7 +243,7 @@ def test_a_fit_that_cannot_be_written_is_a_failure_of_its_own(levers, tmp_path, 
 
     monkeypatch.setattr("hotlever.estimation.batch.write_text", full)
     batch = fit_many(levers[:2], tmp_path / "out", None, OPTIONS, processes=1)
-    assert list(batch.fits) == ["lever-0"]
+    assert list(batch.results) == ["lever-0"]
     assert batch.exit_status == 1
     assert "No space left" in str(batch.failures[str(levers[1])])
 
@@ -261,7 +261,7 @@ def test_a_geometry_that_cannot_be_reduced_is_a_failure_of_its_levers(
 
     monkeypatch.setattr(Lever, "__init__", fail)
     batch = fit_many(levers[:2], tmp_path / "out", None, OPTIONS, processes=1)
-    assert list(batch.fits) == ["lever-1"]
+    assert list(batch.results) == ["lever-1"]
     assert str(batch.failures[str(levers[0])]).endswith("RuntimeError: Factor is exactly singular")
 
 

@@ -84,9 +84,9 @@ def test_many_files_have_the_same_names_and_a_fit_by_other_names_is_made_anew(ru
     status, _, err = run(*arguments, *NAMES)
     assert status == 0, err
     assert "data.txt: up (12 rows); V_b 1 to 9 V; I_h " in err
-    assert "2 of 2 levers were fitted before" in run(*arguments, *NAMES)[2]
+    assert "2 of 2 levers have their fits from before" in run(*arguments, *NAMES)[2]
     status, _, err = run(*arguments, "--column", "I_h (nA)=Strom", "--column", "V_b=U")
-    assert "were fitted before" not in err
+    assert "from before" not in err
 
 
 @pytest.mark.parametrize(

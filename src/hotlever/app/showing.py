@@ -21,20 +21,19 @@ from hotlever import figures
 from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
 from hotlever.calibration import Calibration, read_calibration
-from hotlever.calibration.summary import calibration_text
-from hotlever.calibration.table import STATED, TABLE_COLUMNS
-from hotlever.datasets import OBSERVABLES, QUANTITIES
+from hotlever.calibration.table import TABLE_COLUMNS
+from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError
 from hotlever.estimation import Fit, read_fit
 from hotlever.estimation.summary import parameter_rows
 from hotlever.lever.meshing import chosen_space
 from hotlever.lever.transient.waveform_texts import waveform_from_text
-from hotlever.materials.parameters import sentence
 from hotlever.measurement import parse_columns, read_measurement, read_measurement_of
 from hotlever.probe import Layout, Probe
 from hotlever.probe.probe import read_sections
 from hotlever.probe.shapes import PARAMETRIC
 from hotlever.raman import read_spectra
+from hotlever.report.calibration_pages import calibration_page
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.page import Block, Page
 
@@ -42,8 +41,8 @@ from hotlever.report.page import Block, Page
 _KEPT = 4
 #: No part of a drawing of a probe lies beyond (µm).
 _DRAWABLE_UM = 1e5
-#: Rows of a calibration's table that are shown, and points of a measurement.
-_ROWS, _POINTS = 12, 1000
+#: Points of a measurement that are shown.
+_POINTS = 1000
 
 
 def understood(
@@ -282,7 +281,7 @@ def _page(kind: str, path: Path, added: Callable[[Block], None] | None = None) -
     elif kind == "fit":
         _pages[key] = fit_page(_fit(path, key[2]), added=added)
     else:
-        _pages[key] = _calibration_page(_calibration(path, key[2]), added)
+        _pages[key] = calibration_page(_calibration(path, key[2]), added)
     if len(_pages) > _KEPT:
         del _pages[next(iter(_pages))]
     return _pages[key]
@@ -291,36 +290,6 @@ def _page(kind: str, path: Path, added: Callable[[Block], None] | None = None) -
 @lru_cache(maxsize=_KEPT)
 def _calibration(path: Path, stamp: float) -> Calibration:
     return read_calibration(path)
-
-
-def _calibration_page(
-    calibration: Calibration, added: Callable[[Block], None] | None = None
-) -> Page:
-    made = Page(f"Calibration of {calibration.measurement.path}", added=added)
-    made.text(calibration_text(calibration))
-    for note in calibration.notes:
-        made.text(sentence(note))
-    described = calibration.describes_data
-    made.figure(
-        "calibration",
-        figures.calibration_curves(calibration),
-        "Tip temperature against power and bias with its 95 % band, the I-V curve with its knee, "
-        "and the standard error by source."
-        if described
-        else "The nearest lever, which is no estimate: tip temperature against power and bias, the "
-        "I-V curve, and what the data differ by.",
-    )
-    table = calibration.table
-    step = max(1, table.sizes["bias"] // _ROWS)
-    names = [name for name in TABLE_COLUMNS[:-2] if described or name not in STATED]
-    columns = [f"{QUANTITIES[name][1]} ({QUANTITIES[name][0]})" for name in names]
-    rows = [
-        [f"{float(table[name][number]):.4g}" for name in names]
-        for number in range(0, table.sizes["bias"], step)
-    ]
-    purpose = "for the instrument." if described else "of the nearest lever, not for an instrument."
-    made.table(columns, rows, f"Some rows of the table {purpose}")
-    return made
 
 
 def _svg(made: Figure) -> str:

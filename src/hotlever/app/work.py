@@ -15,7 +15,7 @@ from pydantic import TypeAdapter
 from hotlever.app.changes import Changes
 from hotlever.app.jobs import Task
 from hotlever.app.workers import Report
-from hotlever.tasks.calibrating import calibrate_file
+from hotlever.tasks.calibrating import calibrate_files
 from hotlever.tasks.fitting import fit_files
 from hotlever.tasks.importing import propose_probe
 from hotlever.tasks.measured_requests import CalibrateRequest, FitRequest, RamanRequest
@@ -27,14 +27,14 @@ from hotlever.tasks.sweeping import sweep
 #: By command: what its files are to the request, the request, and the task that takes it.
 _TASKS: dict[str, tuple[str, type, Callable[[Report, Any], Any]]] = {
     "fit": ("data", FitRequest, fit_files),
-    "calibrate": ("data", CalibrateRequest, calibrate_file),
+    "calibrate": ("data", CalibrateRequest, calibrate_files),
     "sweep": ("probe", SweepRequest, sweep),
     "pulse": ("probe", PulseRequest, simulate_in_time),
     "raman": ("spectra", RamanRequest, measure_spectra),
     "probe import": ("drawing", ImportRequest, propose_probe),
 }
 #: Commands that take several files.
-_OF_SEVERAL = ("fit", "raman")
+_OF_SEVERAL = ("fit", "calibrate", "raman")
 
 
 def run(report: Report, folder: Path, task: Task) -> None:

@@ -9,7 +9,14 @@ from typing import Annotated, Any, Self
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from pydantic import Field, PlainSerializer, ValidationInfo, field_serializer, model_validator
+from pydantic import (
+    Field,
+    JsonValue,
+    PlainSerializer,
+    ValidationInfo,
+    field_serializer,
+    model_validator,
+)
 
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.power_law import PowerLaw
@@ -191,7 +198,7 @@ class Calibration(Outcome):
         said = self.doubt or f"{tip} K at {hottest.bias_V.item():.4g} V in {self.medium}"
         return f"<Calibration of {self.measurement.path or 'a measurement'}: {said}>"
 
-    def file(self) -> CalibrationFile:
+    def file(self, request: dict[str, JsonValue] | None = None) -> CalibrationFile:
         """Return what the calibration file holds."""
         budget = budget_of(self.table)
         return CalibrationFile.holding(
@@ -202,6 +209,7 @@ class Calibration(Outcome):
             table={name: self.table[name].values for name in self.columns},
             budget_K=budget,
             data=MeasurementSection.of(self.measurement),
+            request=request,
         )
 
     def table_csv(self) -> str:
@@ -233,7 +241,7 @@ _Pulse = Annotated[
 ]
 
 
-class CalibrationFile(ResultFile):
+class CalibrationFile(ResultFile[Calibration]):
     """What a calibration file holds: the schema that it is written and read by.
 
     Beside what a `Calibration` has: of the knee ``tip_K`` and whether it was measured, and the
@@ -265,7 +273,7 @@ class CalibrationFile(ResultFile):
         check_rows(self.table, self.budget_K, "bias", str(info.context))
         return self
 
-    def calibration(self) -> Calibration:
+    def result(self) -> Calibration:
         """Return the calibration, to go on with as if it had just been made."""
         knee = {name: self.knee[name] for name in Knee.__dataclass_fields__ if name in self.knee}
         names = [*TABLE_COLUMNS, *({TOTAL_POWER} & self.table.keys())]
@@ -293,4 +301,4 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     >>> read_calibration("calibration.json").bias_for(600.0)  # doctest: +SKIP
     array(7.74)
     """
-    return CalibrationFile.read(path, "calibration").calibration()
+    return CalibrationFile.read(path, "calibration").result()

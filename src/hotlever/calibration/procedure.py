@@ -96,6 +96,8 @@ def calibrate(
     whole = given_measurement(measurement, origin)
     measured = averaged(whole, robust=True)
     measured.need_rest("a calibration")
+    if "current" not in measured.observables:
+        raise InputError(f"{measured.path}: no values of I_h, which a calibration needs beside V_b")
     notes = note_on_averages(whole, measured)
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
         if samples:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import xarray as xr
 
@@ -36,25 +38,43 @@ _ADVICE = {
 _GOOD, _FAIR = 15.0, 40.0
 
 
-def calibration_text(calibration: Calibration) -> str:
-    """Return the result of a calibration as lines of text."""
+class Parts(NamedTuple):
+    """What a calibration says: words, tables with their captions, and words that end it."""
+
+    before: list[str]
+    tables: list[tuple[str, list[list[str]]]]
+    after: list[str]
+
+
+def calibration_parts(calibration: Calibration) -> Parts:
+    """Return what a calibration says in words and tables; of one not described no table."""
     basis = f"based on {_BASIS[calibration.route]}, used in {calibration.medium}"
-    priors = prior_lines(calibration.priors)
+    after, tables = prior_lines(calibration.priors), []
     if calibration.describes_data:
-        pulse = [] if calibration.pulse is None else [*_pulse_lines(calibration.pulse), ""]
+        before = [basis, *_knee_lines(calibration), _law_line(calibration)]
+        tables = [("", _budget_rows(calibration))]
+        if calibration.pulse is not None:
+            tables.append((calibration.pulse.timing.text, _pulse_rows(calibration.pulse)))
         stated = significant(calibration.tip_temperature_uncertainty_K)
         sure = f"sure to ± {stated} K (standard error, largest in the table)"
-        lines = [basis, *_knee_lines(calibration), _law_line(calibration)]
-        lines += ["", *_budget_lines(calibration), "", *pulse, *priors]
-        lines.append(f"{sure}: {_verdict(calibration)}")
+        after.append(f"{sure}: {_verdict(calibration)}")
     else:
         knee = [f"its knee: {_knee_point(calibration)}"] if calibration.knee.measured else []
-        lines = [calibration.doubt, f"{NEAREST}; it is {basis}", *knee, *priors]
+        before = [calibration.doubt, f"{NEAREST}; it is {basis}", *knee]
     if np.isfinite(calibration.measured_rms_K):
-        lines.append(
+        after.append(
             f"the measured tip temperatures differ by {calibration.measured_rms_K:.1f} K (rms)"
         )
-    return "\n".join(lines)
+    return Parts(before, tables, after)
+
+
+def calibration_text(calibration: Calibration) -> str:
+    """Return the result of a calibration as lines of text."""
+    parts = calibration_parts(calibration)
+    lines = parts.before
+    for caption, rows in parts.tables:
+        lines += ["", *([f"{caption}:"] if caption else []), *aligned(rows, right=True)]
+    return "\n".join([*lines, *([""] if parts.tables else []), *parts.after])
 
 
 def _law_line(calibration: Calibration) -> str:
@@ -103,7 +123,7 @@ def _knee_point(calibration: Calibration) -> str:
     )
 
 
-def _budget_lines(calibration: Calibration) -> list[str]:
+def _budget_rows(calibration: Calibration) -> list[list[str]]:
     """Return the standard error by source at some temperatures, and the power there.
 
     Without a power law the bias tells more.
@@ -114,21 +134,21 @@ def _budget_lines(calibration: Calibration) -> list[str]:
     if shown.size < _FEW:  # a cold lever, or a short range
         shown = np.linspace(tip[0], tip[-1], _FEW + 1)[1:].round(1)
     columns = [("T_tip (K)", "tip_K", 0), (*tells, 3), ("± (K)", "tip_stderr_K", 1)]
-    return _lines(table, columns, shown)
+    return _rows(table, columns, shown)
 
 
-def _pulse_lines(pulse: PulseCalibration) -> list[str]:
+def _pulse_rows(pulse: PulseCalibration) -> list[list[str]]:
     """Return heights of the pulse for some peak temperatures, with the error by source."""
     first, last = pulse.table.peak_K.values[[0, -1]]
     peak = np.linspace(first, last, _FEW + 2)[1:].round(0 if last - first > 50 else 1)
     columns = [("peak (K)", "peak_K", 0), ("height (V)", "height_V", 3)]
     columns += [("± (K)", "peak_stderr_K", 1)]
     columns += [(f"{moment} (K)", f"{moment}_K", 0) for moment in ("end", "mean")]
-    return [f"{pulse.timing.text}:", *_lines(pulse.table, columns, np.minimum(peak, last))]
+    return _rows(pulse.table, columns, np.minimum(peak, last))
 
 
-def _lines(table: xr.Dataset, columns: list[tuple[str, str, int]], at: Array) -> list[str]:
-    """Return columns of a table as text where the first has some values, then its budget.
+def _rows(table: xr.Dataset, columns: list[tuple[str, str, int]], at: Array) -> list[list[str]]:
+    """Return columns of a table as cells where the first has some values, then its budget.
 
     Of a column are given its head, its name in the table, and the digits behind the point.
     """
@@ -136,10 +156,10 @@ def _lines(table: xr.Dataset, columns: list[tuple[str, str, int]], at: Array) ->
     numbers = [(head, table[name].values, digits) for head, name, digits in columns]
     numbers += [(error.source.item(), error.values, 1) for error in table.budget_K]
     cells = [
-        [head.rjust(7), *(f"{number:.{digits}f}" for number in np.interp(at, along, values))]
+        [head, *(f"{number:.{digits}f}" for number in np.interp(at, along, values))]
         for head, values, digits in numbers
     ]
-    return aligned(list(zip(*cells, strict=True)), right=True)
+    return [list(row) for row in zip(*cells, strict=True)]
 
 
 def _verdict(calibration: Calibration) -> str:

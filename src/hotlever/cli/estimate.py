@@ -26,7 +26,11 @@ def fit_command(request: FitRequest) -> None:
 
 @command("calibrate", CalibrateRequest)
 def calibrate_command(request: CalibrateRequest) -> None:
-    """Find the tip temperature of a lever from its I-V curve, with its error."""
-    from hotlever.tasks.calibrating import calibrate_file
+    """Find the tip temperature of a lever from its I-V curve, with its error.
 
-    calibrate_file(terminal, request)
+    With several data files: of each lever, in parallel, and where the levers differ. The same
+    command again goes on where it was stopped.
+    """
+    from hotlever.tasks.calibrating import calibrate_files
+
+    raise typer.Exit(calibrate_files(terminal, request))

@@ -1,4 +1,4 @@
-"""Fits of many levers: in parallel, each written as it comes, resumed where they were stopped."""
+"""Estimates of many levers: in parallel, each written as it comes, resumed where they stopped."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
 from hotlever import __version__
 from hotlever.errors import HotleverError, InputError
 from hotlever.estimation.estimator import fit
 from hotlever.estimation.options import FitOptions
+from hotlever.estimation.outcome import Result, ResultFile
 from hotlever.estimation.result import Fit, FitFile
 from hotlever.files import Outputs, output_folder, without_nan, write_text
 from hotlever.lever.lever import Lever
@@ -24,21 +26,52 @@ from hotlever.processes import PROCESSORS, Workers, guarded, local_workers, run_
 from hotlever.types import Progress
 
 
+@dataclass(frozen=True)
+class Work(Generic[Result]):
+    """What is done with each of many measurements.
+
+    Attributes
+    ----------
+    kind : str
+        Of what is made: ``fit`` or ``calibration``.
+    estimate : callable
+        Makes it of a measurement, in another process.
+    file : type
+        What its file holds.
+    ending : str
+        Of the names of the files.
+    probe : Probe
+        What the levers are like.
+    options : FitOptions
+        What of a lever is varied.
+    asked : dict of str to JSON values
+        What else the result depends on.
+    """
+
+    kind: str
+    estimate: Callable[[Measurement], Result]
+    file: type[ResultFile[Result]]
+    ending: str
+    probe: Probe
+    options: FitOptions
+    asked: Mapping[str, Any] = field(default_factory=dict)
+
+
 @dataclass
-class Batch:
+class Batch(Generic[Result]):
     """What became of many data files.
 
     Attributes
     ----------
-    fits : dict of str to Fit
+    results : dict of str to Fit or Calibration
         By the name of the lever, in the order of the data files.
     failures : dict of str to HotleverError
-        By data file: why it could not be read or fitted.
+        By data file: why it could not be read, or no result could be made of it.
     reused : int
-        Fits that had been written before from the same data, probe, options and version.
+        Results that had been written before from the same data, probe, options and version.
     """
 
-    fits: dict[str, Fit] = field(default_factory=dict)
+    results: dict[str, Result] = field(default_factory=dict)
     failures: dict[str, HotleverError] = field(default_factory=dict)
     reused: int = 0
 
@@ -54,10 +87,11 @@ class Batch:
     @property
     def undescribed(self) -> dict[str, str]:
         """By lever: that its data are not described, and why."""
-        return {name: f"{name}: {fit.doubt}" for name, fit in self.fits.items() if fit.doubt}
+        results = self.results.items()
+        return {name: f"{name}: {result.doubt}" for name, result in results if result.doubt}
 
     def fail(self, path: str | os.PathLike[str], error: HotleverError) -> None:
-        """Note why a data file could not be read or fitted."""
+        """Note why nothing could be made of a data file."""
         path, text = str(path), str(error)
         self.failures[path] = error if text.startswith(path) else type(error)(f"{path}: {text}")
 
@@ -67,19 +101,9 @@ def fit_many(
     folder: str | os.PathLike[str],
     probe: Probe | None = None,
     options: FitOptions | None = None,
-    *,
-    processes: int | None = None,
-    scheduler: str | None = None,
-    columns: Mapping[str, str] | None = None,
-    reading: Callable[[Measurement], None] | None = None,
-    reducing: Progress | None = None,
-    progress: Progress | None = None,
-) -> Batch:
-    """Fit many levers and write a fit file for each as soon as it is done.
-
-    A file that cannot be read or fitted is reported in the result; the others go on. A lever
-    whose fit file is there already, from the same data, probe, options and version, is not fitted
-    again.
+    **how: Any,
+) -> Batch[Fit]:
+    """Fit many levers and write a fit file for each as soon as it is done; see `estimate_many`.
 
     Parameters
     ----------
@@ -90,6 +114,39 @@ def fit_many(
     probe : Probe, optional
         The reference probe by default.
     options : FitOptions, optional
+    **how
+        As `estimate_many` has them.
+    """
+    probe, options = probe or Probe.reference(), options or FitOptions()
+    work = partial(fit, probe=probe, options=options)
+    return estimate_many(paths, folder, Work("fit", work, FitFile, ".json", probe, options), **how)
+
+
+def estimate_many(
+    paths: Sequence[str | os.PathLike[str]],
+    folder: str | os.PathLike[str],
+    work: Work[Result],
+    *,
+    processes: int | None = None,
+    scheduler: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    reading: Callable[[Measurement], None] | None = None,
+    reducing: Progress | None = None,
+    progress: Progress | None = None,
+) -> Batch[Result]:
+    """Do the same work on many measurements and write a file of each result as soon as it is done.
+
+    A file that cannot be read, or of which nothing can be made, is reported in the result; the
+    others go on. What is there already, from the same data, probe, options and version, is not
+    made again.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Measurement files.
+    folder : path
+        Where the files go, named after the data files.
+    work : Work
     processes : int, optional
         Local worker processes; by default as many as there are processors. They are started by
         spawn: a script needs ``if __name__ == "__main__"``.
@@ -110,25 +167,25 @@ def fit_many(
     ComputationError
         If the scheduler is lost. What was done by then is written.
     """
-    probe, options = probe or Probe.reference(), options or FitOptions()
     if processes is not None and processes < 1:
         raise InputError(f"found processes = {processes}, expected 1 or more")
     outputs, target, data = Outputs(*paths), Path(folder), lever_names(paths)
     outputs.folder(target)
-    files = {name: target / f"{name}.json" for name in data}
-    asked = {"probe": probe.sections(), "options": options.values(), "version": __version__}
+    files = {name: target / f"{name}{work.ending}" for name in data}
+    asked = {"probe": work.probe.sections(), "options": work.options.values(), **work.asked}
+    asked["version"] = __version__
     if columns:
         asked["columns"] = dict(columns)
-    batch, waiting = Batch(), dict[str, Measurement]()
+    batch, waiting = Batch[Result](), dict[str, Measurement]()
 
     def tell() -> None:
         if progress is not None:
-            progress(len(batch.fits) + len(batch.failures), len(files))
+            progress(len(batch.results) + len(batch.failures), len(files))
 
     for name, path in data.items():
         try:
-            measurement = read_measurement_of(probe, path, columns)
-            measurement.need_rest("a fit of several levers")
+            measurement = read_measurement_of(work.probe, path, columns)
+            measurement.need_rest(f"a {work.kind} of several levers")
             if reading is not None:
                 reading(measurement)
             if target.is_dir():
@@ -136,31 +193,31 @@ def fit_many(
         except InputError as error:
             batch.fail(path, error)
             continue
-        earlier = _written_before(files[name], _request(measurement, asked))
+        earlier = _written_before(files[name], work, _request(measurement, asked))
         if earlier is None:
             waiting[name] = measurement
         else:
-            batch.fits[name] = earlier
+            batch.results[name] = earlier
             batch.reused += 1
     tell()
     if waiting:
         with _workers(scheduler, min(processes or PROCESSORS, len(waiting))) as workers:
-            for name, reason in _not_reduced(probe, options, waiting, reducing).items():
+            for name, reason in _not_reduced(work, waiting, reducing).items():
                 batch.fail(waiting.pop(name).path, reason)
             names = list(waiting)
-            tasks = ((measurement, probe, options) for measurement in waiting.values())
-            for number, result in run_all(workers, fit, tasks):
+            tasks = ((measurement,) for measurement in waiting.values())
+            for number, result in run_all(workers, work.estimate, tasks):
                 name, measurement = names[number], waiting[names[number]]
                 try:
                     if isinstance(result, HotleverError):
                         raise result
                     output_folder(target)
                     write_text(files[name], result.file(_request(measurement, asked)).to_json())
-                    batch.fits[name] = result
+                    batch.results[name] = result
                 except HotleverError as error:
                     batch.fail(measurement.path, error)
                 tell()
-    batch.fits = {name: batch.fits[name] for name in files if name in batch.fits}
+    batch.results = {name: batch.results[name] for name in files if name in batch.results}
     return batch
 
 
@@ -214,21 +271,21 @@ def _identity(path: Path) -> object:
 
 
 def _request(measurement: Measurement, asked: dict[str, Any]) -> dict[str, Any]:
-    """Return all that a fit depends on, for its file: the same again need not be fitted."""
+    """Return all that a result depends on, for its file: the same again need not be made."""
     return dict(without_nan({"sha256": measurement.sha256, **asked}))
 
 
-def _written_before(file: Path, request: dict[str, Any]) -> Fit | None:
-    """Return a fit of a file that was made from the same; None if there is none."""
+def _written_before(file: Path, work: Work[Result], request: dict[str, Any]) -> Result | None:
+    """Return a result of a file that was made from the same; None if there is none."""
     try:
-        content = FitFile.read(file, "fit")
+        content = work.file.read(file, work.kind)
     except InputError:
         return None
-    return content.fit() if content.request == request else None
+    return content.result() if content.request == request else None
 
 
 def _not_reduced(
-    probe: Probe, options: FitOptions, waiting: Mapping[str, Measurement], progress: Progress | None
+    work: Work[Any], waiting: Mapping[str, Measurement], progress: Progress | None
 ) -> dict[str, HotleverError]:
     """Reduce each geometry once, before the workers need it; return why some levers have none.
 
@@ -239,7 +296,8 @@ def _not_reduced(
     for name, measurement in waiting.items():
         try:
             probes = [
-                with_measured_circuit(probe, measurement, medium)[0] for medium in options.media
+                with_measured_circuit(work.probe, measurement, medium)[0]
+                for medium in work.options.media
             ]
         except InputError as error:
             failures[name] = error
@@ -248,7 +306,7 @@ def _not_reduced(
         for measured in probes:
             geometry = measured.circuit.base_temperature_K, measured.surroundings.medium
             if geometry not in results:
-                results[geometry] = guarded(_reduce, (measured, options, progress))
+                results[geometry] = guarded(_reduce, (measured, work.options, progress))
             errors.append(results[geometry])
         # of two media one will do
         if None not in errors:

@@ -1,25 +1,29 @@
-"""What the fits of many levers say together: means, and the scatter between the levers."""
+"""What the results of many levers say together: means, and the scatter between the levers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from scipy.special import chdtri
 
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
+from hotlever.estimation.outcome import Outcome
 from hotlever.estimation.result import Fit
 from hotlever.materials.parameters import (
     INVERSION,
     heading,
     is_of_material,
     parameter_named,
-    scale_of,
 )
 from hotlever.text import aligned, value_with_error
 
+#: Rows of a table for people that are of all levers: mean, scatter twice, Birge ratio.
+_OF_ALL = 4
 #: Levers are said to differ if equal ones would scatter as much less often than this.
 _RARE = 0.01
 #: A lever stands apart beyond this many standard deviations (median-based) of the others, which
@@ -27,8 +31,48 @@ _RARE = 0.01
 _APART, _FEWEST = 5.0, 6
 
 
+class Compared(NamedTuple):
+    """How a quantity is called and written by which levers are compared."""
+
+    heading: str  #: of its column in a table for people
+    unit: str
+    column: str  #: in a file; ``{}``, if there is a standard error, where its column says so
+    words: str
+    scale: float = 1.0  #: unit, of its own, that it is printed in
+    lower: float = 0.0
+    upper: float = np.inf
+
+
 def compare_levers(fits: Mapping[str, Fit]) -> xr.Dataset:
-    """Put the fits of several levers side by side.
+    """Put the fits of several levers side by side; see `compared`.
+
+    The quantities are the parameters of the materials, and ``inversion_temperature`` if there is
+    one.
+
+    Raises
+    ------
+    InputError
+        If there is no fit, or they are of levers of different materials.
+    """
+    quantities = {lever: _quantities(fit) for lever, fit in fits.items()}
+    names = list(next(iter(quantities.values()), ()))
+    for lever, own in quantities.items():
+        if missing := [name for name in names if name not in own]:
+            words = _listed([_compared(name).words for name in missing])
+            raise InputError(
+                f"{lever}: {words} is missing, expected a lever of the same materials as "
+                f"{next(iter(fits))}"
+            )
+    return compared(fits, quantities, {name: _compared(name) for name in names})
+
+
+def compared(
+    results: Mapping[str, Outcome],
+    quantities: Mapping[str, Mapping[str, tuple[float, float | None]]],
+    written: Mapping[str, Compared],
+    more: Mapping[str, Any] | None = None,
+) -> xr.Dataset:
+    """Put quantities of several levers side by side.
 
     Levers whose data are not described have no values. Means are weighted by the inverse variance;
     a lever that does not determine a quantity, or has no error of it beside others that have one,
@@ -36,44 +80,43 @@ def compare_levers(fits: Mapping[str, Fit]) -> xr.Dataset:
 
     Parameters
     ----------
-    fits : mapping of str to Fit
+    results : mapping of str to Fit or Calibration
         By lever.
+    quantities : mapping of str to mapping
+        By lever, of each quantity its value and standard error.
+    written : mapping of str to Compared
+        By quantity.
+    more : mapping, optional
+        Further columns on ``lever``.
 
     Returns
     -------
     xarray.Dataset
-        On (``lever``, ``quantity``), the quantities being the parameters of the materials, and
-        ``inversion_temperature`` if there is one: ``value`` and ``stderr`` (NaN where there is
-        none), and ``counts``, whether the value counts in the mean. On ``lever``: ``described``. On
-        ``quantity``: ``mean`` (NaN where no value counts); ``scatter``, the standard deviation
-        between levers (NaN for one lever); ``chi_square`` of the values about their mean, NaN
-        without standard errors; ``birge_ratio``, the root of it over the degrees of freedom; and
-        ``mean_stderr``, the standard error of the mean, larger by the Birge ratio where that is
-        above 1.
+        On (``lever``, ``quantity``): ``value`` and ``stderr`` (NaN where there is none), and
+        ``counts``, whether the value counts in the mean. On ``lever``: ``described``. On
+        ``quantity``: what `Compared` has; ``mean`` (NaN where no value counts); ``scatter``, the
+        standard deviation between levers (NaN for one lever); ``chi_square`` of the values about
+        their mean, NaN without standard errors; ``birge_ratio``, the root of it over the degrees
+        of freedom; and ``mean_stderr``, the standard error of the mean, larger by the Birge ratio
+        where that is above 1.
 
     Raises
     ------
     InputError
-        If there is no fit, or they are of levers of different materials.
+        If there is no lever.
     """
-    if not fits:
-        raise InputError("no fits to compare, expected one or more")
-    compared = {lever: _quantities(fit) for lever, fit in fits.items()}
-    first, names = next((lever, list(quantities)) for lever, quantities in compared.items())
-    for lever, quantities in compared.items():
-        if missing := [name for name in names if name not in quantities]:
-            raise InputError(
-                f"{lever}: {_listed(missing)} is missing, expected a lever of the same materials "
-                f"as {first}"
-            )
-    numbers = [[quantities[name] for name in names] for quantities in compared.values()]
-    described = xr.DataArray([fit.describes_data is True for fit in fits.values()], dims="lever")
+    if not results:
+        raise InputError("no levers to compare, expected one or more")
+    names = list(written)
+    numbers = [[own[name] for name in names] for own in quantities.values()]
+    answers = [result.describes_data is True for result in results.values()]
+    described = xr.DataArray(answers, dims="lever")
     value, stderr = (
         xr.DataArray(column, dims=("lever", "quantity")).where(described)
         for column in np.moveaxis(np.array(numbers, dtype=float), -1, 0)
     )
     stated = stderr > 0
-    positive = xr.DataArray([parameter_named(name).lower >= 0 for name in names], dims="quantity")
+    positive = xr.DataArray([each.lower >= 0 for each in written.values()], dims="quantity")
     undetermined = stated & positive & (stderr >= np.abs(value))
     counts = value.notnull() & ~undetermined & (stated | ~stated.any("lever"))
     counting, count = value.where(counts), counts.sum("lever")
@@ -97,11 +140,24 @@ def compare_levers(fits: Mapping[str, Fit]) -> xr.Dataset:
         "chi_square": chi_square,
         "birge_ratio": birge_ratio,
     }
-    units = ["K" if name == INVERSION else parameter_named(name).unit for name in names]
+    how = {
+        field: ("quantity", [getattr(each, field) for each in written.values()])
+        for field in Compared._fields
+    }
     return labelled(
-        {name: (column.dims, column.values) for name, column in columns.items()},
-        coordinates={"lever": list(fits), "quantity": names, "unit": ("quantity", units)},
+        {name: (column.dims, column.values) for name, column in columns.items()}
+        | {name: ("lever", values) for name, values in (more or {}).items()},
+        coordinates={"lever": list(results), "quantity": names, **how},
     )
+
+
+def _compared(name: str) -> Compared:
+    """Return how a parameter, or the inversion temperature, is called and written."""
+    if name == INVERSION:
+        return Compared(heading(name), "K", f"{name}{{}}_K", "inversion temperature")
+    parameter = parameter_named(name)
+    how = parameter.scale, *parameter.bounds
+    return Compared(heading(name), parameter.unit, f"{name}{{}}", name, *how)
 
 
 def _quantities(fit: Fit) -> dict[str, tuple[float, float | None]]:
@@ -133,12 +189,12 @@ def statements(levers: xr.Dataset) -> list[str]:
     for index in np.flatnonzero(chi_square > limit):
         quantity = levers.isel(quantity=index)
         texts.append(
-            f"the levers differ in {_listed([quantity.quantity.item()])}: they scatter by "
+            f"the levers differ in {quantity.words.item()}: they scatter by "
             f"{quantity.scatter.item() / abs(quantity['mean'].item()):.1%}, χ² is "
             f"{chi_square[index]:.3g} for {count[index] - 1} degrees of freedom (Birge ratio "
             f"{quantity.birge_ratio.item():.1f})"
         )
-    alike = levers.quantity.values[chi_square <= limit]
+    alike = levers.words.values[chi_square <= limit]
     if alike.size:
         texts.append(
             f"the scatter of {_listed(alike)} between the levers is no larger than the standard "
@@ -158,30 +214,30 @@ def statements(levers: xr.Dataset) -> list[str]:
 def _by_lever(chosen: xr.DataArray) -> list[tuple[str, str]]:
     """Return the levers of which some quantities are chosen, with these in words."""
     return [
-        (str(row.lever.item()), _listed(row.quantity.values[row.values]))
+        (str(row.lever.item()), _listed(row.words.values[row.values]))
         for row in chosen
         if row.any()
     ]
 
 
-def _listed(names: Iterable[str]) -> str:
-    *first, last = ["inversion temperature" if name == INVERSION else name for name in names]
-    return f"{', '.join(first)} and {last}" if first else str(last)
+def _listed(words: Iterable[str]) -> str:
+    *first, last = map(str, words)
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def lever_rows(levers: xr.Dataset) -> list[list[str]]:
-    """Return the table of `compare_levers`: columns, levers, then the mean and the scatter."""
-    names = levers.quantity.values.tolist()
-    rows = [["lever", *map(heading, names)]]
+    """Return the table of `compared`: columns, levers, then the mean and the scatter."""
+    rows = [["lever", *levers.heading.values]]
     labels = [*levers.lever.values.tolist(), "weighted mean"]
     values = np.vstack([levers.value, levers["mean"]])
     errors = np.vstack([levers.stderr, levers.mean_stderr])
-    for label, *numbers in zip(labels, values.tolist(), errors.tolist(), strict=True):
-        cells = zip(names, *numbers, strict=True)
+    how = [levers[name].values for name in ("scale", "lower", "upper")]
+    for label, *numbers in zip(labels, values, errors, strict=True):
+        cells = zip(*numbers, *how, strict=True)
         rows.append([str(label), *(_with_error(*cell) for cell in cells)])
     scatter = levers.scatter.values
     for label, numbers, form in (
-        ("scatter between levers", scatter / [scale_of(name) for name in names], ".3g"),
+        ("scatter between levers", scatter / levers.scale.values, ".3g"),
         ("scatter, relative", scatter / np.abs(levers["mean"].values), ".1%"),
         ("Birge ratio", levers.birge_ratio.values, ".2g"),
     ):
@@ -191,24 +247,36 @@ def lever_rows(levers: xr.Dataset) -> list[list[str]]:
     return rows
 
 
-def _with_error(name: str, value: float, stderr: float) -> str:
+def _with_error(value: float, stderr: float, scale: float, lower: float, upper: float) -> str:
     if np.isnan(value):
         return ""
-    return value_with_error(value, stderr, scale_of(name), parameter_named(name).bounds)
+    return value_with_error(float(value), float(stderr), float(scale), (lower, upper))
 
 
 def levers_text(levers: xr.Dataset) -> str:
     """Return the table of many levers and what follows from it as lines of text."""
-    lines = aligned(lever_rows(levers))
-    lines.insert(1 + levers.sizes["lever"], "-" * max(map(len, lines)))
-    return "\n".join(lines + statements(levers))
+    return table_text(lever_rows(levers), statements(levers))
+
+
+def table_text(rows: list[list[str]], said: list[str]) -> str:
+    """Return a table as `lever_rows` has it as text, mean and scatter below a line; then words."""
+    lines = aligned(rows)
+    lines.insert(-_OF_ALL, "-" * max(map(len, lines)))
+    return "\n".join(lines + said)
 
 
 def levers_csv(levers: xr.Dataset) -> str:
     """Return a table with one row for each lever: value and standard error of each quantity."""
+    return frame_text(levers_frame(levers), float_format="%.8g")
+
+
+def levers_frame(levers: xr.Dataset, more: Sequence[str] = ()) -> pd.DataFrame:
+    """Return a table with one row for each lever: its quantities, and further columns."""
     columns = {
-        f"{name}{kind}{'_K' if name == INVERSION else ''}": column.sel(quantity=name, drop=True)
-        for name in levers.quantity.values
+        quantity.column.item().format(kind): column.sel(quantity=quantity).reset_coords(drop=True)
+        for quantity in levers.quantity
         for kind, column in (("", levers.value), ("_stderr", levers.stderr))
+        if not kind or "{}" in quantity.column.item()
     }
-    return frame_text(xr.Dataset(columns).to_dataframe(), float_format="%.8g")
+    table = xr.Dataset({**columns, **{name: levers[name] for name in more}})
+    return table.to_dataframe()

@@ -10,10 +10,18 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    JsonValue,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 
 from hotlever import __version__
 from hotlever.errors import InputError
@@ -82,6 +90,10 @@ _Times = Annotated[Array, stored_as(list[float])]
 _Probe = Annotated[Probe, stored_as(dict[str, dict[str, Any]], _probe, Probe.sections)]
 # What is not written where there is none.
 IF_ANY: Any = Field(None, exclude_if=lambda value: value is None)
+
+
+# A fit or a calibration.
+Result = TypeVar("Result", bound="Outcome")
 
 
 class Section(BaseModel):
@@ -166,10 +178,11 @@ class MeasurementSection(Section):
         return Measurement(**self.attributes_of(Measurement), **columns)
 
 
-class ResultFile(Section):
+class ResultFile(Section, Generic[Result]):
     """What every result file holds; see `hotlever.estimation.outcome.Outcome`.
 
-    One that does not say whether its data are described has a reason if they are not.
+    One that does not say whether its data are described has a reason if they are not. ``request``
+    is what a batch was asked that the result is of.
     """
 
     describes_data: bool | None = True
@@ -178,6 +191,7 @@ class ResultFile(Section):
     probe: _Probe
     data: MeasurementSection
     notes: list[str]
+    request: dict[str, JsonValue] | None = IF_ANY
     software: str = f"hotlever {__version__}"
 
     @classmethod
@@ -209,6 +223,10 @@ class ResultFile(Section):
             "converged": self.describes_data is not None,
             "reason": reason,
         }
+
+    @abstractmethod
+    def result(self) -> Result:
+        """Return the result, to go on with as if it had just been made."""
 
     def content(self) -> dict[str, Any]:
         """Return what is written, in plain values: first what only files of this kind hold."""
@@ -285,8 +303,8 @@ class Outcome(ABC):
             raise InputError(f"{what}: expected data that a lever describes; {self.doubt}")
 
     @abstractmethod
-    def file(self) -> ResultFile:
-        """Return what the result file holds."""
+    def file(self, request: dict[str, JsonValue] | None = None) -> ResultFile[Any]:
+        """Return what the result file holds; `request` is what a batch was asked."""
 
     def content(self) -> dict[str, Any]:
         """Return the content of the result file in plain values."""

@@ -27,7 +27,6 @@ from hotlever.estimation.noise import errors_of_scales
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.outcome import (
-    IF_ANY,
     Matrix,
     MeasurementSection,
     Outcome,
@@ -243,7 +242,7 @@ class Fit(Outcome):
         return Objective(self.residuals(), self.probe, names, self.names, prior)
 
     def file(self, request: dict[str, JsonValue] | None = None) -> FitFile:
-        """Return what the fit file holds; `request` is what a batch was asked."""
+        """Return what the fit file holds."""
         correlation = _Correlation.model_construct(names=self.names, matrix=self.correlation)
         data = _FittedData.of(self.measurement, weights=self.data_weights)
         return FitFile.holding(self, correlation=correlation, data=data, request=request)
@@ -287,11 +286,8 @@ class _FittedData(MeasurementSection):
     weights: Matrix
 
 
-class FitFile(ResultFile):
-    """What a fit file holds: the schema that it is written and read by.
-
-    ``request`` is what a batch was asked that the fit is of.
-    """
+class FitFile(ResultFile[Fit]):
+    """What a fit file holds: the schema that it is written and read by."""
 
     parameters: dict[str, FittedParameter]
     correlation: _Correlation
@@ -307,7 +303,6 @@ class FitFile(ResultFile):
     common_noise_covariance: Matrix
     sum_of_squares: float
     band: _Band
-    request: dict[str, JsonValue] | None = IF_ANY
 
     @model_validator(mode="after")
     def _belongs_together(self, info: ValidationInfo) -> Self:
@@ -325,7 +320,7 @@ class FitFile(ResultFile):
         array(self.data.weights, weights, f"{path}: data: weights")
         return self
 
-    def fit(self) -> Fit:
+    def result(self) -> Fit:
         """Return the fit, to go on with as if it had just been made."""
         names = self.correlation.names
         stderr = np.array([self.parameters[name].stderr for name in names], dtype=float)
@@ -350,7 +345,7 @@ def read_fit(path: str | os.PathLike[str]) -> Fit:
     >>> read_fit("fit.json").parameters["p"].value  # doctest: +SKIP
     2.65
     """
-    return FitFile.read(path, "fit").fit()
+    return FitFile.read(path, "fit").result()
 
 
 def _correlation(covariance: Array) -> Array:

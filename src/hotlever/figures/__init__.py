@@ -6,7 +6,12 @@ writes one as PNG, SVG or PDF.
 # ruff: noqa: F401 (what is imported here is what the shelf offers)
 
 from hotlever.figures.air import air_loss, disc_between_planes, scale_factor, temperature_slices
-from hotlever.figures.calibration import calibration_curves, design_sweep, judged_calibrations
+from hotlever.figures.calibration import (
+    calibrated_levers,
+    calibration_curves,
+    design_sweep,
+    judged_calibrations,
+)
 from hotlever.figures.claims import (
     knee_discrepancy,
     linear_branches,

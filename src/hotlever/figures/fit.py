@@ -19,6 +19,7 @@ from hotlever.datasets import OBSERVABLES
 from hotlever.estimation.lack_of_fit import USUAL_SCATTER
 from hotlever.figures.style import (
     MEASURED,
+    MOST_NAMES,
     NOT_DESCRIBED,
     axis_label,
     curve,
@@ -27,6 +28,7 @@ from hotlever.figures.style import (
     panel_letters,
     parameter_label,
     settled,
+    values_by_lever,
 )
 from hotlever.materials.parameters import parameter_named
 from hotlever.text import BAND, value_with_error
@@ -40,8 +42,6 @@ if TYPE_CHECKING:
 _LIGHT, _DARK = "#BFDBEB", "#5DA5CC"
 #: Quantiles of a band, for those that are stated by a standard error.
 _QUANTILES = (0.025, 0.16, 0.5, 0.84, 0.975)
-#: More levers than this are numbered instead of named along an axis.
-_MOST_NAMES = 24
 
 #: Unit of differences of each observable, and what it is of the observable's own.
 _DIFFERENCES = {"current": ("µA", 1000.0), "reader": ("mV", 1000.0), "tip": ("K", 1.0)}
@@ -348,9 +348,7 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
         From `hotlever.estimation.levers.compare_levers`; without what was held or does not count.
     """
     count = levers.sizes["lever"]
-    number = np.arange(1, count + 1)
-    many = count > _MOST_NAMES
-    levers = levers.assign(value=levers.value.where(levers.counts))
+    many = count > MOST_NAMES
     determined = (np.isfinite(levers.stderr) & levers.counts).any("lever")
     free = levers.quantity.values[determined.values].tolist()
     height, shape = 1.2 * len(free) + (0.8 if many else 1.2), {"sharex": True, "squeeze": False}
@@ -359,22 +357,16 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
         for name, axes in zip(free, column, strict=True):
             quantity = levers.sel(quantity=name)
             label, scale = parameter_label(name)
-            mean, scatter = quantity["mean"].item() / scale, quantity.scatter.item() / scale
-            if np.isfinite(scatter):
-                low, high = mean - scatter, mean + scatter
-                axes.axhspan(low, high, color="0.9", lw=0, label="mean ± scatter between levers")
-            axes.axhline(mean, color=VERMILION, lw=1.0, label="mean of the levers")
-            style: dict[str, Any] = {"ms": 1.5, "lw": 0.5} if many else {"ms": 4, "lw": 1.0}
-            style |= {"fmt": "o", "color": BLUE, "label": "lever, with standard error"}
-            axes.errorbar(number, quantity.value / scale, quantity.stderr / scale, **style)
+            values_by_lever(axes, quantity, scale)
             # a unit below the symbol, as the panels are low
             axes.set_ylabel(label.replace(" (", "\n(", 1))
-            axes.grid(False, axis="x")
         if many:
             column[-1].set(xlabel="lever", xlim=(0, count + 1))
         else:
             names = levers.lever.values
-            column[-1].set_xticks(number, names, rotation=45, ha="right", parse_math=False)
+            column[-1].set_xticks(
+                np.arange(1, count + 1), names, rotation=45, ha="right", parse_math=False
+            )
             column[-1].set_xlim(0.5, count + 0.5)
         made.align_ylabels()
         handles, labels = column[0].get_legend_handles_labels()

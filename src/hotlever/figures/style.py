@@ -33,6 +33,8 @@ MEASURED: Any = {"ls": "none", "marker": "o", "mfc": "none", "color": BLACK, "la
 #: Title of what is drawn of a lever that does not show its data.
 NOT_DESCRIBED = "the data are not described: the nearest lever, without errors"
 
+#: More levers than this are numbered instead of named along an axis.
+MOST_NAMES = 24
 #: Points of a curve that are marked at most.
 _MARKED = 40
 #: What quantities are called that the paper has a symbol for.
@@ -172,3 +174,27 @@ def parameter_label(name: str) -> tuple[str, float]:
     symbol, _, index = parameter.symbol.partition("_")
     symbol += f"$_{{{index}}}$" if index else ""
     return f"{symbol} ({unit})" if unit else symbol, parameter.scale
+
+
+def values_by_lever(axes: Axes, quantity: xr.Dataset, scale: float = 1.0) -> None:
+    """Draw a quantity by lever with its standard error, and mean and scatter of the levers.
+
+    Parameters
+    ----------
+    axes : Axes
+    quantity : xarray.Dataset
+        One of `hotlever.estimation.levers.compared`; what does not count is left out.
+    scale : float
+        Unit, of its own, that it is drawn in.
+    """
+    count = quantity.sizes["lever"]
+    mean, scatter = quantity["mean"].item() / scale, quantity.scatter.item() / scale
+    if np.isfinite(scatter):
+        low, high = mean - scatter, mean + scatter
+        axes.axhspan(low, high, color="0.9", lw=0, label="mean ± scatter between levers")
+    axes.axhline(mean, color=VERMILION, lw=1.0, label="mean of the levers")
+    style: Any = {"ms": 1.5, "lw": 0.5} if count > MOST_NAMES else {"ms": 4, "lw": 1.0}
+    style |= {"fmt": "o", "color": BLUE, "label": "lever, with standard error"}
+    value = quantity.value.where(quantity.counts) / scale
+    axes.errorbar(np.arange(1, count + 1), value, quantity.stderr / scale, **style)
+    axes.grid(False, axis="x")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -154,10 +155,10 @@ def _add_uncertainty(page: Page, uncertainty: Uncertainty) -> None:
         )
 
 
-def levers_page(batch: Batch) -> Page:
+def levers_page(batch: Batch[Fit]) -> Page:
     """Return the report page of many levers, of which one is fitted or more."""
-    levers = compare_levers(batch.fits)
-    observables = {fit.observables for fit in batch.fits.values()}
+    levers = compare_levers(batch.results)
+    observables = {fit.observables for fit in batch.results.values()}
     page = Page(
         f"Fits of {levers.sizes['lever']} levers",
         "Material parameters of levers from their measured "
@@ -172,13 +173,18 @@ def levers_page(batch: Batch) -> Page:
     )
     columns, *rows = lever_rows(levers)
     page.table(columns, rows, "Standard errors in units of the last digits.")
-    noted = [*batch.undescribed.items()]
-    noted += [(name, text) for name, fit in batch.fits.items() for text in fit.notes]
-    if noted:
-        page.heading("What single fits say")
-        page.table(("lever", "note"), noted)
-    if batch.failures:
-        page.heading("Not fitted")
-        reasons = [(path, str(error)) for path, error in batch.failures.items()]
-        page.table(("file", "reason"), reasons)
+    add_remarks(page, batch, "fit", "fitted")
     return page
+
+
+def add_remarks(page: Page, batch: Batch[Any], result: str, made: str) -> None:
+    """Add to a page of many levers what their results say, and what could not be made."""
+    noted = [*batch.undescribed.items()]
+    noted += [(name, text) for name, each in batch.results.items() for text in each.notes]
+    if noted:
+        page.heading(f"What single {result}s say")
+        page.table(("lever", "note"), noted, prose=True)
+    if batch.failures:
+        page.heading(f"Not {made}")
+        reasons = [(path, str(error)) for path, error in batch.failures.items()]
+        page.table(("file", "reason"), reasons, prose=True)

@@ -1,60 +1,106 @@
-"""Calibrations of measurement files."""
+"""Calibrations of measurement files, of one lever or many."""
 
 from __future__ import annotations
 
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from hotlever.calibration import Calibration
+from hotlever.calibration.batch import calibrate_many
+from hotlever.calibration.levers import (
+    Setting,
+    calibrations_csv,
+    calibrations_text,
+    compare_calibrations,
+)
 from hotlever.calibration.power_law import read_power_law
 from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.summary import calibration_text
-from hotlever.errors import ComputationError, InputError
+from hotlever.errors import ComputationError
 from hotlever.estimation import read_fit
-from hotlever.files import write_text
+from hotlever.estimation.batch import Batch
+from hotlever.files import Outputs, write_text
 from hotlever.measurement import read_measurement_of
+from hotlever.tasks.batches import Summary, estimate_several
 from hotlever.tasks.files import draw
 from hotlever.tasks.measured_requests import CalibrateRequest
 from hotlever.tasks.probes import read_probe
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.texts import parse_priors, parse_timing
+from hotlever.tasks.texts import parse_priors, parse_setting, parse_timing
+
+if TYPE_CHECKING:
+    from hotlever.report.page import Page
+
+#: The table of many levers, in the folder of their calibrations.
+CALIBRATIONS_TABLE = "calibrations.csv"
+#: What the name of a table for an instrument ends in.
+TABLE = ".table.csv"
 
 
-def calibrate_file(reporter: Reporter, request: CalibrateRequest) -> None:
-    """Calibrate a lever.
+def calibrate_files(reporter: Reporter, request: CalibrateRequest) -> int:
+    """Calibrate one lever or many; return the exit status.
 
     Raises
     ------
     ComputationError
-        If no lever shows these data; what the search ended at is written.
+        If no lever shows the data of a single one; what the search ended at is written.
     """
     request.check()
-    data, law = request.data, request.power_law
-    timing = None if request.pulse is None else parse_timing(request.pulse)
-    columns, outputs = request.columns, request.outputs()
+    law = None if request.power_law is None else read_power_law(request.power_law)
     fit = None if request.fit is None else read_fit(request.fit)
     like = fit.probe if fit else request.with_physics(read_probe(reporter, request.probe))
-    priors = parse_priors(request.prior, like)
-    measurement = read_measurement_of(like, data, columns)
+    how: dict[str, Any] = {
+        "probe": like if fit is None and law is None else None,
+        "law": law,
+        "priors": parse_priors(request.prior, like),
+        "medium": request.medium,
+        "pulse": None if request.pulse is None else parse_timing(request.pulse),
+        "samples": request.samples if request.posterior else 0,
+    }
+    outputs = request.outputs()
+    if request.several:
+        at = None if request.at is None else Setting(*parse_setting(request.at))
+        make, summarise = partial(calibrate_many, **how), partial(_summary, at)
+        names = "calibrations", CALIBRATIONS_TABLE
+        return estimate_several(reporter, request, outputs, *names, make, summarise)
+    (data,) = request.data
+    measurement = read_measurement_of(like, data, request.columns)
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes)
-    if "current" not in measurement.observables:
-        raise InputError(f"{data}: no values of I_h, which a calibration needs beside V_b")
     with reporter.progress("calibrate") as update:
-        result = calibrate(
-            measurement,
-            probe=like if fit is None and law is None else None,
-            fit=fit,
-            law=None if law is None else read_power_law(law),
-            priors=priors,
-            progress=update,
-            medium=request.medium,
-            pulse=timing,
-            samples=request.samples if request.posterior else 0,
-        )
+        result = calibrate(measurement, fit=fit, progress=update, **how)
+    _write(reporter, request, outputs, result)
+    if not result.describes_data:
+        raise ComputationError(f"{data}: {result.doubt}")
+    return 0
+
+
+def _write(
+    reporter: Reporter, request: CalibrateRequest, outputs: Outputs, result: Calibration
+) -> None:
     reporter.note(*result.notes)
+    texts = [calibration_text(result)]
     with outputs.together():
         if request.output is not None:
             result.write(request.output)
         if request.table is not None:
             write_text(request.table, result.table_csv())
         draw(request.plot, lambda figures: figures.calibration_curves(result))
-    reporter.give(calibration_text(result) + "\n")
-    if not result.describes_data:
-        raise ComputationError(f"{data}: {result.doubt}")
+        if request.report is not None:
+            from hotlever.report.calibration_pages import calibration_page
+
+            texts.append(f"report: {calibration_page(result).write(request.report)}")
+    reporter.give("\n".join([*texts, ""]))
+
+
+def _summary(at: Setting | None, batch: Batch[Calibration]) -> Summary:
+    levers = compare_calibrations(batch.results, at)
+    files = {f"{name}{TABLE}": each.table_csv() for name, each in batch.results.items()}
+    files[CALIBRATIONS_TABLE] = calibrations_csv(levers, batch.failures)
+
+    def page() -> Page:
+        from hotlever.report.calibration_pages import calibrations_page
+
+        return calibrations_page(batch, levers)
+
+    return Summary(calibrations_text(levers), page, files)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import Any
 
-from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.estimation import FitOptions, Measurement, fit
+from hotlever.errors import ComputationError, HotleverError
+from hotlever.estimation import Fit, FitOptions, fit
 from hotlever.estimation.batch import Batch, fit_many
 from hotlever.estimation.experiment import Prediction
 from hotlever.estimation.levers import compare_levers, levers_csv, levers_text
@@ -16,6 +15,7 @@ from hotlever.estimation.uncertainty import Uncertainty, examine
 from hotlever.files import write_text
 from hotlever.measurement import read_measurement_of
 from hotlever.probe import Probe
+from hotlever.tasks.batches import Summary, estimate_several
 from hotlever.tasks.measured_requests import FitRequest
 from hotlever.tasks.probes import read_probe
 from hotlever.tasks.reporter import Reporter
@@ -36,25 +36,20 @@ def fit_files(reporter: Reporter, request: FitRequest) -> int:
     """
     request.check()
     probe = request.with_physics(read_probe(reporter, request.probe))
-    options, columns = request.options(probe), request.columns
-    if len(request.data) > 1:
-        return _fit_several(reporter, request, probe, options, columns).exit_status
-    _fit_one(reporter, request, probe, options, columns)
-    return 0
+    options, outputs = request.options(probe), request.outputs()
+    if not request.several:
+        _fit_one(reporter, request, probe, options)
+        return 0
+    make = partial(fit_many, probe=probe, options=options)
+    return estimate_several(reporter, request, outputs, "fits", LEVERS_TABLE, make, _summary)
 
 
-def _fit_one(
-    reporter: Reporter,
-    request: FitRequest,
-    probe: Probe,
-    options: FitOptions,
-    columns: dict[str, str],
-) -> None:
+def _fit_one(reporter: Reporter, request: FitRequest, probe: Probe, options: FitOptions) -> None:
     outputs, (data,), waveform = request.outputs(), request.data, request.read_waveform()
     samples = request.samples if request.posterior else None
     outputs.file(request.output, ".json")
     outputs.folder(request.report)
-    measurement = read_measurement_of(probe, data, columns, waveform)
+    measurement = read_measurement_of(probe, data, request.columns, waveform)
     if samples or request.profiles:
         measurement.need_rest("--posterior" if samples else "--profiles")
     reporter.tell_table(measurement.understood)
@@ -102,82 +97,9 @@ def _show_curve(reporter: Reporter, prediction: Prediction) -> None:
     reporter.show("curve", {name: values[some].tolist() for name, values in columns.items()})
 
 
-def _fit_several(
-    reporter: Reporter,
-    request: FitRequest,
-    probe: Probe,
-    options: FitOptions,
-    columns: dict[str, str],
-) -> Batch:
-    """Fit many levers in parallel, and compare them.
+def _summary(batch: Batch[Fit]) -> Summary:
+    from hotlever.report.fit_pages import levers_page
 
-    The same again goes on where it was stopped.
-    """
-    data, output, report = request.data, request.output, request.report
-    outputs, scheduler = request.outputs(), request.scheduler
-    if scheduler is not None and _is_open(scheduler):
-        reporter.note(
-            f"--scheduler {scheduler}: without TLS whoever reaches this address can have its "
-            "workers run any code"
-        )
-    if output is None and report is None:
-        raise InputError(
-            f"{len(data)} data files: expected -o FOLDER or --report DIR to write their fits to"
-        )
-    folder = output or Path(str(report), "fits")
-    outputs.folder(folder)
-    outputs.folder(report)
-    if folder.is_dir():
-        outputs.file(folder / LEVERS_TABLE)
-    done = 0
-    with reporter.progress_bars("levers", "geometry") as (fitting, reducing):
-
-        def update(count: int, total: int) -> None:
-            nonlocal done
-            done = count
-            fitting(count, total)
-
-        def read(measurement: Measurement) -> None:
-            (name, *_, rows), *quantities = measurement.understood
-            columns_read = "; ".join(f"{what} {value}" for what, value, _ in quantities)
-            reporter.tell(f"{name}: {rows}; {columns_read}")
-            reporter.note(*measurement.notes)
-
-        where: Any = {"processes": request.processes, "scheduler": scheduler}
-        bars: Any = {"reading": read, "reducing": reducing, "progress": update}
-        try:
-            batch = fit_many(data, folder, probe, options, columns=columns, **where, **bars)
-        except KeyboardInterrupt:
-            raise ComputationError(
-                f"stopped by the user after {done} of {len(data)} files; the same command goes "
-                "on from there"
-            ) from None
-    if batch.reused:
-        count = len(batch.fits) + len(batch.failures)
-        reporter.note(f"{batch.reused} of {count} levers were fitted before, from the same data")
-    if batch.fits:
-        table = compare_levers(batch.fits)
-        texts = [levers_text(table)]
-        with outputs.together():
-            write_text(folder / LEVERS_TABLE, levers_csv(table))
-            if report is not None:
-                from hotlever.report.fit_pages import levers_page
-
-                texts.append(f"report: {levers_page(batch).write(report)}")
-        reporter.give("\n".join([*texts, ""]))
-    for failure in (*map(str, batch.failures.values()), *batch.undescribed.values()):
-        reporter.fail(failure)
-    return batch
-
-
-def _is_open(address: str) -> bool:
-    """Whether anybody on the network who finds a scheduler may use it, and its workers.
-
-    Examples
-    --------
-    >>> [_is_open(one) for one in ("tcp://node7:8786", "tls://node7:8786", "tcp://127.0.0.1:8786")]
-    [True, False, False]
-    """
-    scheme, _, rest = address.rpartition("://")
-    host = rest.rpartition(":")[0].strip("[]")
-    return scheme != "tls" and not (host in ("localhost", "::1") or host.startswith("127."))
+    table = compare_levers(batch.results)
+    files = {LEVERS_TABLE: levers_csv(table)}
+    return Summary(levers_text(table), lambda: levers_page(batch), files)

@@ -60,17 +60,49 @@ class MeasuredRequest(PhysicsRequest):
 
 
 @dataclass(kw_only=True)
-class FitRequest(DriveRequest, MeasuredRequest):
-    """Material parameters from measurements."""
+class LeversRequest(MeasuredRequest):
+    """What is made of the measurement of one lever, or of each of several."""
 
     data: list[Path] = argument(
         MISSING, metavar="DATA.csv...", help="Measurement files, one for each lever."
     )
-    probe: File = option(None, help="Probe file; the reference probe if left out.")
+    probe: File = option(
+        None, help="Probe file of levers like these; the reference probe if left out."
+    )
     output: File = option(
-        None, "-o", "--output", help="Fit file (JSON); a folder of them with several data files."
+        None, "-o", "--output", help="Result file (JSON); a folder of them with several data files."
     )
     report: File = option(None, help="Write a page with figures to this folder.")
+    processes: int | None = option(
+        None, metavar="N", help="Local processes; one for each processor if left out."
+    )
+    scheduler: str | None = option(
+        None, metavar="ADDRESS", help="Dask scheduler for several data files, as tls://HOST:8786."
+    )
+
+    def check(self) -> None:
+        """Refuse what does not go together."""
+        check_number("--processes", self.processes, 1, 256)
+        if self.processes is not None and self.scheduler is not None:
+            raise InputError("--processes and --scheduler: expected one of them, not both")
+        if not self.several and self.scheduler is not None:
+            raise InputError("--scheduler: expected several data files")
+
+    @property
+    def several(self) -> bool:
+        """Whether there are several data files."""
+        return len(self.data) > 1
+
+    def need_single(self, *names: str) -> None:
+        """Refuse several data files, with options that go with one."""
+        if self.several and names:
+            raise InputError(f"{' and '.join(names)}: expected a single data file")
+
+
+@dataclass(kw_only=True)
+class FitRequest(DriveRequest, LeversRequest):
+    """Material parameters from measurements."""
+
     observables: str | None = option(
         None, help="Some of current,reader,tip; all that the file has if left out."
     )
@@ -93,26 +125,14 @@ class FitRequest(DriveRequest, MeasuredRequest):
     )
     samples: int = option(10_000, metavar="N", help="Of the posterior, at least.")
     profiles: bool = option(False, "--profiles", help="Profile the likelihood of each parameter.")
-    processes: int | None = option(
-        None, metavar="N", help="Local processes; one for each processor if left out."
-    )
-    scheduler: str | None = option(
-        None, metavar="ADDRESS", help="Dask scheduler for several data files, as tls://HOST:8786."
-    )
 
     def check(self) -> None:
         """Refuse what does not go together."""
-        several = len(self.data) > 1
+        super().check()
         check_number("--samples", self.samples, 1, 1_000_000)
-        check_number("--processes", self.processes, 1, 256)
-        if self.processes is not None and self.scheduler is not None:
-            raise InputError("--processes and --scheduler: expected one of them, not both")
-        if several and (self.posterior or self.profiles):
-            raise InputError("--posterior and --profiles: expected a single data file")
-        if several and self.drive:
-            raise InputError(f"{next(iter(self.drive))}: expected a single data file")
-        if not several and self.scheduler is not None:
-            raise InputError("--scheduler: expected several data files")
+        if self.posterior or self.profiles:
+            self.need_single("--posterior", "--profiles")
+        self.need_single(*self.drive)
 
     def outputs(self) -> Outputs:
         """Return where files are written to, none of which is read."""
@@ -141,12 +161,10 @@ class FitRequest(DriveRequest, MeasuredRequest):
 
 
 @dataclass(kw_only=True)
-class CalibrateRequest(PlotRequest, MeasuredRequest):
-    """The tip temperature of one lever from its I-V curve."""
+class CalibrateRequest(PlotRequest, LeversRequest):
+    """The tip temperature of levers from their I-V curves."""
 
-    data: Path = argument(MISSING, metavar="IV.csv", help="Measurement file with V_b and I_h.")
     fit: File = option(None, help="A fit of this lever (hotlever fit -o).")
-    probe: File = option(None, help="Probe like this lever; the reference probe if left out.")
     power_law: File = option(None, help="Power law in vacuum (JSON), or a calibration file.")
     pulse: str | None = option(
         None, metavar="TIME[,PERIOD]", help="Calibrate a pulse too, such as 5us or 5us,100us."
@@ -155,30 +173,44 @@ class CalibrateRequest(PlotRequest, MeasuredRequest):
         False, "--posterior", help="Take the limits from samples of the posterior."
     )
     samples: int = option(4_000, metavar="N", min=1, help="Of the posterior, at least.")
-    output: File = option(None, "-o", "--output", help="Calibration file (JSON).")
+    at: str | None = option(
+        None,
+        metavar="BIAS|POWER",
+        help="Where several levers are compared, as 8V or 2mW; the highest bias that all of them "
+        "were measured at if left out.",
+    )
     table: File = option(
-        None, help="Write the table for an instrument, or for its pulses, to this CSV file."
+        None,
+        help="Write the table for an instrument, or for its pulses, to this CSV file; with several "
+        "data files each has one beside its calibration.",
     )
 
     def check(self) -> None:
         """Refuse what does not go together, and a medium that does not exist."""
         from hotlever.estimation.options import UNKNOWN_MEDIUM
 
+        super().check()
         sources = {"--fit": self.fit, "--probe": self.probe, "--power-law": self.power_law}
-        several = [name for name, path in sources.items() if path is not None]
-        if len(several) > 1:
-            names = " and ".join(several)
+        stated = [name for name, path in sources.items() if path is not None]
+        if len(stated) > 1:
+            names = " and ".join(stated)
             raise InputError(f"{names}: expected at most one of {', '.join(sources)}")
         if self.physics is not None and (self.fit or self.power_law):
             raise InputError("--physics: goes with --probe, expected neither --fit nor --power-law")
         check_medium(self.medium, UNKNOWN_MEDIUM)
+        of_one = {"--fit": self.fit, "--table": self.table, "--plot": self.plot}
+        self.need_single(*(name for name, path in of_one.items() if path is not None))
+        if self.at is not None and not self.several:
+            raise InputError("--at: expected several data files")
 
     def outputs(self) -> Outputs:
-        """Check the files that are written, none of which is read."""
-        outputs = Outputs(self.data, self.fit, self.probe, self.power_law, *self.column_files)
-        outputs.file(self.output, ".json")
-        outputs.file(self.table, ".csv")
-        outputs.file(self.plot, *FIGURE_TYPES)
+        """Return where files are written to, none of which is read; those of one lever checked."""
+        outputs = Outputs(*self.data, self.fit, self.probe, self.power_law, *self.column_files)
+        if not self.several:
+            outputs.file(self.output, ".json")
+            outputs.folder(self.report)
+            outputs.file(self.table, ".csv")
+            outputs.file(self.plot, *FIGURE_TYPES)
         return outputs
 
 

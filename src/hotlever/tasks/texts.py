@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, get_args
 
 from hotlever.errors import InputError, quoted, shown
@@ -142,6 +143,20 @@ def parse_timing(text: str) -> PulseTiming:
         return PulseTiming(setting(length, "us", "--pulse"), each)
     except InputError as error:
         raise error if str(error).startswith("--") else InputError(f"--pulse: {error}") from None
+
+
+def parse_setting(text: str) -> tuple[str, float]:
+    """Parse a bias such as ``8V``, or a power such as ``2mW``, as a column and its value.
+
+    Examples
+    --------
+    >>> parse_setting("8V"), parse_setting("500uW")
+    (('bias_V', 8.0), ('power_mW', 0.5))
+    """
+    for column, unit in (("bias_V", "V"), ("power_mW", "mW")):
+        with suppress(InputError):
+            return column, setting(text, unit, "--at", bare=unit == "V")
+    raise InputError(f"--at: found {quoted(text)}, expected a bias such as 8V or a power as 2mW")
 
 
 # --- ranges: START:STOP:COUNT ---------------------------------------------------------------------

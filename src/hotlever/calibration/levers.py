@@ -1,0 +1,189 @@
+"""What the calibrations of many levers say together: how alike they are at a bias or a power."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from hotlever.calibration.calibration import Calibration
+from hotlever.calibration.table import STATED, interpolated
+from hotlever.datasets import QUANTITIES, frame_text
+from hotlever.errors import HotleverError, InputError
+from hotlever.estimation.levers import (
+    Compared,
+    compared,
+    lever_rows,
+    levers_frame,
+    statements,
+    table_text,
+)
+from hotlever.text import value_with_error
+
+#: Of a knee, by its names in calibration files.
+_KNEE = {
+    "lever_V": Compared("knee V_l (V)", "V", "knee_lever_V{}", "lever voltage of the knee"),
+    "current_mA": Compared("I_h (mA)", "mA", "knee_current_mA{}", "current of the knee"),
+    "power_mW": Compared("P_l (mW)", "mW", "knee_power_mW{}", "power of the knee"),
+    "tip_K": Compared("T_tip (K)", "K", "knee_tip_K", "tip temperature of the knee"),
+}
+_K = Compared("k", "1", "k{}", "k")
+#: Of a power law.
+LAW = {
+    "linear_K_per_mW": Compared("a (K/mW)", "K/mW", "linear_K_per_mW", "a"),
+    "nonlinear_K": Compared("b (K)", "K", "nonlinear_K", "b"),
+    "exponent": Compared("m", "1", "exponent", "m"),
+    "hot_K_per_mW": Compared("c (K/mW)", "K/mW", "hot_K_per_mW", "c"),
+    "threshold_mW": Compared("threshold (mW)", "mW", "threshold_mW", "threshold"),
+}
+
+
+class Setting(NamedTuple):
+    """What levers are compared at: a column of their tables, and its value there."""
+
+    along: str
+    value: float
+
+    @property
+    def text(self) -> str:
+        """The value with its unit."""
+        return f"{self.value:.4g} {QUANTITIES[self.along][0]}"
+
+
+def highest_common_bias(calibrations: Mapping[str, Calibration]) -> Setting:
+    """Return the highest bias at which all levers were measured whose data are described."""
+    described = [each for each in calibrations.values() if each.describes_data]
+    highest = [each.table.bias_V.values[-1] for each in described or calibrations.values()]
+    return Setting("bias_V", float(min(highest)))
+
+
+def compare_calibrations(
+    calibrations: Mapping[str, Calibration], at: Setting | None = None
+) -> xr.Dataset:
+    """Put the calibrations of several levers side by side.
+
+    Parameters
+    ----------
+    calibrations : mapping of str to Calibration
+        By lever; one or more.
+    at : Setting, optional
+        Where the tip temperatures are compared; by default at `highest_common_bias`.
+
+    Returns
+    -------
+    xarray.Dataset
+        See `hotlever.estimation.levers.compared`, of the quantities ``tip_K``; ``knee_lever_V``,
+        ``knee_current_mA``, ``knee_power_mW``, ``knee_tip_K``; ``k``; and those of `LAW`. On
+        ``lever`` too: ``tip_low_K`` and ``tip_high_K``, between which 95 % lie, ``file``,
+        ``describes_data``, and ``reason``: why there is no tip temperature.
+
+    Raises
+    ------
+    InputError
+        If there is no calibration.
+    """
+    if not calibrations:
+        raise InputError("no calibrations to compare, expected one or more")
+    at = at or highest_common_bias(calibrations)
+    tip = Compared(f"T_tip at {at.text} (K)", "K", "tip{}_K", f"tip temperature at {at.text}")
+    knee = {f"knee_{name}": how for name, how in _KNEE.items()}
+    tips = {lever: _tip_at(each, at) for lever, each in calibrations.items()}
+    quantities = {}
+    for lever, each in calibrations.items():
+        values = vars(each.knee) | {"tip_K": each.knee_tip_K}
+        quantities[lever] = {
+            "tip_K": (tips[lever]["tip_K"], tips[lever]["tip_stderr_K"]),
+            **{f"knee_{name}": (values[name], values.get(f"{name}_stderr")) for name in _KNEE},
+            "k": (each.k, each.k_stderr),
+            **{name: (getattr(each.power_law, name, np.nan), None) for name in LAW},
+        }
+    more = {
+        name: [values[name] for values in tips.values()] for name in ("tip_low_K", "tip_high_K")
+    } | {
+        "describes_data": [_answer(each.describes_data) for each in calibrations.values()],
+        "reason": [
+            each.doubt or _why_none(each, at, tips[lever]) for lever, each in calibrations.items()
+        ],
+        "file": [each.measurement.path for each in calibrations.values()],
+        at.along: [at.value] * len(calibrations),
+    }
+    table = compared(calibrations, quantities, {"tip_K": tip, **knee, "k": _K, **LAW}, more)
+    return table.assign_attrs(along=at.along)
+
+
+def _tip_at(calibration: Calibration, at: Setting) -> dict[str, float]:
+    """Return the tip temperature with its errors (K); NaN where there is none."""
+    by_bias = at.along == "bias_V"
+    rows = calibration.table if by_bias else calibration.heating
+    known = calibration.describes_data and (by_bias or calibration.power_law is not None)
+    return {
+        name: float(interpolated(rows, at.value, at.along, name)) if known else np.nan
+        for name in ("tip_K", *STATED)
+    }
+
+
+def _why_none(calibration: Calibration, at: Setting, tip: Mapping[str, float]) -> str:
+    """Return why a lever whose data are described has no tip temperature there, if so."""
+    if np.isfinite(tip["tip_K"]):
+        return ""
+    if at.along == "power_mW" and calibration.power_law is None:
+        return "its tip temperature does not follow from a power; expected a bias"
+    low, high = calibration.heating[at.along].values[[0, -1]]
+    unit = QUANTITIES[at.along][0]
+    return f"{at.text} is out of its range, {low:.4g} to {high:.4g} {unit}"
+
+
+def _answer(described: bool | None) -> str:
+    return "unknown" if described is None else str(described).lower()
+
+
+def calibration_rows(levers: xr.Dataset) -> list[list[str]]:
+    """Return the table of `compare_calibrations` for people: see `lever_rows`.
+
+    Without the coefficients of power laws and what no lever has; k stands where one is in air.
+    """
+    finite = levers.value.notnull().any("lever")
+    in_air = (levers.value.sel(quantity="k") > 1.0).any()
+    shown = [
+        name
+        for name in levers.quantity.values[finite.values]
+        if name not in LAW and (name != "k" or in_air)
+    ]
+    return lever_rows(levers.sel(quantity=shown))
+
+
+def law_rows(levers: xr.Dataset) -> list[list[str]]:
+    """Return the coefficients of the power laws in vacuum, a column each, below a head."""
+    laws = levers.sel(quantity=list(LAW))
+    rows = [["lever", *laws.heading.values.tolist()]]
+    for lever in laws.lever:
+        values = laws.value.sel(lever=lever).values.tolist()
+        cells = ("" if np.isnan(value) else value_with_error(value, np.nan) for value in values)
+        rows.append([str(lever.item()), *cells])
+    return rows
+
+
+def calibration_statements(levers: xr.Dataset) -> list[str]:
+    """Say in words whether the levers differ, and which have no tip temperature there, and why."""
+    answers = zip(levers.lever.values, levers.described.values, levers.reason.values, strict=True)
+    missing = [f"{lever}: {reason}" for lever, described, reason in answers if described and reason]
+    return statements(levers) + missing
+
+
+def calibrations_text(levers: xr.Dataset) -> str:
+    """Return the table of many calibrations and what follows from it as lines of text."""
+    return table_text(calibration_rows(levers), calibration_statements(levers))
+
+
+def calibrations_csv(levers: xr.Dataset, failures: Mapping[str, HotleverError]) -> str:
+    """Return a table with one row for each lever, as `compare_calibrations` has them.
+
+    Below them are the data files that no calibration could be made of, and why.
+    """
+    columns = (levers.attrs["along"], "tip_low_K", "tip_high_K", "describes_data", "reason", "file")
+    table = levers_frame(levers, columns)
+    for path, error in failures.items():
+        table.loc[path, ["reason", "file"]] = str(error), path
+    return frame_text(table, float_format="%.8g")

@@ -1,0 +1,89 @@
+"""The report pages of calibrations: of one lever, and of many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+
+from hotlever import figures
+from hotlever.calibration import Calibration
+from hotlever.calibration.levers import calibration_rows, calibration_statements, law_rows
+from hotlever.calibration.summary import calibration_parts
+from hotlever.calibration.table import STATED, TABLE_COLUMNS
+from hotlever.datasets import QUANTITIES
+from hotlever.estimation.batch import Batch
+from hotlever.materials.parameters import sentence
+from hotlever.report.fit_pages import add_remarks
+from hotlever.report.page import Block, Page
+
+#: Rows of a calibration's table that are shown.
+_ROWS = 12
+
+
+def calibration_page(
+    calibration: Calibration, added: Callable[[Block], None] | None = None
+) -> Page:
+    """Return the report page of a calibration, which two sheets of paper hold.
+
+    ``added`` is called with each block as soon as it is there.
+    """
+    described, table = calibration.describes_data, calibration.table
+    page = Page(f"Calibration of {calibration.measurement.path}", added=added)
+    parts = calibration_parts(calibration)
+    for text in parts.before:
+        page.text(sentence(text))
+    for caption, (head, *rows) in parts.tables:
+        page.table(head, rows, caption or "The standard error of the tip temperature, by source.")
+    for text in parts.after:
+        page.text(sentence(text))
+    page.figure(
+        "calibration",
+        figures.calibration_curves(calibration),
+        "Tip temperature against power and bias with its 95 % band, the I-V curve with its knee, "
+        "and the standard error by source."
+        if described
+        else "The nearest lever, which is no estimate: tip temperature against power and bias, the "
+        "I-V curve, and what the data differ by.",
+    )
+    names = [name for name in TABLE_COLUMNS if described or name not in STATED]
+    chosen = np.linspace(0, table.sizes["bias"] - 1, _ROWS).round().astype(int)
+    page.table(
+        [f"{QUANTITIES[name][1]} ({QUANTITIES[name][0]})" for name in names],
+        [[f"{table[name].values[row]:.4g}" for name in names] for row in chosen],
+        "Some rows of the table "
+        + ("for the instrument." if described else "of the nearest lever, not for an instrument."),
+    )
+    for note in calibration.notes:
+        page.text(sentence(note))
+    return page
+
+
+def calibrations_page(batch: Batch[Calibration], levers: xr.Dataset) -> Page:
+    """Return the report page of many levers, of which one is calibrated or more.
+
+    Parameters
+    ----------
+    batch : Batch
+    levers : xarray.Dataset
+        From `hotlever.calibration.levers.compare_calibrations`.
+    """
+    page = Page(
+        f"Calibrations of {levers.sizes['lever']} levers",
+        "Tip temperatures of levers from their I-V curves, and where they differ.",
+    )
+    for text in calibration_statements(levers):
+        page.text(sentence(text))
+    page.figure(
+        "calibrated_levers",
+        figures.calibrated_levers(batch.results, levers),
+        "Tip temperatures of the levers, how far each is from their mean, and what they are "
+        "compared by, with standard errors.",
+    )
+    head, *rows = calibration_rows(levers)
+    page.table(head, rows, "Standard errors in units of the last digits.")
+    head, *rows = law_rows(levers)
+    page.table(head, rows, "Power laws in vacuum.")
+    add_remarks(page, batch, "calibration", "calibrated")
+    return page
