@@ -88,6 +88,8 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "resistivity_slope": ("Ω cm/K", "slope of the resistivity"),
     # what is sure
     "tip_stderr_K": ("K", "standard error of the tip temperature"),
+    "tip_low_K": ("K", "tip temperature, lower 95 % limit"),
+    "tip_high_K": ("K", "tip temperature, upper 95 % limit"),
     "tip_at_power_K": ("K", "tip temperature at a power"),
     "quantile": ("%", "quantile"),
     "inversion_temperature": ("K", "inversion temperature of the heater's doping"),

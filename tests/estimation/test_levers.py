@@ -150,7 +150,7 @@ def test_csv_has_empty_cells_for_what_is_not_known():
 
 
 def test_what_cannot_be_compared_is_refused():
-    with pytest.raises(InputError, match="no fits to compare"):
+    with pytest.raises(InputError, match="no levers to compare"):
         compare_levers({})
     fits = wafer(2, 0.01, 0.005)
     del fits["lever-1"].parameters["n_d"]

@@ -10,8 +10,8 @@ import xarray as xr
 
 from hotlever.calibration.calibration import Calibration
 from hotlever.calibration.table import STATED, interpolated
-from hotlever.datasets import QUANTITIES, frame_text
-from hotlever.errors import HotleverError, InputError
+from hotlever.datasets import QUANTITIES, frame_text, labelled
+from hotlever.errors import HotleverError
 from hotlever.estimation.levers import (
     Compared,
     compared,
@@ -25,9 +25,9 @@ from hotlever.text import value_with_error
 #: Of a knee, by its names in calibration files.
 _KNEE = {
     "lever_V": Compared("knee V_l (V)", "V", "knee_lever_V{}", "lever voltage of the knee"),
-    "current_mA": Compared("I_h (mA)", "mA", "knee_current_mA{}", "current of the knee"),
-    "power_mW": Compared("P_l (mW)", "mW", "knee_power_mW{}", "power of the knee"),
-    "tip_K": Compared("T_tip (K)", "K", "knee_tip_K", "tip temperature of the knee"),
+    "current_mA": Compared("knee I_h (mA)", "mA", "knee_current_mA{}", "current of the knee"),
+    "power_mW": Compared("knee P_l (mW)", "mW", "knee_power_mW{}", "power of the knee"),
+    "tip_K": Compared("knee T_tip (K)", "K", "knee_tip_K", "tip temperature of the knee"),
 }
 _K = Compared("k", "1", "k{}", "k")
 #: Of a power law.
@@ -38,6 +38,8 @@ LAW = {
     "hot_K_per_mW": Compared("c (K/mW)", "K/mW", "hot_K_per_mW", "c"),
     "threshold_mW": Compared("threshold (mW)", "mW", "threshold_mW", "threshold"),
 }
+#: Points of a curve without visible corners.
+_POINTS = 200
 
 
 class Setting(NamedTuple):
@@ -56,7 +58,7 @@ def highest_common_bias(calibrations: Mapping[str, Calibration]) -> Setting:
     """Return the highest bias at which all levers were measured whose data are described."""
     described = [each for each in calibrations.values() if each.describes_data]
     highest = [each.table.bias_V.values[-1] for each in described or calibrations.values()]
-    return Setting("bias_V", float(min(highest)))
+    return Setting("bias_V", float(min(highest, default=np.nan)))
 
 
 def compare_calibrations(
@@ -67,7 +69,7 @@ def compare_calibrations(
     Parameters
     ----------
     calibrations : mapping of str to Calibration
-        By lever; one or more.
+        By lever.
     at : Setting, optional
         Where the tip temperatures are compared; by default at `highest_common_bias`.
 
@@ -82,10 +84,8 @@ def compare_calibrations(
     Raises
     ------
     InputError
-        If there is no calibration.
+        If there is none.
     """
-    if not calibrations:
-        raise InputError("no calibrations to compare, expected one or more")
     at = at or highest_common_bias(calibrations)
     tip = Compared(f"T_tip at {at.text} (K)", "K", "tip{}_K", f"tip temperature at {at.text}")
     knee = {f"knee_{name}": how for name, how in _KNEE.items()}
@@ -137,6 +137,39 @@ def _why_none(calibration: Calibration, at: Setting, tip: Mapping[str, float]) -
 
 def _answer(described: bool | None) -> str:
     return "unknown" if described is None else str(described).lower()
+
+
+def tips_along(calibrations: Mapping[str, Calibration], along: str) -> xr.Dataset:
+    """Return the tip temperatures of those levers whose data are described, at the same settings.
+
+    Parameters
+    ----------
+    calibrations : mapping of str to Calibration
+        By lever.
+    along : {"bias_V", "power_mW"}
+
+    Returns
+    -------
+    xarray.Dataset
+        ``tip_K`` and ``tip_stderr_K`` on (``lever``, ``along``); NaN out of a lever's range.
+    """
+    tables = {
+        lever: each.table if along == "bias_V" else each.heating
+        for lever, each in calibrations.items()
+        if each.describes_data and (along == "bias_V" or each.power_law is not None)
+    }
+    edges = [float(table[along].values[end]) for table in tables.values() for end in (0, -1)]
+    at = np.linspace(min(edges, default=0.0), max(edges, default=1.0), _POINTS)
+    columns = {
+        name: np.array([interpolated(table, at, along, name) for table in tables.values()])
+        for name in ("tip_K", "tip_stderr_K")
+    }
+    shape = len(tables), at.size
+    return labelled(
+        {name: values.reshape(shape) for name, values in columns.items()},
+        ("lever", along),
+        {"lever": list(tables), along: at},
+    )
 
 
 def calibration_rows(levers: xr.Dataset) -> list[list[str]]:

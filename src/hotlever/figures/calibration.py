@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hotlever.calibration.calibration import Calibration
+from hotlever.calibration.levers import tips_along
 from hotlever.calibration.pulses import PulseCalibration
-from hotlever.calibration.table import interpolated
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from hotlever.estimation.lack_of_fit import USUAL_SCATTER
 from hotlever.figures.style import (
@@ -33,8 +33,7 @@ from hotlever.text import BAND
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Points of a curve without visible corners, and what levers are compared by.
-_POINTS = 200
+#: What levers are compared by.
 _COMPARED = ("tip_K", "knee_lever_V", "knee_current_mA", "knee_power_mW")
 #: Colour of each way of calibrating.
 _BY_WAY = (BLUE, GREEN, ORANGE, VERMILION)
@@ -95,56 +94,38 @@ def calibrated_levers(calibrations: Mapping[str, Calibration], levers: xr.Datase
     Parameters
     ----------
     calibrations : mapping of str to Calibration
-        By lever; one whose data are not described is dashed, and in no mean.
+        By lever; those whose data are not described are left out.
     levers : xarray.Dataset
         From `hotlever.calibration.levers.compare_calibrations`.
     """
-    along, at = levers.attrs["along"], levers[levers.attrs["along"]].values[0]
-    number = np.arange(1, levers.sizes["lever"] + 1)
-    many = number.size > len(LINES)
-    tables = {
-        lever: each.table if along == "bias_V" else each.heating
-        for lever, each in calibrations.items()
-    }
-    ends = [float(table[along].values[-1]) for table in tables.values()]
-    starts = [float(table[along].values[0]) for table in tables.values()]
-    common = np.linspace(min(starts), max(ends), _POINTS)
-    tips = np.array([interpolated(table, common, along, "tip_K") for table in tables.values()])
-    described = levers.described.values
+    along, count = levers.attrs["along"], levers.sizes["lever"]
+    tips, many = tips_along(calibrations, along), count > len(LINES)
+    named: Any = {"rotation": 45, "ha": "right", "parse_math": False, "fontsize": 7}
     with figure(8.0, 7.6, 3, 2, letters=True) as (made, grid):
         curves, differences, *by_lever = grid.ravel()
-        counted = np.where(described[:, None], tips, np.nan)
-        known = np.isfinite(counted).any(axis=0)
-        mean = np.full(common.size, np.nan)
-        mean[known] = np.nanmean(counted[:, known], axis=0)
-        for row, (lever, (line, colour)) in enumerate(zip(tables, cycle(LINES), strict=False)):
+        for tip, (line, colour) in zip(tips.tip_K, cycle(LINES), strict=False):
             style: Any = {"color": colour, "ls": line, "lw": 0.8 if many else 1.2}
-            style |= {} if described[row] else {"alpha": 0.4}
-            curves.plot(common, tips[row], label=lever, **style)
-            if described[row]:
-                differences.plot(common, tips[row] - mean, **style)
-        stated = [
-            interpolated(table, common, along, "tip_stderr_K")
-            for table, counts in zip(tables.values(), described, strict=True)
-            if counts
-        ]
-        if known.any():
-            half = np.full(common.size, np.nan)
-            half[known] = BAND * np.nanmedian(np.array(stated)[:, known], axis=0)
-            band: Any = {"color": "0.88", "lw": 0, "zorder": 0}
-            differences.fill_between(common, -half, half, label="95 % of a lever", **band)
-            differences.legend(loc="upper left")
-        for axes in (curves, differences):
-            axes.axvline(at, color="0.6", lw=0.8, ls=":")
-            axes.set(xlabel=axis_label(along))
-        curves.set(ylabel=axis_label("tip_K"))
-        differences.set(ylabel="tip temperature − mean of the levers (K)")
+            curves.plot(tips[along], tip, label=tip.lever.item(), **style)
+            differences.plot(tips[along], tip - tips.tip_K.mean("lever"), **style)
+        half = BAND * tips.tip_stderr_K.mean("lever")
+        band: Any = {"color": "0.88", "lw": 0, "label": "95 % of a lever"}
+        differences.fill_between(tips[along], -half, half, **band)
+        differences.legend(loc="upper left")
+        for axes, label in (
+            (curves, axis_label("tip_K")),
+            (differences, "difference from the mean (K)"),
+        ):
+            axes.axvline(levers[along].values[0], color="0.6", lw=0.8, ls=":")
+            axes.set(xlabel=axis_label(along), ylabel=label)
         if not many:
-            made.legend(*curves.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+            made.legend(*curves.get_legend_handles_labels(), loc="outside lower center", ncols=6)
         for name, axes in zip(_COMPARED, by_lever, strict=True):
             values_by_lever(axes, levers.sel(quantity=name))
-            axes.set_ylabel(levers.heading.sel(quantity=name).item())
-            axes.set(xlabel="lever", xlim=(0.5, number.size + 0.5))
+            axes.set(ylabel=levers.heading.sel(quantity=name).item(), xlim=(0.5, count + 0.5))
+            if many:
+                axes.set(xlabel="lever")
+            else:
+                axes.set_xticks(np.arange(1, count + 1), levers.lever.values, **named)
     return made
 
 

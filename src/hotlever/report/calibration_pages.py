@@ -32,12 +32,11 @@ def calibration_page(
     described, table = calibration.describes_data, calibration.table
     page = Page(f"Calibration of {calibration.measurement.path}", added=added)
     parts = calibration_parts(calibration)
-    for text in parts.before:
+    page.text(sentence("; ".join(parts.before)))
+    for text in parts.after:
         page.text(sentence(text))
     for caption, (head, *rows) in parts.tables:
         page.table(head, rows, caption or "The standard error of the tip temperature, by source.")
-    for text in parts.after:
-        page.text(sentence(text))
     page.figure(
         "calibration",
         figures.calibration_curves(calibration),
