@@ -28,7 +28,8 @@ class PlacedFilm:
     thickness_um : float or ndarray, shape (k, 1)
     counted_um : float or ndarray, shape (k, 1)
         The thickness that makes a sheet conductance: 1 where the elements have it themselves.
-    is_body : bool
+    level : int
+        How many films are below; 0 of the body.
     dopant_from : str or None
         The material from which dopant diffuses into this one.
     faces : float or ndarray, shape (k, 1)
@@ -43,7 +44,7 @@ class PlacedFilm:
     points: Index
     thickness_um: float | Array
     counted_um: float | Array
-    is_body: bool
+    level: int
     dopant_from: str | None
     faces: float | Array
     distances: Array
@@ -100,7 +101,6 @@ def placed_films(
     films = []
     for (level, film, source), numbers in where.items():
         points = np.flatnonzero(np.isin(region, numbers))
-        is_body = film.thickness_um is None
         thickness = at_some(body, points) if film.thickness_um is None else film.thickness_um
         even = np.empty((0, points.size, 1))
         uppermost = (levels[points] == level + 1)[:, None]
@@ -110,7 +110,7 @@ def placed_films(
                 points,
                 thickness,
                 counted_um=thickness if flat else 1.0,
-                is_body=is_body,
+                level=level,
                 dopant_from=source,
                 faces=float(level == 0) + uppermost if flat else 0.0,
                 distances=even
@@ -118,7 +118,7 @@ def placed_films(
                 else _from_borders(layout, region[points], positions[:2, points]),
             )
         )
-    if len(films) == 1 or all(film.is_body for film in films):
+    if len(films) == 1 or not any(film.level for film in films):
         alone = body if flat else 1.0
         return tuple(films), alone, alone
     total = np.zeros((region.size, 1))

@@ -62,9 +62,9 @@ class FilmLaws:
         self.film, self.kind, self.carrier = film, materials[film.material], carrier
         self.own = names_in_laws(film.material, self.kind)
         self.thickening = {
-            name: motion.thickening_um[film.points]
+            name: motion.thickening_um[number]
             for name, motion in motions.items()
-            if film.is_body
+            if motion.thickening_um[number].any()
         }
         self.doping: Array | float = 0.0
         self.doping_by: dict[str, Array | float] = {}
@@ -236,7 +236,7 @@ class LawsAtPoints:
             elif name == GAS:
                 change -= share * self.space.plate_um * kappa
             elif name in self.motions:
-                change -= filling * self.motions[name].thickening_um * kappa
+                change -= filling * self.motions[name].plate_um * kappa
 
     def heat_density(self, T: Array) -> tuple[Array, Array]:
         """Return the heat above that at the base temperature (nJ/µm²), and its slope by T.

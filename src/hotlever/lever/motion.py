@@ -10,14 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from hotlever.lever.films import PlacedFilm, thickness_at
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.rim import RimFilm
 from hotlever.lever.space import Fields, Fluxes, Tangent
-from hotlever.probe.layout import Layout, Taper
+from hotlever.probe.layout import BorderTaper, Layout, Taper
 from hotlever.probe.moving import Movement
-from hotlever.types import Array
+from hotlever.types import Array, Index
 
 #: A small change of a dimension (µm), by which the thickness of a cone is differenced.
 _SMALL_UM = 1e-4
@@ -33,28 +34,25 @@ class Motion:
         Derivative of the velocity's component i (first axis) along j.
     swelling : ndarray, shape (points, 1)
         Of the weights, relative.
-    thickening_um : ndarray, shape (points, 1)
-        Of the body (µm).
+    thickening_um : tuple of ndarray, shape (k, 1)
+        Of each `hotlever.lever.films.PlacedFilm` (µm).
+    plate_um : ndarray, shape (points, 1)
+        Of the plate as the air sees it (µm).
     distances : tuple of ndarray, shape (borders, k, 1)
-        Of those of each `hotlever.lever.films.PlacedFilm`.
+        Of those of each film.
     tip : ndarray, shape (nodes,)
         Of the weights that give the rise of the tip temperature.
-    rim_swelling, rim_thickening_um : ndarray, shape (points of the rim, 1)
-        The same as of the points.
+    rim : tuple of ndarray, shape (k, 1)
+        Of the surface at the points of each `hotlever.lever.rim.RimFilm`, over their weights.
     """
 
     strain: Array
     swelling: Array
-    thickening_um: Array
+    thickening_um: tuple[Array, ...]
+    plate_um: Array
     distances: tuple[Array, ...]
     tip: Array
-    rim_swelling: Array
-    rim_thickening_um: Array
-
-    def of_rim(self, film: RimFilm) -> Array:
-        """Return how surface at the points of a rim grows, over their weights (as its heights)."""
-        longer = self.rim_swelling[film.points] * film.height_um
-        return longer + self.rim_thickening_um[film.points] if film.is_body else longer
+    rim: tuple[Array, ...]
 
     def strained(self, gradient: Array) -> Array:
         """Return how slopes (dimension, points, n) change, the values being the same."""
@@ -96,18 +94,38 @@ def motion_of(space: FullSpace, movement: Movement) -> Motion:
     strain = np.repeat(strain, elements.per_element, axis=2)
 
     layout = mesh.layout
-    longer, along_rim = _along_rim(space, movement)
+    body = _thickening(layout, movement, elements.positions, velocity)
+    region = np.repeat(mesh.region, elements.per_element)
     (element,), _, slopes = elements.at_points(np.array([layout.tip]))
     reference = elements.on_reference(np.array(layout.tip), element)
     at_tip = corners[:, 0, element] + sides[:, :, element] @ reference
     return Motion(
         strain,
         np.asarray(strain[0, 0] + strain[1, 1])[:, None],
-        _thickening(layout, movement, elements.positions, velocity),
-        tuple(_from_borders(space, film, movement, velocity) for film in space.films),
+        tuple(_of_film(film, movement, body, region) for film in space.films),
+        body + movement.films,
+        tuple(_from_borders(space, film, movement, velocity, region) for film in space.films),
         tip=(movement.tip - at_tip) @ slopes[:, 0],
-        rim_swelling=longer[:, None],
-        rim_thickening_um=_thickening(layout, movement, space.rim.places.positions, along_rim),
+        rim=_of_rim(space, movement),
+    )
+
+
+def _of_film(film: PlacedFilm | RimFilm, movement: Movement, body: Array, region: Index) -> Array:
+    """Return how a film thickens at its points, (k, 1), from the rate of the body at all points."""
+    if not film.level:
+        return body[film.points]
+    return movement.thickness_of_films(film.level)[region[film.points], None]
+
+
+def _of_rim(space: FullSpace, movement: Movement) -> tuple[Array, ...]:
+    """Return how surface at the points of a rim grows, over their weights (as its heights)."""
+    longer, velocity = _along_rim(space, movement)
+    places = space.rim.places
+    body = _thickening(space.mesh.layout, movement, places.positions, velocity)
+    region = space.mesh.region[places.elements]
+    return tuple(
+        longer[film.points, None] * film.height_um + _of_film(film, movement, body, region)
+        for film in space.rim.films
     )
 
 
@@ -136,21 +154,29 @@ def _thickening(layout: Layout, movement: Movement, at: Array, velocity: Array) 
     return np.broadcast_to(thicker, (at.shape[1], 1))
 
 
-def _from_borders(space: FullSpace, film: PlacedFilm, movement: Movement, velocity: Array) -> Array:
+def _from_borders(
+    space: FullSpace, film: PlacedFilm, movement: Movement, velocity: Array, region: Index
+) -> Array:
     """Return how the distances of a film's points from the borders of their regions change."""
     changes = np.zeros_like(film.distances)
-    if not film.distances.size:
-        return changes
-    region = np.repeat(space.mesh.region, space.elements.per_element)[film.points]
-    moved = velocity[:, film.points]
-    for number, (now, later) in enumerate(
-        zip(movement.now.regions, movement.later.regions, strict=True)
-    ):
-        before, after, here = now.taper, later.taper, region == number
-        # borders of any other shape belong to drawings, whose outlines do not move
-        if isinstance(before, Taper) and isinstance(after, Taper):
-            centre = movement.of_point(before.centre, after.centre)
-            along = np.tensordot(before.axis, moved[:, here] - centre[:, None], axes=1)
-            longer = (after.length_um - before.length_um) / movement.step
-            changes[:2, here, 0] = longer / 2 - along, longer / 2 + along
+    at, moved = space.elements.positions[:, film.points], velocity[:, film.points]
+    step = movement.step
+    ends = ((movement.before, -step), (movement.after, step))
+    for number in np.unique(region[film.points]) if film.distances.size else ():
+        here = region[film.points] == number
+        distances = film.distances[:, here, 0]
+        low, high = (
+            _as_ordered(layout.regions[number].taper, at[:, here] + way * moved[:, here], distances)
+            for layout, way in ends
+        )
+        changes[: len(low), here, 0] = movement.rate(low, high)
     return changes
+
+
+def _as_ordered(taper: Taper | BorderTaper | None, points: Array, before: Array) -> Array:
+    """Return the distances of points from borders, each border where it was before."""
+    # a film with distances lies on tapered regions only
+    assert taper is not None
+    distances = taper.distances(points)
+    apart = np.abs(before[:, None] - distances).sum(axis=2)
+    return np.asarray(distances[linear_sum_assignment(apart)[1]])

@@ -63,7 +63,7 @@ class RimRadiation:
             of_base -= rim.end_tests[name][:, None]
         by = {name: np.zeros_like(T) for name in ("T", *names)}
         heat = np.zeros_like(T)
-        for film, kind, own in self._films:
+        for number, (film, kind, own) in enumerate(self._films):
             points, unit = film.points, PER_CM2_TO_MILLI_PER_UM2 * rim.weights[film.points]
             value, by_own = kind.emission(T[points], self._base)
             heat[points] += unit * film.height_um * value
@@ -71,7 +71,7 @@ class RimRadiation:
                 if own.get(name) in by_own:
                     change[points] += unit * film.height_um * by_own[own[name]]
                 elif name in self._motions:
-                    change[points] += unit * self._motions[name].of_rim(film) * value
+                    change[points] += unit * self._motions[name].rim[number] * value
         if BASE in by:
             by[BASE] += of_base * by["T"]
         return heat, by

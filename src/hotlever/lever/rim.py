@@ -34,13 +34,14 @@ class RimFilm:
     points : ndarray of int, shape (k,)
     height_um : float or ndarray, shape (k, 1)
         Of the edge; 1 of a solid, whose points stand for areas.
-    is_body : bool
+    level : int
+        How many films are below; 0 of the body.
     """
 
     material: str
     points: Index
     height_um: float | Array
-    is_body: bool
+    level: int
 
 
 @dataclass(frozen=True)
@@ -162,10 +163,10 @@ def _films(layout: Layout, region: Index, positions: Array) -> tuple[RimFilm, ..
     flat = len(positions) == 2
     body = thickness_at(layout, positions) if flat else 1.0
     films = []
-    for film in dict.fromkeys(film for each in layout.regions for film in each.stack):
-        numbers = [number for number, each in enumerate(layout.regions) if film in each.stack]
+    stacks = [tuple(enumerate(each.stack)) for each in layout.regions]
+    for level, film in dict.fromkeys(pair for stack in stacks for pair in stack):
+        numbers = [number for number, stack in enumerate(stacks) if (level, film) in stack]
         points = np.flatnonzero(np.isin(region, numbers))
-        is_body = film.thickness_um is None
         height = at_some(body, points) if film.thickness_um is None else film.thickness_um
-        films.append(RimFilm(film.material, points, height, is_body))
+        films.append(RimFilm(film.material, points, height, level))
     return tuple(films)

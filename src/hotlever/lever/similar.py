@@ -97,7 +97,9 @@ class SimilarLevers:
         """Return the equations of a probe, with the motions of the dimensions among some names."""
         space = self._space(probe, names)
         dimensions = [name for name in names if name in dimensions_of(probe)]
-        motions = {name: motion_of(space, self._moving.movement(name)) for name in dimensions}
+        motions = {
+            name: motion_of(space, self._moving.movement(probe, name)) for name in dimensions
+        }
         return LeverEquations.of_probe(space, probe, motions=motions)
 
     def for_any_parameters(self) -> Self:
