@@ -83,7 +83,7 @@ def materials_of(
     Parameters
     ----------
     sections : mapping
-        Of `material_of`, by name.
+        Of `material_of`, or materials as they are, by name.
     where : str
         Names the file in an error.
     reserved : collection of str
@@ -106,6 +106,9 @@ def materials_of(
                 "a letter, then letters, digits, - or _; and no section's name"
             )
         here = f"{where}: [materials.{name}]"
+        if isinstance(section, Kind):
+            materials[name] = section
+            continue
         if not isinstance(section, dict):
             raise InputError(f"{here} must be a section, found {quoted(section)}")
         materials[name] = material_of(section, here, folder, (like or {}).get(name))

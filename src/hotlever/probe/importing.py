@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from hotlever.errors import InputError
 from hotlever.probe.drawing.layer_inference import Drawn, LayerInference, infer_layers
 from hotlever.probe.drawing.layers import HEATER, REQUIRED, SILICON, terminal_part
 from hotlever.probe.drawing.outlines import Ring
+from hotlever.probe.drawing.saving import relative
 from hotlever.probe.drawing.shape import TOLERANCE_UM
 from hotlever.probe.drawing.sheet import (
     UNITS,
@@ -94,7 +94,7 @@ def import_drawing(path: Path, cell: str | None, folder: Path, unit: str | None 
     inference = infer_layers(sheet, TOLERANCE_UM)
     _check_unit(sheet, inference, unit)
     listing = _listing(sheet, inference)
-    name = _relative(path, folder)
+    name = relative(path, folder)
     text = _probe_file(sheet, inference, listing, name, unit)
     fault: InputError | None = None
     notes: list[str] = []
@@ -147,13 +147,6 @@ def _by_part(inference: LayerInference) -> dict[str, Drawn]:
     """Return what is drawn by what it is taken as."""
     ends = {terminal_part(name): drawn for name, drawn in inference.terminals.items()}
     return inference.layers | ends
-
-
-def _relative(path: Path, folder: Path) -> str:
-    try:
-        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-    except ValueError:  # on another drive
-        return path.resolve().as_posix()
 
 
 def _listing(sheet: Sheet, inference: LayerInference) -> list[str]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_text, write_text
@@ -18,6 +18,7 @@ from hotlever.probe.priors import priors_of
 from hotlever.probe.shapes import (
     DRAWING,
     PARAMETRIC,
+    PARAMETRIC_DRAWING,
     SHAPE_SECTIONS,
     SHAPES,
     Shape,
@@ -29,9 +30,15 @@ from hotlever.records import Record
 from hotlever.spieser2017 import DOI
 from hotlever.text import as_toml
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from hotlever.probe.drawing.kit import Drawing
+
 #: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
 #: gigabytes to read.
 _LARGEST, _LONGEST_LINE = 1_000_000, 1000
+_HEADING = "# A hotlever probe file: lengths in µm, temperatures in K."
 #: Column in which comments begin.
 _COMMENTS = 32
 
@@ -64,6 +71,32 @@ class Probe(ProbeParts):
     def u_shape(cls) -> Probe:
         """Return a two-legged lever with a heater like the reference probe's."""
         return cls(shape=UShape.reference())
+
+    @classmethod
+    def from_drawing(
+        cls,
+        drawing: Drawing | Callable[..., Drawing],
+        materials: Mapping[str, Kind | Mapping[str, Any]] | None = None,
+    ) -> Probe:
+        """Make a probe of what is drawn in Python; see `hotlever.probe.drawing`.
+
+        Parameters
+        ----------
+        drawing : Drawing or callable
+            Or a function that returns one. Its arguments, in µm and with defaults, are then the
+            dimensions of the probe.
+        materials : mapping of str to Kind or mapping, optional
+            Those that layers are made of, by name; or what a section of a probe file would say.
+
+        Raises
+        ------
+        InputError
+            If what is drawn or stated is at fault.
+        """
+        from hotlever.probe.drawing.parametric import sections_of
+
+        where, sections = sections_of(drawing)
+        return cls.from_sections({**sections, MATERIALS: dict(materials or {})}, where, Path())
 
     @classmethod
     def coerce(cls, probe: Probe | str | os.PathLike[str]) -> Probe:
@@ -117,7 +150,7 @@ class Probe(ProbeParts):
         before = None if like is None else like.materials
         materials = materials_of(values.get(MATERIALS, {}), where, SECTIONS, folder, before)
         drawn = {name: values[name] for name in SHAPE_SECTIONS if name in values}
-        shape = shape_of(drawn, where, folder, materials)
+        shape = shape_of(drawn, where, folder, materials, None if like is None else like.shape)
         for name in materials:
             if name not in shape.materials:
                 raise InputError(
@@ -235,14 +268,17 @@ class Probe(ProbeParts):
 
     def to_toml(self) -> str:
         """Return the probe as a commented probe file."""
-        lines = ["# A hotlever probe file: lengths in µm, temperatures in K."]
+        lines = [_HEADING]
         if self.shape == Probe.reference().shape:
             lines.append(
                 "# The reference probe. No drawing of the published lever exists: these dimensions"
                 f"\n# are inferred from the operating points in doi:{DOI}."
             )
-        meaning = self.shape.description()
-        for name, section in self.shape.sections().items():
+        return self._text(lines, self.shape.sections(), self.shape.description())
+
+    def _text(self, lines: list[str], shape: Mapping[str, Any], meaning: Mapping[str, str]) -> str:
+        """Return a probe file with some lines above the sections of its shape."""
+        for name, section in shape.items():
             lines += section_lines(name, section, meaning)
         return "\n".join(lines) + "\n" + self.other_sections()
 
@@ -264,9 +300,32 @@ class Probe(ProbeParts):
             lines += section_lines(LAWS, laws, {})
         return "\n".join(lines) + "\n"
 
-    def to_file(self, path: str | os.PathLike[str]) -> None:
-        """Write the probe as a commented probe file, whole or not at all."""
-        write_text(path, self.to_toml())
+    def to_file(
+        self, path: str | os.PathLike[str], drawing: str | os.PathLike[str] | None = None
+    ) -> None:
+        """Write the probe as a commented probe file, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+        drawing : path, optional
+            Write what is drawn of it too, as GDSII: the probe file names its layers. That of a
+            shape of dimensions is then a drawing, whose dimensions are those of the shape now.
+        """
+        if drawing is None:
+            return write_text(path, self.to_toml())
+        from hotlever.probe.drawing.saving import save_drawing
+        from hotlever.probe.drawing.shape import DrawnShape
+
+        shape = save_drawing(self.shape, drawing, Path(path).parent)
+        return write_text(path, self._text([_HEADING], shape, DrawnShape.description()))
+
+    def draw(self, title: str = "") -> Figure:
+        """Return a figure of the probe from above, with its heater, terminals and tip."""
+        # figures stand above probes: they are the package's to find
+        from hotlever import figures
+
+        return figures.probe_drawing(self.layout(), title)
 
 
 # --- sections of probe files ----------------------------------------------------------------------
@@ -352,6 +411,7 @@ def shape_of(
     where: str,
     folder: Path | None = None,
     materials: Mapping[str, Kind] | None = None,
+    like: Shape | None = None,
 ) -> Shape:
     """Make the shape that some sections of a probe file describe.
 
@@ -365,6 +425,8 @@ def shape_of(
         What the name of a drawing's file is relative to.
     materials : mapping of str to Kind, optional
         Those that the layers of a drawing may be made of.
+    like : Shape, optional
+        One whose class it is to have, if both are drawn by one function.
 
     Raises
     ------
@@ -376,15 +438,20 @@ def shape_of(
     name = values.get("shape")
     if name is None:
         raise InputError(f"{here}: shape is missing (one of: {', '.join(SHAPES)})")
-    if not isinstance(name, str) or name not in SHAPES:
+    if not isinstance(name, str) or name not in (*SHAPES, PARAMETRIC_DRAWING):
         raise unknown_name("shape", str(name), SHAPES, here)
+    kinds = {of: kind.kind for of, kind in (materials or {}).items()}
     if name == DRAWING:
-        from hotlever.probe.drawing.shape import (
-            Drawing,  # most probes are drawn by their dimensions
-        )
+        # imported here: most probes are drawn by their dimensions
+        from hotlever.probe.drawing.shape import DrawnShape
 
-        return Drawing.read(sections, where, folder, materials)
+        return DrawnShape.read(sections, where, folder, kinds)
     for section in SHAPE_SECTIONS[1:]:
         if section in sections:
             raise InputError(f'{where}: section [{section}] means nothing with shape = "{name}"')
+    if name == PARAMETRIC_DRAWING:
+        from hotlever.probe.drawing.parametric import ParametricDrawing
+
+        own = type(like) if isinstance(like, ParametricDrawing) else ParametricDrawing
+        return own.read(values, where, kinds)
     return PARAMETRIC[name].from_values(values, here)

@@ -356,6 +356,8 @@ class UShape(Parametric):
 
 PARAMETRIC: dict[str, type[Parametric]] = {"three-leg": ThreeLeg, "u-shape": UShape}
 DRAWING = "drawing"
+#: Made in Python only.
+PARAMETRIC_DRAWING: Literal["parametric-drawing"] = "parametric-drawing"
 SHAPES = (*PARAMETRIC, DRAWING)
 #: Sections of a probe file that describe a shape; those of a drawing come first to last.
 SHAPE_SECTIONS = ("probe", "layers", "terminals")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hotlever.probe.layout import Layout, Taper
 from hotlever.probe.mesh import ProbeMesh
 from hotlever.probe.probe import Probe
-from hotlever.probe.shapes import DRAWING
+from hotlever.probe.shapes import Parametric
 from hotlever.records import Record
 
 
@@ -19,7 +19,7 @@ def probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
         for key, text in probe.shape.description().items()
         if isinstance(values[key], float | str)
     ]
-    if probe.shape.shape == DRAWING:
+    if not isinstance(probe.shape, Parametric):
         dimensions += [f"  {text}" for text in _regions(layout)]
     lines = [
         f"{name}: {probe.shape.shape}, {layout.thickness_um:g} µm thick",

@@ -17,6 +17,7 @@ from hotlever.materials import LOW_DOPED, full_name
 from hotlever.materials.doping import diffusion_length
 from hotlever.materials.parameters import parameter_named
 from hotlever.probe import MeshOptions, Probe
+from hotlever.probe.shapes import Parametric
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.steps import each
 from hotlever.types import Array, Progress
@@ -90,13 +91,16 @@ class Design:
 
     @property
     def usual(self) -> tuple[str, ...]:
-        """What a designer asks for first: of a drawing, what it has in place of dimensions."""
+        """What a designer asks for first: of a drawing, its dimensions or what it has for them."""
         names = self.numbers
         heater = self.probe.layout().heater.stack
         of_heater = [full_name(film.material, own) for film in heater for own in _OF_HEATERS]
         thickness = [name for name in names if name.startswith("layers.")]
-        first = (*_OF_SHAPES, *thickness, *of_heater, *ANNEALING)
-        return tuple(name for name in dict.fromkeys(first) if name in names)
+        shape = self.probe.shape
+        own = [] if isinstance(shape, Parametric) else shape.dimensions()
+        first = (*own, *_OF_SHAPES, *thickness, *of_heater, *ANNEALING)
+        # a share of what is zero is nothing
+        return tuple(name for name in dict.fromkeys(first) if names.get(name))
 
     @property
     def _is_annealed(self) -> bool:

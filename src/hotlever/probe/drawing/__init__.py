@@ -1,5 +1,19 @@
-"""Drawings of levers: GDSII, OASIS and DXF files made layouts.
+"""Drawings of levers: in Python, and GDSII, OASIS and DXF files, made layouts.
 
 A file's *sheet* (its outlines by layer) becomes a shape of the probe file, whose outlines are
-healed, cut into regions and checked. Nothing of this is loaded for a parametric shape.
+healed, cut into regions and checked; a `Drawing` of areas made in Python goes the same way. Nothing
+of this is loaded for a shape by its dimensions.
 """
+
+from hotlever.probe.drawing.kit import (
+    Drawing,
+    Layer,
+    Polygon,
+    difference,
+    fillet,
+    mirror,
+    rectangle,
+    union,
+)
+
+__all__ = ["Drawing", "Layer", "Polygon", "difference", "fillet", "mirror", "rectangle", "union"]

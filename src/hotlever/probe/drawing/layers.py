@@ -7,13 +7,14 @@ else. A layer with a thickness of its own is a *film*, which lies on the body; a
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
 from typing import Any
 
 from pydantic import Field
 
 from hotlever.errors import InputError, quoted, unknown_name
-from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED, Kind
+from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.probe.drawing.outlines import Ring
 from hotlever.records import Record
@@ -116,7 +117,7 @@ def terminal_part(name: str) -> str:
 
 
 def layer_values(
-    section: Mapping[str, Any], materials: Mapping[str, Kind], where: str
+    section: Mapping[str, Any], kinds: Mapping[str, str], where: str
 ) -> dict[str, dict[str, Any]]:
     """Return what ``[layers]`` says of each layer, its outlines as they are given.
 
@@ -126,15 +127,15 @@ def layer_values(
         If the body or a heater is missing, a key is wrong, or a material does not exist.
     """
     if (SILICON in section) == (BODY in section):
-        raise InputError(
-            f"{where}: {SILICON} is missing"
-            if BODY not in section
-            else f"{where}: {SILICON} and {BODY}: expected one of them, the outline of the lever"
-        )
+        if SILICON in section:
+            raise InputError(
+                f"{where}: {SILICON} and {BODY}: expected one of them, the outline of the lever"
+            )
+        raise _missing(SILICON, section, where)
     layers = {}
     for name, given in section.items():
         if isinstance(given, Mapping):
-            own = _of_material(given, materials, f"{where.removesuffix(']')}.{name}]")
+            own = _of_material(given, kinds, f"{where.removesuffix(']')}.{name}]")
         elif name in (SILICON, BODY):
             own = {DRAWN: given, "material": HIGH_DOPED, "kind": "high-doped-silicon"}
         else:
@@ -144,9 +145,14 @@ def layer_values(
     return layers
 
 
-def _of_material(
-    given: Mapping[str, Any], materials: Mapping[str, Kind], where: str
-) -> dict[str, Any]:
+def _missing(name: str, section: Mapping[str, Any], where: str) -> InputError:
+    """Return the error for a name that a section lacks, with the one that may be meant by it."""
+    near = difflib.get_close_matches(name, section, n=1)
+    hint = f"; is it meant by {quoted(near[0])}?" if near else ""
+    return InputError(f"{where}: {name} is missing{hint}")
+
+
+def _of_material(given: Mapping[str, Any], kinds: Mapping[str, str], where: str) -> dict[str, Any]:
     """Return what a section says of a layer, with the kind of its material."""
     if DRAWN not in given:
         raise InputError(f"{where}: {DRAWN} is missing")
@@ -158,11 +164,11 @@ def _of_material(
     material = given["material"]
     if not isinstance(material, str):
         raise InputError(f"{where}: material = {quoted(material)}: expected a name")
-    if not materials:
+    if not kinds:
         raise InputError(f"{where}: material = {quoted(material)}: there is no [materials]")
-    if material not in materials:
-        raise unknown_name("material", material, materials, where)
-    return {**given, "kind": materials[material].kind}
+    if material not in kinds:
+        raise unknown_name("material", material, kinds, where)
+    return {**given, "kind": kinds[material]}
 
 
 def _check_roles(layers: Mapping[str, dict[str, Any]], named: list[str], where: str) -> None:
@@ -197,7 +203,7 @@ def terminal_values(section: Mapping[str, Any], where: str) -> dict[str, dict[st
     """
     for name in REQUIRED:
         if name not in section:
-            raise InputError(f"{where}: {name} is missing")
+            raise _missing(name, section, where)
     terminals = {}
     for name, given in section.items():
         by_area, here = isinstance(given, Mapping), f"{where.removesuffix(']')}.{name}]"

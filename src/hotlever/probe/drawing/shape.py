@@ -12,7 +12,6 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from hotlever.errors import InputError, quoted
-from hotlever.materials import Kind
 from hotlever.probe.drawing.contacts import covered
 from hotlever.probe.drawing.layers import (
     DRAWN,
@@ -86,7 +85,7 @@ class DrawingFile(Record):
         return read_sheet(path, self.cell, unit_um=unit_um, tolerance_um=tolerance_um)
 
 
-class Drawing(DrawingFile, Shape):
+class DrawnShape(DrawingFile, Shape):
     """A lever of any outline; lengths in µm.
 
     Layers that a probe file takes from a drawing file are read once, when the drawing is made
@@ -168,8 +167,8 @@ class Drawing(DrawingFile, Shape):
         sections: Mapping[str, Any],
         where: str,
         folder: Path | None = None,
-        materials: Mapping[str, Kind] | None = None,
-    ) -> Drawing:
+        kinds: Mapping[str, str] | None = None,
+    ) -> DrawnShape:
         """Make a drawing of the sections of a probe file.
 
         Parameters
@@ -180,8 +179,8 @@ class Drawing(DrawingFile, Shape):
             Names them in an error.
         folder : path, optional
             What the name of the file is relative to.
-        materials : mapping of str to Kind, optional
-            Those that layers may be made of.
+        kinds : mapping of str to str, optional
+            Of the materials that layers may be made of, by name.
 
         Raises
         ------
@@ -198,7 +197,7 @@ class Drawing(DrawingFile, Shape):
             except ValidationError:
                 raise InputError(f"{here}: tip_um = {quoted(tip)}: expected [x, y] (µm)") from None
         layers = layer_values(
-            _section(sections, "layers", where), materials or {}, f"{where}: [layers]"
+            _section(sections, "layers", where), kinds or {}, f"{where}: [layers]"
         )
         terminals = terminal_values(_section(sections, "terminals", where), f"{where}: [terminals]")
         given = {name: part[DRAWN] for name, part in layers.items()} | {

@@ -1,0 +1,292 @@
+"""Levers drawn in Python: areas, what they are made of, and where terminals hold them.
+
+Areas are polygons of shapely, one or several, with holes or without, so that all of that library
+can be used on them; wherever one is expected a list of points is too (µm). A `Drawing` says what
+the sections ``[probe]``, ``[layers]`` and ``[terminals]`` of a probe file say, and goes the same
+way to a layout.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon, affinity
+from shapely import box as rectangle
+
+from hotlever.errors import InputError, quoted
+from hotlever.probe.drawing.layers import AREA, DRAWN, Rings
+from hotlever.probe.drawing.outlines import GRID, DrawingError, Ring, polygons
+from hotlever.probe.layout import Point
+from hotlever.types import Array
+
+__all__ = ["Drawing", "Layer", "Polygon", "difference", "fillet", "mirror", "rectangle", "union"]
+
+Area: TypeAlias = "Polygon | MultiPolygon | Sequence[Point]"
+#: What is drawn by numbers is drawn well (µm): where a dimension moves one of two edges that were
+#: the same, they are not the same any more.
+_TOLERANCE_UM = 1e-4
+#: Straight lines that stand for a quarter of a circle.
+_QUARTER = 8
+#: An angle (rad) by which an outline turns that is no corner.
+_STRAIGHT = 1e-6
+
+
+@dataclass(frozen=True)
+class Layer:
+    """What is drawn in one layer, and what it is made of.
+
+    Attributes
+    ----------
+    drawn : area or str
+        Or the name of a layer of the drawing's file.
+    material : str, optional
+        Its name among the materials of the probe; left out: the silicon of ``[material]``.
+    thickness_um : float, optional
+        Of a film on the body; left out: a part of the body.
+    """
+
+    drawn: Area | str
+    material: str | None = None
+    thickness_um: float | None = None
+
+    @property
+    def section(self) -> Any:
+        """Its value in ``[layers]``."""
+        if self.material is None and self.thickness_um is None:
+            return _drawn(self.drawn)
+        own = {"material": self.material, "thickness_um": self.thickness_um}
+        return {DRAWN: _drawn(self.drawn), **{key: own[key] for key in own if own[key] is not None}}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A lever as it is drawn; see `hotlever.Probe.from_drawing`.
+
+    Attributes
+    ----------
+    layers : mapping of str to Layer
+        Or to an area of the silicon of ``[material]``: ``silicon`` (or ``body``) is the whole
+        lever, ``heater`` and any other name a low-doped part of it.
+    terminals : mapping of str to area
+        The edges inside it are the terminal; a line of two points is too, and ``{"area": …}`` makes
+        all below it one. There are ``supply`` and ``ground``, and ``reader`` if there is one.
+    tip_um : tuple of float
+        Place of the tip.
+    thickness_um : float
+        Of the body.
+    file, cell : str, optional
+        GDSII, OASIS or DXF; layers and terminals may then be names of its layers.
+    tolerance_um : float, optional
+        What is nearer is the same; left out: 0.0001, of a file 0.002.
+
+    Examples
+    --------
+    >>> from hotlever import Probe
+    >>> leg = rectangle(0, 2, 30, 6)
+    >>> drawing = Drawing(
+    ...     layers={
+    ...         "silicon": union(leg, mirror(leg), rectangle(30, -6, 34, 6)),
+    ...         "heater": rectangle(29, -2, 35, 2),
+    ...     },
+    ...     terminals={"supply": [(0, -6), (0, -2)], "ground": [(0, 2), (0, 6)]},
+    ...     tip_um=(32, 0),
+    ...     thickness_um=0.4,
+    ... )
+    >>> [region.name for region in Probe.from_drawing(drawing).layout().regions]
+    ['heater', 'silicon at ground', 'silicon at supply']
+    """
+
+    layers: Mapping[str, Layer | Area | str]
+    terminals: Mapping[str, Area | str | Mapping[str, Area | str]]
+    tip_um: Point
+    thickness_um: float
+    file: str | None = None
+    cell: str | None = None
+    tolerance_um: float | None = None
+
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """Return the sections of a probe file that describe it.
+
+        Raises
+        ------
+        InputError
+            If what is drawn is no area.
+        """
+        probe = {
+            name: getattr(self, name)
+            for name in ("thickness_um", "tip_um", "file", "cell", "tolerance_um")
+            if getattr(self, name) is not None
+        }
+        if self.file is None:
+            probe.setdefault("tolerance_um", _TOLERANCE_UM)
+        layers = {
+            name: each.section if isinstance(each, Layer) else _drawn(each)
+            for name, each in self.layers.items()
+        }
+        terminals = {
+            name: {AREA: _drawn(each[AREA])}
+            if isinstance(each, Mapping) and AREA in each
+            else _drawn(each)
+            for name, each in self.terminals.items()
+        }
+        return {"probe": {"shape": "drawing", **probe}, "layers": layers, "terminals": terminals}
+
+
+def union(*areas: Area) -> Polygon | MultiPolygon:
+    """Return all that lies in any of some areas.
+
+    Raises
+    ------
+    DrawingError
+        If an outline crosses itself.
+    """
+    return shapely.union_all([_area(area, "union") for area in areas], grid_size=GRID)
+
+
+def difference(area: Area, *others: Area) -> Polygon | MultiPolygon:
+    """Return an area without what lies in others.
+
+    Raises
+    ------
+    DrawingError
+        If an outline crosses itself, or nothing is left.
+    """
+    whole = _area(area, "difference")
+    rest = shapely.difference(whole, union(*others), grid_size=GRID)
+    if rest.is_empty:
+        raise DrawingError("nothing is left", "difference", place=whole)
+    return rest
+
+
+def mirror(area: Area, *, x_um: float | None = None, y_um: float = 0.0) -> Polygon | MultiPolygon:
+    """Return an area seen in the line y = y_um, or x = x_um if that is given (µm).
+
+    Raises
+    ------
+    DrawingError
+        If an outline crosses itself.
+
+    Examples
+    --------
+    >>> mirror(rectangle(0, 1, 4, 3)).bounds, mirror(rectangle(0, 1, 4, 3), x_um=4).bounds
+    ((0.0, -3.0, 4.0, -1.0), (4.0, 1.0, 8.0, 3.0))
+    """
+    across, about = ((1, -1), (0, y_um)) if x_um is None else ((-1, 1), (x_um, 0))
+    return affinity.scale(_area(area, "mirror"), *across, origin=about)
+
+
+def fillet(
+    area: Area, radius_um: float, at: Sequence[Point] | None = None, *, quarter: int = _QUARTER
+) -> Polygon | MultiPolygon:
+    """Return an area with rounded corners.
+
+    An arc is made of straight lines, as many for each corner whatever the radius is, so that it
+    can be a dimension.
+
+    Parameters
+    ----------
+    area : area
+    radius_um : float
+    at : sequence of points, optional
+        Round the corners nearest to these; all if left out.
+    quarter : int
+        Lines that stand for a quarter of a circle.
+
+    Raises
+    ------
+    DrawingError
+        If an edge has no room for the radius, or an outline crosses itself.
+
+    Examples
+    --------
+    >>> round(fillet(rectangle(0, 0, 4, 4), 1.0, quarter=100).area - (16 - 4 + math.pi), 3)
+    -0.0
+    """
+    # without corners that are none, where areas were joined
+    whole = _area(area, "fillet").normalize().simplify(GRID)
+    if not radius_um > 0:
+        raise InputError(f"fillet: found a radius of {radius_um:g} µm, expected one above 0")
+    corners = shapely.get_coordinates(whole)
+    if at is not None:
+        places = np.array(at, dtype=float).reshape(-1, 1, 2)
+        corners = corners[np.linalg.norm(places - corners, axis=2).argmin(axis=1)]
+    rounded = []
+    for part in shapely.get_parts(whole):
+        outline, *holes = (_rounded(ring, corners, radius_um, quarter) for ring in _rings(part))
+        rounded.append(Polygon(outline, holes))
+    return union(*rounded)
+
+
+def _rounded(outline: Ring, chosen: Array, radius: float, quarter: int) -> Array:
+    """Return a ring, (n, 2), with arcs in place of chosen corners."""
+    ring = np.array(outline)
+    before, after = np.roll(ring, 1, axis=0) - ring, np.roll(ring, -1, axis=0) - ring
+    room = np.linalg.norm(after, axis=1)
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    turn = math.pi - np.abs(np.arctan2(cross, (before * after).sum(axis=1)))
+    here = (ring[:, None] == chosen).all(axis=2).any(axis=1) & (turn > _STRAIGHT)
+    cut = np.where(here, radius * np.tan(turn / 2), 0.0)
+    lacking = cut + np.roll(cut, -1) - room
+    if lacking.max() > 0:
+        worst = int(lacking.argmax())
+        raise DrawingError(
+            f"with a radius of {radius:g} µm its arcs need {(lacking + room)[worst]:.4g} µm of an "
+            f"edge of {room[worst]:.4g} µm, expected a radius of at most "
+            f"{radius * room[worst] / (lacking + room)[worst]:.4g} µm",
+            "fillet",
+            place=ring[worst],
+        )
+    points: list[Array] = []
+    for corner, to_before, to_after, angle, length in zip(
+        ring, before, after, turn, cut, strict=True
+    ):
+        if not length:
+            points.append(corner[None])
+            continue
+        back, on = to_before / np.linalg.norm(to_before), to_after / np.linalg.norm(to_after)
+        middle = corner + (back + on) * length / (1 + float(back @ on))
+        first, last = corner + length * back - middle, corner + length * on - middle
+        steps = max(1, round(angle / (math.pi / 2) * quarter))
+        share = np.linspace(0.0, angle, steps + 1)[:, None]
+        # along the circle from one point of contact to the other
+        points.append(
+            middle + (np.sin(angle - share) * first + np.sin(share) * last) / math.sin(angle)
+        )
+    return np.concatenate(points)
+
+
+def _area(area: Any, what: str) -> Polygon | MultiPolygon:
+    """Return what is given as an area as one that is valid; `what` names it in an error."""
+    if isinstance(area, Polygon | MultiPolygon):
+        if area.is_valid:
+            return area
+        # says where, if it is one outline that is wrong
+        outlines = polygons(what, _rings(area), 0.0)
+        raise DrawingError("outlines that cross or touch each other", what, place=outlines[0])
+    try:
+        ring = tuple((float(x), float(y)) for x, y in area)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{what}: found {quoted(area)}, expected a polygon or points such as "
+            "[(0, 0), (4, 0), (4, 2)] (µm)"
+        ) from None
+    return polygons(what, [ring], 0.0)[0]
+
+
+def _drawn(area: Any) -> Any:
+    """Return outlines and holes of an area; the name of a layer, or a list of points, as it is."""
+    return _rings(area) if isinstance(area, Polygon | MultiPolygon) else area
+
+
+def _rings(area: Polygon | MultiPolygon) -> Rings:
+    """Return the outlines of an area, each with its holes after it."""
+    return tuple(
+        tuple((x, y) for x, y in ring.coords[:-1])
+        for part in shapely.get_parts(area)
+        for ring in (part.exterior, *part.interiors)
+    )
