@@ -28,7 +28,13 @@ from hotlever.estimation import Fit, read_fit
 from hotlever.estimation.summary import parameter_rows
 from hotlever.lever.meshing import chosen_space
 from hotlever.lever.transient.waveform_texts import waveform_from_text
-from hotlever.measurement import parse_columns, read_measurement, read_measurement_of
+from hotlever.measurement import (
+    FileColumn,
+    parse_columns,
+    preview,
+    read_measurement,
+    read_measurement_of,
+)
 from hotlever.probe import Layout, Probe
 from hotlever.probe.probe import read_sections
 from hotlever.probe.shapes import PARAMETRIC
@@ -54,23 +60,35 @@ def understood(
     """
     told = told or {}
     probe = _probe(folder, told.get("probe"))
-    columns = parse_columns(told.get("columns") or [])
+    assigned = parse_columns(told.get("columns") or [])
     pulse = told.get("waveform")
     waveform = waveform_from_text("pulse", pulse) if pulse else None
-    measurement = read_measurement_of(probe, folder / name, columns, waveform)
+    measurement = read_measurement_of(probe, folder / name, assigned, waveform)
     data = measurement.dataset(probe.circuit)
     (along,) = data.sizes
     data = data.isel({along: slice(None, None, data.sizes[along] // _POINTS + 1)})
     in_time = {"time_us": data.time.values.tolist()} if along == "time" else {}
     columns_shown = ("bias_V", "lever_V", *(column.name for column in OBSERVABLES.values()))
     head, *rows = measurement.understood
+    # the page shows all columns
+    _, unused = preview(folder / name, assigned, driven=waveform is not None)
+    notes = [note for note in measurement.notes if note not in unused]
     return {
         "rows": [(name, *head[1:]), *rows],
-        "notes": [note.replace(f"{folder}/", "") for note in measurement.notes],
+        "notes": [note.replace(f"{folder}/", "") for note in notes],
         "observables": list(measurement.observables),
         "medium": measurement.medium,
         "data": in_time | {column: data[column].values.tolist() for column in columns_shown},
     }
+
+
+def columns(report: Report, folder: Path, name: str, told: Mapping[str, Any]) -> list[FileColumn]:
+    """Return the columns of a measurement file, and what they are used as; see `understood`."""
+    try:
+        assigned = parse_columns(told.get("columns") or [])
+    except InputError:
+        assigned = {}
+    return preview(folder / name, assigned, driven=bool(told.get("waveform")))[0]
 
 
 def page(report: Report, folder: Path, kind: str, name: str) -> None:

@@ -7,6 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from hotlever.datasets import MEASURANDS, OBSERVABLES, PLAIN
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_bytes
 from hotlever.measurement.data import LEVER, MEASURED, TIME
-from hotlever.tables import TextTable
+from hotlever.tables import TextTable, read_table
 from hotlever.tables.cells import text_lines
 from hotlever.types import Array
 from hotlever.units import TIMES, conversion, name_and_unit, unknown_unit
@@ -123,6 +124,23 @@ def _quantity(heading: str, assigned: bool = False) -> tuple[str | None, str | N
     of_time = assigned or conversion(unit or "", MEASURANDS[TIME].unit)
     is_time = name.casefold() in TIMES and of_time
     return TIME if is_time else symbol_of(name), unit
+
+
+def quantity_of(heading: str, *, assigned: bool = False) -> str | None:
+    """Return the quantity that a heading, or what is assigned to one, names; None if not known."""
+    return _quantity(heading, assigned)[0]
+
+
+def measured_table(path: str | os.PathLike[str], assigned: Mapping[str, str]) -> TextTable:
+    """Read the table of a measurement file, below the row whose headings are known or assigned.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    expected = "one like 'V_b (V),I_h (mA),V_r (mV)'"
+    return read_table(path, expected, is_heading=partial(is_heading, assigned=assigned))
 
 
 def is_heading(name: str, assigned: Mapping[str, str]) -> bool:
@@ -282,17 +300,21 @@ def is_taken_as_bias(columns: Mapping[str, Column], assigned: Mapping[str, str])
     return bias is not None and "V_b" not in told and _quantity(bias.heading)[0] != "V_b"
 
 
-def notes_on_columns(
+def note_on_bias(
     table: TextTable, columns: Mapping[str, Column], assigned: Mapping[str, str]
 ) -> list[str]:
-    """Say which heading was taken as the bias without naming it, and which columns are not used."""
-    notes = []
-    bias = columns.get("V_b")
-    if bias is not None and is_taken_as_bias(columns, assigned):
-        notes.append(
-            f"{table.path}: {bias.origin} is the only voltage and counts as the bias; if it is "
-            f"that over the lever, say {_assignment(LEVER, bias.heading)}"
-        )
+    """Say which heading was taken as the bias without naming it."""
+    if not is_taken_as_bias(columns, assigned):
+        return []
+    bias = columns["V_b"]
+    return [
+        f"{table.path}: {bias.origin} is the only voltage and counts as the bias; if it is "
+        f"that over the lever, say {_assignment(LEVER, bias.heading)}"
+    ]
+
+
+def note_on_unused(table: TextTable, columns: Mapping[str, Column]) -> list[str]:
+    """Say which columns are not used, and what they may be."""
     used = {column.index for column in columns.values()}
     unused = [
         (heading, name_and_unit(heading)[1] or "")
@@ -305,10 +327,10 @@ def notes_on_columns(
         likely = next((column for column in missing if conversion(unit, column.unit)), None)
         if likely is not None:
             hints.append(f"if one is {likely.symbol}, say {_told(likely.symbol, heading)}")
-    if unused:
-        names = [f"'{shown(heading)}'" for heading, _ in unused]
-        more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-        what = f"columns {', '.join(names[:_MOST_NAMES])}{more} are"
-        what = what if len(names) > 1 else f"column {names[0]} is"
-        notes.append(f"{table.path}: {'; '.join([f'{what} not used', *hints[:_MOST_HINTS]])}")
-    return notes
+    if not unused:
+        return []
+    names = [f"'{shown(heading)}'" for heading, _ in unused]
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    what = f"columns {', '.join(names[:_MOST_NAMES])}{more} are"
+    what = what if len(names) > 1 else f"column {names[0]} is"
+    return [f"{table.path}: {'; '.join([f'{what} not used', *hints[:_MOST_HINTS]])}"]

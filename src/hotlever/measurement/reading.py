@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,9 +14,10 @@ from hotlever.lever.transient.waveform import Waveform
 from hotlever.measurement.bias import check_times, find_bias, find_waveform, leave_out_jumps, mirror
 from hotlever.measurement.columns import (
     find_columns,
-    is_heading,
     is_taken_as_bias,
-    notes_on_columns,
+    measured_table,
+    note_on_bias,
+    note_on_unused,
     parse_columns,
 )
 from hotlever.measurement.contents import Contents, check
@@ -25,7 +25,6 @@ from hotlever.measurement.data import MEASURED, TIME, Measurement
 from hotlever.measurement.rows import described, disagreements, sweeps_of
 from hotlever.measurement.settings import Settings
 from hotlever.probe import Circuit, Probe
-from hotlever.tables import read_table
 
 _MOST_NOTES = 20
 
@@ -74,8 +73,7 @@ def read_measurement(
         no lever can have, or whose unit must be wrong.
     """
     assigned = parse_columns(f"{name}={heading}" for name, heading in (columns or {}).items())
-    expected = "one like 'V_b (V),I_h (mA),V_r (mV)'"
-    table = read_table(path, expected, is_heading=partial(is_heading, assigned=assigned))
+    table = measured_table(path, assigned)
     settings = Settings.of(table)
     quantities = find_columns(table, assigned, driven=waveform is not None)
     remarks = (
@@ -91,7 +89,11 @@ def read_measurement(
         assumed = circuit is not None and is_taken_as_bias(quantities, assigned)
         series_ohm = circuit.series_resistance_ohm if circuit and assumed else 0.0
         order = _complete_at_rest(contents, circuit, series_ohm, symmetric=not signed)
-    notes = contents.notes + notes_on_columns(table, quantities, assigned)
+    notes = [
+        *contents.notes,
+        *note_on_bias(table, quantities, assigned),
+        *note_on_unused(table, quantities),
+    ]
     more = len(notes) - _MOST_NOTES
     if more > 0:
         notes[_MOST_NOTES:] = [f"{path}: {more} more such notes"]

@@ -6,6 +6,7 @@ A measurement is dropped or chosen; a file is made of it, whose page is shown.
 from __future__ import annotations
 
 from collections.abc import Awaitable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 from nicegui import ui
 
 from hotlever.app.jobs import Job
+from hotlever.app.pages.columns import ColumnPicker
 from hotlever.app.pages.frame import (
     FIGURE_FILES,
     ErrorBanner,
@@ -30,6 +32,7 @@ from hotlever.app.pages.plots import MeasuredPlots
 from hotlever.app.project import DATA
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError, InputError
+from hotlever.measurement import FileColumn
 
 _DROP = "Drop a measurement here (bias, current and what else there is), or press +"
 
@@ -60,6 +63,7 @@ class MeasuredPage(Page):
             with right:
                 Work(session, self.name, self._ended, during=self._follow, notes=False)
                 self._result = ui.column().classes("w-full gap-2")
+                self._columns = ColumnPicker(partial(self.tell, "columns"))
                 opened = ui.expansion("What was understood", value=True)
                 self._understood = opened.props("header-class=text-bold")
                 with self._understood, ui.column().classes("w-full gap-2"):
@@ -108,15 +112,6 @@ class MeasuredPage(Page):
         self._select = self.choice("data", "Measurement", names, None)
         if not names:
             small_button("Try the example", self._example, icon="science")
-        with ui.expansion("Columns with other names"):
-            self._columns = ui.textarea(
-                value="\n".join(self.told["columns"]),
-                placeholder="I_h (uA)=Current",
-                on_change=lambda event: self.tell("columns", _lines(event.value)),
-            )
-            label = "Which column is which, one on a line"
-            self._columns.props(f'dense outlined autogrow aria-label="{label}"')
-            caption("One on a line: QUANTITY (UNIT)=NAME of the column, or its number.")
 
     async def _dropped(self, names: list[str]) -> None:
         self._select.set_options(self.session.project.data)
@@ -144,7 +139,6 @@ class MeasuredPage(Page):
 
     def show_told(self) -> None:
         """Show what was told of the measurement that is chosen."""
-        self._columns.set_value("\n".join(self.told["columns"]))
 
     def changed(self) -> Awaitable[None] | None:
         """Read the measurement anew if another one, or another probe, was chosen."""
@@ -158,11 +152,14 @@ class MeasuredPage(Page):
         """Read the measurement, and show what was understood, and what was made of it before."""
         self._reads += 1
         turn, understood, name = self._reads, None, self.chosen["data"]
+        columns: list[FileColumn] = []
         self._read_of = name, self.chosen.get("probe")
         self.banner.clear()
         if name is not None:
             told = {key: self.told[key] for key in self.tellable}
             told["probe"] = self.chosen.get("probe")
+            with suppress(HotleverError):
+                columns = await self.session.ask("full", "showing:columns", name, told)
             try:
                 understood = await self.session.ask("full", "showing:understood", name, told)
             except HotleverError as error:
@@ -170,6 +167,7 @@ class MeasuredPage(Page):
                     self.banner.say(str(error))
         if turn != self._reads:  # something else has been chosen meanwhile
             return
+        self._columns.show(columns, self.told["columns"], understood is not None)
         self._show_understood(understood)
         if job := self.session.jobs.by_page.get(self.name):
             self._follow(job)
@@ -269,7 +267,3 @@ class _ResultBlocks:
             asked = self._kind, self._name, shown, suffix
             drawn = self._page.session.ask("full", "showing:drawn", *asked)
             await hand_over(drawn, f"{Path(self._name).name.split('.')[0]}-{shown}{suffix}")
-
-
-def _lines(text: str | None) -> list[str]:
-    return [line.strip() for line in (text or "").splitlines() if line.strip()]
