@@ -30,8 +30,8 @@ from hotlever.lever.meshing import chosen_space
 from hotlever.lever.transient.waveform_texts import waveform_from_text
 from hotlever.measurement import (
     FileColumn,
+    file_columns,
     parse_columns,
-    preview,
     read_measurement,
     read_measurement_of,
 )
@@ -71,7 +71,7 @@ def understood(
     columns_shown = ("bias_V", "lever_V", *(column.name for column in OBSERVABLES.values()))
     head, *rows = measurement.understood
     # the page shows all columns
-    _, unused = preview(folder / name, assigned, driven=waveform is not None)
+    _, unused = file_columns(folder / name, assigned, driven=waveform is not None)
     notes = [note for note in measurement.notes if note not in unused]
     return {
         "rows": [(name, *head[1:]), *rows],
@@ -88,7 +88,7 @@ def columns(report: Report, folder: Path, name: str, told: Mapping[str, Any]) ->
         assigned = parse_columns(told.get("columns") or [])
     except InputError:
         assigned = {}
-    return preview(folder / name, assigned, driven=bool(told.get("waveform")))[0]
+    return file_columns(folder / name, assigned, driven=bool(told.get("waveform")))[0]
 
 
 def page(report: Report, folder: Path, kind: str, name: str) -> None:

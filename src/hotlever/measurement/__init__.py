@@ -7,16 +7,16 @@ and the order of the rows; `preview` shows the columns of a file that may be non
 
 from hotlever.measurement.columns import parse_columns
 from hotlever.measurement.data import MEASURED, Measurement, with_measured_circuit
-from hotlever.measurement.preview import FileColumn, preview
+from hotlever.measurement.preview import FileColumn, file_columns
 from hotlever.measurement.reading import given_measurement, read_measurement, read_measurement_of
 
 __all__ = [
     "MEASURED",
     "FileColumn",
     "Measurement",
+    "file_columns",
     "given_measurement",
     "parse_columns",
-    "preview",
     "read_measurement",
     "read_measurement_of",
     "with_measured_circuit",

@@ -38,7 +38,7 @@ class FileColumn:
     symbol: str
 
 
-def preview(
+def file_columns(
     path: str | os.PathLike[str], columns: Mapping[str, str] | None = None, *, driven: bool = False
 ) -> tuple[list[FileColumn], list[str]]:
     """Return the columns of a measurement file, which may lack what a measurement needs.

@@ -237,6 +237,19 @@ class ContactRequest(TableRequest, LeverRequest, TimesRequest):
 
 
 @dataclass(kw_only=True)
+class SpectrumRequest(TableRequest, LeverRequest):
+    """A lever under small signals."""
+
+    bias: str = option(MISSING, metavar="V", help="Of the operating point.")
+    frequency: str = option(
+        "1Hz:10MHz:71", metavar="START:STOP:COUNT", help="Spaced evenly in the logarithm."
+    )
+    amplitude: str | None = option(
+        None, metavar="V", help="Of a sine about the bias: harmonics of V_l instead (3ω method)."
+    )
+
+
+@dataclass(kw_only=True)
 class ImportRequest(PlotRequest):
     """A probe file for a drawing."""
 
