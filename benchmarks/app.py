@@ -24,7 +24,7 @@ from bad_files import bad_files
 from problems import table
 from random_clicks import PAGES, RandomUser, act
 
-MATERIAL = "phonon scattering exponent"
+MATERIAL = "phonon scattering exponent, p"
 #: Seconds after which the app has forgotten a page, and given back its memory.
 _FORGOTTEN_S = 52.0
 #: Notes when a key was pressed, and which plots were drawn since.

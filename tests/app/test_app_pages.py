@@ -240,7 +240,7 @@ def test_a_shape_is_drawn_while_its_fields_change(tmp_path: Path) -> None:
         field = next(
             one
             for one in user.client.elements.values()
-            if isinstance(one, ui.number) and one.props["label"] == "length_um"
+            if isinstance(one, ui.number) and one.props["label"] == "length"
         )
         field.set_value(60.0)
         await until(lambda: "length_um = 60" in page_text.value)

@@ -129,7 +129,7 @@ def test_saving_asks_before_another_file_is_replaced(tmp_path: Path) -> None:
         press(user, "Replace it")
         await until(lambda: "three-leg" in path.read_text())
         # what was saved here is saved again without a question, unless another has written it
-        of(user, ui.number, "length_um").set_value(60.0)
+        of(user, ui.number, "length").set_value(60.0)
         await until(lambda: "length_um = 60" in of(user, ui.textarea).value)
         press(user, "Save")
         await until(lambda: "length_um = 60" in path.read_text())

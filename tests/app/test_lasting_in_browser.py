@@ -44,7 +44,7 @@ def test_a_project_is_what_it_was(tmp_path: Path) -> None:
         choose(page, "Probe", "own.toml")
         expect(page.get_by_text("hotlever sweep own.toml --bias")).to_be_visible(timeout=_WORK)
         expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
-        n_d = page.get_by_label("n_d, ").first
+        n_d = page.get_by_label("doping concentration of the heater, n_d").first
         n_d.fill("5e17")
         bias = page.get_by_label("Bias in volts")
         bias.fill("6.5")

@@ -120,7 +120,7 @@ def test_a_page_shows_what_was_undone(tmp_path: Path) -> None:
     async def story(user: User, session: Session) -> None:
         await user.open("/lever")
         await until(lambda: "length_um = 54.4" in of(user, ui.textarea).value)
-        field = of(user, ui.number, "length_um")
+        field = of(user, ui.number, "length")
         field.set_value(60.0)
         await until(lambda: "length_um = 60" in of(user, ui.textarea).value)
         press(user, "Undo")

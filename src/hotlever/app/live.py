@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from PIL import Image
-from shapely import Polygon, contains_xy
 
 from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
@@ -26,12 +25,13 @@ from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError
 from hotlever.lever import Branch, Lever
 from hotlever.lever.branch import Reach
+from hotlever.lever.current_path import current_path
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.reduced.response_surface import is_papers
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
-from hotlever.probe import Circuit, Layout, Probe
+from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import of_materials
 from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.tasks.probes import make_lever
@@ -43,6 +43,8 @@ _POINTS, _CELLS = 121, 360
 #: Steps of the highest temperature (K) that the colours of the map reach, and the colours.
 _SCALE_K = 100.0
 _COLOURS = colormaps[HEAT](np.linspace(0.0, 1.0, 256), bytes=True)
+#: Share of the branch at which it is nearly cold.
+_COLD = 0.02
 #: How much making reduced levers steps back behind other work.
 _NICE = 10
 #: Levers kept for sliders that go back and forth.
@@ -52,9 +54,12 @@ FULL, REDUCED, COARSE_MODEL = "full lever", "reduced lever", "coarse lever"
 
 
 class _Map:
-    """Temperatures of a lever on a grid of cells, and along the line through heater and tip."""
+    """Temperatures of a lever on a grid of cells, and along the current through the tip.
 
-    def __init__(self, space: FullSpace) -> None:
+    Its `potential` (V, at the nodes) is of a state in which a current flows.
+    """
+
+    def __init__(self, space: FullSpace, potential: Array) -> None:
         layout = space.mesh.layout
         low, high = layout.box
         step = float(max(high - low)) / _CELLS
@@ -63,13 +68,12 @@ class _Map:
         ends = self.x[0] - half, self.x[-1] + half, self.y[0] - half, self.y[-1] + half
         self.box = [float(end) for end in ends]
         points = np.stack(np.meshgrid(self.x, self.y), axis=-1).reshape(-1, 2)
-        self._inside = _inside(layout, points)
+        self._inside = layout.contains(points)
         probes = space.elements.basis.probes
         self._cells = probes(points[self._inside].T)
-        line = np.column_stack([np.linspace(low[0], high[0], 161), np.full(161, layout.tip[1])])
-        line = line[_inside(layout, line)]
-        self.along = line[:, 0]
-        self._line = probes(line.T) if len(line) else None
+        self.outline = layout.outline
+        path, self.along = current_path(space, potential)
+        self._line = probes(path.T)
 
     def picture(self, T: Array, low: float, high: float) -> bytes:
         """Return the map as PNG, coloured from `low` to `high` (K), transparent beside the lever.
@@ -85,17 +89,12 @@ class _Map:
         return written.getvalue()
 
     def line(self, T: Array) -> Array:
-        """Return the temperature (K) along the line through the tip."""
-        return np.zeros(0) if self._line is None else np.asarray(self._line @ T)
+        """Return the temperature (K) along the current."""
+        return np.asarray(self._line @ T)
 
 
-def _inside(layout: Layout, points: Array) -> Any:
-    """Return which points lie inside a layout, and not on its edges."""
-    inside = np.zeros(len(points), dtype=bool)
-    for region in layout.regions:
-        outer, *holes = region.rings
-        inside |= contains_xy(Polygon(outer, holes), points)
-    return inside
+#: Maps by mesh; those of one shape share it.
+_maps: dict[int, tuple[object, _Map]] = {}
 
 
 @dataclass
@@ -121,6 +120,21 @@ class LiveLever:
             "knee": None if knee is None else vars(knee),
         }
 
+    @property
+    def map(self) -> _Map:
+        """How its states are drawn, and those of all levers of this mesh."""
+        number = id(self.space.mesh)
+        if number not in _maps:
+            if len(_maps) >= _KEPT:
+                _maps.clear()
+            # where it is nearly cold the path of the current is that of the shape
+            x = self.branch.states(np.array([_COLD * self.branch.end_u]))
+            x = self.branch.equations.space.expanded(x)[:, 0]
+            potential = self.space.nodal(x, self.branch.base_temperature_K)[1]
+            # the mesh is kept, so that no other gets its number
+            _maps[number] = self.space.mesh, _Map(self.space, potential)
+        return _maps[number][1]
+
     def reaches(self, bias: float) -> bool:
         """Whether its branch has a state at a bias (V)."""
         return bool(np.isfinite(self.branch.read(self.circuit, np.array([bias])).u).all())
@@ -139,7 +153,7 @@ class LiveLever:
         shown = {name: float(value[0]) for name, value in self.branch.shown(reading.u).items()}
         x = self.branch.equations.space.expanded(self.branch.states(reading.u))
         low = self.branch.base_temperature_K
-        drawn, T = _map_of(self.space), self.space.nodal(x[:, 0], low, self.circuit.end_rises())[0]
+        drawn, T = self.map, self.space.nodal(x[:, 0], low, self.circuit.end_rises())[0]
         # in steps, so that colours stay the same while the lever gets a little hotter
         high = _SCALE_K * np.ceil(max(float(T.max()), low + 1.0) / _SCALE_K)
         return {
@@ -153,20 +167,6 @@ class LiveLever:
             "line": drawn.line(T),
             "notes": reading.notes(np.array([bias])),
         }
-
-
-#: Maps by mesh; those of one shape share it.
-_maps: dict[int, tuple[object, _Map]] = {}
-
-
-def _map_of(space: FullSpace) -> _Map:
-    number = id(space.mesh)
-    if number not in _maps:
-        if len(_maps) >= _KEPT:
-            _maps.clear()
-        # the mesh is kept, so that no other gets its number
-        _maps[number] = space.mesh, _Map(space)
-    return _maps[number][1]
 
 
 # --- called from the app -------------------------------------------------------------------------
@@ -201,12 +201,13 @@ def answer(
     live = _quick(probe, most, ask["reduced"]) if ask["quick"] else _full(report, probe, most)
     if live.model == REDUCED and not live.reaches(ask["bias"]):
         live = _quick(probe, most, False)
-    drawn = _map_of(live.space)
+    drawn = live.map
     return {
         "model": live.model,
         "curves": live.curves,
         "now": live.at(ask["bias"]),
         "box": drawn.box,
+        "outline": drawn.outline,
         "along": drawn.along,
         "base_K": live.branch.base_temperature_K,
     }
@@ -225,7 +226,7 @@ def prepare(report: Report, folder: Path, name: str | None, changes: dict[str, A
 
 
 def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
-    """Return what sliders need of a probe: by group names, values, bounds, units and meanings."""
+    """Return what sliders need of a probe: by group names, values, bounds and units."""
     probe = _probe(folder, name, {})
     sliders: dict[str, list[Any]] = {"material": [], "dimensions": [], "circuit": []}
     parameters = of_materials(probe)
@@ -235,25 +236,27 @@ def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
         if value == 0.0:
             low, high = -0.2 * parameter.scale, 0.2 * parameter.scale
         ends = min(low, value), max(high, value)
-        sliders["material"].append((key, value, *ends, parameter.unit, parameter.meaning))
-    meanings = probe.shape.description()
+        sliders["material"].append((key, value, *ends, parameter.unit))
     for key, value in probe.shape.dimensions().items():
         if key not in probe.shape.tied():
             low, high = (0.8 * value, 1.2 * value) if key != EDGE_BIAS else (-0.2, 0.2)
             ends = min(low, value), max(high, value)
-            sliders["dimensions"].append((key, value, *ends, "µm", meanings.get(key, "")))
+            sliders["dimensions"].append((key, value, *ends, "µm"))
     circuit = probe.circuit
     resistance, base = circuit.series_resistance_ohm, circuit.base_temperature_K
     top = max(2 * resistance, 1000.0)
     sliders["circuit"] = [
-        ("series_resistance_ohm", resistance, 0.0, top, "Ω", "series resistance"),
-        ("base_temperature_K", base, 250.0, 400.0, "K", "temperature of the leg ends"),
+        ("series_resistance_ohm", resistance, 0.0, top, "Ω"),
+        ("base_temperature_K", base, 250.0, 400.0, "K"),
     ]
     return {
         "sliders": sliders,
-        "medium": probe.surroundings.medium,
-        "gap_um": probe.surroundings.surface_gap_um,
-        "physics": dict(probe.physics),
+        "meanings": probe.shape.description() | probe.circuit.description(),
+        "around": {
+            "medium": probe.surroundings.medium,
+            "surface_gap_um": probe.surroundings.surface_gap_um,
+            **dict(probe.physics),
+        },
         "reduced": _can_be_reduced(probe),
     }
 

@@ -36,6 +36,8 @@ _IMPURITIES = 0.75
 _SCATTERING, _SEEBECK = 0.5, 5.0
 #: Of the emissivity: it depends on the thickness and on the doping.
 _EMISSIVITY = 0.7
+#: What a₁ is.
+_SLOPE = "temperature coefficient of the high-doped resistivity"
 #: What counts in time alone.
 IN_TIME = "in time"
 #: Units by the endings of names in probe files.
@@ -135,7 +137,7 @@ OF_SILICON = _table(
             ("n_d", "n_d", "cm⁻³", 1e17, 1e16, 1e19, "doping concentration of the heater"),
             ("p", "p", "1", 1.0, 1.0, 4.0, "phonon scattering exponent"),
             ("a0", "a₀", "Ω cm", 1e-4, 1e-4, 1e-2, "high-doped resistivity at 300 K"),
-            ("a1", "a₁", "Ω cm K⁻¹", 1e-6, 0.0, 1e-5, "its temperature coefficient"),
+            ("a1", "a₁", "Ω cm K⁻¹", 1e-6, 0.0, 1e-5, _SLOPE),
         )
     ),
     Parameter(
@@ -209,7 +211,7 @@ OF_DIELECTRIC = _table(
     ),
     Parameter(
         *("kappa_exponent", "m", "1", 1.0, -1.5, 1.5),
-        "power of the temperature in it",
+        "power of the temperature in the thermal conductivity",
         value=0.0,
     ),
     _scale("kappa", "c_κ"),
@@ -325,6 +327,21 @@ def parameter_named(name: str) -> Parameter:
     stem, _, ending = name.rpartition("_")
     words = (stem if ending in _UNITS else name).replace("_", " ")
     return Parameter(name, words, _UNITS.get(ending, "1"), 1.0, -math.inf, math.inf, words)
+
+
+def label(name: str) -> str:
+    """Return what a parameter, or any other value of a probe file, is called in words.
+
+    Examples
+    --------
+    >>> label("n_d"), label("heater_width_um")
+    ('doping concentration of the heater, n_d', 'heater width')
+    >>> label("film.tcr")
+    'temperature coefficient of the resistivity, α (film)'
+    """
+    named = parameter_named(name)
+    meaning = named.meaning.removesuffix(f", {name.rpartition('.')[0]}")
+    return named.symbol if meaning == named.symbol else f"{meaning}, {named.symbol}"
 
 
 def scaled_unit(name: str) -> str:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hotlever.errors import InputError
 from hotlever.materials import HIGH_DOPED
@@ -241,6 +242,25 @@ class Layout:
         """Least and largest corner of the lever, shape (2, 2)."""
         boxes = np.array([region.box for region in self.regions])
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    @property
+    def outline(self) -> list[list[Point]]:
+        """The outer rings, and those of the holes, of all regions together (µm)."""
+        parts = getattr(self._polygon, "geoms", [self._polygon])
+        rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
+        return [list(ring.coords) for ring in rings]
+
+    def contains(self, points: Array) -> NDArray[np.bool_]:
+        """Return which of some points (µm), shape (n, 2), lie inside, and not on the edge."""
+        from shapely import contains_xy
+
+        return np.asarray(contains_xy(self._polygon, points))
+
+    @property
+    def _polygon(self) -> Any:
+        from shapely import Polygon, union_all
+
+        return union_all([Polygon(region.outline, region.holes) for region in self.regions])
 
     @property
     def terminal_names(self) -> tuple[str, ...]:

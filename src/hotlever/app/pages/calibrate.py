@@ -92,11 +92,11 @@ class _Question:
         self._session, self._name, self._along = session, name, along
         self._asked = session.choices("asked")
         title, unit = _ASKED[along]
-        with ui.row().classes("w-full items-center no-wrap"):
+        with ui.row().classes("w-full items-center"):
             value = self._asked[along]
             self._number = ui.number(f"For a {title} of", value=value, on_change=self.answer)
-            self._number.props(f"suffix={unit} debounce=150").classes("w-48")
-            self._answer = ui.label().classes("remark").props("aria-live=polite")
+            self._number.props(f"suffix={unit} debounce=150").classes("w-60")
+            self._answer = ui.label().classes("remark col min-w-60").props("aria-live=polite")
             self._answer.props(f"data-answer={along}")
 
     async def answer(self) -> None:

@@ -33,6 +33,9 @@ _ALSO = {"simulate": {"pulse"}, "fit": {"files"}, "calibrate": {"files", "asked"
 FIGURE_FILES = (".svg", ".png", ".pdf")
 #: Changes that are listed, and files of each that are named; refused files that are named.
 _LISTED, _NAMED, _REFUSED = 30, 4, 5
+#: A cell that is a button.
+_CHOICE = """<q-td :props="props"><q-btn flat dense no-caps color="primary" :label="props.value"
+    @click="$parent.$emit('chosen', props.value)" /></q-td>"""
 _STYLE = Path(__file__).with_name("style.css")
 
 
@@ -54,22 +57,26 @@ def framed(session: Session, page: str) -> Iterator[ErrorBanner]:
     look_alike()
     ui.page_title(f"{title} · hotlever")
     ui.add_css(_STYLE)
-    ui.colors(primary="#0072B2", negative="#D55E00", positive="#009E73", warning="#E69F00")
+    ui.colors(primary="#0072B2")
     dark = ui.dark_mode(session.chosen.get("dark", False))
 
     def switch() -> None:
         dark.value = session.chosen["dark"] = not dark.value
 
     with ui.header().classes("items-center q-py-xs no-wrap").props("role=banner"):
-        ui.label("hotlever").classes("text-bold text-lg q-mr-md")
-        with ui.element("nav").classes("row no-wrap").props('aria-label="Pages"'):
+        with flat_button(title, None, icon="menu", label=f"Pages: {title}") as menu, ui.menu():
+            for other, (name, _) in PAGES.items():
+                ui.menu_item(name, partial(ui.navigate.to, f"/{other}"))
+        menu.props("color=white").classes("lt-md")
+        ui.label("hotlever").classes("text-bold text-lg q-mr-md gt-sm")
+        with ui.element("nav").classes("row gt-sm").props('aria-label="Pages"'):
             for other, (name, icon) in PAGES.items():
                 here = other == page
                 link = ui.button(name, icon=icon, on_click=partial(ui.navigate.to, f"/{other}"))
                 link.props(f"flat dense color=white {'aria-current=page' if here else ''}")
-                link.classes("q-px-sm" + (" bg-white/25" if here else ""))
+                link.classes("q-px-sm" + (" bg-black/25" if here else ""))
         ui.space()
-        ui.label(str(session.project.folder)).classes("text-xs ellipsis gt-sm")
+        ui.label(str(session.project.folder)).classes("text-xs ellipsis gt-md")
         for label, icon, click in (
             ("Undo", "undo", partial(_step, session, page, -1)),
             ("Redo", "redo", partial(_step, session, page, 1)),
@@ -115,9 +122,9 @@ class ErrorBanner:
 
 
 @contextmanager
-def two_columns() -> Iterator[tuple[ui.column, ui.column]]:
-    """Give a narrow column for what is set and a wide one for what comes out."""
-    with ui.row().classes("w-full items-start"):
+def two_columns(style: str = "") -> Iterator[tuple[ui.column, ui.column]]:
+    """Give a narrow column for what is set and a wide one for what comes out; see style.css."""
+    with ui.row().classes(f"w-full items-start {style}"):
         left = ui.column().classes("controls gap-3")
         right = ui.column().classes("results gap-3")
         yield left, right
@@ -243,8 +250,16 @@ def figure(content: str, alt: str, *, wide: bool = False) -> None:
         image.props["src"], image.props["alt"] = source, alt
 
 
-def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], **options: Any) -> ui.table:
-    """Show rows of texts; cells are escaped by the browser's own table."""
+def table(
+    columns: Sequence[str],
+    rows: Sequence[Sequence[Any]],
+    chosen: Callable[[str], Any] | None = None,
+    **options: Any,
+) -> ui.table:
+    """Show rows of texts; cells are escaped by the browser's own table.
+
+    The first of each is a button if something is to follow when a row is `chosen` by it.
+    """
     names = [str(number) for number in range(len(columns))]
     head = [
         {"name": name, "label": label, "field": name, "align": "left"}
@@ -252,6 +267,9 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], **options: Any)
     ]
     body = [{"id": number, **dict(zip(names, row, strict=True))} for number, row in enumerate(rows)]
     shown = ui.table(columns=head, rows=body, row_key="id", **options)
+    if chosen is not None:
+        shown.add_slot("body-cell-0", _CHOICE)
+        shown.on("chosen", lambda event: chosen(event.args))
     return shown.classes("w-full").props("dense flat bordered")
 
 

@@ -112,8 +112,7 @@ class LeversPage(Page):
         with ui.row().classes("items-center"):
             for name, label in _FILES.items():
                 download_button(self.session, name, label)
-        shown = table(levers["head"], levers["rows"]).classes("cursor-pointer")
-        shown.on("rowClick", lambda event: self._open(event.args[1]["0"]))
+        table(levers["head"], levers["rows"], self._open)
         caption("A click on a lever opens it on the page Fit.")
 
     def _open(self, stem: str) -> None:

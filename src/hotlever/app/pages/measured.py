@@ -231,7 +231,7 @@ class _ResultBlocks:
     async def show(self) -> None:
         """Show it as it is drawn."""
         shown = ui.row().classes("w-full gap-3 items-start")
-        waiting = ui.spinner(size="lg")
+        waiting = ui.spinner(size="lg").props('aria-label="Being drawn"')
 
         def hear(kind: str, block: dict[str, Any]) -> None:
             if kind == "block" and not shown.is_deleted:

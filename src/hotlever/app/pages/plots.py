@@ -106,7 +106,7 @@ class MeasuredPlots:
 
 
 class LivePlots:
-    """Temperature map, I-V curve, temperature by power, and the profile through the tip."""
+    """Temperature map, I-V curve, temperature by power, and the profile along the current."""
 
     def __init__(self) -> None:
         line: Any = {"type": "scatter", "mode": "lines", "line": {"color": BLUE, "width": 2}}
@@ -151,8 +151,9 @@ class LivePlots:
                 axes("power P<sub>l</sub> (mW)", _TIP, 270, normal="y"),
                 "Tip temperature against power",
             )
-            profile = axes("x (µm)", "temperature (K)", 270, normal="xy")
-            self._profile = plotted([line], profile, "Temperature along the lever, through the tip")
+            profile = axes("along the current (µm)", "temperature (K)", 270, normal="xy")
+            alt = "Temperature along the current from the supply through the tip to the ground"
+            self._profile = plotted([line], profile, alt)
         # before its first plot a browser takes whole figures only
         self._ready: set[ui.plotly] = set()
         for plot in (self._heat, self._iv, self._tp, self._profile):
@@ -185,14 +186,16 @@ class LivePlots:
             # of one height for all biases, so that the profile moves and not its axis
             highest = float(np.max(curves["tip_K"]))
             self._profile.figure["layout"]["yaxis"]["range"] = [answer["base_K"], highest]
-            self._profile.figure["layout"]["xaxis"]["range"] = answer["box"][:2]
+            self._profile.figure["layout"]["xaxis"]["range"] = [0.0, answer["along"][-1]]
             self._profile.figure["data"][0] |= line
             self._profile.update()
-        self._show_map(answer["box"], now["scale_K"], now["picture"])
+        self._show_map(answer["box"], answer["outline"], now["scale_K"], now["picture"])
         self._curves, self._along = curves, answer["along"]
 
-    def _show_map(self, box: list[float], scale: tuple[float, float], picture: bytes) -> None:
-        """Show the picture of the map in its place, and the bar of its colours."""
+    def _show_map(
+        self, box: list[float], outline: Any, scale: tuple[float, float], picture: bytes
+    ) -> None:
+        """Show the picture of the map in its place, the lever's outline, and the colours' bar."""
         left, right, bottom, top = box
         source = f"data:image/png;base64,{b64encode(picture).decode('ascii')}"
         figure = self._heat.figure
@@ -205,6 +208,11 @@ class LivePlots:
         figure["layout"]["images"][0] |= {"x": left, "y": top, **size}
         figure["layout"]["xaxis"]["range"] = [left, right]
         figure["layout"]["yaxis"]["range"] = [bottom, top]
+        # cold legs are as dark as a dark page, the hottest places nearly as light as a light one
+        figure["layout"]["shapes"] = [
+            {"type": "path", "path": _closed(ring), "line": {"color": INK, "width": 1.5}}
+            for ring in outline
+        ]
         figure["data"][0]["marker"] |= {"cmin": scale[0], "cmax": scale[1]}
         self._heat.update()
 
@@ -226,6 +234,10 @@ def _colours() -> list[list[Any]]:
 
     shares = np.linspace(0.0, 1.0, 32)
     return [[share, to_hex(colormaps[HEAT](share))] for share in shares.tolist()]
+
+
+def _closed(ring: Sequence[tuple[float, float]]) -> str:
+    return "M" + "L".join(f"{x:.5g},{y:.5g}" for x, y in ring) + "Z"
 
 
 def _range(values: list[float]) -> list[float]:

@@ -17,6 +17,7 @@ from hotlever.app.pages.page import Page
 from hotlever.app.project import LARGEST_PROBE, safe_name
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import read_text
+from hotlever.materials.parameters import label
 
 
 class ProbeFile:
@@ -117,9 +118,9 @@ class Dimensions:
         self.clear()
         with self._column:
             for name, (value, meaning) in values.items():
-                number = ui.number(name, value=value, format="%.4g", step=value / 50)
-                number.props(f'suffix=µm debounce=200 aria-label="{meaning}"')
-                number.classes("w-full").tooltip(meaning)
+                number = ui.number(label(name), value=value, format="%.4g", step=value / 50)
+                number.props("suffix=µm debounce=200").classes("w-full")
+                number.tooltip(f"{name}: {meaning}")
                 number.on_value_change(lambda event, n=name: self._changed(n, event.value))
                 self._numbers[name] = number
 

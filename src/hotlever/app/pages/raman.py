@@ -155,6 +155,5 @@ class RamanPage(Page):
             if project.stamp(f"{_FIGURE}.svg"):
                 drawn = project.path(f"{_FIGURE}.svg").read_text(encoding="utf-8")
                 figure(drawn, _ALT, wide=True)
-            shown = table(head, rows, pagination=20).classes("cursor-pointer")
-            shown.on("rowClick", lambda event: self._spectrum.show(f"{_TIP}/{event.args[1]['0']}"))
-            caption("A click on a row shows its spectrum above.")
+            table(head, rows, lambda name: self._spectrum.show(f"{_TIP}/{name}"), pagination=20)
+            caption("A click on a name shows its spectrum above.")

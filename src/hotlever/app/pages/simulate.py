@@ -26,21 +26,21 @@ class SimulatePage(Page):
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
-        with two_columns() as (left, right):
+        with two_columns("live") as (left, right):
             with left:
                 self.probe_choice()
                 self._sliders = Sliders(self, self._moved)
             with right:
                 view = ui.toggle(_VIEWS, value=self.chosen["view"])
                 view.props('aria-label="What is shown"').on_value_change(self._view)
-                with ui.column().classes("w-full gap-3") as rest:
+                with ui.column().classes("w-full gap-3 parts") as rest:
                     self._live = LiveView(self)
-                    with ui.card().classes("w-full").props("flat bordered"):
+                    with ui.card().classes("w-full last").props("flat bordered"):
                         ui.label("Take it with you").classes("text-bold")
                         self.kind_buttons(lambda kind: self.run(self._sweep(kind)))
                         Work(session, self.name, self.give)
                         self.command()
-                with ui.column().classes("w-full gap-3") as time:
+                with ui.column().classes("w-full gap-3 last") as time:
                     self._pulses = Pulses(session, banner, self.chosen)
                 for name, shown in (
                     ("rest", rest),

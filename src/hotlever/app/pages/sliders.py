@@ -9,16 +9,15 @@ import asyncio
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
 from typing import Any
 
 from nicegui import background_tasks, ui
-from nicegui.events import ValueChangeEventArguments
 
 from hotlever.app.pages.frame import flat_button, number_shown
 from hotlever.app.pages.page import Page
 from hotlever.app.pages.plots import LivePlots
 from hotlever.errors import HotleverError
+from hotlever.materials.parameters import label
 from hotlever.probe.physics import Physics
 
 _GROUPS = {"material": "Material", "dimensions": "Dimensions", "circuit": "Circuit"}
@@ -55,41 +54,32 @@ class Sliders:
         self._session, self._banner, self._chosen = page.session, page.banner, page.chosen
         self._moved = moved
         self.free = set[str]()
+        # medium, surface and physics: what the probe's file says of them, and the fields
+        self._of_file: dict[str, Any] = {}
+        self._around: dict[str, Any] = {}
         self._show_surroundings()
         self._show_physics()
         self._show_bias()
         self._of_probe = ui.column().classes("w-full gap-1")
 
     def _show_surroundings(self) -> None:
-        changes = self._chosen["changes"]
         with ui.row().classes("items-center w-full no-wrap"):
             ui.label("in")
-            self._medium = ui.toggle(
-                ["vacuum", "air"],
-                value=changes.get("medium", "vacuum"),
-                on_change=lambda event: self._change("medium", event.value),
-            )
-            self._gap = ui.number(
-                "surface (µm)",
-                value=changes.get("surface_gap_um"),
-                min=0.01,
-                max=1e4,
-                on_change=lambda event: self._change("surface_gap_um", event.value),
-            ).props("clearable placeholder=none stack-label")
-            self._gap.bind_visibility_from(self._medium, "value", value="air")
+            medium = self._add_around("medium", ui.toggle(["vacuum", "air"], value="vacuum"))
+            gap = ui.number("surface (µm)", min=0.01, max=1e4)
+            gap.props("clearable placeholder=none stack-label")
+            gap.bind_visibility_from(medium, "value", value="air")
+            self._add_around("surface_gap_um", gap)
 
     def _show_physics(self) -> None:
-        changes = self._chosen["changes"]
-        self._of_file = dict.fromkeys(Physics.model_fields, False)
-        self._effects = {}
         with ui.row().classes("items-center w-full"):
             for effect, meaning in Physics.description().items():
-                box = ui.checkbox(effect, value=changes.get(effect, False)).tooltip(meaning)
-                self._effects[effect] = box.props("dense")
-                box.on_value_change(partial(self._switch, effect))
+                self._add_around(effect, ui.checkbox(effect).tooltip(meaning))
 
-    def _switch(self, effect: str, event: ValueChangeEventArguments[bool | None]) -> None:
-        self._change(effect, bool(event.value), self._of_file[effect])
+    def _add_around(self, name: str, field: Any) -> Any:
+        self._around[name] = field
+        field.on_value_change(lambda event: self._change(name, event.value, self._of_file))
+        return field
 
     def _show_bias(self) -> None:
         with ui.column().classes("w-full gap-0") as self.of_bias:
@@ -109,20 +99,17 @@ class Sliders:
         except HotleverError as error:
             self._banner.say(str(error))
             return
-        if "medium" not in self._chosen["changes"]:
-            self._medium.set_value(probe["medium"])
-        if probe["gap_um"] is not None and "surface_gap_um" not in self._chosen["changes"]:
-            self._gap.set_value(probe["gap_um"])
-        self._of_file = probe["physics"]
-        for effect, box in self._effects.items():
-            box.set_value(self._chosen["changes"].get(effect, self._of_file[effect]))
+        changes = self._chosen["changes"]
+        self._of_file = probe["around"]
+        for name, field in self._around.items():
+            field.set_value(changes.get(name, self._of_file[name]))
         self._of_probe.clear()
         with self._of_probe:
             for group, title in _GROUPS.items():
                 opened = ui.expansion(title, value=group == "material")
                 with opened.props("dense-toggle header-class=text-bold"):
                     for slider in probe["sliders"][group]:
-                        self._slider(*slider)
+                        self._slider(*slider, probe["meanings"].get(slider[0], ""))
             flat_button("All as in the probe file", self._reset, icon="restart_alt")
         of_material = {name for name, *_ in probe["sliders"]["material"]}
         self.free = of_material | {"series_resistance_ohm"} if probe["reduced"] else set()
@@ -131,18 +118,19 @@ class Sliders:
     def _slider(
         self, name: str, value: float, low: float, high: float, unit: str, meaning: str
     ) -> None:
-        """Show the slider of a parameter, and its number."""
+        """Show the slider of a parameter, and its number; its name in files on hover."""
         now = self._chosen["changes"].get(name, value)
         unit = "" if unit == "1" else unit
         with ui.column().classes("w-full gap-0"):
             with ui.row().classes("w-full items-center no-wrap justify-between"):
-                ui.label(name).classes("text-sm").tooltip(meaning)
-                number = ui.number(format="%.4g").classes("w-36").props(remove="outlined")
+                words, hint = label(name), f"{name}: {meaning}" if meaning else name
+                ui.label(words).classes("text-sm remark").tooltip(hint)
+                number = ui.number(format="%.4g").classes("w-36 shrink-0").props(remove="outlined")
                 number.props(f'borderless suffix="{unit}" input-class=text-right')
-                number.props(f'aria-label="{name}, {meaning}"')
+                number.props(f'aria-label="{words}"')
             slider = ui.slider(min=low, max=high, step=(high - low) / 400, value=now)
-            number.bind_value(slider.props(f'dense aria-label="{meaning}"'))
-        slider.on_value_change(lambda event: self._change(name, event.value, value))
+            number.bind_value(slider.props(f'dense aria-label="{words}"'))
+        slider.on_value_change(lambda event: self._change(name, event.value, {name: value}))
 
     async def _reset(self) -> None:
         self._chosen["changes"] = {}
@@ -157,14 +145,15 @@ class Sliders:
                 self._slider_of_bias.props(f"max={self._chosen['most']:g}")
             self._moved()
 
-    def _change(self, name: str, value: Any, of_probe: Any = None) -> None:
-        if value is None and name != "surface_gap_um":
+    def _change(self, name: str, value: Any, of_file: dict[str, Any]) -> None:
+        if name not in of_file or (value is None and name != "surface_gap_um"):
             return
         changes = {key: old for key, old in self._chosen["changes"].items() if key != name}
-        if value != of_probe:
+        if value != of_file[name]:
             changes[name] = value
-        self._chosen["changes"] = changes
-        self._moved()
+        if changes != self._chosen["changes"]:
+            self._chosen["changes"] = changes
+            self._moved()
 
 
 class LiveView:
@@ -177,7 +166,7 @@ class LiveView:
         self._rests = 0
         self._busy = False
         self._free: set[str] = set()
-        with ui.row().classes("w-full items-end gap-6"):
+        with ui.row().classes("w-full items-end gap-6 numbers"):
             self._numbers = {key: number_shown(key, title) for key, (title, _) in _NUMBERS.items()}
             self._knee = number_shown("knee", "knee of the I-V curve")
         self._model = ui.label("starting").classes("text-xs opacity-70").props("aria-live=polite")
@@ -253,8 +242,8 @@ class LiveView:
 
     def _blank(self) -> None:
         """Show no numbers where there are none: the last ones were of another state."""
-        for label in (*self._numbers.values(), self._knee):
-            label.set_text("–")
+        for number in (*self._numbers.values(), self._knee):
+            number.set_text("–")
         self._model.set_text("no state is shown")
         self._notes.set_text("")
         self._drawn.set_visibility(False)

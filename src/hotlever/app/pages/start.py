@@ -30,8 +30,8 @@ _SENTENCES = (
     "hotlever tells how hot the tip of a Joule-heated cantilever is, and how sure that is.",
     "Drop a measurement (bias and current, and what else you have) and press Fit or Calibrate; or "
     "go to Simulate and move the sliders of the reference probe.",
-    "Everything lies as files in the folder named above, and each page shows the command line "
-    "that does the same.",
+    "Everything lies as files in {folder}, and each page shows the command line that does the "
+    "same.",
 )
 _DROP = "Drop anything here: a measurement, a drawing (GDSII, OASIS, DXF), a probe file"
 #: Kinds of files of a project, and the page and the name there under which one is chosen.
@@ -131,7 +131,8 @@ class StartPage(Page):
         super().__init__(session, banner)
         with ui.column().classes("w-full max-w-5xl mx-auto gap-4"):
             for sentence in _SENTENCES:
-                ui.label(sentence).classes("text-base")
+                words = sentence.format(folder=session.project.folder)
+                ui.label(words).classes("text-base remark")
             drop_zone(session, banner, _DROP, self._sort)
             ui.label("Try it").classes("text-lg text-bold")
             with ui.row().classes("w-full gap-3"):

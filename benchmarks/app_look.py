@@ -1,0 +1,164 @@
+"""What the app's pages look like: at three widths, light and dark, and by keyboard alone.
+
+``python benchmarks/app_look.py [FOLDER [PAGE …]]`` opens each page in a headless Chromium, prints
+for each the lowest contrast and what is wrong (cut off, covered, unreachable, without a name),
+and keeps a picture of each look in the folder.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import Page
+
+from app_in_browser import App, browsing, go, running
+from hotlever.app.pages.frame import PAGES
+from hotlever.app.project import Project
+from problems import table
+
+WIDTHS = (390, 1024, 1920)
+_HEIGHTS = {390: 844, 1024: 768, 1920: 1080}
+#: Contrast that a focus must have with what is around it (WCAG 2.2, 1.4.11).
+_OF_THE_FOCUS = 3.0
+_SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
+#: Roles of the tree of accessibility that must have a name.
+_NAMED = (
+    *("button", "link", "textbox", "combobox", "checkbox", "switch", "slider", "spinbutton"),
+    *("tab", "menuitem", "radio", "image", "img", "dialog"),
+)
+#: Times that Tab is pressed at most, and milliseconds for a page to come to rest.
+_MOST_TABS, _REST_MS = 200, 700
+
+
+@dataclass
+class Look:
+    """What was found of a page: contrasts by kind, with what is needed, and what is wrong."""
+
+    page: str
+    contrasts: list[tuple[str, float, float, str]] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    controls: int = 0
+
+    def lowest(self, kind: str) -> float:
+        """Return the lowest contrast of a kind; infinite if there is none."""
+        return min((one[1] for one in self.contrasts if one[0] == kind), default=float("inf"))
+
+
+def furnish(folder: Path) -> None:
+    """Fill a project, so that each page has something to show."""
+    project = Project(folder)
+    for name in ("lever-b.csv", "reference-probe.gds", "lever-a.csv"):
+        project.take_example(name)
+    project.take_example_folders("raman", "hot-plate", "tip")
+    for line in (
+        "fit lever-a.csv -o lever-a.fit.json",
+        "fit lever-a.csv lever-b.csv -o fits",
+        "calibrate lever-a.csv --fit lever-a.fit.json -o lever-a.calibration.json "
+        "--table lever-a.table.csv",
+        "raman tip --calibrate-from hot-plate --save-calibration raman.json -o tip.raman.csv "
+        "--plot raman.svg",
+    ):
+        command = [sys.executable, "-m", "hotlever", *line.split()]
+        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+
+
+def look(page: Page, app: App, address: str, folder: Path) -> Look:
+    """Look at a page at all widths, light and dark, and walk through it by keyboard."""
+    made = Look(address or "start")
+    for theme in ("light", "dark"):
+        page.set_viewport_size({"width": 1920, "height": 1080})
+        go(page, app, address)
+        if (theme == "dark") != page.evaluate("document.body.matches('.body--dark')"):
+            page.get_by_label("Light or dark").click()
+        _settle(page)
+        for width in WIDTHS:
+            page.set_viewport_size({"width": width, "height": _HEIGHTS[width]})
+            page.wait_for_timeout(_REST_MS)
+            picture = folder / f"{made.page}-{theme}-{width}.png"
+            page.screenshot(path=picture, full_page=True)
+            seen = page.evaluate(f"(look => [look.colours(), look.faults()])({_SCRIPT})")
+            made.contrasts += [tuple(one) for one in seen[0]]
+            made.faults += [f"{width} {theme}: {fault}" for fault in seen[1]]
+            made.faults += [
+                f"{width} {theme}: contrast {value:.2f} of {what}"
+                for _, value, least, what in made.contrasts[-len(seen[0]) :]
+                if value < least
+            ]
+            if width != WIDTHS[1]:
+                _walk(page, made, f"{width} {theme}")
+    made.faults = list(dict.fromkeys(made.faults))
+    return made
+
+
+def _settle(page: Page) -> None:
+    """Wait until there is nothing more to come, with all that can be unfolded open."""
+    page.wait_for_timeout(2 * _REST_MS)
+    while page.evaluate(f"({_SCRIPT}).unfolded()"):
+        page.wait_for_timeout(_REST_MS)
+
+
+def _walk(page: Page, made: Look, where: str) -> None:
+    """Press Tab until all controls have been met; note those that were not, or without a name."""
+    page.evaluate(f"{{({_SCRIPT}).forget(); document.activeElement.blur(); scrollTo(0, 0)}}")
+    reached = 0
+    for _ in range(_MOST_TABS):
+        page.keyboard.press("Tab")
+        met = page.evaluate(f"({_SCRIPT}).focused()")
+        if met is None:
+            break
+        if not met:  # the end of the page, where the browser's own controls would follow
+            continue
+        reached += 1
+        what, contrast, hidden = met
+        if contrast < _OF_THE_FOCUS:
+            made.faults.append(f"{where}: focus of contrast {contrast:.2f} on {what}")
+        if hidden:
+            made.faults.append(f"{where}: {what} has the focus, {hidden}")
+    made.controls = max(made.controls, reached)
+    missed = page.evaluate(f"({_SCRIPT}).unreached()")
+    made.faults += [f"{where}: no Tab reaches {what}" for what in missed]
+    made.faults += [f"{where}: a {role} has no name" for role in _nameless(page)]
+
+
+def _nameless(page: Page) -> list[str]:
+    """Return the roles of what has no name for who cannot see it."""
+    # what Plotly measures its texts with, far outside of the window
+    page.evaluate("document.querySelector('#js-plotly-tester')?.setAttribute('aria-hidden', true)")
+    session = page.context.new_cdp_session(page)
+    nodes: list[dict[str, Any]] = session.send("Accessibility.getFullAXTree")["nodes"]
+    session.detach()
+    roles = [
+        node["role"]["value"]
+        for node in nodes
+        if not node.get("ignored") and not node.get("name", {}).get("value", "").strip()
+    ]
+    return [role for role in roles if role in _NAMED]
+
+
+def main() -> None:
+    folder, *pages = sys.argv[1:] or ["benchmarks/results/look"]
+    pictures = Path(folder)
+    pictures.mkdir(parents=True, exist_ok=True)
+    rows, faults = [], []
+    with tempfile.TemporaryDirectory() as name:
+        furnish(Path(name))
+        with running(Path(name)) as app, browsing(app) as (page, seen):
+            for address in pages or PAGES:
+                made = look(page, app, address, pictures)
+                lowest = [f"{made.lowest(kind):.2f}" for kind in ("text", "icon", "line")]
+                rows.append((made.page, made.controls, *lowest, len(made.faults)))
+                faults += [f"{made.page} {fault}" for fault in made.faults]
+            faults += seen.errors
+    for fault, times in Counter(faults).items():
+        print(fault, f"({times} times)" if times > 1 else "")
+    table(("page", "controls", "contrast of text", "of icons", "of lines", "faults"), rows)
+
+
+if __name__ == "__main__":
+    main()
