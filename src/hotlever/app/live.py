@@ -38,8 +38,8 @@ from hotlever.tasks.probes import make_lever
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
-#: Biases of a curve, and cells of the temperature map along its longer side.
-_POINTS, _CELLS = 121, 360
+#: Biases of a curve, cells of the temperature map along its longer side, points of the profile.
+_POINTS, _CELLS, _PROFILE = 121, 360, 361
 #: Steps of the highest temperature (K) that the colours of the map reach, and the colours.
 _SCALE_K = 100.0
 _COLOURS = colormaps[HEAT](np.linspace(0.0, 1.0, 256), bytes=True)
@@ -72,8 +72,9 @@ class _Map:
         probes = space.elements.basis.probes
         self._cells = probes(points[self._inside].T)
         self.outline = layout.outline
-        path, self.along = current_path(space, potential)
-        self._line = probes(path.T)
+        path, along = current_path(space, potential)
+        self.along = np.linspace(0.0, along[-1], _PROFILE)
+        self._line = probes(np.array([np.interp(self.along, along, axis) for axis in path.T]))
 
     def picture(self, T: Array, low: float, high: float) -> bytes:
         """Return the map as PNG, coloured from `low` to `high` (K), transparent beside the lever.

@@ -109,14 +109,14 @@ class Sliders:
                 opened = ui.expansion(title, value=group == "material")
                 with opened.props("dense-toggle header-class=text-bold"):
                     for slider in probe["sliders"][group]:
-                        self._slider(*slider, probe["meanings"].get(slider[0], ""))
+                        self._slider(probe["meanings"].get(slider[0], ""), *slider)
             flat_button("All as in the probe file", self._reset, icon="restart_alt")
         of_material = {name for name, *_ in probe["sliders"]["material"]}
         self.free = of_material | {"series_resistance_ohm"} if probe["reduced"] else set()
         self._moved()
 
     def _slider(
-        self, name: str, value: float, low: float, high: float, unit: str, meaning: str
+        self, meaning: str, name: str, value: float, low: float, high: float, unit: str
     ) -> None:
         """Show the slider of a parameter, and its number; its name in files on hover."""
         now = self._chosen["changes"].get(name, value)
