@@ -69,12 +69,13 @@ class _Map:
         self.box = [float(end) for end in ends]
         points = np.stack(np.meshgrid(self.x, self.y), axis=-1).reshape(-1, 2)
         self._inside = layout.contains(points)
-        probes = space.elements.basis.probes
-        self._cells = probes(points[self._inside].T)
+        self._cells = space.elements.basis.probes(points[self._inside].T)
         self.outline = layout.outline
         path, along = current_path(space, potential)
         self.along = np.linspace(0.0, along[-1], _PROFILE)
-        self._line = probes(np.array([np.interp(self.along, along, axis) for axis in path.T]))
+        points = np.stack([np.interp(self.along, along, axis) for axis in path.T], axis=-1)
+        elements, self._shares, _ = space.elements.at_points(points)
+        self._on_path = space.elements.dofs[elements]
 
     def picture(self, T: Array, low: float, high: float) -> bytes:
         """Return the map as PNG, coloured from `low` to `high` (K), transparent beside the lever.
@@ -91,7 +92,7 @@ class _Map:
 
     def line(self, T: Array) -> Array:
         """Return the temperature (K) along the current."""
-        return np.asarray(self._line @ T)
+        return np.asarray((self._shares * T[self._on_path]).sum(axis=1))
 
 
 #: Maps by mesh; those of one shape share it.

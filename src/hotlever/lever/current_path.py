@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
-from scipy.spatial import cKDTree
+from collections.abc import Iterator
 
+import numpy as np
+
+from hotlever.errors import InputError
 from hotlever.lever.full_space import FullSpace
 from hotlever.types import Array
 
-#: Steps along the path, as a share of the longer side of the lever; and their greatest number.
-_STEP, _MOST_STEPS = 1 / 400, 4000
-#: Quadrature points over which the direction of the current is averaged.
-_NEAR = 6
+#: Steps along the path, as a share of the longer side of the lever, and their greatest number; to
+#: end at the edge they are halved so often.
+_STEP, _MOST_STEPS, _HALVINGS = 1 / 150, 2000, 6
 
 
 def current_path(space: FullSpace, potential: Array) -> tuple[Array, Array]:
@@ -35,32 +36,35 @@ def current_path(space: FullSpace, potential: Array) -> tuple[Array, Array]:
     along : ndarray, shape (n,)
         Length of the path up to each (µm).
     """
-    elements = space.elements
-    inside = np.repeat(space.conducting, elements.per_element)
-    slopes = (elements.sampling[inside.size :] @ potential).reshape(2, -1)
-    places, flow = elements.positions.T[inside], -slopes.T[inside]
-    tree = cKDTree(places)
-    # what is farther from all points of the lever is outside
-    reach = 2.0 * float(tree.query(places, k=2)[0][:, 1].max())
-    step = _STEP * float(np.ptp(places, axis=0).max())
+    elements, layout = space.elements, space.mesh.layout
+    longest = _STEP * float(np.ptp(layout.box, axis=0).max())
 
-    def direction(at: Array) -> Array | None:
-        far, near = tree.query(at, k=_NEAR)
-        mean = flow[near].mean(axis=0)
-        length = float(np.hypot(*mean))
-        return mean / length if far[0] < reach and length > 0.0 else None
+    def direction(at: Array) -> Array:
+        (element,), _, slopes = elements.at_points(at[None])
+        if not space.conducting[element]:
+            raise InputError("no current flows there")
+        flow = -slopes[:, 0] @ potential[elements.dofs[element]]
+        return np.asarray(flow / np.linalg.norm(flow))
 
-    def followed(at: Array, sign: float) -> list[Array]:
-        path: list[Array] = []
-        while len(path) < _MOST_STEPS and (first := direction(at)) is not None:
-            middle = direction(at + 0.5 * sign * step * first)
-            if middle is None:
-                break
-            at = at + sign * step * middle
-            path.append(at)
-        return path
+    def followed(at: Array, sign: float) -> Iterator[Array]:
+        size, steps = sign * longest, 0
+        while abs(size) > longest / 2**_HALVINGS and steps < _MOST_STEPS:
+            try:
+                middle = at + 0.5 * size * direction(at)
+                after = at + size * direction(middle)
+                direction(after)
+            except InputError:  # beyond the edge
+                size /= 2
+                continue
+            at, steps = after, steps + 1
+            yield at
 
-    start = places[tree.query(space.mesh.layout.tip)[1]]
-    points = np.array([*followed(start, -1.0)[::-1], start, *followed(start, 1.0)])
-    points = points[space.mesh.layout.contains(points)]
-    return points, step * np.arange(len(points), dtype=float)
+    start = np.array(layout.tip)
+    try:
+        direction(start)
+    except InputError:
+        places = elements.positions.T[np.repeat(space.conducting, elements.per_element)]
+        start = places[np.argmin(np.linalg.norm(places - start, axis=1))]
+    points = np.array([*[*followed(start, -1.0)][::-1], start, *followed(start, 1.0)])
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return points, np.concatenate([[0.0], np.cumsum(lengths)])
