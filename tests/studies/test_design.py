@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import hotlever
 from drawn import reference_points
 from hotlever.errors import InputError
 from hotlever.probe import Probe
 from hotlever.spieser2017 import ANNEALING_K
-from hotlever.studies.design import Design, quantities, sensitivities, vary
+from hotlever.studies.design import Design, design_notes, quantities, sensitivities, vary
 
 EXAMPLES = Path(hotlever.__file__).parent / "examples"
 
@@ -43,19 +44,40 @@ def test_the_design_s_knee_is_the_lever_s(start, reference):
 
 
 def test_a_sweep_of_the_heater_s_length(start):
-    data = vary(start, "heater_length_um", [4.0, 4.6], air=False)
+    data = vary(start, {"heater_length_um": [4.0, 4.6]}, air=False)
     assert data.heater_length_um.values.tolist() == [4.0, 4.6]
     assert data.cold_ohm.diff("heater_length_um").item() > 0
     assert data.knee_K.diff("heater_length_um").item() < 0
     assert data.knee_mW.attrs["units"] == "mW"
 
 
+def test_a_map_has_each_with_each_and_gaps_with_their_reasons(start):
+    """In vacuum the power of the knee grows as the thickness, whatever the doping."""
+    varied = {"thickness_um": [-0.2, 0.2, 0.4], "n_d": [5e17, 6e17]}
+    data = vary(start, varied, air=False)
+    assert data.knee_mW.dims == ("thickness_um", "n_d")
+    thin, thick = data.knee_mW.values[1:]
+    np.testing.assert_allclose(thick, 2.0 * thin, rtol=1e-6)
+    alone = quantities(start.changed({"n_d": 5e17}), 2.0, air=False)
+    assert data.tip_K.values[2, 0] == pytest.approx(alone["tip_K"], abs=1e-6)
+    assert np.isnan(data.tip_K.values[0]).all()
+    assert all("thickness_um = -0.2" in reason for reason in data.reason.values[0])
+    assert set(data.reason.values[1:].flat) == {""}
+    [note] = design_notes(data)
+    assert note.startswith("with thickness_um = -0.2 and n_d = 5e+17; thickness_um = -0.2 and")
+    assert data.n_d.attrs["base_value"] == start.probe.material.n_d
+    with pytest.raises(InputError, match=r"thickness_um = -0\.2"):
+        vary(start, {"thickness_um": [-0.2]}, air=False)
+
+
 def test_annealing_changes_the_diffusion_length_only(start):
-    longer = start.changed("annealing_min", 120.0)
+    longer = start.changed({"annealing_min": 120.0})
     delta = start.probe.material.delta
     assert longer.material.delta == pytest.approx(2 * delta)
     assert longer.shape == start.probe.shape
-    assert start.changed("annealing_K", ANNEALING_K).material.delta == pytest.approx(delta)
+    both = start.changed({"delta": 0.5, "annealing_min": 120.0})
+    assert both.material.delta == pytest.approx(2 * 0.5)
+    assert start.changed({"annealing_K": ANNEALING_K}).material.delta == pytest.approx(delta)
 
 
 @pytest.fixture(scope="module")
@@ -80,15 +102,15 @@ def test_what_is_varied_of_a_drawing(example, usual):
         if name == "pressure_mbar":  # means nothing without accommodation, as its error says
             continue
         factor = 1.02 if value else 1.0
-        assert isinstance(design.changed(name, value * factor), Probe)
+        assert isinstance(design.changed({name: value * factor}), Probe)
 
 
 def test_a_film_of_a_drawing_is_varied_exactly():
     design = Design(Probe.from_file(EXAMPLES / "palladium-on-nitride.toml"))
-    data = vary(design, "layers.track.thickness_um", [0.05, 0.1], air=False)
+    data = vary(design, {"layers.track.thickness_um": [0.05, 0.1]}, air=False)
     first, second = data.cold_ohm.values
     assert first / second == pytest.approx(2.0, rel=1e-3)
-    data = vary(design, "film.resistivity", [2e-5, 3e-5], air=False)
+    data = vary(design, {"film.resistivity": [2e-5, 3e-5]}, air=False)
     assert data.cold_ohm.values[1] / data.cold_ohm.values[0] == pytest.approx(1.5, rel=1e-3)
 
 
@@ -101,9 +123,9 @@ def test_the_numbers_of_a_drawing_are_those_it_has(drawn):
 
 
 def test_scale_and_edges_of_a_drawing_are_varied(drawn):
-    larger = vary(drawn, "scale", [1.0, 1.1], air=False)
+    larger = vary(drawn, {"scale": [1.0, 1.1]}, air=False)
     assert larger.tip_K.diff("scale").item() > 0
-    wider = vary(drawn, "edge_bias_um", [-0.05, 0.0, 0.05], air=False)
+    wider = vary(drawn, {"edge_bias_um": [-0.05, 0.0, 0.05]}, air=False)
     assert (wider.cold_ohm.diff("edge_bias_um") < 0).all()
     assert wider.cold_ohm.values[1] == pytest.approx(larger.cold_ohm.values[0], rel=1e-9)
 
@@ -143,6 +165,16 @@ def test_design_command(run, tmp_path):
     assert out.splitlines()[0].startswith("thickness_um,knee_K,inversion_K,knee_mW")
     assert len(out.splitlines()) == 3
     assert (tmp_path / "d.png").stat().st_size > 10_000
+    twice = ("--vary", "thickness_um=0.3:0.4:2", "--vary", "heater_width_um=1:2:2")
+    status, out, err = run("design", *twice, "--no-air", "-o", "d.nc", "--plot", "d.svg")
+    assert (status, out) == (0, ""), err
+    with xr.open_dataset("d.nc") as data:
+        assert dict(data.knee_K.sizes) == {"thickness_um": 2, "heater_width_um": 2}
+        assert data.heater_width_um.attrs["units"] == "µm"
+    assert "heater width (µm)" in Path("d.svg").read_text()
+    status, out, err = run("design", "--vary", "p=2:3:2", "--vary", "p=1:2:2")
+    assert (status, out) == (2, "")
+    assert "--vary p: given twice" in err
     status, out, err = run("design", "--vary", "thicknes_um=0.3:0.4:2")
     assert (status, out) == (2, "")
     assert "did you mean 'thickness_um'" in err

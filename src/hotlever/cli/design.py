@@ -3,33 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from hotlever.cli import output as terminal
 from hotlever.cli.options import command
+from hotlever.datasets import write_dataset
 from hotlever.errors import InputError
-from hotlever.files import FIGURE_TYPES, Outputs, write_text
+from hotlever.files import write_text
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import read_probe
-from hotlever.tasks.requests import (
-    File,
-    PhysicsRequest,
-    PlotRequest,
-    ProbeRequest,
-    option,
-)
-from hotlever.tasks.texts import check_number, parse_vary
+from hotlever.tasks.requests import PhysicsRequest, ProbeRequest, TableRequest, option
+from hotlever.tasks.texts import check_number, parse_varied
+
+#: Numbers that are varied at once of which there are figures: a curve or a map.
+_DRAWN = 2
 
 
 @dataclass(kw_only=True)
-class DesignRequest(PlotRequest, PhysicsRequest, ProbeRequest):
+class DesignRequest(TableRequest, PhysicsRequest, ProbeRequest):
     """What a change of a probe's design does."""
 
-    vary: str | None = option(
+    vary: list[str] | None = option(
         None,
         metavar="NAME=START:STOP:COUNT",
-        help="Sweep a number of the probe file, annealing_K or annealing_min; "
-        "a table of sensitivities if left out.",
+        help="Sweep a number of the probe file, annealing_K or annealing_min; repeated: each with "
+        "each, as a map. A table of sensitivities if left out.",
     )
     power: float = option(2.0, help="Power (mW) in vacuum at which the tip temperature is given.")
     annealing_K: float = option(
@@ -37,7 +36,6 @@ class DesignRequest(PlotRequest, PhysicsRequest, ProbeRequest):
     )
     annealing_min: float = option(ANNEALING_S / 60.0, help="Annealing (min) that the delta is of.")
     air: bool = option(True, help="Solve in air too, for k.")
-    output: File = option(None, "-o", "--output", help="FILE.csv; standard output if left out.")
 
 
 @command("design", DesignRequest)
@@ -46,24 +44,24 @@ def design_command(request: DesignRequest) -> None:
     from hotlever.probe.shapes import DRAWING
     from hotlever.studies import design as study
 
-    vary, output, plot = request.vary, request.output, request.plot
-    power, air = request.power, request.air
-    outputs = Outputs(request.probe)
-    outputs.file(output, ".csv")
-    outputs.file(plot, *FIGURE_TYPES)
-    check_number("--power", power, 1e-3, 1000)
+    output, plot, outputs = request.output, request.plot, request.outputs(request.probe)
+    asked: Any = {"power_mW": request.power, "air": request.air}
+    check_number("--power", request.power, 1e-3, 1000)
     check_number("--annealing-K", request.annealing_K, 700, 1700)
     check_number("--annealing-min", request.annealing_min, 1e-3, 1e5)
-    if vary is None and (plot is not None or output is not None):
+    varied = parse_varied(request.vary or [])
+    if not varied and (plot is not None or output is not None):
         raise InputError("a file or a figure needs a sweep: --vary NAME=START:STOP:COUNT")
+    if plot is not None and len(varied) > _DRAWN:
+        raise InputError(f"--plot: found {len(varied)} of --vary, expected at most {_DRAWN}")
     start = study.Design(
         request.with_physics(read_probe(terminal, request.probe)),
         request.annealing_K,
         request.annealing_min,
     )
-    if vary is None:
+    if not varied:
         with terminal.progress("design") as update:
-            sensitivities = study.sensitivities(start, power_mW=power, air=air, progress=update)
+            sensitivities = study.sensitivities(start, progress=update, **asked)
         terminal.give(study.sensitivity_text(sensitivities) + "\n")
         if start.probe.shape.shape == DRAWING:
             names = ", ".join(start.numbers)
@@ -71,14 +69,14 @@ def design_command(request: DesignRequest) -> None:
                 f"a drawing has no dimensions but these; --vary NAME=START:STOP:COUNT of {names}"
             )
         return
-    name, values = parse_vary(vary)
-    start.value(name)
     with terminal.progress("design") as update:
-        data = study.vary(start, name, values, power_mW=power, air=air, progress=update)
-    terminal.note(*study.knee_notes(data))
+        data = study.vary(start, varied, progress=update, **asked)
+    terminal.note(*study.design_notes(data))
     with outputs.together():
-        if output is not None:
+        if output is not None and output.suffix.lower() == ".nc":
+            write_dataset(data, output, ())
+        elif output is not None:
             write_text(output, study.design_csv(data))
-        draw(plot, lambda figures: figures.design_sweep(data))
+        draw(plot, lambda figures: figures.design_study(data))
     if output is None:
         terminal.give(study.design_csv(data))

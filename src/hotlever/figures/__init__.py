@@ -9,7 +9,6 @@ from hotlever.figures.air import air_loss, disc_between_planes, scale_factor, te
 from hotlever.figures.calibration import (
     calibrated_levers,
     calibration_curves,
-    design_sweep,
     judged_calibrations,
 )
 from hotlever.figures.claims import (
@@ -20,6 +19,7 @@ from hotlever.figures.claims import (
     thermoelectric_shift,
 )
 from hotlever.figures.contact import contact_overview
+from hotlever.figures.design import design_study
 from hotlever.figures.drawing import outlines_drawing, probe_drawing
 from hotlever.figures.fit import (
     correlation_matrix,

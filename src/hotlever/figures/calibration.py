@@ -1,4 +1,4 @@
-"""Figures of a calibration with its error budget, and of a design question."""
+"""Figures of calibrations: of one with its error budget, of many levers, and judged ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from hotlever.calibration.calibration import Calibration
 from hotlever.calibration.levers import tips_along
 from hotlever.calibration.pulses import PulseCalibration
-from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
+from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION
 from hotlever.estimation.lack_of_fit import USUAL_SCATTER
 from hotlever.figures.style import (
     COLOURS,
@@ -26,7 +26,6 @@ from hotlever.figures.style import (
     from_zero,
     values_by_lever,
 )
-from hotlever.studies.design import label_of
 from hotlever.studies.simulation_based_calibration import ESTIMATE, LEVELS, WAYS
 from hotlever.text import BAND
 
@@ -205,38 +204,3 @@ def _difference(axes: Axes, calibration: Calibration, measured: xr.Dataset) -> N
     axes.plot(data.bias_V[off], share[off], "o", color=VERMILION, ms=5.0, label="off")
     axes.set(xlabel=axis_label("bias_V"), ylabel="I$_h$: data − lever (% of the largest)")
     axes.legend(loc="best")
-
-
-def design_sweep(data: xr.Dataset) -> Figure:
-    """Draw temperatures, knee and k against the number that was varied.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `hotlever.studies.design.vary`.
-    """
-    (name,) = data.dims
-    along = data[name]
-    with figure(8.0, 5.6, 2, 2, sharex=True, letters=True) as (made, grid):
-        temperature, power, volts, loss = grid.ravel()
-        temperature.plot(along, data.knee_K, "o-", color=VERMILION, label="knee")
-        temperature.plot(along, data.inversion_K, "--", color=ORANGE, label="inversion T$_i$")
-        tip = f"tip at {data.attrs['power_mW']:g} mW"
-        temperature.plot(along, data.tip_K, "s-", color=BLUE, label=tip)
-        temperature.set(ylabel="tip temperature (K)")
-        temperature.legend()
-        power.plot(along, data.knee_mW, "o-", color=BLUE)
-        power.set(ylabel="power of the knee (mW)")
-        volts.plot(along, data.knee_V, "o-", color=BLUE, label="lever V$_l$ (V)")
-        volts.plot(along, data.knee_bias_V, "s-", color=GREEN, label="bias V$_b$ (V)")
-        volts.plot(along, data.knee_mA, "^-", color=PURPLE, label="current I$_h$ (mA)")
-        volts.set(ylabel="at the knee (V, mA)", ylim=(0, None))
-        volts.legend()
-        in_air = bool(np.isfinite(data.k).any())
-        loss.plot(along, data.k if in_air else data.cold_ohm / 1000.0, "o-", color=BLUE)
-        loss.set(ylabel="k, power in air / in vacuum" if in_air else "cold resistance (kΩ)")
-        for axes in grid.ravel():
-            axes.axvline(data.attrs["base_value"], color="0.6", lw=0.8, ls=":")
-        for axes in grid[1]:
-            axes.set(xlabel=label_of(str(name)))
-    return made

@@ -19,7 +19,7 @@ from hotlever.report.fit_pages import add_remarks
 from hotlever.report.page import Block, Page
 
 #: Rows of a calibration's table that are shown.
-_ROWS = 12
+_ROWS = 21
 
 
 def calibration_page(

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from hotlever.datasets import frame_text, labelled
-from hotlever.errors import unknown_name
+from hotlever.errors import HotleverError, unknown_name
 from hotlever.lever import Lever
 from hotlever.materials import LOW_DOPED, full_name
 from hotlever.materials.doping import diffusion_length
@@ -41,6 +42,8 @@ _SHOWN = ("knee_K", "knee_mW", "knee_V", "knee_bias_V", "tip_K", "cold_ohm", "k"
 _STEP = 0.02
 #: Between the coarse and the default mesh, for differences between levers.
 DESIGN_MESH = MeshOptions(corner=0.1, heater=0.35, lever=0.15, panels=0.6)
+#: Designs that are named of those of which something is not known.
+_MOST_NOTED = 3
 _NO_KNEE = "no knee: the lever voltage rises until something melts"
 #: √(T_tip − T_base) (K^½) of a lever that is called cold.
 _COLD_U = 0.5
@@ -110,22 +113,28 @@ class Design:
             for region in self.probe.layout().regions
         )
 
-    def changed(self, name: str, value: float) -> Probe:
-        """Return the probe with one value changed.
+    def changed(self, values: Mapping[str, float]) -> Probe:
+        """Return the probe with some values changed.
 
         The diffusion length follows the annealing as Δ = 2 √(D t_a) does, from the probe's Δ at
         the design's own annealing: the law's ± 40 % in D does not enter.
+
+        Raises
+        ------
+        InputError
+            If a name does not exist, or no such probe can be made.
         """
-        self.value(name)
-        if name not in ANNEALING:
-            return self.probe.with_(**{name: value})
-        annealing: Any = {name: value}
-        other = replace(self, **annealing)
+        for name in values:
+            self.value(name)
+        annealing: Any = {name: value for name, value in values.items() if name in ANNEALING}
+        probe = self.probe.with_(**{name: values[name] for name in values.keys() - annealing})
+        if not annealing:
+            return probe
         before, after = (
             diffusion_length(design.annealing_K, 60.0 * design.annealing_min)
-            for design in (self, other)
+            for design in (self, replace(self, **annealing))
         )
-        return self.probe.with_(delta=self.probe.material.delta * float(after / before))
+        return probe.with_(delta=probe.material.delta * float(after / before))
 
 
 def _number(entry: Any) -> bool:
@@ -167,38 +176,70 @@ def quantities(probe: Probe, power_mW: float, air: bool = True) -> dict[str, flo
 
 def vary(
     design: Design,
-    name: str,
-    values: Sequence[float] | Array,
+    values: Mapping[str, Sequence[float] | Array],
     *,
     power_mW: float = 2.0,
     air: bool = True,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Solve a design for several values of one of its numbers.
+    """Solve a design for several values of some of its numbers, each with each.
+
+    Parameters
+    ----------
+    design : Design
+    values : mapping of str to sequence of float
+        By name: a key of the probe file, or of `ANNEALING`.
+    power_mW, air
+        See `quantities`.
+    progress : callable, optional
 
     Returns
     -------
     xarray.Dataset
-        `QUANTITIES` on the dimension `name`, which is a probe file's key or of `ANNEALING`.
+        `QUANTITIES` on a dimension for each name, and ``reason``: why such a probe cannot be made
+        or solved, or has no knee; empty if it can and has.
 
     Raises
     ------
     InputError
-        If the name does not exist or a value is impossible.
+        If a name does not exist.
+    HotleverError
+        If none of the designs can be made and solved: the error of the first.
     """
     design.probe.circuit.need_cold_start("a study of a design")
-    probes = [design.changed(name, float(value)) for value in values]
-    rows = [quantities(probe, power_mW, air) for probe in each(probes, progress)]
-    varied = parameter_named(name)
-    meaning = {"units": varied.unit, "long_name": varied.meaning}
+    base = {name: design.value(name) for name in values}
+    coordinates = {name: np.asarray(each, dtype=float) for name, each in values.items()}
+    shape = tuple(each.size for each in coordinates.values())
+    rows, reasons, errors = [], [], []
+    for combination in each(list(product(*coordinates.values())), progress):
+        chosen = dict(zip(coordinates, map(float, combination), strict=True))
+        row, reason = dict.fromkeys(QUANTITIES, float("nan")), ""
+        try:
+            row = quantities(design.changed(chosen), power_mW, air)
+            reason = _NO_KNEE if np.isnan(row["knee_K"]) else ""
+        except HotleverError as error:
+            errors.append(error)
+            reason = str(error)
+        rows.append(row)
+        reasons.append(reason)
+    if len(errors) == len(rows):
+        raise errors[0]
+    columns: dict[str, Array] = {
+        key: np.reshape([row[key] for row in rows], shape) for key in QUANTITIES
+    }
     return labelled(
-        {key: [row[key] for row in rows] for key in QUANTITIES},
-        name,
-        {name: (name, np.asarray(values, dtype=float), meaning)},
+        {**columns, "reason": np.reshape(np.array(reasons, dtype=object), shape)},
+        tuple(coordinates),
+        {name: (name, each, _described(name, base[name])) for name, each in coordinates.items()},
         **{key: json.dumps(section) for key, section in design.probe.sections().items()},
         power_mW=power_mW,
-        base_value=design.value(name),
     )
+
+
+def _described(name: str, base: float) -> dict[str, object]:
+    """Return unit and meaning of a number of a design, and what the design has."""
+    varied = parameter_named(name)
+    return {"units": varied.unit, "long_name": varied.meaning, "base_value": base}
 
 
 def sensitivities(
@@ -228,7 +269,7 @@ def sensitivities(
     for name, here in each(list(zip(names, value, strict=True)), progress):
         step = 0.1 * _STEP if name == "annealing_K" else _STEP
         high, low = (
-            quantities(design.changed(name, here * factor), power_mW, air)
+            quantities(design.changed({name: here * factor}), power_mW, air)
             for factor in (1.0 + step, 1.0 - step)
         )
         for key in QUANTITIES:
@@ -241,14 +282,21 @@ def sensitivities(
     )
 
 
-def knee_notes(data: xr.Dataset) -> list[str]:
-    """Say for which values of a sweep of a design there is no knee, and why."""
-    (name,) = data.dims
-    without = data[name].values[np.isnan(data.knee_K.values)]
-    if not without.size:
-        return []
-    values = ", ".join(f"{value:g}" for value in without)
-    return [_NO_KNEE.replace("no knee", f"no knee with {name} = {values}")]
+def design_notes(data: xr.Dataset) -> list[str]:
+    """Say of which designs of a study something is not known, and why."""
+    designs: dict[str, list[str]] = {}
+    for numbers in np.argwhere(data.reason.values != ""):
+        point = data.reason.isel(dict(zip(data.reason.dims, numbers.tolist(), strict=True)))
+        named = " and ".join(f"{name} = {point[name].item():g}" for name in data.reason.dims)
+        designs.setdefault(point.item(), []).append(named)
+    notes = [f"with {'; '.join(_few(named))}: {reason}" for reason, named in designs.items()]
+    return _few(notes)
+
+
+def _few(texts: list[str]) -> list[str]:
+    """Return the first of many texts, and how many more there are."""
+    more = len(texts) - _MOST_NOTED
+    return texts if more <= 1 else [*texts[:_MOST_NOTED], f"and {more} more"]
 
 
 def sensitivity_text(data: xr.Dataset) -> str:
@@ -280,8 +328,8 @@ def sensitivity_text(data: xr.Dataset) -> str:
 
 
 def design_csv(data: xr.Dataset) -> str:
-    """Return a sweep of a design as CSV, one row per value; empty where nothing is known."""
-    return frame_text(data[list(QUANTITIES)].to_dataframe(), float_format="%.6g")
+    """Return a study of a design as CSV, one row per design; empty where nothing is known."""
+    return frame_text(data[[*QUANTITIES, "reason"]].to_dataframe(), float_format="%.6g")
 
 
 def label_of(name: str) -> str:

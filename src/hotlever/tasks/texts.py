@@ -232,6 +232,26 @@ def parse_vary(text: str) -> tuple[str, Array]:
     return name.strip(), np.linspace(start, stop, count)
 
 
+def parse_varied(texts: Iterable[str]) -> dict[str, Array]:
+    """Parse several ``NAME=START:STOP:COUNT``, of which each value goes with each other.
+
+    Examples
+    --------
+    >>> {name: values.size for name, values in parse_varied(["n_d=1e17:5e17:3", "p=2:3:2"]).items()}
+    {'n_d': 3, 'p': 2}
+    """
+    varied: dict[str, Array] = {}
+    for text in texts:
+        name, values = parse_vary(text)
+        if name in varied:
+            raise InputError(f"--vary {shown(name)}: given twice, expected once")
+        varied[name] = values
+    count = math.prod(values.size for values in varied.values())
+    if count > MOST_DESIGNS:
+        raise InputError(f"--vary: found {count} designs, expected at most {MOST_DESIGNS}")
+    return varied
+
+
 def _parse_range(
     text: str, where: str, example: str, most: int, end: Callable[[str], float] | None = None
 ) -> tuple[float, float, int]:

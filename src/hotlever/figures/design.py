@@ -1,0 +1,107 @@
+"""Figures of a study of a design: curves along one number, or maps over two."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from hotlever.colours import BLUE, GREEN, ORANGE, PURPLE, VERMILION
+from hotlever.figures.style import figure
+from hotlever.studies.design import label_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: Contours of a map, about.
+_LEVELS = 8
+
+
+def design_study(data: xr.Dataset) -> Figure:
+    """Draw what follows from a design against the number, or the two, that were varied.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `hotlever.studies.design.vary`.
+    """
+    last = "k" if data.k.notnull().any() else "cold_ohm"
+    labels = {
+        "knee_K": "tip temperature at the knee (K)",
+        "knee_mW": "power of the knee (mW)",
+        "tip_K": f"tip temperature at {data.attrs['power_mW']:g} mW (K)",
+        "k": "k, power in air / in vacuum",
+        "cold_ohm": "cold resistance (Ω)",
+    }
+    del labels["cold_ohm" if last == "k" else "k"]
+    return (_map if len(data.dims) == 2 else _curves)(data, labels)
+
+
+def _map(data: xr.Dataset, labels: dict[str, str]) -> Figure:
+    """Draw contour maps; what cannot be made or has no such value is hatched."""
+    across, up = map(str, data.knee_K.dims)
+    base = [data[name].attrs["base_value"] for name in (across, up)]
+    inside = all(
+        data[name].values.min() <= value <= data[name].values.max()
+        for name, value in zip((across, up), base, strict=True)
+    )
+    star: Any = {"color": VERMILION, "ms": 11, "mec": "white", "ls": "", "label": "the design"}
+    with figure(8.4, 6.4, 2, 2, sharex=True, sharey=True, letters=True) as (made, grid):
+        for axes, (name, label) in zip(grid.ravel(), labels.items(), strict=True):
+            _contours(made, axes, data[name].transpose(up, across), label)
+            if inside:
+                axes.plot(*base, "*", **star)
+            axes.grid(False)
+        marks = [Patch(fc="white", ec="0.6", hatch="////", label="no such lever, or no such value")]
+        made.legend(handles=[*grid[0, 0].lines, *marks], loc="outside upper center", ncols=2)
+        for axes in grid[1]:
+            axes.set(xlabel=label_of(across))
+        for axes in grid[:, 0]:
+            axes.set(ylabel=label_of(up))
+    return made
+
+
+def _contours(made: Figure, axes: Axes, values: xr.DataArray, label: str) -> None:
+    up, across = (values[name].values for name in values.dims)
+    known = np.isfinite(values.values)
+    hatched: Any = {"hatch": "////", "cmap": ListedColormap(["white"]), "edgecolor": "0.6"}
+    missing = np.ma.masked_where(known, np.zeros(known.shape))
+    axes.pcolor(across, up, missing, shading="nearest", lw=0.0, **hatched)
+    if np.ptp(values.values[known]) > 0.0:
+        shown: Any = {"levels": _LEVELS}
+        filled = axes.contourf(across, up, values.values, **shown)
+        lines = axes.contour(across, up, values.values, colors="white", linewidths=0.7, **shown)
+        axes.clabel(lines, fontsize=7)
+        made.colorbar(filled, ax=axes, label=label)
+
+
+def _curves(data: xr.Dataset, labels: dict[str, str]) -> Figure:
+    (name,) = data.knee_K.dims
+    along = data[name]
+    with figure(8.0, 5.6, 2, 2, sharex=True, letters=True) as (made, grid):
+        temperature, power, volts, loss = grid.ravel()
+        temperature.plot(along, data.knee_K, "o-", color=VERMILION, label="knee")
+        temperature.plot(along, data.inversion_K, "--", color=ORANGE, label="inversion T$_i$")
+        tip = f"tip at {data.attrs['power_mW']:g} mW"
+        temperature.plot(along, data.tip_K, "s-", color=BLUE, label=tip)
+        temperature.set(ylabel="tip temperature (K)")
+        temperature.legend()
+        power.plot(along, data.knee_mW, "o-", color=BLUE)
+        power.set(ylabel=labels["knee_mW"])
+        volts.plot(along, data.knee_V, "o-", color=BLUE, label="lever V$_l$ (V)")
+        volts.plot(along, data.knee_bias_V, "s-", color=GREEN, label="bias V$_b$ (V)")
+        volts.plot(along, data.knee_mA, "^-", color=PURPLE, label="current I$_h$ (mA)")
+        volts.set(ylabel="at the knee (V, mA)", ylim=(0, None))
+        volts.legend()
+        last = "k" if "k" in labels else "cold_ohm"
+        loss.plot(along, data[last], "o-", color=BLUE)
+        loss.set(ylabel=labels[last])
+        for axes in grid.ravel():
+            axes.axvline(along.attrs["base_value"], color="0.6", lw=0.8, ls=":")
+        for axes in grid[1]:
+            axes.set(xlabel=label_of(str(name)))
+    return made
