@@ -167,6 +167,13 @@ def test_a_pulse_is_followed_in_time(app: App, page: Page) -> None:
     with page.expect_download(timeout=_WORK) as download:
         button(page, "CSV").click()
     assert len(Path(download.value.path()).read_text().splitlines()) > 10
+    button(page, "film").click()
+    expect(page.locator("img[alt^='The temperature map']")).to_be_visible(timeout=_WORK)
+    picture(page, "simulate-film")
+    button(page, "small signals").click()
+    button(page, "Respond").click()
+    expect(page.locator("img[alt^='Impedance']")).to_be_visible(timeout=_WORK)
+    picture(page, "simulate-small-signals")
     button(page, "at a bias").click()
     expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
 

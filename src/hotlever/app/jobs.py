@@ -20,7 +20,7 @@ _MOST_NOTES = 200
 #: Share of the work from which on it tells how long the rest takes: it may begin slowly.
 _TELLING = 0.03
 #: Options that name what is written.
-_FILES = ("output", "plot", "fields")
+_FILES = ("output", "plot", "fields", "film")
 
 
 @dataclass(frozen=True)

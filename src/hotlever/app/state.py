@@ -73,7 +73,7 @@ class Simulate(BaseModel):
     changes: Annotated[Changes, AfterValidator(_fit_together)] = {}
     bias: float = 8.0
     most: float = 12.0
-    view: Literal["rest", "time"] = "rest"
+    view: Literal["rest", "time", "signals"] = "rest"
 
 
 class Pulse(BaseModel):
@@ -85,6 +85,15 @@ class Pulse(BaseModel):
     period: float | None = 20.0
     count: float | None = 5
     until: float | None = None
+
+
+class Signals(BaseModel):
+    """Small signals on the page Simulate, or the amplitude of those that are not."""
+
+    lowest_Hz: float | None = 1.0
+    highest_Hz: float | None = 1e7
+    count: float | None = 71
+    amplitude_V: float | None = None
 
 
 class Raman(BaseModel):
@@ -141,6 +150,7 @@ class Choices(BaseModel):
     lever: Lever = Lever()
     simulate: Simulate = Simulate()
     pulse: Pulse = Pulse()
+    signals: Signals = Signals()
     raman: Raman = Raman()
     fit: Fit = Fit()
     calibrate: Calibrate = Calibrate()

@@ -19,8 +19,9 @@ from hotlever.tasks.calibrating import calibrate_files
 from hotlever.tasks.fitting import fit_files
 from hotlever.tasks.importing import propose_probe
 from hotlever.tasks.measured_requests import CalibrateRequest, FitRequest, RamanRequest
-from hotlever.tasks.requests import ImportRequest, PulseRequest, SweepRequest
+from hotlever.tasks.requests import ImportRequest, PulseRequest, SpectrumRequest, SweepRequest
 from hotlever.tasks.simulating import simulate_in_time
+from hotlever.tasks.small_signals import respond
 from hotlever.tasks.spectra import measure_spectra
 from hotlever.tasks.sweeping import sweep
 
@@ -30,6 +31,7 @@ _TASKS: dict[str, tuple[str, type, Callable[[Report, Any], Any]]] = {
     "calibrate": ("data", CalibrateRequest, calibrate_files),
     "sweep": ("probe", SweepRequest, sweep),
     "pulse": ("probe", PulseRequest, simulate_in_time),
+    "spectrum": ("probe", SpectrumRequest, respond),
     "raman": ("spectra", RamanRequest, measure_spectra),
     "probe import": ("drawing", ImportRequest, propose_probe),
 }

@@ -28,7 +28,7 @@ PAGES = {
     "levers": ("Levers", "table_rows"),
 }
 #: What else of the state of a project pages show, beside what has their name.
-_ALSO = {"simulate": {"pulse"}, "fit": {"files"}, "calibrate": {"files", "asked"}}
+_ALSO = {"simulate": {"pulse", "signals"}, "fit": {"files"}, "calibrate": {"files", "asked"}}
 #: Types of files that figures leave as.
 FIGURE_FILES = (".svg", ".png", ".pdf")
 #: Changes that are listed, and files of each that are named; refused files that are named.
@@ -242,9 +242,10 @@ def number_shown(key: str, title: str, value: str = "…") -> ui.label:
         return ui.label(value).classes("number").props(f'data-number="{key}"')
 
 
-def figure(content: str, alt: str, *, wide: bool = False) -> None:
-    """Show an SVG figure: as an image it may hold texts from files, but no script of them runs."""
-    source = f"data:image/svg+xml;base64,{b64encode(content.encode()).decode('ascii')}"
+def figure(content: str | bytes, alt: str, *, wide: bool = False) -> None:
+    """Show an SVG figure or a GIF: an image may hold texts from files, but no script of it runs."""
+    kind, data = ("gif", content) if isinstance(content, bytes) else ("svg+xml", content.encode())
+    source = f"data:image/{kind};base64,{b64encode(data).decode('ascii')}"
     with ui.element("div").classes("paper wide w-full" if wide else "paper"):
         image = ui.element("img")
         image.props["src"], image.props["alt"] = source, alt

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -164,10 +164,10 @@ class Page:
 
     # --- what was written is given ----------------------------------------------------------------
 
-    def kind_buttons(self, asked: Callable[[str], Any]) -> None:
-        """Show a button for each of `KINDS`."""
+    def kind_buttons(self, asked: Callable[[str], Any], kinds: Mapping[str, str] = KINDS) -> None:
+        """Show a button for each of some kinds of files."""
         with ui.row().classes("items-center"):
-            for kind, meaning in KINDS.items():
+            for kind, meaning in kinds.items():
                 small_button(kind, lambda _, to=kind: asked(to)).tooltip(meaning)
 
     def written(self, job: Job) -> bool:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from nicegui import ui
 
 from hotlever.app.jobs import Job, Task
-from hotlever.app.pages.frame import ErrorBanner, caption, figure, number_shown
-from hotlever.app.pages.page import Page, Work, outputs
+from hotlever.app.pages.drawn import DrawnPage, in_python, probe_files, settings, stem
+from hotlever.app.pages.frame import ErrorBanner, figure
+from hotlever.app.pages.page import KINDS, outputs
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 
@@ -23,40 +23,14 @@ _FIELDS: dict[str, tuple[str, str, tuple[str, ...], str]] = {
     "count": ("Pulses", "", ("train",), ""),
     "until": ("Follow until", "us", ("pulse", "train", "step"), "its end"),
 }
-_ALT = "Voltages, current, tip temperature and heat in time"
 
 
-def stem(lever: dict[str, Any]) -> str:
-    """Return what names of files begin with, of the lever that is chosen."""
-    return Path(lever["probe"] or "reference.toml").stem
-
-
-def settings(lever: dict[str, Any]) -> dict[str, Any]:
-    """Return the options of a task that say what is changed of a probe."""
-    texts = {None: "none", True: "true", False: "false"}
-    changes = {
-        name: texts[value] if value is None or isinstance(value, bool) else value
-        for name, value in lever["changes"].items()
-    }
-    medium = changes.pop("medium", None)
-    return {"medium": medium, "set": [f"{name}={changes[name]}" for name in sorted(changes)]}
-
-
-def in_python(lever: dict[str, Any]) -> str:
-    """Return what makes the probe that is chosen in Python."""
-    name, changes = lever["probe"], dict(sorted(lever["changes"].items()))
-    made = f"Probe.from_file({name!r})" if name else "Probe.reference()"
-    if not changes:
-        return made
-    if all(name.isidentifier() for name in changes):
-        return f"{made}.with_({', '.join(f'{key}={value!r}' for key, value in changes.items())})"
-    return f"{made}.with_(**{changes!r})"
-
-
-class Pulses(Page):
+class Pulses(DrawnPage):
     """What the lever shows in time, as `hotlever pulse` computes it."""
 
     name = "pulse"
+    alt = "Voltages, current, tip temperature and heat in time"
+    kinds: ClassVar = {**KINDS, "film": "the temperature map in time (GIF)"}
 
     def __init__(self, session: Session, banner: ErrorBanner, lever: dict[str, Any]) -> None:
         super().__init__(session, banner)
@@ -69,21 +43,12 @@ class Pulses(Page):
                 ui.button("Follow", icon="timeline", on_click=self.start)
             with ui.row().classes("w-full items-center"):
                 self._fields = {key: self._field(key) for key in _FIELDS}
-        Work(session, self.name, self._ended)
-        self._result = ui.column().classes("w-full gap-3")
-        self.command()
+        self.show_result()
         self._offer()
-        self._keep_result(session.jobs.by_page.get(self.name))
-        self._show()
 
     def _field(self, key: str) -> ui.number:
-        label, unit, _, placeholder = _FIELDS[key]
-        least = 1 if key == "count" else None
-        number = ui.number(label, value=self.chosen[key], min=least, on_change=self._keep(key))
-        number.props(f"debounce=200 suffix={unit.replace('u', 'µ')}" if unit else "debounce=200")
-        if placeholder:
-            number.props(f'clearable stack-label placeholder="{placeholder}"')
-        return number.classes("w-36")
+        label, unit, _, empty = _FIELDS[key]
+        return self.number(key, label, unit, empty)
 
     def changed(self) -> None:
         """Follow what was chosen of the wave form."""
@@ -122,8 +87,9 @@ class Pulses(Page):
         else:
             wave = {"pulse": f"{height},{texts.pop('length')}"}
         files = outputs(f"{stem(self._lever)}.pulse", "SVG")
-        probe = (self._lever["probe"],) if self._lever["probe"] else ()
-        return Task("pulse", probe, {**settings(self._lever), **wave, **texts, **files})
+        return Task(
+            "pulse", probe_files(self._lever), {**settings(self._lever), **wave, **texts, **files}
+        )
 
     def python(self) -> str:
         """Return the lines of Python that simulate the lever."""
@@ -139,41 +105,21 @@ class Pulses(Page):
             ]
         )
 
-    async def _ended(self, job: Job) -> None:
-        if self._keep_result(job):
-            self._show()
-        else:
-            await self.give(job)
-
-    def _keep_result(self, job: Job | None) -> bool:
-        """Keep what is to be shown of a job, if it simulated the lever; return whether it did."""
-        if job is None or not job.task.written.endswith(".svg"):
-            return False
-        if self.written(job):
-            self.session.shown[self.name] = job.task, job.shown.get("table", [])
-        return True
-
-    def _show(self) -> None:
-        """Show what was simulated last, with the figure that was drawn, and give it."""
-        self._result.clear()
-        if self.name not in self.session.shown:
-            return
-        task, numbers = self.session.shown[self.name]
-        path = self.session.project.path(task.written)
-        if not path.is_file():
-            return
-        with self._result:
-            with ui.row().classes("w-full items-end gap-6"):
-                for title, value in numbers:
-                    number_shown(title, title, value)
-            figure(path.read_text(encoding="utf-8"), _ALT, wide=True)
-            with ui.row().classes("w-full items-center"):
-                caption(task.writing({}).line).classes("remark col")
-                self.kind_buttons(partial(self._ask, task, path))
+    def show_figure(self, path: Path) -> None:
+        """Show the figure that was drawn, and the film of it if there is one."""
+        super().show_figure(path)
+        film = path.with_suffix(".gif")
+        if self.session.project.stamp(film.name) >= self.session.project.stamp(path.name):
+            figure(film.read_bytes(), "The temperature map in time", wide=True)
 
     def _ask(self, task: Task, path: Path, kind: str) -> None:
-        """Give a file that there is, or have it written."""
-        if kind in ("CSV", "SVG"):
-            ui.download.file(path.with_suffix(f".{kind.lower()}"))
+        if kind == "film":
+            self.run(task.writing({"film": path.with_suffix(".gif").name}))
         else:
-            self.run(task.writing(outputs(path.stem, kind)))
+            super()._ask(task, path, kind)
+
+    async def _ended(self, job: Job) -> None:
+        if job.task.written.endswith(".gif"):
+            self._show()
+        else:
+            await super()._ended(job)

@@ -8,15 +8,17 @@ from typing import Any
 from nicegui import ui
 
 from hotlever.app.jobs import Task
+from hotlever.app.pages.drawn import in_python, probe_files, settings, stem
 from hotlever.app.pages.frame import ErrorBanner, two_columns
 from hotlever.app.pages.page import Page, Work, outputs
-from hotlever.app.pages.pulses import Pulses, in_python, settings, stem
+from hotlever.app.pages.pulses import Pulses
 from hotlever.app.pages.sliders import LiveView, Sliders
+from hotlever.app.pages.small_signals import SmallSignals
 from hotlever.app.session import Session
 
 #: Biases of a sweep that is written.
 _BIASES = 49
-_VIEWS = {"rest": "at a bias", "time": "in time"}
+_VIEWS = {"rest": "at a bias", "time": "in time", "signals": "small signals"}
 
 
 class SimulatePage(Page):
@@ -42,12 +44,12 @@ class SimulatePage(Page):
                         self.command()
                 with ui.column().classes("w-full gap-3 last") as time:
                     self._pulses = Pulses(session, banner, self.chosen)
-                for name, shown in (
-                    ("rest", rest),
-                    ("rest", self._sliders.of_bias),
-                    ("time", time),
-                ):
+                with ui.column().classes("w-full gap-3") as signals:
+                    self._signals = SmallSignals(session, banner, self.chosen)
+                for name, shown in (("rest", rest), ("time", time), ("signals", signals)):
                     shown.bind_visibility_from(view, "value", value=name)
+                of_bias = self._sliders.of_bias
+                of_bias.bind_visibility_from(view, "value", backward=lambda name: name != "time")
 
     async def open(self) -> None:
         """Ask for the sliders of the probe, and so for the first state."""
@@ -67,6 +69,7 @@ class SimulatePage(Page):
         self._live.follow(self._sliders.free)
         self.show_command()
         self._pulses.show_command()
+        self._signals.show_command()
 
     def task(self) -> Task:
         """Return the task that writes the table of a sweep."""
@@ -78,8 +81,7 @@ class SimulatePage(Page):
         bias = f"{chosen['bias']:g}:{chosen['bias']:g}:1"
         bias = bias if kind == "VTU" else f"0:{chosen['most']:g}:{_BIASES}"
         files = outputs(f"{stem(chosen)}.sweep", kind)
-        probe = (chosen["probe"],) if chosen["probe"] else ()
-        return Task("sweep", probe, {"bias": bias, **settings(chosen), **files})
+        return Task("sweep", probe_files(chosen), {"bias": bias, **settings(chosen), **files})
 
     def python(self) -> str:
         """Return the lines of Python that make the sweep."""

@@ -1,0 +1,113 @@
+"""What pages have in common whose task computes a table and draws it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar
+
+from nicegui import ui
+
+from hotlever.app.jobs import Job, Task
+from hotlever.app.pages.frame import caption, figure, number_shown
+from hotlever.app.pages.page import KINDS, Page, Work, outputs
+
+
+def stem(lever: Mapping[str, Any]) -> str:
+    """Return what names of files begin with, of the lever that is chosen."""
+    return Path(lever["probe"] or "reference.toml").stem
+
+
+def probe_files(lever: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the files that a task of the lever is given."""
+    return (lever["probe"],) if lever["probe"] else ()
+
+
+def settings(lever: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options of a task that say what is changed of a probe."""
+    texts = {None: "none", True: "true", False: "false"}
+    changes = {
+        name: texts[value] if value is None or isinstance(value, bool) else value
+        for name, value in lever["changes"].items()
+    }
+    medium = changes.pop("medium", None)
+    return {"medium": medium, "set": [f"{name}={changes[name]}" for name in sorted(changes)]}
+
+
+def in_python(lever: Mapping[str, Any]) -> str:
+    """Return what makes the probe that is chosen in Python."""
+    name, changes = lever["probe"], dict(sorted(lever["changes"].items()))
+    made = f"Probe.from_file({name!r})" if name else "Probe.reference()"
+    if not changes:
+        return made
+    if all(name.isidentifier() for name in changes):
+        return f"{made}.with_({', '.join(f'{key}={value!r}' for key, value in changes.items())})"
+    return f"{made}.with_(**{changes!r})"
+
+
+class DrawnPage(Page):
+    """A page, or a part of one, that shows the figure of its task and gives what it computed."""
+
+    #: What the figure shows, and what it may be asked for as.
+    alt = ""
+    kinds: ClassVar[Mapping[str, str]] = KINDS
+
+    def show_result(self) -> None:
+        """Show the work here, what it drew last, and the command line."""
+        Work(self.session, self.name, self._ended)
+        self._result = ui.column().classes("w-full gap-3")
+        self.command()
+        self._keep_result(self.session.jobs.by_page.get(self.name))
+        self._show()
+
+    def number(self, key: str, label: str, unit: str = "", empty: str = "") -> ui.number:
+        """Ask for a number; `empty` is what counts where there is none."""
+        number = ui.number(label, value=self.chosen[key], on_change=self._keep(key))
+        number.props(f"debounce=200 suffix={unit.replace('u', 'µ')}" if unit else "debounce=200")
+        if empty:
+            number.props(f'clearable stack-label placeholder="{empty}"')
+        return number.classes("w-36")
+
+    async def _ended(self, job: Job) -> None:
+        if self._keep_result(job):
+            self._show()
+        else:
+            await self.give(job)
+
+    def _keep_result(self, job: Job | None) -> bool:
+        """Keep what is to be shown of a job, if it drew that; return whether it did."""
+        if job is None or not job.task.written.endswith(".svg"):
+            return False
+        if self.written(job):
+            self.session.shown[self.name] = job.task, job.shown.get("table", [])
+        return True
+
+    def _show(self) -> None:
+        """Show what was computed last, with the figure that was drawn, and give it."""
+        self._result.clear()
+        if self.name not in self.session.shown:
+            return
+        task, numbers = self.session.shown[self.name]
+        path = self.session.project.path(task.written)
+        if not path.is_file():
+            return
+        with self._result:
+            with ui.row().classes("w-full items-end gap-6"):
+                for title, value in numbers:
+                    number_shown(title, title, value)
+            self.show_figure(path)
+            with ui.row().classes("w-full items-center"):
+                caption(task.writing({}).line).classes("remark col")
+                self.kind_buttons(partial(self._ask, task, path), self.kinds)
+
+    def show_figure(self, path: Path) -> None:
+        """Show the figure that was drawn."""
+        figure(path.read_text(encoding="utf-8"), self.alt, wide=True)
+
+    def _ask(self, task: Task, path: Path, kind: str) -> None:
+        """Give a file that there is, or have it written."""
+        if kind in ("CSV", "SVG"):
+            ui.download.file(path.with_suffix(f".{kind.lower()}"))
+        else:
+            self.run(task.writing(outputs(path.stem, kind)))
