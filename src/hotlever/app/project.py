@@ -28,8 +28,10 @@ FIT, CALIBRATION, TABLE = ".fit.json", ".calibration.json", ".table.csv"
 #: Folder of the fits of many levers.
 FITS = "fits"
 #: Endings of tables that commands write: no measurements.
-_WRITTEN = (TABLE, ".raman.csv", ".corrections.csv")
-_WRITTEN += (".sweep.csv", ".pulse.csv", ".spectrum.csv", ".design.csv")
+_WRITTEN = (
+    *(TABLE, ".raman.csv", ".corrections.csv"),
+    *(".sweep.csv", ".pulse.csv", ".spectrum.csv", ".design.csv"),
+)
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
