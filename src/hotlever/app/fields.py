@@ -11,7 +11,7 @@ from hotlever.app.edits import LayerRow, Section
 from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
 from hotlever.errors import InputError
-from hotlever.probe.probe import sections_of
+from hotlever.probe.file_sections import sections_of
 
 #: Numbers of other sections that can be set: keys, in the order in which they are shown.
 _OTHERS = {

@@ -36,7 +36,7 @@ from hotlever.measurement import (
     read_measurement_of,
 )
 from hotlever.probe import Layout, Probe
-from hotlever.probe.probe import read_sections
+from hotlever.probe.file_sections import read_sections
 from hotlever.probe.shapes import PARAMETRIC
 from hotlever.raman import read_spectra
 from hotlever.report.calibration_pages import calibration_page

@@ -23,8 +23,9 @@ from hotlever.probe.drawing.sheet import (
     read_sheet,
     sensible_unit,
 )
+from hotlever.probe.file_sections import commented, other_sections
 from hotlever.probe.layout import Point, ring_area
-from hotlever.probe.probe import Probe, commented
+from hotlever.probe.probe import Probe
 from hotlever.text import aligned, as_toml
 
 #: Layers that are listed.
@@ -205,7 +206,7 @@ def _probe_file(
     for role in dict.fromkeys((*REQUIRED, *inference.terminals)):
         reason = reasons.get(terminal_part(role))
         lines.append(_entry(role, inference.terminals.get(role), reason, "10/0"))
-    return "\n".join(lines) + "\n" + reference.other_sections()
+    return "\n".join(lines) + "\n" + other_sections(reference)
 
 
 def _entry(key: str, value: Drawn | Point | None, reason: str | None, example: object) -> str:

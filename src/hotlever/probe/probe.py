@@ -1,46 +1,27 @@
-"""A probe, and the file that describes it: its sections read, checked and written."""
+"""A probe, and the file that describes it."""
 
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hotlever.errors import InputError, quoted, unknown_name
-from hotlever.files import read_text, write_text
+from hotlever.files import write_text
 from hotlever.materials import REFERENCE, Kind
 from hotlever.materials.sections import LAWS, materials_of, own_laws, refuse_own_laws
+from hotlever.probe.file_sections import file_text, read_sections, shape_of, with_values
 from hotlever.probe.parts import MATERIALS, PARTS, SECTIONS, ProbeParts
 from hotlever.probe.physics import Physics
 from hotlever.probe.priors import priors_of
-from hotlever.probe.shapes import (
-    DRAWING,
-    PARAMETRIC,
-    PARAMETRIC_DRAWING,
-    SHAPE_SECTIONS,
-    SHAPES,
-    Shape,
-    ThreeLeg,
-    UShape,
-)
-from hotlever.probe.tip import Tip
-from hotlever.records import Record
+from hotlever.probe.shapes import PARAMETRIC, SHAPE_SECTIONS, ThreeLeg, UShape
 from hotlever.spieser2017 import DOI
-from hotlever.text import as_toml
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hotlever.probe.drawing.kit import Drawing
-
-#: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
-#: gigabytes to read.
-_LARGEST, _LONGEST_LINE = 1_000_000, 1000
-_HEADING = "# A hotlever probe file: lengths in µm, temperatures in K."
-#: Column in which comments begin.
-_COMMENTS = 32
 
 
 class Probe(ProbeParts):
@@ -189,12 +170,6 @@ class Probe(ProbeParts):
         values = read_sections(path)
         return cls.from_sections(values, str(path), Path(path).parent)
 
-    @property
-    def _records(self) -> dict[str, Record]:
-        """What it consists of, beside the shape, by the section of its file."""
-        named = {f"{MATERIALS}.{name}": kind for name, kind in self.materials.items()}
-        return named | self.parts
-
     def sections(self) -> dict[str, dict[str, Any]]:
         """Return the sections as plain values: what `from_sections` takes, or refuses."""
         sections: dict[str, dict[str, Any]] = self.shape.sections()
@@ -268,37 +243,13 @@ class Probe(ProbeParts):
 
     def to_toml(self) -> str:
         """Return the probe as a commented probe file."""
-        lines = [_HEADING]
+        heading = ""
         if self.shape == Probe.reference().shape:
-            lines.append(
+            heading = (
                 "# The reference probe. No drawing of the published lever exists: these dimensions"
-                f"\n# are inferred from the operating points in doi:{DOI}."
+                f"\n# are inferred from the operating points in doi:{DOI}.\n"
             )
-        return self._text(lines, self.shape.sections(), self.shape.description())
-
-    def _text(self, lines: list[str], shape: Mapping[str, Any], meaning: Mapping[str, str]) -> str:
-        """Return a probe file with some lines above the sections of its shape."""
-        for name, section in shape.items():
-            lines += section_lines(name, section, meaning)
-        return "\n".join(lines) + "\n" + self.other_sections()
-
-    def other_sections(self) -> str:
-        """Return the sections of its file beside those of its shape."""
-        lines = []
-        for name, part in self._records.items():
-            lines += section_lines(name, part.model_dump(), part.description(), optional=True)
-        if self.tip is None:
-            example = Tip(height_um=0.7, half_angle_deg=20, apex_radius_um=0.02)
-            lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]
-            values, meaning = example.model_dump(), example.description()
-            lines += section_lines("tip", values, meaning, start="# ")[1:]
-        if not self.physics:
-            lines += ["", "# Without a section [physics] the physics is the paper's. Beyond it:"]
-            effects = dict.fromkeys(Physics.model_fields, True)
-            lines += section_lines("physics", effects, Physics.description(), start="# ")[1:]
-        if laws := own_laws(self.made_of):
-            lines += section_lines(LAWS, laws, {})
-        return "\n".join(lines) + "\n"
+        return file_text(self, self.shape.sections(), self.shape.description(), heading)
 
     def to_file(
         self, path: str | os.PathLike[str], drawing: str | os.PathLike[str] | None = None
@@ -318,7 +269,7 @@ class Probe(ProbeParts):
         from hotlever.probe.drawing.shape import DrawnShape
 
         shape = save_drawing(self.shape, drawing, Path(path).parent)
-        return write_text(path, self._text([_HEADING], shape, DrawnShape.description()))
+        return write_text(path, file_text(self, shape, DrawnShape.description()))
 
     def draw(self, title: str = "") -> Figure:
         """Return a figure of the probe from above, with its heater, terminals and tip."""
@@ -326,132 +277,3 @@ class Probe(ProbeParts):
         from hotlever import figures
 
         return figures.probe_drawing(self.layout(), title)
-
-
-# --- sections of probe files ----------------------------------------------------------------------
-
-
-def read_sections(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read a probe file (TOML).
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or is not TOML.
-    """
-    return sections_of(read_text(path, largest=_LARGEST), str(path))
-
-
-def sections_of(text: str, path: str) -> dict[str, Any]:
-    """Return the sections of the text of a probe file; `path` names it in an error.
-
-    Raises
-    ------
-    InputError
-        If it is not TOML.
-    """
-    for number, line in enumerate(text.splitlines(), start=1):
-        if len(line) > _LONGEST_LINE:
-            raise InputError(
-                f"{path}: line {number}: {len(line)} characters, expected at most {_LONGEST_LINE}"
-            )
-    try:
-        values = tomllib.loads(text)
-    except RecursionError:
-        raise InputError(f"{path}: not valid TOML: nested too deeply") from None
-    except ValueError as error:
-        # a number of thousands of digits is a ValueError too
-        reason = str(error).partition(";")[0]
-        raise InputError(f"{path}: not valid TOML: {reason}") from None
-    return values
-
-
-def with_values(section: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a section without the keys that have no value."""
-    return {
-        key: with_values(value) if isinstance(value, Mapping) else value
-        for key, value in section.items()
-        if value is not None
-    }
-
-
-def commented(entry: str, text: str | None) -> str:
-    """Return a line of a probe file with a comment, if there is one."""
-    return f"{entry:<{_COMMENTS - 2}}  # {text}" if text else entry
-
-
-def section_lines(
-    name: str,
-    section: Mapping[str, Any],
-    meaning: Mapping[str, str],
-    *,
-    optional: bool = False,
-    start: str = "",
-) -> list[str]:
-    """Return the lines of a section, after an empty one, each with what its value is.
-
-    Keys that have no value are left out, or with `optional` named in a comment. Sections inside it
-    come last. The `start` of each line may make all of it a comment.
-    """
-    inner = {key: value for key, value in section.items() if isinstance(value, Mapping)}
-    lines = [] if inner and len(inner) == len(section) else ["", f"{start}[{name}]"]
-    for key, value in section.items():
-        if key in inner or (value is None and not optional):
-            continue
-        written = f"{value:.12g}" if isinstance(value, float) else as_toml(value)
-        entry = f"# {key} =" if value is None else f"{start}{key} = {written}"
-        lines.append(commented(entry, meaning.get(key)))
-    for key, values in inner.items():
-        lines += section_lines(f"{name}.{key}", values, {})
-    return lines
-
-
-def shape_of(
-    sections: Mapping[str, Any],
-    where: str,
-    folder: Path | None = None,
-    materials: Mapping[str, Kind] | None = None,
-    like: Shape | None = None,
-) -> Shape:
-    """Make the shape that some sections of a probe file describe.
-
-    Parameters
-    ----------
-    sections : mapping
-        ``[probe]``, and ``[layers]`` and ``[terminals]`` of a drawing.
-    where : str
-        Names the file in an error.
-    folder : path, optional
-        What the name of a drawing's file is relative to.
-    materials : mapping of str to Kind, optional
-        Those that the layers of a drawing may be made of.
-    like : Shape, optional
-        One whose class it is to have, if both are drawn by one function.
-
-    Raises
-    ------
-    InputError
-        If the shape is unknown, a dimension is missing, misspelt or impossible, or a drawing is
-        at fault.
-    """
-    values, here = sections["probe"], f"{where}: [probe]"
-    name = values.get("shape")
-    if name is None:
-        raise InputError(f"{here}: shape is missing (one of: {', '.join(SHAPES)})")
-    if not isinstance(name, str) or name not in (*SHAPES, PARAMETRIC_DRAWING):
-        raise unknown_name("shape", str(name), SHAPES, here)
-    kinds = {of: kind.kind for of, kind in (materials or {}).items()}
-    if name == DRAWING:
-        # imported here: most probes are drawn by their dimensions
-        from hotlever.probe.drawing.shape import DrawnShape
-
-        return DrawnShape.read(sections, where, folder, kinds)
-    for section in SHAPE_SECTIONS[1:]:
-        if section in sections:
-            raise InputError(f'{where}: section [{section}] means nothing with shape = "{name}"')
-    if name == PARAMETRIC_DRAWING:
-        from hotlever.probe.drawing.parametric import ParametricDrawing
-
-        own = type(like) if isinstance(like, ParametricDrawing) else ParametricDrawing
-        return own.read(values, where, kinds)
-    return PARAMETRIC[name].from_values(values, here)

@@ -18,7 +18,7 @@ from hotlever.materials import LOW_DOPED, full_name
 from hotlever.materials.doping import diffusion_length
 from hotlever.materials.parameters import parameter_named
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.shapes import Parametric
+from hotlever.probe.shapes import PARAMETRIC_DRAWING
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.steps import each
 from hotlever.types import Array, Progress
@@ -100,7 +100,7 @@ class Design:
         of_heater = [full_name(film.material, own) for film in heater for own in _OF_HEATERS]
         thickness = [name for name in names if name.startswith("layers.")]
         shape = self.probe.shape
-        own = [] if isinstance(shape, Parametric) else shape.dimensions()
+        own = shape.dimensions() if shape.shape == PARAMETRIC_DRAWING else ()
         first = (*own, *_OF_SHAPES, *thickness, *of_heater, *ANNEALING)
         # a share of what is zero is nothing
         return tuple(name for name in dict.fromkeys(first) if names.get(name))
