@@ -304,12 +304,20 @@ def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> xr.Vari
 
 
 def csv_text(data: xr.Dataset, columns: Sequence[str]) -> str:
-    """Return columns of a dataset as CSV text; empty where a value does not exist."""
+    """Return columns of a dataset as CSV text; empty where a value does not exist.
+
+    What lies along a line has a column for each point, counted from 0 behind the name.
+    """
+    flat: dict[str, Array] = {}
+    for name in columns:
+        values, (stem, _, unit) = data[name].values, name.rpartition("_")
+        lines = {f"{stem}.{point}_{unit}": column for point, column in enumerate(values.T)}
+        flat |= {name: values} if values.ndim == 1 else lines
     rows = (
         ",".join(f"{value:.10g}" if math.isfinite(value) else "" for value in row)
-        for row in zip(*(data[name].values for name in columns), strict=True)
+        for row in zip(*flat.values(), strict=True)
     )
-    return "\n".join([",".join(columns), *rows]) + "\n"
+    return "\n".join([",".join(flat), *rows]) + "\n"
 
 
 def frame_text(frame: Any, **options: Any) -> str:

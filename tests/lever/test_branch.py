@@ -253,7 +253,7 @@ def test_extrapolated_laws_are_noted(coarse):
 
 
 def test_a_thousand_biases_cost_no_more_states(coarse):
-    few, many = (coarse.with_probe(coarse.probe) for _ in range(2))
+    few, many = (Lever(coarse.probe, space=coarse.space) for _ in range(2))
     few.sweep(np.linspace(1, 11, 25))
     many.sweep(np.linspace(1, 11, 1000))
     states: list[Branch] = [lever.branch_to(11.0) for lever in (few, many)]

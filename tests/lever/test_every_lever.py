@@ -19,6 +19,7 @@ from hotlever.lever import Branch, Lever
 from hotlever.lever.balances import BALANCES, balance_columns
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE
+from hotlever.lever.monitors import MonitorMap
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.reduced.training import cached_reduction
 from hotlever.lever.sensitivities import Linearised, by_parameter
@@ -137,6 +138,38 @@ def test_charge_and_energy_are_conserved(one, branch):
     np.testing.assert_allclose(columns["ground_current_mA"], branch.values[1:, 1], rtol=1e-7)
     ways = ("end_heat_mW", "air_heat_mW", "radiated_mW")
     np.testing.assert_allclose(sum(columns[way] for way in ways), power, rtol=1e-6)
+
+
+def test_monitors_show_the_fields_of_the_elements(one, branch):
+    layout = one.probe.layout()
+    equations, states = branch.equations, branch.x[:, -2:]
+    full = equations.space.full
+    inside = np.isin(full.mesh.region, layout.named("heater"))
+    some = np.flatnonzero(inside)[0]
+    (x, y), other = layout.tip, full.mesh.elements.p[:2, full.mesh.elements.t[:, some]].mean(axis=1)
+    monitors = {
+        "apex": {"point_um": [x, y]},
+        "line": {"line_um": [[x, y], other.tolist()], "points": 2},
+        "hot": {"region": "heater"},
+    }
+    shown = MonitorMap(one.probe.with_monitors(**monitors), equations)
+    columns = shown.columns(shown.values(states).T)
+    np.testing.assert_allclose(columns["apex_K"], branch.base_temperature_K + branch.u[-2:] ** 2)
+    expanded = equations.space.expanded(states)
+    base, ends = equations.base_temperature_K, equations.terminals.end_rises
+    basis = full.elements.basis
+    places = np.zeros((basis.mesh.dim(), 2))
+    places[:2] = np.transpose([(x, y), other])
+    for number in range(2):
+        for unit, nodal in zip("KV", full.nodal(expanded[:, number], base, ends), strict=True):
+            there = basis.probes(places) @ nodal
+            np.testing.assert_allclose(columns[f"line_{unit}"][number], there, rtol=1e-9)
+            each = np.asarray(basis.interpolate(nodal))
+            mean = np.average(each[inside], weights=basis.dx[inside])
+            assert columns[f"hot_{unit}"][number] == pytest.approx(mean, rel=1e-9)
+    change = np.random.default_rng(2).normal(size=states.shape)
+    moved = shown.values(states + change) - shown.values(states)
+    np.testing.assert_allclose(shown.changes(change), moved, atol=1e-9)
 
 
 def test_the_jacobian_passes_a_taylor_test(branch):

@@ -30,9 +30,14 @@ DIELECTRIC = {"kind": "dielectric", "kappa": NITRIDE, "kappa_exponent": 0.0}
 HOTTEST = 650.0
 
 
+def wave_number(middle_K: float) -> float:
+    """m (1/µm) at a temperature in the middle."""
+    return 2.0 / LENGTH * np.arccos(1.0 / (1.0 + TCR * (middle_K - BASE)))
+
+
 def exact(middle_K: float) -> tuple[float, float]:
     """Voltage (V) and current (mA) at a temperature in the middle."""
-    m = 2.0 / LENGTH * np.arccos(1.0 / (1.0 + TCR * (middle_K - BASE)))
+    m = wave_number(middle_K)
     per_width = m * np.sqrt(SHEET_MW_K / (TCR * SHEET_OHM * 1e-3))  # mA/µm
     voltage = 2.0 * per_width * 1e-3 * SHEET_OHM * np.tan(m * LENGTH / 2.0) / m
     return float(voltage), float(per_width * WIDTH)
@@ -70,6 +75,23 @@ def test_a_drawn_strip_is_within_1e_6_of_the_exact_solution():
         assert state.lever_V == pytest.approx(voltage, rel=1e-12)
         assert state.current_mA == pytest.approx(current, rel=1e-6)
         assert state.tip_K - BASE == pytest.approx(tip - BASE, rel=1e-6)
+
+
+def test_monitors_show_the_exact_profile_and_its_means():
+    line = {"line_um": [[0.0, 0.7], [LENGTH, 1.3]], "points": 41}
+    probe = strip().with_monitors(line=line, all={"region": "metal"})
+    lever = Lever(probe)
+    branch, voltage = lever.branch(HOTTEST), exact(600.0)[0]
+    state = lever.polished(branch.states(branch.u_at([600.0])), voltage)
+    data, m = lever.dataset([state]).isel(bias=0), wave_number(600.0)
+    phase, end = m * (np.linspace(0.0, LENGTH, 41) - LENGTH / 2), m * LENGTH / 2
+    rise = (np.cos(phase) / np.cos(end) - 1.0) / TCR
+    np.testing.assert_allclose(data.line_K - BASE, rise, atol=1e-6 * rise.max())
+    volts = voltage / 2 * (1.0 + np.sin(phase) / np.sin(end))
+    np.testing.assert_allclose(data.line_V, volts, atol=1e-6 * voltage)
+    mean = (np.tan(end) / end - 1.0) / TCR
+    assert data.all_K.item() - BASE == pytest.approx(mean, rel=1e-7)
+    assert data.all_V.item() == pytest.approx(voltage / 2, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -28,18 +28,11 @@ BALANCES = (
 
 
 def balance_names(wiring: Wiring) -> tuple[str, ...]:
-    """Return what `balance_columns` returns: `BALANCES`, and what terminals show.
+    """Return what `balance_columns` returns: `BALANCES`, and currents into the lever (mA).
 
-    These are the potential (V) and the current into the lever (mA) of those that the paper's
-    circuit does not have.
+    These are at the terminals that the paper's circuit does not have.
     """
-    volts = tuple(f"{name}_V" for name in _measured(wiring))
-    return (*BALANCES, *volts, *(f"{name}_mA" for name in _unusual(wiring)))
-
-
-def _measured(wiring: Wiring) -> tuple[str, ...]:
-    """Return the terminals whose potential follows, without the reader of the paper's circuit."""
-    return tuple(name for name in wiring.measurable if name != "reader")
+    return (*BALANCES, *(f"{name}_mA" for name in _unusual(wiring)))
 
 
 def _unusual(wiring: Wiring) -> tuple[str, ...]:
@@ -54,7 +47,7 @@ def balance_columns(equations: LeverEquations, x: Array) -> Array:
     Currents and heats at terminals are consistent fluxes: reactions of the weak form at the nodes
     of each. The names are `balance_names`.
     """
-    return _balances(equations, x, equations.fluxes(x), _leaving(equations, x))
+    return _balances(equations, equations.fluxes(x), _leaving(equations, x))
 
 
 def balance_slopes(equations: LeverEquations, x: Array, slopes: Array) -> Array:
@@ -62,7 +55,7 @@ def balance_slopes(equations: LeverEquations, x: Array, slopes: Array) -> Array:
     theta = equations.kirchhoff(x)[1] * equations.space.air.rise(slopes)
     into_tip = equations.into_tip(x)[1]["T"] * equations.footprint.rise(slopes)
     leaving = _Leaving(theta, equations.radiated_change(x, slopes), into_tip)
-    return _balances(equations, slopes, equations.flux_changes(x, slopes), leaving)
+    return _balances(equations, equations.flux_changes(x, slopes), leaving)
 
 
 def heat_left(equations: LeverEquations, x: Array) -> Array:
@@ -105,8 +98,8 @@ def _heat_out(
     return by_ends - at_ends, into_air, light, into_tip.sum(axis=0)
 
 
-def _balances(equations: LeverEquations, x: Array, fluxes: Fluxes, leaving: _Leaving) -> Array:
-    """Return the balances of states, fluxes, and what leaves the surface; all linear."""
+def _balances(equations: LeverEquations, fluxes: Fluxes, leaving: _Leaving) -> Array:
+    """Return the balances of fluxes and what leaves the surface; all linear."""
     space = equations.space
     assert isinstance(space, FullSpace)  # a reduced lever has no ends
     heats = _heat_out(equations, fluxes, leaving)
@@ -119,13 +112,8 @@ def _balances(equations: LeverEquations, x: Array, fluxes: Fluxes, leaving: _Lea
     }
     grounds = [name for name in into if equations.circuit.contact(name).kind == "ground"]
     ground = -sum((into[name] for name in grounds), start=np.zeros_like(heats[0]))
-    volts = [
-        np.tensordot(weights, x[unknowns], axes=1)
-        for name in _measured(space.wiring)
-        for unknowns, weights in [space.potential_at(name)]
-    ]
     currents = [into[name] for name in _unusual(space.wiring)]
-    return np.stack([*of_parts, ground, *heats, *volts, *currents], axis=-1)
+    return np.stack([*of_parts, ground, *heats, *currents], axis=-1)
 
 
 def _made(heat: Array, points: Index) -> Array:

@@ -17,6 +17,7 @@ from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES, balance_columns, balance_names, balance_slopes
 from hotlever.lever.branch import Branch
 from hotlever.lever.equations import SHOWN, LeverEquations
+from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.materials import Kind
 from hotlever.materials.sections import LAWS, own_laws
 from hotlever.probe import Circuit, Probe
@@ -48,6 +49,8 @@ def dataset_of_states(
     shown = dict(zip(SHOWN, equations.observed(x), strict=True))
     shown["tip_K"] = base + equations.space.tip_rise(x)
     shown["max_K"] = base + equations.highest_rise(x)
+    monitors = MonitorMap(probe, equations)
+    shown |= monitors.columns(monitors.values(x).T)
     return _dataset(probe, equations, shown, balance_columns(equations, x), notes)
 
 
@@ -65,6 +68,9 @@ def dataset_of_branch(
     equations, shown = branch.equations, branch.shown(u)
     shown["tip_K"] = branch.tip_K(u)
     shown["max_K"] = branch.base_temperature_K + branch.highest_rise_at(u)
+    monitors = MonitorMap(probe, equations)
+    curves = monitors.values(branch.x).T, monitors.changes(branch.slopes).T
+    shown |= monitors.columns(branch.through(*curves)(u))
     balances = branch.through(
         balance_columns(equations, branch.x), balance_slopes(equations, branch.x, branch.slopes)
     )
@@ -79,7 +85,10 @@ def _dataset(
     notes: Sequence[str],
     sensitivities: Array | None = None,
 ) -> xr.Dataset:
-    """Return what is observed of n states, of which the balances (n, k) are `balance_columns`."""
+    """Return what is observed of n states, of which the balances (n, k) are `balance_columns`.
+
+    Shown are what instruments see, the tip, the highest temperature, and monitors.
+    """
     made_of = equations.laws.made_of
     names = balance_names(probe.wiring)
     columns = {**shown, **dict(zip(names, balances.T, strict=True))}
@@ -95,9 +104,10 @@ def _dataset(
     # where all of the conductor is the heater there are no legs
     whole = np.where(np.isnan(columns["legs_ohm"]), 0.0, columns["legs_ohm"])
     columns["lever_ohm"] = whole + columns["heater_ohm"]
-    every = (*SWEEP_COLUMNS, *at_terminals, *_MORE)
-    variables: dict[str, Any] = {name: columns[name] for name in every}
-    coordinates: dict[str, Any] = {"bias": columns["bias_V"]}
+    every = dict.fromkeys((*SWEEP_COLUMNS, *at_terminals, *_MORE, *shown))
+    kept = {name: columns[name] for name in every}
+    variables, coordinates = with_meanings(probe, kept, "bias")
+    coordinates["bias"] = columns["bias_V"]
     if sensitivities is not None:
         variables["sensitivity"] = (("observable", "bias", "parameter"), sensitivities)
         coordinates |= {"observable": list(OBSERVABLES), "parameter": list(usual_parameters(probe))}
@@ -110,9 +120,8 @@ def _dataset(
         ),
     )
     for column in at_terminals:
-        terminal, _, unit = column.rpartition("_")
-        meaning = "potential of" if unit == "V" else "current into the lever at"
-        data[column].attrs = {"units": unit, "long_name": f"{meaning} terminal {terminal}"}
+        meaning = f"current into the lever at terminal {column.removesuffix('_mA')}"
+        data[column].attrs = {"units": "mA", "long_name": meaning}
     return data
 
 
@@ -169,18 +178,17 @@ def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
     InputError
         If the suffix is neither, or the file cannot be written.
     """
-    write_dataset(data, path, _in_a_file(data))
+    write_dataset(data, path, in_a_file(data, SWEEP_COLUMNS))
 
 
 def sweep_csv(data: xr.Dataset) -> str:
     """Return a sweep as CSV text, one row per bias; empty where a value does not exist."""
-    return csv_text(data, _in_a_file(data))
+    return csv_text(data, in_a_file(data, SWEEP_COLUMNS))
 
 
-def _in_a_file(data: xr.Dataset) -> list[str]:
-    """Return the columns of a sweep's file: the usual ones, and those of other terminals."""
-    own = [str(name) for name in data.data_vars if name not in QUANTITIES]
-    return [*SWEEP_COLUMNS, *own]
+def in_a_file(data: xr.Dataset, columns: Sequence[str]) -> list[str]:
+    """Return the columns of a file: the usual ones, and those of other terminals and monitors."""
+    return [*columns, *(str(name) for name in data.data_vars if name not in QUANTITIES)]
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:

@@ -213,13 +213,24 @@ class FiniteElements:
             positions=positions.reshape(len(positions), -1),
         )
 
+    def interpolation(self, points: Array) -> tuple[csr_matrix, Index]:
+        """Return the matrix from nodal values to those at points, and the element of each.
+
+        See `at_points`.
+        """
+        elements, shares, _ = self.at_points(points)
+        starts = np.arange(0, shares.size + 1, shares.shape[1])
+        matrix = (shares.ravel(), self.dofs[elements].ravel(), starts)
+        return csr_matrix(matrix, shape=(len(points), self.size)), elements
+
     def at_points(self, points: Array) -> tuple[Index, Array, Array]:
         """Return the element at each point, and its basis functions there, with their slopes.
 
         Parameters
         ----------
         points : ndarray, shape (n, dimension)
-            µm. A point outside by rounding is given the nearest element.
+            µm; a last coordinate left out is zero. A point outside by rounding is given the nearest
+            element.
 
         Returns
         -------
@@ -232,6 +243,7 @@ class FiniteElements:
         InputError
             If a point lies outside the mesh.
         """
+        points = np.pad(points, ((0, 0), (0, len(self.positions) - points.shape[1])))
         elements = np.empty(len(points), dtype=np.intp)
         local = np.empty(points.T.shape)
         for number, point in enumerate(points):

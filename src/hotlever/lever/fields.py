@@ -273,7 +273,7 @@ def heater_profile(state: State, count: int = 161) -> xr.Dataset:
     # stay inside: the ends are shared with high-doped silicon
     position = np.linspace(-0.5, 0.5, count) * taper.length_um * (1 - 1e-9)
     points = np.reshape(taper.centre, (2, 1)) + np.outer(taper.axis, position)
-    T = lever.space.elements.basis.probes(points) @ state.nodal[0]
+    T = lever.space.elements.interpolation(points.T)[0] @ state.nodal[0]
     n, _ = tapered_doping(taper.distances(points), silicon.n_d, silicon.delta, n_hd=beside.n_hd)
     sigma, sigma_by = silicon.electrical_conductivity(T, n)
     columns = {

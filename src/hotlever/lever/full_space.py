@@ -81,9 +81,7 @@ class FullSpace(Space):
         self.is_temperature = np.zeros(self.size + 1, dtype=bool)
         self.is_temperature[self._T[self._T >= 0]] = True
         # in the middle of the silicon's thickness
-        tip = np.zeros(len(self.elements.positions))
-        tip[:2] = mesh.layout.tip
-        (element,), (weights,), _ = self.elements.at_points(tip[None])
+        (element,), (weights,), _ = self.elements.at_points(np.array([mesh.layout.tip]))
         self.tip = (self._T[self.elements.dofs[element]], weights)
         self.held = {name: int(self._V[self.contact_nodes[name][0]]) for name in self.wiring.held}
         unknowns = np.stack([self._T, self._V])
@@ -163,10 +161,16 @@ class FullSpace(Space):
 
     def rise_at(self, places: Array, x: Array) -> Array:
         """Return the rise of the temperature (K) at places (k, 2) in states, (k, n)."""
-        element, shares, _ = self.elements.at_points(places)
-        unknowns = self._T[self.elements.dofs[element]]
-        nodal = np.where((unknowns >= 0)[..., None], x[unknowns], 0.0)
-        return np.asarray(np.einsum("ks,ksn->kn", shares, nodal))
+        return np.asarray(self.elements.interpolation(places)[0] @ self.nodal_rises(x))
+
+    @property
+    def full(self) -> FullSpace:
+        """It is no reduced one."""
+        return self
+
+    def combined(self, rises: csr_matrix, potentials: csr_matrix) -> csr_matrix:
+        """Return the map from the unknowns to combinations of what is at the nodes, (k, nodes)."""
+        return rises @ self._selection(self._T) + potentials @ self._selection(self._V)
 
     @cached_property
     def rim(self) -> Rim:

@@ -127,6 +127,8 @@ class Lever:
             raise InputError("another shape, tip or wiring needs a new Lever")
         other = copy(self)
         other.probe = probe
+        if probe.model_copy(update={"monitor": self.probe.monitor}) == self.probe:
+            return other  # its states are the same
         around, base = probe.surroundings, probe.circuit.base_temperature_K
         if (around, base) != (self.probe.surroundings, self.circuit.base_temperature_K):
             other.space = other._surrounded(self.space)

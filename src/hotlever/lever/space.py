@@ -12,7 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from hotlever.lever.films import PlacedFilm
 from hotlever.lever.linear_map import LinearMap
 from hotlever.lever.rim import Rim
 from hotlever.types import Array, Index
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 
 class Factors(Protocol):
@@ -242,6 +245,11 @@ class Space(ABC):
 
     @property
     @abstractmethod
+    def full(self) -> Any:
+        """That of the full lever."""
+
+    @property
+    @abstractmethod
     def rim(self) -> Rim:
         """The surface at which the mesh ends."""
 
@@ -286,6 +294,20 @@ class Space(ABC):
     def expanded(self, x: Array) -> Array:
         """Return states of the full lever: those of modes in terms of its own unknowns."""
         return x
+
+    @abstractmethod
+    def combined(self, rises: csr_matrix, potentials: csr_matrix) -> Any:
+        """Return the map from the unknowns to combinations of what is at the nodes.
+
+        Parameters
+        ----------
+        rises, potentials : csr_matrix, shape (k, nodes)
+            Weights of the rises (K) and of the potentials (V) of the full lever's nodes.
+
+        Returns
+        -------
+        csr_matrix or ndarray, shape (k, size + 1)
+        """
 
     @abstractmethod
     def rises(self, x: Array) -> Array:

@@ -150,12 +150,8 @@ class SolidLever(Lever):
     @cached_property
     def _from_flat(self) -> csr_matrix:
         """The matrix from nodal values of the flat lever to those of this one."""
-        flat, nodes = self._flat.space.elements, self.space.elements.nodes
-        element, shares, _ = flat.at_points(nodes[:2].T)
-        rows = np.repeat(np.arange(len(element)), shares.shape[1])
-        return csr_matrix(
-            (shares.ravel(), (rows, flat.dofs[element].ravel())), shape=(len(element), flat.size)
-        )
+        flat = self._flat.space.elements
+        return flat.interpolation(self.space.elements.nodes[:2].T)[0]
 
     def _read(
         self, bias: Array, progress: Progress | None = None
@@ -165,7 +161,8 @@ class SolidLever(Lever):
 
     def _state_at(self, branch: Branch, u: float, bias: float) -> State:
         """Return a state from the cache, or solve it from that of the flat lever."""
-        facts: dict[str, Any] = {"probe": self.probe.sections(), "bias_V": bias}
+        solved = self.probe.model_copy(update={"monitor": None})
+        facts: dict[str, Any] = {"probe": solved.sections(), "bias_V": bias}
         facts["nodes"] = self.space.elements.nodes
         if self.medium == "air":
             air = self.space.air.operator

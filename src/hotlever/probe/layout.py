@@ -97,6 +97,8 @@ class Region:
         What lies on the body.
     insulates : bool
         Whether nothing in the stack carries a current.
+    layers : tuple of str
+        Of a drawing, those that it has.
     """
 
     name: str
@@ -108,6 +110,13 @@ class Region:
     dopant_from: str = HIGH_DOPED
     films: tuple[Film, ...] = ()
     insulates: bool = False
+    layers: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What it may be called: its name, its part, its layers and its materials."""
+        materials = (film.material for film in self.stack)
+        return tuple(dict.fromkeys((self.name, self.part, *self.layers, *materials)))
 
     @property
     def stack(self) -> tuple[Film, ...]:
@@ -209,6 +218,10 @@ class Layout:
         return self.thickness_um + max(
             sum(film.thickness_um or 0.0 for film in region.films) for region in self.regions
         )
+
+    def named(self, name: str) -> list[int]:
+        """Return the numbers of the regions that may be called so."""
+        return [index for index, region in enumerate(self.regions) if name in region.names]
 
     @property
     def cone_in_air(self) -> Tip | None:

@@ -16,6 +16,7 @@ from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.probe.circuit import Circuit, Contact, Wiring
 from hotlever.probe.contact import SampleContact
 from hotlever.probe.layout import Layout
+from hotlever.probe.monitors import Monitor, Monitors
 from hotlever.probe.physics import THE_PAPERS, Physics
 from hotlever.probe.shapes import PARAMETRIC, SHAPE_SECTIONS, Shape
 from hotlever.probe.surroundings import Surroundings
@@ -40,6 +41,7 @@ PARTS: dict[str, type[Record]] = {
     "contact": SampleContact,
     "physics": Physics,
     "prior": PriorTexts,
+    "monitor": Monitors,
 }
 MATERIALS = "materials"
 #: All sections of a probe file.
@@ -58,6 +60,7 @@ class ProbeParts(Record):
     contact: SampleContact | None = None
     physics: Physics = THE_PAPERS
     prior: PriorTexts | None = None
+    monitor: Monitors | None = None
 
     @model_validator(mode="after")
     def _tip_stands_on_the_heater(self) -> Self:
@@ -126,6 +129,11 @@ class ProbeParts(Record):
     def stated_priors(self) -> dict[str, str]:
         """What its file says of its priors, by name."""
         return {} if self.prior is None else self.prior.model_extra or {}
+
+    @property
+    def monitors(self) -> dict[str, Monitor]:
+        """Where temperature and potential are reported, by name."""
+        return {} if self.monitor is None else self.monitor.named
 
     @property
     def parts(self) -> dict[str, Record]:

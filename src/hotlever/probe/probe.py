@@ -12,6 +12,7 @@ from hotlever.files import write_text
 from hotlever.materials import REFERENCE, Kind
 from hotlever.materials.sections import LAWS, materials_of, own_laws, refuse_own_laws
 from hotlever.probe.file_sections import file_text, read_sections, shape_of, with_values
+from hotlever.probe.monitors import Monitor, Monitors
 from hotlever.probe.parts import MATERIALS, PARTS, SECTIONS, ProbeParts
 from hotlever.probe.physics import Physics
 from hotlever.probe.priors import priors_of
@@ -153,6 +154,8 @@ class Probe(ProbeParts):
                 f"{where}: [material]: no layer is made of it, expected no "
                 "such section, or a layer without a material of its own"
             )
+        if probe.monitor is not None:
+            probe.monitor.check(probe.layout(), f"{where}: [monitor]")
         priors_of(probe.stated_priors, probe, f"{where}: [prior]")
         return probe
 
@@ -240,6 +243,30 @@ class Probe(ProbeParts):
             If there is no such effect.
         """
         return self.model_copy(update={"physics": Physics.of(effects, where)})
+
+    def with_monitors(self, **monitors: Monitor | Mapping[str, Any]) -> Probe:
+        """Return the probe with some monitors beside those that it has.
+
+        Parameters
+        ----------
+        **monitors : Monitor or mapping
+            By name, which heads its columns; a mapping holds what ``[monitor.NAME]`` of a probe
+            file does.
+
+        Raises
+        ------
+        InputError
+            If one is not on the lever (the nearest place is given), or its name is taken.
+
+        Examples
+        --------
+        >>> probe = Probe.reference().with_monitors(spot={"point_um": (40, 0)})
+        >>> print(probe.monitors["spot"])
+        at (40, 0) µm
+        """
+        made = Monitors.from_values({**self.monitors, **monitors}, "monitors")
+        made.check(self.layout(), "monitors")
+        return self.model_copy(update={"monitor": made})
 
     def to_toml(self) -> str:
         """Return the probe as a commented probe file."""

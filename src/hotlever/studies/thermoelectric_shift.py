@@ -285,8 +285,7 @@ def _from_supply(plain: Lever) -> tuple[Taper, dict[str, Array]]:
     elements = space.elements
     end = 0.25 * taper.length_um * np.array(taper.axis)
     places = np.array(taper.centre) + np.outer([-1.0, 0.0, 1.0], end)
-    element, shares, _ = elements.at_points(places)
-    before, centre, after = (shares * potential[elements.dofs[element]]).sum(axis=1)
+    before, centre, after = elements.interpolation(places)[0] @ potential
     if before < after:
         taper = replace(taper, axis=(-taper.axis[0], -taper.axis[1]))
     at_points = (elements.sampling[: elements.weights.size] @ potential)[:, None]

@@ -15,6 +15,7 @@ from typing import Self
 
 import numpy as np
 from scipy.optimize import nnls
+from scipy.sparse import csr_matrix
 
 from hotlever.air.coupling import ReducedAir
 from hotlever.lever.films import at_some
@@ -112,7 +113,7 @@ class ReducedSpace(Space):
     def __init__(
         self, full: FullSpace, modes_T: Array, modes_V: Array, lift: Array, hot: Index | None = None
     ) -> None:
-        self.full, self.lift = full, lift
+        self._full, self.lift = full, lift
         self.modes = np.concatenate([modes_T, modes_V])
         self.count, self.size = len(modes_T), len(modes_T) + len(modes_V)
         self.is_temperature = np.arange(self.size + 1) < self.count
@@ -172,6 +173,11 @@ class ReducedSpace(Space):
         modes_V = proper_orthogonal_modes(np.where(is_T, 0.0, free), most[1], least)
         return cls(full, modes_T, modes_V, lift, hot)
 
+    @property
+    def full(self) -> FullSpace:
+        """That of the full lever."""
+        return self._full
+
     def at_points(self, points: Index, weights: Array) -> ReducedSpace:
         """Return the same modes at some of the points, with other weights."""
         space = copy(self)
@@ -205,6 +211,12 @@ class ReducedSpace(Space):
         """Return the full states of reduced ones, (full.size + 1, n)."""
         free = self.modes.T @ x[:-1] + np.outer(self.lift, x[-1])
         return np.vstack([free, x[-1:]])
+
+    def combined(self, rises: csr_matrix, potentials: csr_matrix) -> Array:
+        """Return the map from the unknowns to combinations of what is at the nodes, (k, nodes)."""
+        return np.asarray(
+            self.full.combined(rises, potentials) @ self.expanded(np.eye(self.size + 1))
+        )
 
     def coordinates(self, x: Array) -> Array:
         """Return the reduced states nearest to full ones, or to changes of them."""

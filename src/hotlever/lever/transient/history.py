@@ -13,8 +13,9 @@ from scipy.optimize import brentq
 
 from hotlever.datasets import csv_text, labelled, write_dataset
 from hotlever.errors import ComputationError, HistoryEndError, InputError
-from hotlever.lever.dataset import probe_attributes, range_notes
+from hotlever.lever.dataset import in_a_file, probe_attributes, range_notes
 from hotlever.lever.lever import State
+from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.lever.transient.problem import MONITORED, TransientProblem
 from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
 from hotlever.lever.transient.waveform import Piece, Waveform
@@ -56,13 +57,17 @@ class _Observer:
     """Reads off the ends of steps, one after the other, what is `_REPORTED`."""
 
     def __init__(self, lever: Lever) -> None:
+        self.monitors = MonitorMap(lever.probe, lever.equations)
         self._space, base = lever.space, lever.equations.base_temperature_K
         self._zero = np.array([0.0, 0.0, 0.0, base, base])[:, None]
         self._at_ends: float | None = None
         self._added = np.zeros((2, 1))
 
     def read(self, step: Step) -> tuple[Array, Array]:
-        """Return values and slopes (per µs) at both ends of the next step, each (9, 2)."""
+        """Return values and slopes (per µs) at both ends of the next step, each (9 + rows, 2).
+
+        Behind what is `_REPORTED` come the rows of the monitors.
+        """
         shown, flows, held, at_ends = np.split(step.monitored, _PARTS_MONITORED)
         moving, _, held_by, at_ends_by = np.split(step.monitored_slopes, _PARTS_MONITORED)
         if self._at_ends is None:
@@ -71,15 +76,17 @@ class _Observer:
         self._added = added[:, 1:]
         # what is held at the leg ends leaves without a flux at rest
         left, left_by = added[1:] - (at_ends - self._at_ends), flows[1:] - at_ends_by
-        highest, highest_by = self._highest(step)
-        values = np.concatenate([shown, highest, added[:1], held, left])
+        own = self._space.size + 1
+        x, slopes = step.x[:own], step.slopes[:own]
+        highest, highest_by = self._highest(x, slopes)
+        values = np.concatenate([shown, highest, added[:1], held, left, self.monitors.values(x)])
         values[: len(self._zero)] += self._zero
-        return values, np.concatenate([moving, highest_by, flows[:1], held_by, left_by])
+        by_time = [moving, highest_by, flows[:1], held_by, left_by, self.monitors.changes(slopes)]
+        return values, np.concatenate(by_time)
 
-    def _highest(self, step: Step) -> tuple[Array, Array]:
+    def _highest(self, x: Array, slopes: Array) -> tuple[Array, Array]:
         """Return the highest rise (K) at both ends, and its slopes, each (1, 2)."""
-        own, ends = self._space.size + 1, np.arange(2)
-        rises, slopes = self._space.rises(step.x[:own]), self._space.rises(step.slopes[:own])
+        ends, rises, slopes = np.arange(2), self._space.rises(x), self._space.rises(slopes)
         hottest = rises.argmax(axis=0)
         return rises[None, hottest, ends], slopes[None, hottest, ends]
 
@@ -217,14 +224,14 @@ class _Recorder:
         self, lever: Lever, asked: Array | None, per_step: int, callback: Callback | None
     ) -> None:
         self._lever, self._asked, self._per_step, self._callback = lever, asked, per_step, callback
-        self._observer = _Observer(lever)
+        self.observer = _Observer(lever)
         self.time: list[float] = []
         self.bias: list[float] = []
         self.values: list[Array] = []
 
     def add(self, piece: Piece, step: Step) -> float | None:
         """Add the rows of a step; return when silicon melts, if it does."""
-        values, slopes = self._observer.read(step)
+        values, slopes = self.observer.read(step)
         if not self.time and (self._asked is None or self._asked[0] == 0.0):
             self._add(piece, step, values, slopes, 0.0)
         melts = _melts(step, values, slopes, self._lever.equations.laws.limit[0])
@@ -276,13 +283,15 @@ def checked_times(at: ArrayLike) -> Array:
 
 
 def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Dataset:
-    values = np.array(recorder.values).reshape(-1, len(_REPORTED)).T
-    columns = dict(zip(_REPORTED, values, strict=True))
+    observer, count = recorder.observer, len(_REPORTED)
+    values = np.array(recorder.values).reshape(len(recorder.time), count + observer.monitors.size)
+    columns = dict(zip(_REPORTED, values[:, :count].T, strict=True))
     columns["power_mW"] = columns["lever_V"] * columns["current_mA"]
     # the reader, where there is none, is NaN throughout
     variables = {"time_us": np.array(recorder.time), "bias_V": np.array(recorder.bias)}
     more = ("max_K", "supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ")
     variables |= {name: columns[name] for name in (*TIME_COLUMNS[2:], *more)}
+    variables |= observer.monitors.columns(values[:, count:])
     return history_dataset(lever, waveform, variables)
 
 
@@ -292,10 +301,11 @@ def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Arra
     at_rest = lever.medium == "air" and not lever.equations.heat_in_air.size
     notes = [_AIR_NOTE] if at_rest else []
     notes += range_notes(lever.equations.laws.made_of, "{} µs on", time, columns["max_K"])
+    variables, coordinates = with_meanings(lever.probe, columns, "time")
     return labelled(
-        columns,
+        variables,
         "time",
-        {"time": time},
+        {"time": time, **coordinates},
         **probe_attributes(lever.probe, lever.equations.laws.made_of),
         waveform=waveform.text,
         notes="\n".join(notes),
@@ -310,9 +320,9 @@ def write_history(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
     InputError
         If the suffix is neither, or the file cannot be written.
     """
-    write_dataset(data, path, TIME_COLUMNS)
+    write_dataset(data, path, in_a_file(data, TIME_COLUMNS))
 
 
 def history_csv(data: xr.Dataset) -> str:
     """Return a history as CSV text, one row per time; empty where a value does not exist."""
-    return csv_text(data, TIME_COLUMNS)
+    return csv_text(data, in_a_file(data, TIME_COLUMNS))

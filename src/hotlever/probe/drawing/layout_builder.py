@@ -224,6 +224,7 @@ def _regions(
             material=layers[own].material,
             films=tuple(Film(layers[film].material, layers[film].thickness_um) for film in films),
             insulates=number in insulates,
+            layers=tuple(piece.layers),
         )
         regions.append(made if dopant_from is None else replace(made, dopant_from=dopant_from))
     return regions
