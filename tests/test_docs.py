@@ -33,7 +33,7 @@ PAGES = {
 #: Pages whose examples take minutes.
 SLOW = {
     *("how-to/calibrate", "how-to/design", "how-to/fit", "how-to/levers", "how-to/uncertainty"),
-    "how-to/unknown-lever",
+    *("how-to/unknown-lever", "how-to/draw-in-python"),
     *("examples/reference-probe", "examples/boron-lever", "examples/palladium-on-nitride"),
 }
 #: Modules whose numbers the theory page states.

@@ -148,7 +148,7 @@ def sections_of(
 
 def _module(function: Callable[..., Drawing]) -> str:
     """Return the name of a function's module, the same in processes that a script starts."""
-    return function.__module__.replace("__mp_main__", "__main__")
+    return (function.__module__ or "__main__").replace("__mp_main__", "__main__")
 
 
 def _imported(module: str, name: str) -> Any:
