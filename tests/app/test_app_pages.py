@@ -101,6 +101,8 @@ def test_every_page_opens_in_an_empty_folder(tmp_path: Path) -> None:
         for address, words in {
             "/": "Try it",
             "/lever": "heater (low-doped)",
+            "/design": "hotlever design --vary heater_length_um=3:6:5 --power 2.0",
+            "/materials": "Quasi-metallic silicon",
             "/raman": "Measure",
             "/fit": "Try the example",
             "/calibrate": "Calibrate",

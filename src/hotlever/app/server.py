@@ -14,9 +14,11 @@ from nicegui import app, background_tasks, ui
 
 from hotlever.app.access import Access
 from hotlever.app.pages.calibrate import CalibratePage
+from hotlever.app.pages.design import DesignPage
 from hotlever.app.pages.fit import FitPage
 from hotlever.app.pages.lever import LeverPage
 from hotlever.app.pages.levers import LeversPage
+from hotlever.app.pages.materials import MaterialsPage
 from hotlever.app.pages.raman import RamanPage
 from hotlever.app.pages.simulate import SimulatePage
 from hotlever.app.pages.start import StartPage, serve_pictures
@@ -35,7 +37,10 @@ _MESSAGES = 100
 #: Seconds after which a page is shown with what it has by then.
 _SOON_S = 1.0
 LOCAL = ("127.0.0.1", "localhost", "::1")
-_PAGES = (StartPage, LeverPage, SimulatePage, RamanPage, FitPage, CalibratePage, LeversPage)
+_PAGES = (
+    *(StartPage, LeverPage, SimulatePage, DesignPage, MaterialsPage),
+    *(RamanPage, FitPage, CalibratePage, LeversPage),
+)
 
 
 @dataclass(frozen=True)

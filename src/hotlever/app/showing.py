@@ -209,6 +209,27 @@ def levers(report: Report, folder: Path, names: list[str]) -> dict[str, Any]:
     return {"head": [*head, "remark"], "rows": rows}
 
 
+def design_numbers(report: Report, folder: Path, name: str | None) -> dict[str, float]:
+    """Return what can be varied of a probe, what is asked for first before the rest."""
+    from hotlever.studies.design import Design
+
+    design = Design(_probe(folder, name))
+    numbers = design.numbers
+    return {key: numbers[key] for key in dict.fromkeys((*design.usual, *numbers)) if numbers[key]}
+
+
+def materials(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
+    """Return all materials, or those of a probe file, in words and as curves."""
+    from hotlever.materials import catalogue
+
+    if name is None:
+        curves = catalogue.curves()
+    else:
+        probe = _probe(folder, name)
+        curves = catalogue.curves(probe.made_of, probe.layout().thickness_um)
+    return {"kinds": catalogue.sections(), "figure": _svg(figures.material_curves(curves))}
+
+
 def packed(report: Report, folder: Path, paths: list[Path]) -> bytes:
     """Return files as the content of one."""
     content = io.BytesIO()

@@ -96,6 +96,28 @@ class Signals(BaseModel):
     amplitude_V: float | None = None
 
 
+class Design(BaseModel):
+    """The page Design: one or two numbers of a probe that are varied, and the power (mW)."""
+
+    probe: str | None = None
+    first: str | None = "heater_length_um"
+    first_from: float | None = 3.0
+    first_to: float | None = 6.0
+    first_count: float | None = 5
+    second: str | None = None
+    second_from: float | None = None
+    second_to: float | None = None
+    second_count: float | None = 5
+    power: float | None = 2.0
+    air: bool = True
+
+
+class Materials(BaseModel):
+    """The page Materials: of which probe file; empty for all that levers can be made of."""
+
+    probe: str | None = None
+
+
 class Raman(BaseModel):
     """The page Raman."""
 
@@ -135,6 +157,7 @@ class Levers(BaseModel):
 
     data: list[str] | None = None
     probe: str | None = None
+    command: Literal["fit", "calibrate"] = "fit"
 
 
 class Told(BaseModel):
@@ -151,6 +174,8 @@ class Choices(BaseModel):
     simulate: Simulate = Simulate()
     pulse: Pulse = Pulse()
     signals: Signals = Signals()
+    design: Design = Design()
+    materials: Materials = Materials()
     raman: Raman = Raman()
     fit: Fit = Fit()
     calibrate: Calibrate = Calibrate()

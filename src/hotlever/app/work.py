@@ -16,10 +16,17 @@ from hotlever.app.changes import Changes
 from hotlever.app.jobs import Task
 from hotlever.app.workers import Report
 from hotlever.tasks.calibrating import calibrate_files
+from hotlever.tasks.designing import vary_design
 from hotlever.tasks.fitting import fit_files
 from hotlever.tasks.importing import propose_probe
 from hotlever.tasks.measured_requests import CalibrateRequest, FitRequest, RamanRequest
-from hotlever.tasks.requests import ImportRequest, PulseRequest, SpectrumRequest, SweepRequest
+from hotlever.tasks.requests import (
+    DesignRequest,
+    ImportRequest,
+    PulseRequest,
+    SpectrumRequest,
+    SweepRequest,
+)
 from hotlever.tasks.simulating import simulate_in_time
 from hotlever.tasks.small_signals import respond
 from hotlever.tasks.spectra import measure_spectra
@@ -32,6 +39,7 @@ _TASKS: dict[str, tuple[str, type, Callable[[Report, Any], Any]]] = {
     "sweep": ("probe", SweepRequest, sweep),
     "pulse": ("probe", PulseRequest, simulate_in_time),
     "spectrum": ("probe", SpectrumRequest, respond),
+    "design": ("probe", DesignRequest, vary_design),
     "raman": ("spectra", RamanRequest, measure_spectra),
     "probe import": ("drawing", ImportRequest, propose_probe),
 }
@@ -52,6 +60,8 @@ def run(report: Report, folder: Path, task: Task) -> None:
     options = {
         name: value for name, value in task.options.items() if value not in (None, "", False, [])
     }
+    switched_off = [name for name in options if name.startswith("no_")]
+    options |= {name.removeprefix("no_"): not options.pop(name) for name in switched_off}
     if task.files:
         options[files_are] = task.files if task.command in _OF_SEVERAL else task.files[0]
     with Changes(folder).recorded(task.line):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from hotlever.materials.kind import Kind
@@ -16,6 +18,7 @@ from hotlever.types import Array
 #: Temperatures of curves (K), and of a layer whose κ follows from its thickness (µm).
 _FROM_K, _TO_K, _STEPS, _LAYER_UM = 250.0, 1300.0, 106, 0.4
 #: A preset for the kinds that have no values of their own.
+_THIN = f"n-silicon, {_LAYER_UM:g} µm by thickness"
 _EXAMPLES = {"metal-film": "Pt", "dielectric": "SiN"}
 
 
@@ -27,29 +30,35 @@ def _example(kind: str) -> Kind:
 
 def listing() -> list[str]:
     """Return kinds, parameters, laws and presets, line by line."""
-    lines: list[str] = []
-    for name, kind in KINDS.items():
-        example = _example(name)
-        lines.append(f"{name}: {(kind.__doc__ or '').partition('.')[0]}")
-        rows = [["  parameter", "unit", "from", "to", "left out", ""]]
-        for own, parameter in kind.declared.items():
-            value = getattr(example, own)
-            given = name not in _EXAMPLES or own not in PRESETS[_EXAMPLES[name]].values
-            default = f"{value:.4g}" if given and isinstance(value, float) else "–"
-            limits = f"{parameter.lower:.4g}", f"{parameter.upper:.4g}"
-            rows.append([f"  {own}", parameter.unit, *limits, default, parameter.meaning])
-        lines += aligned(rows)
-        for law in _laws(name, example):
-            low, high = law.temperature_range
-            first = (law.__doc__ or "").partition("\n")[0].partition(",")[0].rstrip(".")
-            lines.append(f"  {first}: {law.source}; {low:g} to {high:g} K")
-        lines.append("")
-    lines.append("presets:")
+    lines = [line for section in sections().values() for line in (*section, "")]
+    return [*lines, f"Eq.: of Spieser et al. (2017), doi:{DOI}"]
+
+
+def sections() -> dict[str, list[str]]:
+    """Return the lines of each kind, and of the presets."""
+    lines = {name: _kind_lines(name, kind) for name, kind in KINDS.items()}
     rows = []
     for name, preset in PRESETS.items():
         values = ", ".join(f"{key} {value:g}" for key, value in preset.values.items())
         rows.append([f"  {name}", preset.kind, values, preset.source])
-    return [*lines, *aligned(rows), "", f"Eq.: of Spieser et al. (2017), doi:{DOI}"]
+    return {**lines, "presets": ["presets:", *aligned(rows)]}
+
+
+def _kind_lines(name: str, kind: type[Kind]) -> list[str]:
+    example = _example(name)
+    rows = [["  parameter", "unit", "from", "to", "left out", ""]]
+    for own, parameter in kind.declared.items():
+        value = getattr(example, own)
+        given = name not in _EXAMPLES or own not in PRESETS[_EXAMPLES[name]].values
+        default = f"{value:.4g}" if given and isinstance(value, float) else "–"
+        limits = f"{parameter.lower:.4g}", f"{parameter.upper:.4g}"
+        rows.append([f"  {own}", parameter.unit, *limits, default, parameter.meaning])
+    lines = [f"{name}: {(kind.__doc__ or '').partition('.')[0]}", *aligned(rows)]
+    for law in _laws(name, example):
+        low, high = law.temperature_range
+        first = (law.__doc__ or "").partition("\n")[0].partition(",")[0].rstrip(".")
+        lines.append(f"  {first}: {law.source}; {low:g} to {high:g} K")
+    return lines
 
 
 def _laws(name: str, example: Kind) -> list[Law]:
@@ -59,25 +68,36 @@ def _laws(name: str, example: Kind) -> list[Law]:
     return list(dict.fromkeys((*example.laws, *other.laws, *example.effects)))
 
 
-def curves() -> dict[str, tuple[Array, Array, Array | None]]:
-    """Return temperature (K), κ (W m⁻¹ K⁻¹) and ρ (Ω cm, or None) of many materials.
-
-    By name: of each kind of silicon with the values of the reference probe, and of each preset.
-    Curves end where the material melts.
-    """
-    plain = {name: _example(name) for name in KINDS if name not in _EXAMPLES}
-    thin = {f"n-silicon, {_LAYER_UM:g} µm by thickness": {"c_kappa": "thickness"}}
-    made = plain | {
-        name: plain["n-silicon"].model_copy(update=values) for name, values in thin.items()
-    }
+def examples() -> dict[str, Kind]:
+    """Return each kind of silicon with the values of the reference probe, and each preset."""
+    made = {name: _example(name) for name in KINDS if name not in _EXAMPLES}
+    made[_THIN] = made["n-silicon"].model_copy(update={"c_kappa": "thickness"})
     for name, preset in PRESETS.items():
         made[name] = material_of({"kind": preset.kind, "preset": name}, name)
+    return made
+
+
+def curves(
+    kinds: Mapping[str, Kind] | None = None, thickness_um: float = _LAYER_UM
+) -> dict[str, tuple[Array, Array, Array | None]]:
+    """Return temperature (K), κ (W m⁻¹ K⁻¹) and ρ (Ω cm, or None) of materials, by name.
+
+    Curves go as far as the laws do, and end where the material melts.
+
+    Parameters
+    ----------
+    kinds : mapping of str to Kind, optional
+        `examples` if left out.
+    thickness_um : float
+        Of a layer whose κ follows from it.
+    """
     curves_of = {}
-    for name, kind in made.items():
-        T = np.linspace(_FROM_K, min(_TO_K, kind.highest_K), _STEPS)
-        kappa, _ = kind.thermal_conductivity(T, _LAYER_UM)
+    for name, kind in (examples() if kinds is None else kinds).items():
+        low = max([_FROM_K, *(law.lowest_K for law in kind.stated.values())])
+        T = np.linspace(low, min(_TO_K, kind.highest_K), _STEPS)
+        kappa, _ = kind.thermal_conductivity(T, thickness_um)
         rho = None
-        if kind.conducts and name not in thin:
+        if kind.conducts and name != _THIN:
             rho = 1.0 / kind.electrical_conductivity(T, getattr(kind, "n_d", 0.0))[0]
         curves_of[name] = T, 100.0 * kappa, rho
     return curves_of

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import FIGURE_TYPES, Outputs
+from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.tasks.probes import read_probe
 from hotlever.units import setting
 
@@ -247,6 +248,24 @@ class SpectrumRequest(TableRequest, LeverRequest):
     amplitude: str | None = option(
         None, metavar="V", help="Of a sine about the bias: harmonics of V_l instead (3ω method)."
     )
+
+
+@dataclass(kw_only=True)
+class DesignRequest(TableRequest, PhysicsRequest, ProbeRequest):
+    """What a change of a probe's design does."""
+
+    vary: list[str] | None = option(
+        None,
+        metavar="NAME=START:STOP:COUNT",
+        help="Sweep a number of the probe file, annealing_K or annealing_min; repeated: each with "
+        "each, as a map. A table of sensitivities if left out.",
+    )
+    power: float = option(2.0, help="Power (mW) in vacuum at which the tip temperature is given.")
+    annealing_K: float = option(
+        ANNEALING_K, "--annealing-K", help="Annealing (K) that the probe's delta is of."
+    )
+    annealing_min: float = option(ANNEALING_S / 60.0, help="Annealing (min) that the delta is of.")
+    air: bool = option(True, help="Solve in air too, for k.")
 
 
 @dataclass(kw_only=True)

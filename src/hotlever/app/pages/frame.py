@@ -22,6 +22,8 @@ PAGES = {
     "": ("Start", "home"),
     "lever": ("Lever", "architecture"),
     "simulate": ("Simulate", "tune"),
+    "design": ("Design", "insights"),
+    "materials": ("Materials", "layers"),
     "raman": ("Raman", "thermostat"),
     "fit": ("Fit", "query_stats"),
     "calibrate": ("Calibrate", "straighten"),

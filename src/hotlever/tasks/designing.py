@@ -1,0 +1,59 @@
+"""What a change of a probe's design does: sensitivities, or a table and a figure of variations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hotlever.datasets import write_dataset
+from hotlever.errors import InputError
+from hotlever.files import write_text
+from hotlever.probe.shapes import DRAWING
+from hotlever.studies import design as study
+from hotlever.tasks.files import draw
+from hotlever.tasks.probes import read_probe
+from hotlever.tasks.reporter import Reporter
+from hotlever.tasks.requests import DesignRequest
+from hotlever.tasks.texts import check_number, parse_varied
+
+#: Numbers that are varied at once of which there are figures: a curve or a map.
+_DRAWN = 2
+
+
+def vary_design(reporter: Reporter, request: DesignRequest) -> None:
+    """Find how knee, tip temperature and loss to air depend on a probe's design."""
+    output, plot, outputs = request.output, request.plot, request.outputs(request.probe)
+    asked: Any = {"power_mW": request.power, "air": request.air}
+    check_number("--power", request.power, 1e-3, 1000)
+    check_number("--annealing-K", request.annealing_K, 700, 1700)
+    check_number("--annealing-min", request.annealing_min, 1e-3, 1e5)
+    varied = parse_varied(request.vary or [])
+    if not varied and (plot is not None or output is not None):
+        raise InputError("a file or a figure needs a sweep: --vary NAME=START:STOP:COUNT")
+    if plot is not None and len(varied) > _DRAWN:
+        raise InputError(f"--plot: found {len(varied)} of --vary, expected at most {_DRAWN}")
+    start = study.Design(
+        request.with_physics(read_probe(reporter, request.probe)),
+        request.annealing_K,
+        request.annealing_min,
+    )
+    if not varied:
+        with reporter.progress("design") as update:
+            sensitivities = study.sensitivities(start, progress=update, **asked)
+        reporter.give(study.sensitivity_text(sensitivities) + "\n")
+        if start.probe.shape.shape == DRAWING:
+            names = ", ".join(start.numbers)
+            reporter.note(
+                f"a drawing has no dimensions but these; --vary NAME=START:STOP:COUNT of {names}"
+            )
+        return
+    with reporter.progress("design") as update:
+        data = study.vary(start, varied, progress=update, **asked)
+    reporter.note(*study.design_notes(data))
+    with outputs.together():
+        if output is not None and output.suffix.lower() == ".nc":
+            write_dataset(data, output, ())
+        elif output is not None:
+            write_text(output, study.design_csv(data))
+        draw(plot, lambda figures: figures.design_study(data))
+    if output is None:
+        reporter.give(study.design_csv(data))
