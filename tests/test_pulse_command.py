@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 from PIL import Image
 
+from experiments import on_coarse_meshes
 from hotlever.lever import State
 from hotlever.tasks.simulating import _Frames
 
@@ -90,10 +91,12 @@ def test_a_file_gives_the_bias(run, tmp_path):
 def test_ramps_sines_and_trains_in_any_medium(run):
     train = ("--pulse", "5V,1us", "--period", "4us", "--count", "2", "--until", "8us")
     for words in (("--ramp", "4,10us"), ("--sine", "3V+0.5V@200kHz", "--until", "9us"), train):
-        status, out, _ = run("pulse", *words)
+        with on_coarse_meshes():
+            status, out, _ = run("pulse", *words)
         assert status == 0
         assert len(rows(out)) > 5
-    status, _, err = run("pulse", "--step", "3", "--at", "1us", "--medium", "air", "-o", "a.nc")
+    with on_coarse_meshes():
+        status, _, err = run("pulse", "--step", "3", "--at", "1us", "--medium", "air", "-o", "a.nc")
     assert status == 0
     assert "note" not in err
     with xr.open_dataset("a.nc") as data:

@@ -8,6 +8,8 @@ import pytest
 
 from documents import ROOT, beside_examples, blocks, commands, run_commands
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 

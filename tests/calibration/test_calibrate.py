@@ -28,6 +28,8 @@ from hotlever.probe.priors import Prior, default_priors, published_material
 from made_up import GONE, damaged
 from synthetic_curves import measured_curve, measurement_of
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 
 @pytest.fixture(scope="module")
 def calibrated(reference):

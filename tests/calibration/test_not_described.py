@@ -14,37 +14,60 @@ import pytest
 
 from hotlever import figures
 from hotlever.app import showing
+from hotlever.calibration import inference
 from hotlever.calibration.calibration import Calibration, read_calibration
 from hotlever.calibration.summary import calibration_text
 from hotlever.cli import main
 from hotlever.errors import InputError
+from hotlever.estimation.diagnosis import Diagnosis
 from hotlever.files import json_text
 from hotlever.lever import Branch
+from hotlever.measurement import Measurement
 from hotlever.report.calibration_pages import calibration_page
-from synthetic_curves import measured_curve
+from synthetic_curves import measured_curve, measurement_of
 
 ERRORS = ("tip_stderr_K", "tip_low_K", "tip_high_K")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, reference: Branch) -> Path:
-    """What ``hotlever calibrate`` writes of a current that its meter has clipped."""
+def clipped(reference: Branch) -> Measurement:
+    """A current that its meter has clipped."""
+    data = measurement_of(measured_curve(reference, np.random.default_rng(4)))
+    return replace(data, current_mA=np.minimum(data.current_mA, 0.8 * data.current_mA.max()))
+
+
+@pytest.fixture(scope="module", params=["said", pytest.param("searched", marks=pytest.mark.slow)])
+def folder(
+    request: pytest.FixtureRequest,
+    tmp_path_factory: pytest.TempPathFactory,
+    reference: Branch,
+    clipped: Measurement,
+) -> Path:
+    """What ``hotlever calibrate`` writes of data that no lever shows.
+
+    It takes long to find that none does; it may as well be said of data that a lever shows.
+    """
     folder = tmp_path_factory.mktemp("refused")
-    curve = measured_curve(reference, np.random.default_rng(4))
-    current = np.minimum(curve.current_mA, 0.8 * curve.current_mA.max())
-    rows = [f"{v:.6g},{i:.6g}" for v, i in zip(curve.bias_V, current, strict=True)]
+    data = clipped
+    if request.param == "said":
+        data = measurement_of(measured_curve(reference, np.random.default_rng(4)))
+    rows = [f"{v:.6g},{i:.6g}" for v, i in zip(data.bias_V, data.current_mA, strict=True)]
     (folder / "clipped.csv").write_text("\n".join(["# R_s (kOhm): 5.6", "V_b (V),I_h (mA)", *rows]))
     files = {"-o": "cal.json", "--table": "table.csv", "--plot": "cal.png"}
     options = [word for key, name in files.items() for word in (key, str(folder / name))]
-    with pytest.raises(SystemExit) as ended:
-        main(["calibrate", str(folder / "clipped.csv"), *options, "--pulse", "5us"])
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "said":
+            patch.setattr(inference, "_verdict", lambda *_: (True, "current differs by 5 %"))
+            patch.setattr(Diagnosis, "named", lambda *_: "is the current clipped?")
+        with pytest.raises(SystemExit) as ended:
+            main(["calibrate", str(folder / "clipped.csv"), *options, "--pulse", "5us"])
     assert ended.value.code == 1
     return folder
 
 
 @pytest.fixture(scope="module")
-def refused(folder: Path) -> Calibration:
-    return read_calibration(folder / "cal.json")
+def refused(folder: Path, clipped: Measurement) -> Calibration:
+    return replace(read_calibration(folder / "cal.json"), measurement=clipped)
 
 
 def numbers(content: Any, key: str) -> list[Any]:

@@ -18,6 +18,8 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import pulse, simulate
 from synthetic_curves import measured_curve, measurement_of
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 
 @pytest.fixture(scope="module")
 def measured(reference):

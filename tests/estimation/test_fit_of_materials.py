@@ -20,6 +20,8 @@ from hotlever.probe.parameters import of_materials, usual_parameters
 from hotlever.probe.priors import default_priors
 from of_materials import of_named_silicon, p_type_probe, strip_probe
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 BIAS = np.linspace(0.05, 0.45, 10)
 TRUTH = {"film.resistivity": 2.3e-5, "film.tcr": 1.7e-3, "nitride.kappa": 0.027}
 

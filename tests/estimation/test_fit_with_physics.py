@@ -9,6 +9,8 @@ from hotlever import Lever, Probe, calibrate, fit
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import Measurement
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 PROBE = Probe.reference().with_physics(("thermoelectric", "radiation"))
 BIAS = np.concatenate([np.linspace(-9.0, -1.0, 9), np.linspace(1.0, 9.0, 9)])
 

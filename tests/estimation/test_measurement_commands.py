@@ -14,6 +14,8 @@ import pytest
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 HELD = tuple(word for name in ("delta", "p", "a0", "a1") for word in ("--fix", name))
 NAMES = ("--column", "I_h (uA)=Strom", "--column", "V_b=U")
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hotlever import Lever, Probe
 from hotlever.lever.lever import COARSE
+from hotlever.report import transient_pages
 from hotlever.report.transient_pages import transient_page
 
 
-def test_the_page_shows_steps_trains_time_constants_and_spectra(tmp_path):
+def test_the_page_shows_steps_trains_time_constants_and_spectra(tmp_path, monkeypatch):
+    # few pulses and frequencies are as many pages
+    monkeypatch.setattr(transient_pages, "_COUNT", 2)
+    monkeypatch.setattr(transient_pages, "_FREQUENCIES", np.geomspace(10.0, 1e7, 7))
     told = []
     page = transient_page(Lever(Probe.reference(), COARSE), lambda *steps: told.append(steps))
     written = page.write(tmp_path)

@@ -10,6 +10,8 @@ from hotlever.lever.transient import sine, spectrum
 from hotlever.lever.transient.cyclic import cyclic_steady_state
 from hotlever.lever.transient.frequency_domain import HARMONIC_COLUMNS, harmonics
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 
 def test_a_weak_first_harmonic_is_the_small_signal(coarse):
     found = harmonics(coarse, 4.0, 1e-3, [1e2, 2e4, 1e6])
