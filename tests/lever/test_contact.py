@@ -61,7 +61,8 @@ def test_the_current_tells_of_the_resistance(touching):
     at = {"interface_K_per_mW": 102.0}, {"interface_K_per_mW": 98.0}
     more, less = (touching.with_probe(touching.probe.with_(**one)).sweep([4.0, 8.0]) for one in at)
     slope = sweep_in_contact(touching, [4.0, 8.0]).current_by_resistance
-    np.testing.assert_allclose(slope, (more.current_mA - less.current_mA) / 4.0, rtol=2e-3)
+    by_interface = slope * touching.equations.contact.sum_by_interface
+    np.testing.assert_allclose(by_interface, (more.current_mA - less.current_mA) / 4.0, rtol=2e-3)
 
 
 def test_the_jacobian_is_exact(touching):

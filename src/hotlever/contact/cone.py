@@ -1,6 +1,7 @@
 """Heat along the cone of a tip, from its flat end up to the lever, and from its side to the sample.
 
-In one dimension, with the conductivity of a wire of the local diameter. Air between the side and
+In one dimension, through spherical shells about the point of the cone, as heat spreads in one; with
+the conductivity of a wire of the local diameter. Air between the side and
 the sample conducts along arcs about the edge of the contact: for a sharp cone, whose arcs are
 circles about the apex, that is exact. Temperatures jump at both surfaces, and near the contact it
 is the jumps that limit the heat.
@@ -69,12 +70,13 @@ def up_the_cone(
     height = scale * np.expm1(position)
     per_step = (height + scale) * (position[-1] / _STEPS)
     radius = tip.apex_radius_um + tip.slope * height
+    area = _shell(tip) * math.pi * radius**2
     lost = None if air is None else air.conductance(tip, height)
 
     def slopes(at: int, state: Array) -> Array:
         T, heat = state
         kappa, _ = thermal_conductivity_of_wire(T, 2.0 * radius[at])
-        rise = heat / (PER_CM_TO_MILLI_PER_UM * kappa * math.pi * radius[at] ** 2)
+        rise = heat / (PER_CM_TO_MILLI_PER_UM * kappa * area[at])
         more = np.zeros_like(heat)
         if air is not None and lost is not None:
             theta, _ = kirchhoff_variable(T, base_temperature_K)
@@ -91,6 +93,12 @@ def up_the_cone(
     return T, heat
 
 
+def _shell(tip: Tip) -> float:
+    """Return the area of a shell for each height between shells, over that of the cone's slice."""
+    cosine = math.cos(math.radians(tip.half_angle_deg))
+    return 2.0 * cosine / (1.0 + cosine)
+
+
 def cold_resistance(tip: Tip, T: float) -> float:
     """Return the resistance of a cone (K/mW) all of which is at one temperature (K), in vacuum.
 
@@ -101,10 +109,10 @@ def cold_resistance(tip: Tip, T: float) -> float:
     --------
     >>> tip = Tip(height_um=0.7, half_angle_deg=20, apex_radius_um=0.005)
     >>> round(cold_resistance(tip, 300.0))
-    19791
+    20389
     """
     end, base = tip.apex_radius_um, tip.base_radius_um
     bulk, cold = (float(thermal_conductivity_of_wire(K, math.inf)[0]) for K in (T, 300.0))
     by_bulk = (1.0 / end - 1.0 / base) / bulk
     by_surface = MEAN_FREE_PATH_UM / (4.0 * cold) * (1.0 / end**2 - 1.0 / base**2)
-    return (by_bulk + by_surface) / (PER_CM_TO_MILLI_PER_UM * math.pi * tip.slope)
+    return (by_bulk + by_surface) / (PER_CM_TO_MILLI_PER_UM * math.pi * tip.slope * _shell(tip))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hotlever.contact.cone import AirBeside, cold_resistance, up_the_cone
-from hotlever.contact.spreading import spreading_resistance
+from hotlever.contact.spreading import contact_resistance
 from hotlever.materials.laws import Evaluated
 from hotlever.probe import Probe
 from hotlever.types import Array
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 #: Rises of the temperature at the base between which the law is tabulated, and how often.
-_LOWEST_K, _HIGHEST_K, _TABULATED = -60.0, 1500.0, 120
+_LOWEST_K, _HIGHEST_K, _COOLER, _TABULATED = -60.0, 1500.0, 5, 115
 #: Share of a parameter, or of all resistances, by which it is changed for a derivative.
 _STEP = 1e-3
 #: By this name the interface stands in probe files and fits.
@@ -53,8 +53,9 @@ class ContactLaw:
 
     Attributes
     ----------
-    interface_K_per_mW, spreading_K_per_mW : float
-        Resistances of interface and sample.
+    interface_K_per_mW, spreading_K_per_mW, below_apex_K_per_mW : float
+        Resistances of interface and sample, and their sum. Spreading depends a little on the
+        interface, which makes the flux more uniform.
     """
 
     def __init__(self, probe: Probe) -> None:
@@ -65,11 +66,12 @@ class ContactLaw:
         self._base_K = probe.circuit.base_temperature_K
         layers = contact.layers
         self.interface_K_per_mW = contact.interface_K_per_mW
-        self.spreading_K_per_mW = spreading_resistance(
-            tip.apex_radius_um,
-            [layer.kappa for layer in layers],
-            [layer.thickness_um for layer in layers if layer.thickness_um is not None],
+        thicknesses = [layer.thickness_um for layer in layers if layer.thickness_um is not None]
+        kappas = [layer.kappa for layer in layers]
+        self.below_apex_K_per_mW = contact_resistance(
+            tip.apex_radius_um, kappas, thicknesses, self.interface_K_per_mW
         )
+        self.spreading_K_per_mW = self.below_apex_K_per_mW - self.interface_K_per_mW
         self._air: AirBeside | None = None
         around = probe.surroundings
         if around.medium == "air":
@@ -82,19 +84,18 @@ class ContactLaw:
         """Heat at the base, at the apex, and rise of the apex, by the rise at the base."""
         from scipy.interpolate import CubicSpline  # takes long, and few levers are in contact
 
-        below = self.interface_K_per_mW + self.spreading_K_per_mW
+        below = self.below_apex_K_per_mW
         above = cold_resistance(self._tip, self._base_K)
         # where nothing else conducts and the cone is cold, this is the rise at the base
-        driving = np.linspace(_LOWEST_K, _HIGHEST_K, _TABULATED)
+        driving = _rises(_HIGHEST_K)
         for _ in range(2):
-            at_apex = driving / (1.0 + above / below) if below > 0 else np.zeros_like(driving)
+            at_apex = driving / (1.0 + above / below)
             heat = driving / (below + above)
             base, air = self._base_K, self._air
             T, into_tip = up_the_cone(self._tip, base + at_apex, heat, base, air)
             rise = T - base
             # a hot cone resists more: no more of the table than is of use
-            highest = np.interp(_HIGHEST_K, rise, driving)
-            driving = np.linspace(_LOWEST_K, highest, _TABULATED)
+            driving = _rises(float(np.interp(_HIGHEST_K, rise, driving)))
         return CubicSpline(rise, np.stack([into_tip, heat, at_apex], axis=1))
 
     def heat(self, rise: Array, names: Sequence[str] = ()) -> Evaluated:
@@ -118,6 +119,13 @@ class ContactLaw:
         return AtTheContact(self._base_K + apex, heat, into_tip - heat)
 
     @property
+    def sum_by_interface(self) -> float:
+        """How the sum of the resistances changes with that of the interface."""
+        step = _STEP * self.below_apex_K_per_mW
+        more = self._changed(INTERFACE, self.interface_K_per_mW + step)
+        return (more.below_apex_K_per_mW - self.below_apex_K_per_mW) / step
+
+    @property
     def names(self) -> tuple[str, ...]:
         """The numbers of a probe on which the law depends."""
         return (INTERFACE, *_NUMBERS, *(("gas_conductivity",) if self._air else ()))
@@ -125,11 +133,12 @@ class ContactLaw:
     def _by(self, name: str, rise: Array) -> Array:
         """Return how the heat changes with a number of the probe."""
         (value,) = self._probe.values([name])
-        step = _STEP * value
-        if name == INTERFACE:
-            step = _STEP * (value + self.spreading_K_per_mW)
-        low, high = (self._changed(name, value + way * step).heat(rise)[0] for way in (-1.0, 1.0))
-        return np.asarray((high - low) / (2.0 * step))
+        step = _STEP * (self.below_apex_K_per_mW if name == INTERFACE else value)
+        # an interface may have none, and no less: by both sides further up, then
+        ways = (0.0, 1.0, 2.0) if name == INTERFACE else (-1.0, 0.0, 1.0)
+        low, middle, high = (self._changed(name, value + way * step).heat(rise)[0] for way in ways)
+        slope = (high - low) / (2.0 * step)
+        return np.asarray(slope - (high - 2.0 * middle + low) / step if ways[0] == 0.0 else slope)
 
     def _changed(self, name: str, value: float) -> ContactLaw:
         key = name, value
@@ -140,6 +149,12 @@ class ContactLaw:
     @cached_property
     def _others(self) -> dict[tuple[str, float], ContactLaw]:
         return {}
+
+
+def _rises(highest: float) -> Array:
+    """Return rises (K) at which the law is tabulated, zero among them."""
+    cooler = np.linspace(_LOWEST_K, 0.0, _COOLER, endpoint=False)
+    return np.concatenate([cooler, np.linspace(0.0, highest, _TABULATED)])
 
 
 def contact_of(probe: Probe) -> ContactLaw | None:

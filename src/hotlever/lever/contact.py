@@ -84,9 +84,8 @@ def sweep_in_contact(
     branch, reading, _ = lever._read(data.bias_V.values)
     powered = data.current_mA.values != 0
     slope = np.zeros(powered.size)
-    slope[powered] = sensitivities_of(branch, reading.u[powered], lever.circuit, [INTERFACE])[
-        0, :, 0
-    ]
+    by = sensitivities_of(branch, reading.u[powered], lever.circuit, [INTERFACE])
+    slope[powered] = by[0, :, 0] / law_of(lever).sum_by_interface
     columns = _columns(lever, data.tip_K.values) | {
         "current_change_mA": data.current_mA.values - free.current_mA.values,
         "tip_change_K": data.tip_K.values - free.tip_K.values,
