@@ -114,6 +114,6 @@ def test_in_air_the_cone_conducts_to_the_sample_beside_the_contact(in_air):
     tip = {**TIP, "tip.apex_radius_um": 0.005}
     probe = in_air.probe.with_(**tip, surface_gap_um=0.7, sample="polymer")
     data = sweep_in_contact(Lever(probe, COARSE), [8.0])
-    assert data.beside_mW.item() > 5.0 * data.sample_mW.item() > 0.0
+    assert data.beside_mW.item() > data.sample_mW.item() > 0.0
     left = data.end_heat_mW + data.air_heat_mW + data.into_tip_mW
     assert left.item() == pytest.approx(data.power_mW.item(), rel=1e-5)

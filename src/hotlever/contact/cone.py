@@ -1,10 +1,12 @@
 """Heat along the cone of a tip, from its flat end up to the lever, and from its side to the sample.
 
 In one dimension, through spherical shells about the point of the cone, as heat spreads in one; with
-the conductivity of a wire of the local diameter. Air between the side and
-the sample conducts along arcs about the edge of the contact: for a sharp cone, whose arcs are
-circles about the apex, that is exact. Temperatures jump at both surfaces, and near the contact it
-is the jumps that limit the heat.
+the conductivity of a wire of the local diameter. Air between the side and the sample conducts along
+arcs about the edge of the contact: for a sharp cone, whose arcs are circles about the apex, that is
+exact. Temperatures jump at both surfaces, and near the contact it is the jumps that limit the heat.
+The lever's own surface is a plate above the sample, and near it the cone adds nothing to what that
+plate gives: of the arcs at the height z of h a share (1 − z/h)^1.5 counts, whose exponent is
+fitted to meshes of cone, plate and air (``benchmarks/contact_3d.py``).
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
 #: Steps up the cone, evenly spaced in the logarithm of the distance, and nodes along an arc.
 _STEPS, _NODES = 160, 16
+#: Exponent of the share of the arcs that counts beyond the lever's own surface.
+_BEYOND = 1.5
 
 
 class AirBeside(NamedTuple):
@@ -32,7 +36,10 @@ class AirBeside(NamedTuple):
     jump_at_sample_um: float
 
     def conductance(self, tip: Tip, height_um: Array) -> Array:
-        """Return the heat that passes per height (µm) and θ: a number for each height."""
+        """Return the heat that passes per height (µm) and θ: a number for each height.
+
+        It is what passes beyond what the lever's own surface gives, a plate above the sample.
+        """
         half_angle = math.radians(tip.half_angle_deg)
         nodes, weights = np.polynomial.legendre.leggauss(_NODES)
         width = (math.pi / 2.0 - half_angle) / 2.0
@@ -41,7 +48,8 @@ class AirBeside(NamedTuple):
         along = away * (width * weights / (end + away[..., None] * np.sin(angles))).sum(axis=-1)
         jumps = self.jump_um / (end + away * math.sin(half_angle))
         jumps = jumps + self.jump_at_sample_um / (end + away)
-        return np.asarray(2.0 * math.pi / math.cos(half_angle) / (along + jumps))
+        beyond = np.clip(1.0 - height_um / tip.height_um, 0.0, 1.0) ** _BEYOND
+        return np.asarray(2.0 * math.pi / math.cos(half_angle) * beyond / (along + jumps))
 
 
 def up_the_cone(
