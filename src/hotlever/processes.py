@@ -375,7 +375,12 @@ def _work(pipe: Connection, environment: dict[str, str]) -> None:
     with suppress(EOFError, OSError):
         send(_DONE)
         while True:
-            function, arguments, new = pipe.recv()
+            try:
+                function, arguments, new = pipe.recv()
+            except (AttributeError, ImportError) as error:
+                # a class of a notebook, say
+                send(_DONE, InputError(f"{error}: expected it in a module that can be imported"))
+                return
             shared.update(new)
             values = (shared[a.number] if isinstance(a, _Shared) else a for a in arguments)
             result = guarded(function, tuple(values))

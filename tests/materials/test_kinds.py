@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,20 +10,16 @@ from test_silicon import BEYOND, TEMPERATURES, numerical_derivative
 
 from hotlever.errors import InputError
 from hotlever.materials import KINDS, PARAMETERS, published
-from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon, PSilicon
+from hotlever.materials.kinds import LowDopedSilicon, PSilicon
 from hotlever.materials.p_silicon import (
     band_gap_p,
     conductivity_p,
     hole_mobility,
     inversion_temperature_p,
 )
-from hotlever.materials.parameters import OF_SILICON, Parameter, field_of
 from hotlever.materials.presets import PRESETS
 from hotlever.materials.sections import material_of
 from hotlever.materials.silicon import band_gap, thermal_conductivity_of_layer
-from hotlever.probe import Probe
-from hotlever.probe.parameters import parameters_of
-from hotlever.probe.priors import default_priors
 
 OPTION_III = published("option III").material
 #: One material of each kind, and of each choice that a kind offers.
@@ -218,30 +212,6 @@ def test_the_papers_material_has_each_parameter_of_its_two_kinds():
         assert {name: getattr(OPTION_III, name) for name in kind.declared} == {
             name: getattr(kind, name) for name in kind.declared
         }
-
-
-def test_a_parameter_of_ones_own_is_a_row_and_a_field():
-    row = Parameter(
-        *("grain_size", "d", "1", 1.0, 0.01, 1.0),
-        "of its grains",
-        spread=0.2,
-        usual=True,
-        value=0.7,
-    )
-
-    class Shining(HighDopedSilicon):
-        family: ClassVar = OF_SILICON | {"grain_size": row}
-        grain_size: float = field_of(row)
-
-    legs = Shining(c_kappa=0.7, a0=1e-3, a1=1e-6)
-    assert [*set(legs.parameters) - set(HighDopedSilicon.declared)] == ["grain_size"]
-    assert (legs.usual[-1], legs.grain_size) == ("grain_size", 0.7)
-    probe = Probe.from_file("src/hotlever/examples/boron-lever.toml")
-    probe = probe.model_copy(update={"materials": {**probe.materials, "legs": legs}})
-    assert parameters_of(probe)["legs.grain_size"].spread == 0.2
-    assert default_priors(probe)["legs.grain_size"].value == 0.7
-    with pytest.raises(InputError, match=r"grain_size = 3.0: input should be less"):
-        legs.with_(grain_size=3.0)
 
 
 def test_the_paper_varies_six_parameters_and_every_kind_its_own():

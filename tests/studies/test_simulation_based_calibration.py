@@ -17,7 +17,7 @@ from hotlever.studies.simulation_based_calibration import (
     ALL,
     ESTIMATE,
     WAYS,
-    MinimosLever,
+    MinimosMaterial,
     MinimosSilicon,
     draw,
     judge,
@@ -95,13 +95,14 @@ def test_drift_grows_over_the_ramp(solved_once):
 def test_another_mobility_changes_the_lever_and_nobody_else_s():
     probe = Probe.reference()
     before = Lever(probe, COARSE).sweep([5.0, 9.0])
-    other = MinimosLever(probe, COARSE)
+    changed = probe.with_material("material", MinimosMaterial)
+    other = Lever(changed, COARSE)
     assert isinstance(other.equations.laws.made_of[LOW_DOPED], MinimosSilicon)
     assert abs(other.sweep([5.0, 9.0]).current_mA / before.current_mA - 1).max() > 5e-3
     again = Lever(probe, COARSE)
     assert type(again.equations.laws.made_of[LOW_DOPED]) is NSilicon
     xr.testing.assert_allclose(again.sweep([5.0, 9.0]).current_mA, before.current_mA)
-    assert isinstance(other.with_probe(probe.with_(n_d=4e17)), MinimosLever)
+    assert type(changed.with_(n_d=4e17).kinds[LOW_DOPED]) is MinimosSilicon
 
 
 def test_raman_temperatures_have_the_errors_that_they_state(solved_once):

@@ -9,7 +9,6 @@ from typing import Any, Literal, cast, get_args
 from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
-from hotlever.materials.parameters import OF_SILICON, is_of_material
 from hotlever.probe import Probe
 from hotlever.probe.parameters import (
     heat_capacities,
@@ -23,6 +22,8 @@ from hotlever.probe.surroundings import Medium
 Weights = Literal["maximum", "errors"]
 #: What the medium is called if nobody knows it: either is tried.
 UNKNOWN_MEDIUM = "unknown"
+#: What a fit varies of the paper's lever.
+_THE_PAPERS = tuple(PARAMETERS)
 
 
 @dataclass(frozen=True)
@@ -76,16 +77,15 @@ class FitOptions:
     priors: Mapping[str, Prior | str] = field(default_factory=dict)
     usual_priors: bool = False
     free: Sequence[str] = ()
-    usual: Sequence[str] = tuple(PARAMETERS)
+    usual: Sequence[str] = _THE_PAPERS
 
     def __post_init__(self) -> None:
         for name in self.fixed:
-            if not is_of_material(name):
-                raise unknown_name("parameter", name, OF_SILICON)
             for others, what in ((self.priors, "has a prior"), (self.free, "is free")):
                 if name in others:
                     raise InputError(f"{name} is fixed and {what}, expected one of them")
-        if not self.varied:
+        # a material of one's own may have others than these
+        if self.usual is not _THE_PAPERS and not self.varied:
             raise InputError("all parameters are fixed; nothing is left to fit")
         for kind, names, existing in (
             ("weights", [self.weights], get_args(Weights)),

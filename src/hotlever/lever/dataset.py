@@ -19,7 +19,7 @@ from hotlever.lever.branch import Branch
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.materials import Kind
-from hotlever.materials.sections import LAWS, own_laws
+from hotlever.materials.sections import LAWS
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.parts import SECTIONS
@@ -114,7 +114,7 @@ def _dataset(
     data = labelled(
         variables,
         coordinates=coordinates,
-        **probe_attributes(probe, made_of),
+        **probe_attributes(probe),
         notes="\n".join(
             [*notes, *range_notes(made_of, "a bias of {} V", columns["bias_V"], columns["max_K"])]
         ),
@@ -158,15 +158,9 @@ def range_notes(made_of: Mapping[str, Kind], where: str, along: Array, max_K: Ar
     ]
 
 
-def probe_attributes(probe: Probe, made_of: Mapping[str, Kind]) -> dict[str, str]:
-    """Return what a dataset says of a probe, which `probe_of` reads.
-
-    Its lever may be made of materials with other laws.
-    """
-    values: dict[str, Any] = probe.sections()
-    if laws := own_laws(made_of):
-        values[LAWS] = laws
-    sections = {name: json.dumps(section) for name, section in values.items()}
+def probe_attributes(probe: Probe) -> dict[str, str]:
+    """Return what a dataset says of a probe, which `probe_of` reads."""
+    sections = {name: json.dumps(section) for name, section in probe.sections().items()}
     return {**sections, "medium": probe.surroundings.medium}
 
 
@@ -221,7 +215,7 @@ def probe_of(data: xr.Dataset) -> Probe:
     Raises
     ------
     InputError
-        If it has a material with laws of its own, which no file holds.
+        If it has a material with laws of its own, whose class is not at hand.
     """
     names = [name for name in (*SECTIONS, LAWS) if name in data.attrs]
     return Probe.from_sections({name: json.loads(data.attrs[name]) for name in names}, "sweep")

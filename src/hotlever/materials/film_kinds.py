@@ -18,7 +18,6 @@ from hotlever.materials.films import (
     metal_conductivity,
     reciprocal,
     wiedemann_franz,
-    wiedemann_franz_of,
 )
 from hotlever.materials.heat import enthalpy_by_capacity
 from hotlever.materials.kind import Kind
@@ -26,7 +25,7 @@ from hotlever.materials.laws import FORMULA_TO, Evaluated, Law
 from hotlever.materials.parameters import OF_DIELECTRIC, OF_METAL, Parameter, field_bounds, field_of
 from hotlever.materials.silicon import MELTING_POINT, Carrier
 from hotlever.materials.stated import StatedLaw, number_or_law
-from hotlever.materials.thermopower import of_one_carrier, thermoelectric_metal
+from hotlever.materials.thermopower import of_one_carrier
 from hotlever.types import Array
 
 
@@ -134,27 +133,23 @@ class MetalFilm(Stored):
             return self.property_at("kappa", T)
         if self.kappa is not None:
             return constant_conductivity(T, self.kappa)
-        if isinstance(self.resistivity, StatedLaw):
-            return wiedemann_franz_of(T, self._by_resistivity, self.lorenz_ratio)
-        return wiedemann_franz(T, self.resistivity, self.tcr, self.lorenz_ratio)
+        return wiedemann_franz(T, self._alone, self.lorenz_ratio)
 
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
         if isinstance(self.resistivity, StatedLaw):
-            return self._by_resistivity(T)
+            return reciprocal(self.property_at("resistivity", T))
         return metal_conductivity(T, self.resistivity, self.tcr)
 
-    def _by_resistivity(self, T: Array) -> Evaluated:
-        """Return σ (S cm⁻¹) by the law of the resistivity."""
-        return reciprocal(self.property_at("resistivity", T))
+    def _alone(self, T: Array) -> Evaluated:
+        """Return σ (S cm⁻¹), which no doping changes."""
+        return self.electrical_conductivity(T, 0.0)
 
     def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
         """Return β and γ, see `Kind.thermoelectric`."""
-        if not {"resistivity", "seebeck"}.isdisjoint(self.stated):
-            S, by = self.property_at("seebeck", T)
-            volts = 1e-6 * S, {name: 1e-6 * slope for name, slope in by.items()}
-            return of_one_carrier(self.electrical_conductivity(T, n), volts)
-        return thermoelectric_metal(T, self.resistivity, self.tcr, self.seebeck)
+        S, by = self.property_at("seebeck", T)
+        volts = 1e-6 * S, {name: 1e-6 * slope for name, slope in by.items()}
+        return of_one_carrier(self.electrical_conductivity(T, n), volts)
 
 
 class Dielectric(Stored):

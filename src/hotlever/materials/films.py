@@ -53,39 +53,26 @@ def metal_conductivity(T: ArrayLike, resistivity: float, tcr: float) -> Evaluate
 
 @law(meant_for=(250.0, 800.0), source="Wiedemann and Franz, Ann. Phys. 165, 497 (1853)")
 def wiedemann_franz(
-    T: ArrayLike, resistivity: float, tcr: float, lorenz_ratio: float = 1.0
+    T: ArrayLike, conductivity: Callable[[Array], Evaluated], lorenz_ratio: float = 1.0
 ) -> Evaluated:
     """Thermal conductivity of a metal by its electrical one, κ = L σ T, in W cm⁻¹ K⁻¹.
 
     Parameters
     ----------
-    T, resistivity, tcr
-        See `metal_conductivity`.
+    T : array_like
+    conductivity : callable
+        Law of σ (S cm⁻¹) by temperature.
     lorenz_ratio : float
         L over Sommerfeld's value; above 1 where the lattice carries heat too.
 
     Examples
     --------
-    >>> kappa, _ = wiedemann_franz(293.0, resistivity=1.05e-5, tcr=3.6e-3)
+    >>> kappa, _ = wiedemann_franz(293.0, lambda T: metal_conductivity(T, 1.05e-5, 3.6e-3))
     >>> (100 * kappa).round(1).item()  # W/(m K)
     68.2
     """
     T = np.asarray(T, dtype=float)
-    return _by_electrons(T, metal_conductivity.formula(T, resistivity, tcr), lorenz_ratio)
-
-
-@law(meant_for=(250.0, 800.0), source="Wiedemann and Franz, Ann. Phys. 165, 497 (1853)")
-def wiedemann_franz_of(
-    T: ArrayLike, conductivity: Callable[[Array], Evaluated], lorenz_ratio: float = 1.0
-) -> Evaluated:
-    """Thermal conductivity by a law of the electrical one (S cm⁻¹), see `wiedemann_franz`."""
-    T = np.asarray(T, dtype=float)
-    return _by_electrons(T, conductivity(T), lorenz_ratio)
-
-
-def _by_electrons(T: Array, conductivity: Evaluated, lorenz_ratio: float) -> Evaluated:
-    """Return κ = L σ T, see `wiedemann_franz`."""
-    sigma, by = conductivity
+    sigma, by = conductivity(T)
     lorenz = SOMMERFELD * lorenz_ratio
     kappa = lorenz * sigma * T
     return kappa, {

@@ -13,13 +13,10 @@ from hotlever.errors import unknown_name
 from hotlever.materials.formulas import TEMPERATURE
 from hotlever.materials.laws import Evaluated, Law
 from hotlever.materials.parameters import (
-    OF_CLASSES,
-    OF_DIELECTRIC,
-    OF_METAL,
-    OF_SILICON,
     STATED,
     Parameter,
     constant_of,
+    declare,
 )
 from hotlever.materials.radiation import grey_emission
 from hotlever.materials.silicon import MELTING_POINT, Carrier
@@ -28,8 +25,20 @@ from hotlever.records import Record
 from hotlever.types import Array
 
 
+def class_name(made: type) -> str:
+    """Return the name of a class with its module, as files and messages state it."""
+    return f"{made.__module__}.{made.__qualname__}"
+
+
 class Kind(Record):
-    """A material of one kind (section ``[materials.NAME]`` of a probe file)."""
+    """A material of one kind (section ``[materials.NAME]`` of a probe file).
+
+    A class of one's own is made of one of `hotlever.materials.kinds`. What it has in place of the
+    law of its kind is a method that returns a value and its exact derivatives, a dict by ``"T"``
+    and by the names of the parameters that it depends on; `laws` says range and source. A parameter
+    of its own is a field made by `hotlever.materials.parameters.field_of`: fits, priors, ``--set``
+    and files know it then. `hotlever.probe.Probe.with_material` makes a probe of it.
+    """
 
     #: The parameters of its family, of which it has those that are its fields.
     family: ClassVar[dict[str, Parameter]]
@@ -52,12 +61,19 @@ class Kind(Record):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
-        """Find the parameters among the fields."""
+        """Find the parameters among the fields: those of its family, and then its own."""
         super().__pydantic_init_subclass__(**options)
         family = getattr(cls, "family", {})
-        tabled = OF_SILICON | OF_METAL | OF_DIELECTRIC
-        OF_CLASSES.update({name: row for name, row in family.items() if name not in tabled})
-        cls.declared = {name: family[name] for name in family if name in cls.model_fields}
+        own = {
+            name: row._replace(name=name)
+            for name, field in cls.model_fields.items()
+            for row in field.metadata
+            if isinstance(row, Parameter)
+        }
+        for row in own.values():
+            declare(row, class_name(cls))
+        of_family = {name: family[name] for name in family if name in cls.model_fields}
+        cls.declared = of_family | own
         cls.usual = tuple(name for name, parameter in cls.declared.items() if parameter.usual)
 
     @property

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
+from hotlever.errors import InputError
 from hotlever.spieser2017 import PUBLISHED_VALUES
 
 INVERSION = "inversion_temperature"
@@ -227,8 +228,30 @@ STATED: dict[str, tuple[str, tuple[float, float]]] = {
     "seebeck": ("µV K⁻¹", (-2000.0, 2000.0)),
     "emissivity": ("1", (0.0, 1.0)),
 }
-#: Parameters that classes of materials made in Python declare, by name.
-OF_CLASSES: dict[str, Parameter] = {}
+#: Of the kinds above, and of classes of materials made in Python, by name.
+_DECLARED = OF_DIELECTRIC | OF_METAL | OF_SILICON
+#: The classes that declare some of them.
+_OWNERS: dict[str, str] = {}
+
+
+def declare(parameter: Parameter, owner: str) -> None:
+    """Note a parameter of a class of materials, so that it is printed by its name.
+
+    Raises
+    ------
+    InputError
+        If a parameter of this name is in another unit elsewhere.
+    """
+    name = parameter.name
+    other = _DECLARED.get(name, parameter)
+    printed = other.unit, other.scale
+    if printed != (parameter.unit, parameter.scale) and _OWNERS.get(name) != owner:
+        raise InputError(
+            f"{owner}: {name} is in {parameter.scale:g} {parameter.unit}, and elsewhere in "
+            f"{other.scale:g} {other.unit}: expected the same, or another name"
+        )
+    if name not in _DECLARED or name in _OWNERS:
+        _DECLARED[name], _OWNERS[name] = parameter, owner
 
 
 def constant_of(name: str, value: float) -> Parameter:
@@ -258,7 +281,9 @@ def field_of(parameter: Parameter, **others: Any) -> Any:
     }
     if not math.isnan(parameter.value):
         stated["default"] = parameter.value
-    return Field(**{**stated, **others})
+    field = Field(**{**stated, **others})
+    field.metadata.append(parameter)
+    return field
 
 
 def field_bounds(parameter: Parameter) -> tuple[float, float]:
@@ -300,7 +325,7 @@ def is_of_material(name: str) -> bool:
     >>> is_of_material("film.tcr"), is_of_material("n_d"), is_of_material("thickness_um")
     (True, True, False)
     """
-    return "." in name or name in OF_SILICON
+    return "." in name or name in OF_SILICON or name in _OWNERS
 
 
 def parameter_named(name: str) -> Parameter:
@@ -315,10 +340,10 @@ def parameter_named(name: str) -> Parameter:
     >>> parameter_named("film.tcr").symbol, parameter_named("film.tcr").unit
     ('α (film)', 'K⁻¹')
     """
-    if name in OF_SILICON:
-        return OF_SILICON[name]
     material, _, own = name.rpartition(".")
-    if material and (declared := (OF_CLASSES | OF_DIELECTRIC | OF_METAL | OF_SILICON).get(own)):
+    if not material and is_of_material(name):
+        return _DECLARED[name]
+    if material and (declared := _DECLARED.get(own)):
         return declared._replace(
             name=name,
             symbol=f"{declared.symbol} ({material})",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import create_model, model_validator
 
@@ -91,8 +91,15 @@ class Material(_Numbers):
     """Parameters of the laws in Eqs. 4 to 11 (section ``[material]`` of a probe file).
 
     They are a preset of two kinds of silicon that share what both have: the n-doped one of heater
-    and reader, and the high-doped one around it.
+    and reader, and the high-doped one around it. A class made of it may have others of these kinds,
+    whose own parameters are fields of it too.
     """
+
+    #: What the two are, by name.
+    classes: ClassVar[Mapping[str, type[Kind]]] = {
+        LOW_DOPED: NSilicon,
+        HIGH_DOPED: HighDopedSilicon,
+    }
 
     @model_validator(mode="after")
     def _heater_is_the_low_doped_part(self) -> Material:
@@ -104,11 +111,10 @@ class Material(_Numbers):
     def kinds(self) -> dict[str, Kind]:
         """The two kinds of silicon, by `LOW_DOPED` and `HIGH_DOPED`."""
         values = dict(self)
-        made: dict[str, type[Kind]] = {LOW_DOPED: NSilicon, HIGH_DOPED: HighDopedSilicon}
         # unchecked, since the values are checked already: fits make many
         return {
             name: kind.model_construct(**{own: values[own] for own in kind.declared})
-            for name, kind in made.items()
+            for name, kind in self.classes.items()
         }
 
 
@@ -160,5 +166,7 @@ def published(name: str) -> PublishedSet:
 
 def usual_values(kind: str) -> dict[str, Any]:
     """Return the values that parameters of a kind have where a probe file leaves them out."""
+    if KINDS[kind].family is not OF_SILICON:
+        return {}
     values = REFERENCE.model_dump() | _OF_THEIR_OWN.get(kind, {})
     return {name: values[name] for name in KINDS[kind].declared if name in values}

@@ -1,7 +1,7 @@
 """Materials as the sections of a probe file hold them, and those that no file can hold.
 
 A file says which of its materials follow laws of their own, those of a class made of a kind in
-Python, so that reading it does not give another lever.
+Python; it is read where that class is at hand, so that reading it does not give another lever.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from hotlever.errors import InputError, quoted, shown, unknown_name
-from hotlever.materials.kind import Kind
+from hotlever.materials.kind import Kind, class_name
 from hotlever.materials.kinds import KINDS
 from hotlever.materials.parameters import HIGH_DOPED, LOW_DOPED
-from hotlever.materials.presets import PRESETS, usual_values
+from hotlever.materials.presets import PRESETS, Material, usual_values
 from hotlever.materials.table_files import with_tables
+from hotlever.records import Record
 
 #: Names of materials.
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
@@ -28,7 +29,7 @@ def material_of(
     values: Mapping[str, Any],
     where: str,
     folder: Path | None = None,
-    like: Kind | None = None,
+    made: type[Kind] | None = None,
 ) -> Kind:
     """Make a material of a section of a probe file.
 
@@ -41,8 +42,8 @@ def material_of(
         Names the section in an error.
     folder : path, optional
         What names of files of tables are relative to.
-    like : Kind, optional
-        One of the same kind whose class it is to have, with laws of its own.
+    made : type, optional
+        A class of this kind with laws of its own.
 
     Raises
     ------
@@ -60,7 +61,8 @@ def material_of(
     if not isinstance(kind, str) or kind not in KINDS:
         raise unknown_name("kind", str(kind), KINDS, where)
     usual = {**usual_values(kind), **_preset(values.get("preset"), kind, where)}
-    made = type(like) if like is not None and like.kind == kind else KINDS[kind]
+    if made is None or not issubclass(made, KINDS[kind]):
+        made = KINDS[kind]
     try:
         stated = with_tables(values, folder)
     except InputError as error:
@@ -76,7 +78,7 @@ def materials_of(
     where: str,
     reserved: Collection[str],
     folder: Path | None = None,
-    like: Mapping[str, Kind] | None = None,
+    classes: Mapping[str, type[Record]] | None = None,
 ) -> dict[str, Kind]:
     """Make all materials of the section ``[materials]`` of a probe file.
 
@@ -90,8 +92,8 @@ def materials_of(
         Names that no material may have.
     folder : path, optional
         What names of files are relative to.
-    like : mapping of str to Kind, optional
-        Materials whose classes those of the same name and kind are to have.
+    classes : mapping of str to type, optional
+        Those that materials are to have, as far as they are of the kind.
 
     Raises
     ------
@@ -111,7 +113,8 @@ def materials_of(
             continue
         if not isinstance(section, dict):
             raise InputError(f"{here} must be a section, found {quoted(section)}")
-        materials[name] = material_of(section, here, folder, (like or {}).get(name))
+        made: Any = (classes or {}).get(name)
+        materials[name] = material_of(section, here, folder, made)
     return materials
 
 
@@ -129,27 +132,30 @@ def _preset(name: Any, kind: str, where: str) -> Mapping[str, float]:
 # --- laws of their own ----------------------------------------------------------------------------
 
 
-def own_laws(kinds: Mapping[str, Kind]) -> dict[str, str]:
-    """Return the classes of materials that are of no kind of ``KINDS`` itself, by material."""
-    return {
-        name: f"{type(kind).__module__}.{type(kind).__qualname__}"
-        for name, kind in kinds.items()
-        if type(kind) is not KINDS.get(kind.kind)
-    }
+def classes_at_hand(laws: Any, where: str) -> dict[str, type[Record]]:
+    """Return the classes that stored values of a lever with laws of its own name, by section.
 
-
-def refuse_own_laws(values: Mapping[str, Any], where: str) -> None:
-    """Refuse stored values of a lever with laws of its own.
+    A file says which class it was, and holds no law: nothing is imported that a file names.
 
     Raises
     ------
     InputError
-        Naming the first material and its class.
+        Naming the first material whose class was not imported before.
     """
-    laws = values.get(LAWS)
-    if laws:
-        name, law = next(iter(laws.items())) if isinstance(laws, Mapping) else ("material", laws)
-        raise InputError(
-            f"{where}: '{shown(str(name))}' follows laws of its own, those of the Python class "
-            f"{shown(str(law), 80)}, which no file holds: expected the probe made in Python"
-        )
+    if not isinstance(laws, Mapping):
+        raise InputError(f"{where}: [{LAWS}] must be a section, found {quoted(laws)}")
+    # of classes made again under a name, in a notebook, the last
+    made = {class_name(each): each for base in (Kind, Material) for each in _made_of(base)}
+    for name, law in laws.items():
+        if str(law) not in made:
+            raise InputError(
+                f"{where}: '{shown(str(name))}' follows laws of its own, those of the Python class "
+                f"{shown(str(law), 80)}, which no file holds: expected Python that has imported it"
+            )
+    return {name: made[law] for name, law in laws.items()}
+
+
+def _made_of(base: type[Record]) -> list[type[Record]]:
+    """Return all classes made of one."""
+    direct = base.__subclasses__()
+    return [*direct, *(each for own in direct for each in _made_of(own))]

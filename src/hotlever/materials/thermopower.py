@@ -20,7 +20,6 @@ import numpy as np
 from numpy.polynomial.chebyshev import Chebyshev, chebpts1
 from numpy.typing import ArrayLike
 
-from hotlever.materials.films import metal_conductivity
 from hotlever.materials.laws import Evaluated, Partials, law
 from hotlever.materials.p_silicon import carried_in_p_silicon
 from hotlever.materials.silicon import (
@@ -277,14 +276,4 @@ def of_one_carrier(conductivity: Evaluated, seebeck: Evaluated) -> Evaluated:
     by: Partials = {}
     _add(by, d_sigma, np.stack([S, S**2]))
     _add(by, d_S, np.stack([sigma, 2.0 * sigma * S]))
-    return np.stack([sigma * S, sigma * S**2]), by
-
-
-@law(meant_for=(200.0, 1700.0), source="definition")
-def thermoelectric_metal(T: ArrayLike, resistivity: float, tcr: float, seebeck: float) -> Evaluated:
-    """β and γ of a metal with one Seebeck coefficient (µV/K)."""
-    sigma, d_sigma = metal_conductivity.formula(T, resistivity, tcr)
-    S = 1e-6 * seebeck
-    by = {name: np.stack([S * d, S**2 * d]) for name, d in d_sigma.items()}
-    by["seebeck"] = 1e-6 * np.stack([sigma, 2.0 * S * sigma])
     return np.stack([sigma * S, sigma * S**2]), by

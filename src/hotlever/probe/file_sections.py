@@ -11,7 +11,7 @@ from typing import Any
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import read_text
 from hotlever.materials import Kind
-from hotlever.materials.sections import LAWS, own_laws
+from hotlever.materials.sections import LAWS
 from hotlever.probe.parts import MATERIALS, ProbeParts
 from hotlever.probe.physics import Physics
 from hotlever.probe.shapes import (
@@ -197,6 +197,6 @@ def other_sections(probe: ProbeParts) -> str:
         lines += ["", "# Without a section [physics] the physics is the paper's. Beyond it:"]
         effects = dict.fromkeys(Physics.model_fields, True)
         lines += section_lines("physics", effects, Physics.description(), start="# ")[1:]
-    if laws := own_laws(probe.made_of):
-        lines += section_lines(LAWS, laws, {})
+    if probe.laws:
+        lines += section_lines(LAWS, probe.laws, {})
     return "\n".join(lines) + "\n"

@@ -11,7 +11,8 @@ import numpy as np
 from pydantic import ConfigDict, Field, SerializeAsAny, model_validator
 
 from hotlever.errors import unknown_name
-from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind, Material, full_name
+from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED, REFERENCE, Kind, Material, full_name
+from hotlever.materials.kind import class_name
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.probe.circuit import Circuit, Contact, Wiring
 from hotlever.probe.contact import SampleContact
@@ -43,7 +44,7 @@ PARTS: dict[str, type[Record]] = {
     "prior": PriorTexts,
     "monitor": Monitors,
 }
-MATERIALS = "materials"
+MATERIAL, MATERIALS = "material", "materials"
 #: All sections of a probe file.
 SECTIONS = (*SHAPE_SECTIONS, MATERIALS, *PARTS)
 
@@ -140,7 +141,7 @@ class ProbeParts(Record):
         """Those of its parts that matter, beside the shape, by the section of a probe file."""
         parts = {name: getattr(self, name) for name in PARTS if getattr(self, name)}
         if not self.has_plain_silicon:
-            del parts["material"]
+            del parts[MATERIAL]
         return parts
 
     @property
@@ -152,6 +153,23 @@ class ProbeParts(Record):
     def kinds(self) -> dict[str, Kind]:
         """All its materials by name, the two of ``[material]`` among them."""
         return {**self.material.kinds, **self.materials}
+
+    @property
+    def classes(self) -> dict[str, type[Record]]:
+        """Of its materials those that are of a class of one's own, by section."""
+        own: dict[str, type[Record]] = {
+            name: type(kind)
+            for name, kind in self.materials.items()
+            if type(kind) is not KINDS[kind.kind]
+        }
+        if type(self.material) is not Material and self.has_plain_silicon:
+            own[MATERIAL] = type(self.material)
+        return own
+
+    @property
+    def laws(self) -> dict[str, str]:
+        """The names of these classes, as files state them."""
+        return {name: class_name(made) for name, made in self.classes.items()}
 
     @property
     def made_of(self) -> dict[str, Kind]:
@@ -226,6 +244,7 @@ class ProbeParts(Record):
             "probe": type(self.shape),
             **named,
             **PARTS,
+            MATERIAL: type(self.material),
             **wired,
             **{f"layers.{key}": layer for key, layer in self.shape.layer_records().items()},
         }

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import write_text
-from hotlever.materials import REFERENCE, Kind
-from hotlever.materials.sections import LAWS, materials_of, own_laws, refuse_own_laws
+from hotlever.materials import KINDS, REFERENCE, Kind, Material
+from hotlever.materials.sections import LAWS, classes_at_hand, material_of, materials_of
+from hotlever.materials.stated import names_stated
 from hotlever.probe.file_sections import file_text, read_sections, shape_of, with_values
 from hotlever.probe.monitors import Monitor, Monitors
-from hotlever.probe.parts import MATERIALS, PARTS, SECTIONS, ProbeParts
+from hotlever.probe.parts import MATERIAL, MATERIALS, PARTS, SECTIONS, ProbeParts
 from hotlever.probe.physics import Physics
 from hotlever.probe.priors import priors_of
 from hotlever.probe.shapes import PARAMETRIC, SHAPE_SECTIONS, ThreeLeg, UShape
+from hotlever.records import Record
 from hotlever.spieser2017 import DOI
 
 if TYPE_CHECKING:
@@ -121,7 +123,11 @@ class Probe(ProbeParts):
         InputError
             Naming the section and key, what was found and what is expected.
         """
-        refuse_own_laws(values, where)
+        if like is None:
+            classes = classes_at_hand(values.get(LAWS, {}), where)
+        else:
+            classes = like.classes
+        values = {name: section for name, section in values.items() if name != LAWS}
         for name, section in values.items():
             if name not in SECTIONS:
                 raise unknown_name("section", name, SECTIONS, where)
@@ -129,8 +135,7 @@ class Probe(ProbeParts):
                 raise InputError(f"{where}: [{name}] must be a section, found {quoted(section)}")
         if "probe" not in values:
             raise InputError(f"{where}: section [probe] is missing")
-        before = None if like is None else like.materials
-        materials = materials_of(values.get(MATERIALS, {}), where, SECTIONS, folder, before)
+        materials = materials_of(values.get(MATERIALS, {}), where, SECTIONS, folder, classes)
         drawn = {name: values[name] for name in SHAPE_SECTIONS if name in values}
         shape = shape_of(drawn, where, folder, materials, None if like is None else like.shape)
         for name in materials:
@@ -142,9 +147,8 @@ class Probe(ProbeParts):
         parts: dict[str, Any] = {"shape": shape, MATERIALS: materials}
         usual = {"material": REFERENCE.model_dump()}
         for name, part in PARTS.items():
-            if name == "material" and like is not None:
-                part = type(like.material)
             if name in values:
+                part = classes.get(name, part)
                 section = {**usual.get(name, {}), **values[name]}
                 parts[name] = part.from_values(section, f"{where}: [{name}]")
         probe = cls.from_values(parts, where)
@@ -179,8 +183,8 @@ class Probe(ProbeParts):
         if self.materials:
             sections[MATERIALS] = {name: kind.model_dump() for name, kind in self.materials.items()}
         sections |= {name: part.model_dump() for name, part in self.parts.items()}
-        if laws := own_laws(self.made_of):
-            sections[LAWS] = laws
+        if self.laws:
+            sections[LAWS] = dict(self.laws)
         return {name: with_values(section) for name, section in sections.items()}
 
     def with_(self, **changes: Any) -> Probe:
@@ -195,9 +199,16 @@ class Probe(ProbeParts):
             If a name exists in no section (the nearest one is given) or a value is impossible.
         """
         sections = self.sections()
-        sections.pop(LAWS, None)
+        named = {
+            f"{section}.{own}": (section, own)
+            for name, value in changes.items()
+            for section in [name.rpartition(".")[0]]
+            if section in self.materials
+            for own in names_stated({name: value})
+        }
+        keys = {name: named.get(name) or self.field(name)[:2] for name in changes}
         for name, value in changes.items():
-            section, key, _ = self.field(name)
+            section, key = keys[name]
             if key in self.shape.read_with:
                 raise InputError(
                     f"{name} counts when a drawing is read, expected it in the probe file"
@@ -208,7 +219,7 @@ class Probe(ProbeParts):
             inside.setdefault(last, {})[key] = value
             if section in self.materials:
                 useless = type(self.materials[section]).without_use(inside[last])
-                for other in {*useless} - {own for _, own, _ in map(self.field, changes)}:
+                for other in {*useless} - {own for _, own in keys.values()}:
                     inside[last].pop(other, None)
         sections = {name: with_values(section) for name, section in sections.items()}
         shape = PARAMETRIC.get(str(sections["probe"]["shape"]))
@@ -216,6 +227,43 @@ class Probe(ProbeParts):
             own = sections["probe"].items()
             sections["probe"] = {key: value for key, value in own if key in shape.model_fields}
         return Probe.from_sections(sections, "probe", like=self)
+
+    def with_material(self, section: str, made: type[Record], **values: Any) -> Probe:
+        """Return the probe with a class of one's own for one of its materials.
+
+        Parameters
+        ----------
+        section : str
+            Name of the material, or ``material``, the silicon of that section.
+        made : type
+            A class made of the material's kind, see `hotlever.materials.kind.Kind`, or of
+            `hotlever.materials.Material`.
+        values : float, str or dict
+            What its section holds in place of what it held.
+
+        Raises
+        ------
+        InputError
+            If there is no such material, or the class or a value is none for it.
+        """
+        plain = [MATERIAL] if self.has_plain_silicon else []
+        if section not in [*self.materials, *plain]:
+            raise unknown_name("material", section, [*self.materials, *plain])
+        before = self.material if section == MATERIAL else self.materials[section]
+        base = KINDS[before.kind] if isinstance(before, Kind) else Material
+        if not issubclass(made, base):
+            raise InputError(
+                f"{section}: found {made.__name__}, expected a class made of {base.__name__}"
+            )
+        own, here = {**with_values(before.model_dump()), **values}, f"[{section}]"
+        parts = dict(self)
+        if issubclass(made, Kind):
+            useless = {*made.without_use(own)} - values.keys()
+            own = {name: value for name, value in own.items() if name not in useless}
+            parts[MATERIALS] = {**self.materials, section: material_of(own, here, made=made)}
+        else:
+            parts[MATERIAL] = made.from_values(own, here)
+        return type(self).from_values(parts, "probe")
 
     def __repr__(self) -> str:
         # the probe file without its comments

@@ -28,7 +28,7 @@ from hotlever.steps import each
 from hotlever.studies.simulation_based_calibration import (
     NOISE,
     RAMAN,
-    MinimosLever,
+    MinimosMaterial,
     some_tip,
     values_from_priors,
 )
@@ -129,7 +129,9 @@ def twin_measurement(
         true = true.with_(**{name: own[name] for name in nominal.shape.dimensions() if name in own})
     if "tip" in departures:
         true = true.model_copy(update={"tip": some_tip(rng)})
-    lever = (MinimosLever if "mobility" in departures else Lever)(true, COARSE)
+    if "mobility" in departures:
+        true = true.with_material("material", MinimosMaterial)
+    lever = Lever(true, COARSE)
     highest = float(lever.branch().bias(HOTTEST_TIP_K, true.circuit))
     sweep = lever.sweep(np.linspace(RAMP[0], highest, RAMP.size))
 

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 import xarray as xr
@@ -27,8 +28,7 @@ from hotlever.datasets import labelled
 from hotlever.errors import BranchEndError, HotleverError
 from hotlever.estimation import Measurement
 from hotlever.lever import Branch, Lever
-from hotlever.lever.equations import LeverEquations
-from hotlever.materials import LOW_DOPED
+from hotlever.materials import LOW_DOPED, Material
 from hotlever.materials.kinds import NSilicon
 from hotlever.materials.laws import Evaluated
 from hotlever.materials.minimos import minimos_mobility
@@ -81,14 +81,10 @@ class MinimosSilicon(NSilicon):
         return conductivity_low_doped(T, n, self.p, self.impurity_exponent, minimos_mobility)
 
 
-class MinimosLever(Lever):
-    """A lever whose carriers move as in MINIMOS where it is low-doped."""
+class MinimosMaterial(Material):
+    """The silicon of a lever whose carriers move as in MINIMOS where it is low-doped."""
 
-    def _prepare(self) -> None:
-        super()._prepare()
-        kinds = self.probe.kinds
-        kinds[LOW_DOPED] = MinimosSilicon.model_construct(**dict(kinds[LOW_DOPED]))
-        self.equations = LeverEquations(self.space, kinds, self.circuit, self.probe.physics)
+    classes: ClassVar = {**Material.classes, LOW_DOPED: MinimosSilicon}
 
 
 def draw(
@@ -142,8 +138,9 @@ def measure(
     ComputationError
         If a state of the lever was not found.
     """
-    kind = MinimosLever if "mobility" in departures else Lever
-    lever = kind(true, _FINER if "mesh" in departures else None)
+    if "mobility" in departures:
+        true = true.with_material("material", MinimosMaterial)
+    lever = Lever(true, _FINER if "mesh" in departures else None)
     even = np.linspace(1.0 / POINTS, 1.0, POINTS)
     try:
         sweep = lever.sweep((highest or HIGHEST_V[true.surroundings.medium]) * even)

@@ -16,7 +16,6 @@ from hotlever.lever.reduced.response_surface import C_KAPPA, ParameterDomain, Re
 from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
 from hotlever.lever.sensitivities import Linearised
 from hotlever.materials import full_name
-from hotlever.materials.sections import own_laws
 from hotlever.probe import Probe
 from hotlever.probe.parameters import of_materials
 from hotlever.threads import one_blas_thread
@@ -125,7 +124,12 @@ def known_reduction(lever: Lever, names: Collection[str] = ()) -> ReducedLever |
 
 
 def _file(lever: Lever, domain: ParameterDomain) -> Path | None:
-    """Return the file of a reduced lever, named by all that it depends on but the ranges."""
+    """Return the file of a reduced lever, named by all that it depends on but the ranges.
+
+    There is none of a lever with laws of its own: whoever changes their code keeps their name.
+    """
+    if lever.probe.classes:
+        return None
     elements, air, probe = lever.space.elements, lever.space.air, lever.probe
     held = {
         full_name(material, name): value
@@ -139,7 +143,6 @@ def _file(lever: Lever, domain: ParameterDomain) -> Path | None:
         "base_temperature_K": lever.circuit.base_temperature_K,
         "gas_conductivity": probe.surroundings.gas_conductivity,
         "held": held,
-        "laws": own_laws(probe.made_of),
         "parameters": list(domain.parameters),
         "options": asdict(ReductionOptions()),
         # a change of Netgen's mesh makes a new file instead of a wrong answer

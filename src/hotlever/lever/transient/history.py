@@ -306,7 +306,7 @@ def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Arra
         variables,
         "time",
         {"time": time, **coordinates},
-        **probe_attributes(lever.probe, lever.equations.laws.made_of),
+        **probe_attributes(lever.probe),
         waveform=waveform.text,
         notes="\n".join(notes),
     )

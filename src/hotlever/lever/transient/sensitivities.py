@@ -129,7 +129,7 @@ def with_sensitivities(
         },
         "time",
         {"time": times, "observable": list(OBSERVABLES), "parameter": list(names)},
-        **probe_attributes(lever.probe, lever.equations.laws.made_of),
+        **probe_attributes(lever.probe),
         waveform=waveform.text,
     )
 
