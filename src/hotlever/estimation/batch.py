@@ -163,12 +163,13 @@ def estimate_many(
     Raises
     ------
     InputError
-        If the folder cannot be made, or no scheduler answers.
+        If the folder cannot be made, a name is no parameter's, or no scheduler answers.
     ComputationError
         If the scheduler is lost. What was done by then is written.
     """
     if processes is not None and processes < 1:
         raise InputError(f"found processes = {processes}, expected 1 or more")
+    options.of(probe)  # raises for all levers at once
     outputs, target, data = Outputs(*paths), Path(folder), lever_names(paths)
     outputs.folder(target)
     files = {name: target / f"{name}{work.ending}" for name in data}
