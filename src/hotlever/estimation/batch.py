@@ -119,6 +119,7 @@ def fit_many(
     """
     probe, options = probe or Probe.reference(), options or FitOptions()
     work = partial(fit, probe=probe, options=options)
+    options.of(probe)  # raises for all levers at once
     return estimate_many(paths, folder, Work("fit", work, FitFile, ".json", probe, options), **how)
 
 
@@ -169,7 +170,6 @@ def estimate_many(
     """
     if processes is not None and processes < 1:
         raise InputError(f"found processes = {processes}, expected 1 or more")
-    options.of(probe)  # raises for all levers at once
     outputs, target, data = Outputs(*paths), Path(folder), lever_names(paths)
     outputs.folder(target)
     files = {name: target / f"{name}{work.ending}" for name in data}

@@ -123,10 +123,7 @@ class Probe(ProbeParts):
         InputError
             Naming the section and key, what was found and what is expected.
         """
-        if like is None:
-            classes = classes_at_hand(values.get(LAWS, {}), where)
-        else:
-            classes = like.classes
+        classes = classes_at_hand(values.get(LAWS, {}), where) if like is None else like.classes
         values = {name: section for name, section in values.items() if name != LAWS}
         for name, section in values.items():
             if name not in SECTIONS:
