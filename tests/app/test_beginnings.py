@@ -146,3 +146,40 @@ def test_a_page_that_waits_for_a_busy_process_is_shown(tmp_path: Path) -> None:
         await user.should_see("What was understood", retries=200)
 
     visit(tmp_path, story)
+
+
+def titles(user: User) -> str:
+    """Return the titles of what can be unfolded."""
+    there = [one for one in user.client.elements.values() if isinstance(one, ui.expansion)]
+    return "; ".join(str(one.props["label"]) for one in there)
+
+
+@pytest.mark.parametrize("address", ["/fit", "/calibrate"])
+def test_without_a_measurement_an_example_is_shown(tmp_path: Path, address: str) -> None:
+    """Logs, spectra and results are there, and none of them is taken for a measurement."""
+    shutil.copy(EXAMPLES / "raman" / "tip" / "tip_00.txt", tmp_path)
+    (tmp_path / "log.csv").write_text("time (s),temperature (K)\n0,293\n1,294\n")
+    (tmp_path / "result.csv").write_text(
+        "bias_V,current_mA,lever_V,reader_V,tip_K,power_mW,heater_ohm,legs_ohm\n"
+        "1,0.144,0.192,0.056,295.4,0.028,753,574\n2,0.288,0.386,0.113,302.7,0.111,763,577\n"
+    )
+
+    async def story(user: User, session: Session) -> None:
+        await user.open(address)
+        await until(lambda: "An example, lever-a.csv" in titles(user))
+        plots = [one for one in user.client.elements.values() if isinstance(one, ui.plotly)]
+        assert len(plots[0].figure["data"][0]["x"]) == 25  # type: ignore[index,call-overload]
+        assert not shown(user, "role=alert").strip()
+        assert session.chosen[address[1:]]["data"] is None
+        user.find("Try the example").click()
+        await user.should_see(f"hotlever {address[1:]} lever-a.csv", retries=50)
+        assert (tmp_path / "lever-a.csv").is_file()
+        # a measurement that is there is taken the next time, whatever is newer
+        (tmp_path / "newer.csv").write_text("time (s),temperature (K)\n0,293\n1,294\n")
+        session.choices(address[1:])["data"] = None
+        await user.open(address)
+        await user.should_see(f"hotlever {address[1:]} lever-a.csv", retries=50)
+        await user.open("/levers")
+        await until(lambda: session.chosen["levers"]["data"] == ["lever-a.csv"])
+
+    visit(tmp_path, story)

@@ -11,6 +11,7 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,8 @@ _KEPT = 4
 _DRAWABLE_UM = 1e5
 #: Points of a measurement that are shown.
 _POINTS = 1000
+#: Names of columns that all tables have which hotlever writes of levers.
+_OF_RESULTS = {"bias_V", "current_mA", "lever_V", "tip_K", "power_mW"}
 
 
 def understood(
@@ -74,12 +77,32 @@ def understood(
     _, unused = file_columns(folder / name, assigned, driven=waveform is not None)
     notes = [note for note in measurement.notes if note not in unused]
     return {
-        "rows": [(name, *head[1:]), *rows],
+        "rows": [(Path(name).name, *head[1:]), *rows],
         "notes": [note.replace(f"{folder}/", "") for note in notes],
         "observables": list(measurement.observables),
         "medium": measurement.medium,
         "data": in_time | {column: data[column].values.tolist() for column in columns_shown},
     }
+
+
+def measurements(report: Report, folder: Path, names: list[str], most: int) -> list[str]:
+    """Return those of some files, `most` of them, that are measurements of levers.
+
+    Logs and spectra are none, nor are tables that hotlever has written, under whatever name.
+    """
+    paths = (folder / name for name in names)
+    measured = (path.name for path in paths if _is_measurement(path, file_stamp(path)))
+    return list(islice(measured, most))
+
+
+@lru_cache(maxsize=2000)
+def _is_measurement(path: Path, stamp: float) -> bool:
+    try:
+        read_measurement(path)
+    except InputError:
+        return False
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return not set(file.readline().strip().split(",")) >= _OF_RESULTS
 
 
 def columns(report: Report, folder: Path, name: str, told: Mapping[str, Any]) -> list[FileColumn]:

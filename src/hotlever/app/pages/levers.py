@@ -44,8 +44,7 @@ class LeversPage(Page):
         super().__init__(session, banner)
         self._seen: Any = None
         data = session.project.data
-        before = data[:1] if self.chosen["data"] is None else self.chosen["data"]
-        self.chosen["data"] = [name for name in before if name in data]
+        chosen = [name for name in self.chosen["data"] or () if name in data]
         with two_columns() as (left, right):
             with left:
                 drop_zone(session, banner, _DROP, self._dropped)
@@ -53,12 +52,12 @@ class LeversPage(Page):
                     data,
                     label="Levers",
                     multiple=True,
-                    value=self.chosen["data"],
+                    value=chosen,
                     on_change=self._keep("data", []),
                 )
                 self._files.classes("w-full").props("use-chips")
                 with ui.row():
-                    flat_button("All", lambda: self._files.set_value(session.project.data))
+                    flat_button("All", self._take_all)
                     flat_button("None", partial(self._files.set_value, []))
                 self.probe_choice()
                 start = ui.button("Fit all", icon="table_rows", on_click=self.start)
@@ -71,6 +70,13 @@ class LeversPage(Page):
         self.show_command()
         ui.timer(_LOOK_S, self.open)
 
+    async def _take_all(self) -> None:
+        """Choose all measurements of levers that lie in the folder."""
+        names = self.session.project.data
+        measured = await self.session.ask("full", "showing:measurements", names, len(names))
+        self._files.set_options(names)
+        self._files.set_value(measured)
+
     async def _dropped(self, names: list[str]) -> None:
         self._files.set_options(self.session.project.data)
         taken = [name for name in names if name in self._files.options]
@@ -80,12 +86,12 @@ class LeversPage(Page):
     def task(self) -> Task:
         """Return the task that fits all."""
         options = {"probe": self.chosen["probe"], "output": FITS, "report": _REPORT}
-        return Task("fit", tuple(self.chosen["data"]), options)
+        return Task("fit", tuple(self._files.value), options)
 
     def start(self) -> bool:
         """Fit all, if these are several."""
         with self.banner.caught():
-            if len(self.chosen["data"]) < 2:
+            if len(self._files.value) < 2:
                 raise InputError("choose two measurements or more; the page Fit fits one")
             return super().start()
         return False
@@ -94,7 +100,10 @@ class LeversPage(Page):
         await self.open()
 
     async def open(self) -> None:
-        """Show the fits that are there, when there is a new one."""
+        """Show the fits that are there, when there is a new one; first, take the measurements."""
+        if self.chosen["data"] is None:
+            self.chosen["data"] = []
+            await self._take_all()
         project = self.session.project
         names = [f"{FITS}/{path.name}" for path in sorted(project.path(FITS).glob("*.json"))]
         seen = [(name, project.stamp(name)) for name in (*names, *_FILES)]

@@ -30,11 +30,17 @@ from hotlever.app.pages.frame import (
 )
 from hotlever.app.pages.page import Page, Work
 from hotlever.app.pages.plots import MeasuredPlots
-from hotlever.app.project import DATA
+from hotlever.app.project import DATA, EXAMPLES
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError, InputError
 from hotlever.measurement import FileColumn
 
+#: What is shown where there is no measurement.
+_EXAMPLE = "lever-a.csv"
+_UNDERSTOOD, _OF_EXAMPLE = (
+    "What was understood",
+    f"An example, and what is understood of it: {_EXAMPLE}",
+)
 _DROP = "Drop a measurement here (bias, current and what else there is), or press +"
 
 
@@ -65,7 +71,7 @@ class MeasuredPage(Page):
                 Work(session, self.name, self._ended, during=self._follow, notes=False)
                 self._result = ui.column().classes("w-full gap-2")
                 self._columns = ColumnPicker(partial(self.tell, "columns"))
-                opened = ui.expansion("What was understood", value=True)
+                opened = ui.expansion(_UNDERSTOOD, value=True)
                 self._understood = opened.props("header-class=text-bold")
                 with self._understood, ui.column().classes("w-full gap-2"):
                     self._plots = MeasuredPlots()
@@ -74,7 +80,13 @@ class MeasuredPage(Page):
                 self.command()
 
     async def open(self) -> None:
-        """Read the measurement that was chosen last."""
+        """Read the measurement that was chosen last, or the latest of the folder."""
+        if self.chosen["data"] is None:
+            names = self.session.project.data
+            latest = await self.session.ask("full", "showing:measurements", names, 1)
+            if latest and self.chosen["data"] is None:
+                self._select.set_value(latest[0])  # which reads it
+                return
         await self.read()
 
     # --- for the page to say ----------------------------------------------------------------------
@@ -107,15 +119,15 @@ class MeasuredPage(Page):
     def _data_controls(self) -> None:
         """Show where a measurement is dropped or chosen, and what is told of it."""
         drop_zone(self.session, self.banner, _DROP, self._dropped)
-        names = self.session.project.data
-        if self.chosen["data"] not in names:
-            self.chosen["data"] = names[0] if names else None
-        self._select = self.choice("data", "Measurement", names, None)
-        if not names:
-            small_button("Try the example", self._example, icon="science")
+        self._try = small_button("Try the example", self._example, icon="science")
+        self._select = self.choice("data", "Measurement", self._offered, None)
+
+    @property
+    def _offered(self) -> dict[str, str]:
+        return {"": "none yet"} | {name: name for name in self.session.project.data}
 
     async def _dropped(self, names: list[str]) -> None:
-        self._select.set_options(self.session.project.data)
+        self._select.set_options(self._offered)
         if names[-1] not in self._select.options:
             raise InputError(f"{names[-1]}: no measurement by its name, expected {', '.join(DATA)}")
         if self.chosen["data"] == names[-1]:
@@ -124,7 +136,7 @@ class MeasuredPage(Page):
 
     async def _example(self) -> None:
         with self.banner.caught():
-            await self._dropped([self.session.project.take_example("lever-a.csv")])
+            await self._dropped([self.session.project.take_example(_EXAMPLE)])
 
     @property
     def told(self) -> dict[str, Any]:
@@ -156,23 +168,26 @@ class MeasuredPage(Page):
         columns: list[FileColumn] = []
         self._read_of = name, self.chosen.get("probe")
         self.banner.clear()
+        told = {key: self.told[key] for key in self.tellable}
+        told["probe"] = self.chosen.get("probe")
         if name is not None:
-            told = {key: self.told[key] for key in self.tellable}
-            told["probe"] = self.chosen.get("probe")
             with suppress(HotleverError):
                 columns = await self.session.ask("full", "showing:columns", name, told)
-            try:
-                understood = await self.session.ask("full", "showing:understood", name, told)
-            except HotleverError as error:
-                if turn == self._reads:
-                    self.banner.say(str(error))
+        try:
+            file = name or str(EXAMPLES / _EXAMPLE)
+            understood = await self.session.ask("full", "showing:understood", file, told)
+        except HotleverError as error:
+            if turn == self._reads:
+                self.banner.say(str(error))
         if turn != self._reads:  # something else has been chosen meanwhile
             return
         self._columns.show(columns, self.told["columns"], understood is not None)
         self._show_understood(understood)
         if job := self.session.jobs.by_page.get(self.name):
             self._follow(job)
-        self._button.set_enabled(understood is not None)
+        self._try.set_visibility(name is None)
+        self._understood.props(f'label="{_UNDERSTOOD if name else _OF_EXAMPLE}"')
+        self._button.set_enabled(understood is not None and name is not None)
         self.understood()
         self.show_command()
         await self._show_result()
