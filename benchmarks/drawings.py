@@ -2,15 +2,17 @@
 
 python benchmarks/drawings.py [same|doping|air|solid]
 
-same: the reference probe as a drawing against the parametric one, results and time. doping: the
-distance to each border against diffusion solved in the plane, for heaters of several shapes;
-between parallel borders both are the same, which shows how good the diffusion is solved. air: the
-panels of each lever, what making its operator costs beside a parametric lever of as many panels,
-and what finer panels change. solid: levers in air against the full 3-D simulation.
+same: the reference probe as a drawing against the parametric one: results, times of a sweep and of
+a layout, and of loading what each needs. doping: the distance to each border against diffusion
+solved in the plane, for heaters of several shapes; between parallel borders both are the same,
+which shows how good the diffusion is solved. air: the panels of each lever, what making its
+operator costs beside a parametric lever of as many panels, and what finer panels change. solid:
+levers in air against the full 3-D simulation.
 """
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from dataclasses import replace
 from functools import partial
@@ -31,6 +33,8 @@ from hotlever.lever.full_space import FullSpace
 from hotlever.lever3d import SolidLever
 from hotlever.materials import LOW_DOPED
 from hotlever.probe import Layout, MeshOptions, Probe, mesh_layout
+from hotlever.probe.drawing import Drawing
+from hotlever.probe.drawing.layout_builder import build_layout
 from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.threads import one_blas_thread
@@ -38,6 +42,8 @@ from problems import BIAS, processor_seconds, table
 
 #: Of the diffusion in the plane: largest edge in the heater (share of its width), and time steps.
 FINE, STEPS = MeshOptions(heater=0.02, lever=0.05), 400
+#: What has to be loaded for a probe by its dimensions, and for one that is drawn.
+LOADED = {"parametric": "hotlever.probe.probe", "drawn": "hotlever.probe.drawing.parametric"}
 #: Biases of levers in air (V).
 IN_AIR = [4.0, 12.0]
 
@@ -78,28 +84,12 @@ def same() -> None:
     """Print the reference probe, drawn, against itself."""
     reference = Probe.reference()
     layout = reference.layout()
-    probe = Probe.from_sections(
-        {
-            "probe": {"shape": "drawing", "thickness_um": 0.4, "tip_um": list(layout.tip)},
-            "layers": {
-                "silicon": [region.outline for region in layout.regions],
-                "heater": next(
-                    region.outline for region in layout.regions if region.name == "heater"
-                ),
-                "reader": next(
-                    region.outline for region in layout.regions if region.name == "reader"
-                ),
-            },
-            "terminals": {
-                terminal.name: [terminal.start, terminal.end] for terminal in layout.terminals
-            },
-        },
-        "benchmark",
-    )
+    probe = Probe.from_drawing(Drawing.of_layout(layout))
     sweeps, rows = {}, []
     for name, compared in {"parametric": reference, "drawn": probe}.items():
         lever = Lever(compared)
         seconds = processor_seconds(lambda lever=lever: fresh(lever).sweep(BIAS), 7)
+        layouts = processor_seconds(lambda compared=compared: hundred_layouts(compared), 3)
         sweeps[name] = sweep = lever.sweep(BIAS)
         first = sweeps["parametric"]
         rows.append(
@@ -107,12 +97,27 @@ def same() -> None:
                 name,
                 lever.space.size,
                 f"{1000 * seconds:.0f}",
+                f"{10 * layouts:.2f}",
+                f"{processor_seconds(lambda name=name: loaded(LOADED[name]), 5):.2f}",
                 *(f"{float(np.abs(sweep[key] / first[key] - 1).max()):.1e}"
                   for key in ("current_mA", "lever_V", "reader_V")),
                 f"{float(np.abs(sweep.tip_K - first.tip_K).max()):.4f}",
             ]
         )  # fmt: skip
-    table(["lever", "unknowns", "sweep (ms)", "I_h", "V_l", "V_r", "T_tip (K)"], rows)
+    columns = ["lever", "unknowns", "sweep (ms)", "layout (ms)", "load (s)"]
+    table([*columns, "I_h", "V_l", "V_r", "T_tip (K)"], rows)
+
+
+def hundred_layouts(probe: Probe) -> None:
+    """Make the layout of a probe again and again, as if it had not been made before."""
+    for _ in range(100):
+        build_layout.cache_clear()
+        probe.shape.layout()
+
+
+def loaded(module: str) -> None:
+    """Load a module in a process of its own."""
+    subprocess.run([sys.executable, "-c", f"import {module}"], check=True)
 
 
 def fresh(lever: Lever) -> Lever:

@@ -16,7 +16,7 @@ and the heater's share at the knee are what `slope_regression` explains the slop
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ from hotlever.lever.dataset import dataset_of_branch
 from hotlever.lever.lever import COARSE, HOTTEST
 from hotlever.materials.silicon import thermal_conductivity
 from hotlever.probe import Probe
+from hotlever.probe.drawing import Drawing, Layer
 from hotlever.probe.shapes import Shape, ThreeLeg, UShape
 from hotlever.spieser2017 import HOTTEST_TIP_K, KNEE_PREDICTED_K
 from hotlever.steps import each
@@ -99,28 +100,10 @@ def all_cases() -> dict[str, Case]:
 def with_heater_of(probe: Probe, **material: Any) -> Probe:
     """Return a lever drawn as some probe is, whose heater is of another material."""
     layout = probe.layout()
-    return Probe.from_sections(
-        {
-            "probe": {
-                "shape": "drawing",
-                "thickness_um": layout.thickness_um,
-                "tip_um": list(layout.tip),
-            },
-            "layers": {
-                "silicon": [_points(region.outline) for region in layout.regions],
-                "heater": {"drawn": _points(layout.heater.outline), "material": "other"},
-            },
-            "materials": {"other": material},
-            "terminals": {
-                contact.name: _points((contact.start, contact.end)) for contact in layout.terminals
-            },
-        },
-        "probe",
-    )
-
-
-def _points(points: Any) -> list[list[float]]:
-    return np.asarray(points, dtype=float).tolist()
+    drawing = Drawing.of_layout(layout)
+    heater = {"heater": Layer(layout.heater.outline, "other")}
+    whole = {"silicon": drawing.layers["silicon"]}
+    return Probe.from_drawing(replace(drawing, layers=whole | heater), {"other": material})
 
 
 def squares(shape: Shape) -> float:

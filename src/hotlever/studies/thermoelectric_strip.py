@@ -15,6 +15,7 @@ from hotlever.errors import ComputationError
 from hotlever.lever import Lever
 from hotlever.materials.kinds import LowDopedSilicon
 from hotlever.probe import Probe, Taper
+from hotlever.probe.drawing import Drawing, Layer, rectangle
 from hotlever.studies.thermoelectric_shift import Axis, hot_spot
 from hotlever.threads import one_blas_thread
 
@@ -32,15 +33,17 @@ _R_S = 20_000.0
 def strip_of(silicon: LowDopedSilicon, **circuit: object) -> Probe:
     """Return a strip of one kind of silicon along x, from the supply to ground."""
     half = 0.5 * _WIDTH
-    outline = [[0.0, -half], [_LENGTH, -half], [_LENGTH, half], [0.0, half]]
     ends = {"supply": 0.0, "ground": _LENGTH}
-    centre = [0.5 * _LENGTH, 0.0]
+    drawing = Drawing(
+        layers={"silicon": Layer(rectangle(0.0, -half, _LENGTH, half), "strip")},
+        terminals={name: [(x, -half), (x, half)] for name, x in ends.items()},
+        tip_um=(0.5 * _LENGTH, 0.0),
+        thickness_um=_THICK,
+    )
     return Probe.from_sections(
         {
-            "probe": {"shape": "drawing", "thickness_um": _THICK, "tip_um": centre},
-            "layers": {"silicon": {"drawn": [outline], "material": "strip"}},
-            "terminals": {name: [[x, -half], [x, half]] for name, x in ends.items()},
-            "materials": {"strip": silicon.model_dump()},
+            **drawing.sections(),
+            "materials": {"strip": silicon},
             "circuit": circuit,
             "physics": {"thermoelectric": True},
         },

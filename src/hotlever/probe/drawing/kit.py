@@ -19,9 +19,10 @@ from shapely import MultiPolygon, Polygon, affinity
 from shapely import box as rectangle
 
 from hotlever.errors import InputError, quoted
-from hotlever.probe.drawing.layers import AREA, DRAWN, Rings
+from hotlever.materials import LOW_DOPED
+from hotlever.probe.drawing.layers import AREA, DRAWN, SILICON, Rings
 from hotlever.probe.drawing.outlines import GRID, DrawingError, Ring, polygons
-from hotlever.probe.layout import Point
+from hotlever.probe.layout import Layout, Point
 from hotlever.types import Array
 
 __all__ = ["Drawing", "Layer", "Polygon", "difference", "fillet", "mirror", "rectangle", "union"]
@@ -108,6 +109,17 @@ class Drawing:
     file: str | None = None
     cell: str | None = None
     tolerance_um: float | None = None
+
+    @classmethod
+    def of_layout(cls, layout: Layout) -> Drawing:
+        """Return the drawing of a lever of a built-in shape."""
+        low = {each.name: each.outline for each in layout.regions if each.material == LOW_DOPED}
+        return cls(
+            layers={SILICON: union(*(region.outline for region in layout.regions)), **low},
+            terminals={end.name: (end.start, end.end) for end in layout.terminals},
+            tip_um=layout.tip,
+            thickness_um=layout.thickness_um,
+        )
 
     def sections(self) -> dict[str, dict[str, Any]]:
         """Return the sections of a probe file that describe it.

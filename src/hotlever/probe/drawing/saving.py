@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from hotlever.files import whole_file
-from hotlever.materials import LOW_DOPED
-from hotlever.probe.drawing.kit import Drawing, union
-from hotlever.probe.drawing.layers import AREA, DRAWN, SILICON, Rings
+from hotlever.probe.drawing.kit import Drawing
+from hotlever.probe.drawing.layers import AREA, DRAWN, Rings
 from hotlever.probe.drawing.outlines import DrawingError, parts_of, polygons, together
 from hotlever.probe.drawing.parametric import ParametricDrawing
 from hotlever.probe.drawing.shape import TOLERANCE_UM, DrawnShape
@@ -94,15 +93,7 @@ def _drawn(shape: Shape) -> DrawnShape:
         return shape
     if isinstance(shape, ParametricDrawing):
         return shape.drawn
-    layout = shape.layout()
-    low = {each.name: each.outline for each in layout.regions if each.material == LOW_DOPED}
-    drawing = Drawing(
-        layers={SILICON: union(*(region.outline for region in layout.regions)), **low},
-        terminals={end.name: (end.start, end.end) for end in layout.terminals},
-        tip_um=layout.tip,
-        thickness_um=layout.thickness_um,
-    )
-    return DrawnShape.read(drawing.sections(), shape.shape)
+    return DrawnShape.read(Drawing.of_layout(shape.layout()).sections(), shape.shape)
 
 
 def relative(path: Path, folder: Path) -> str:
