@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Self
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import ArrayLike
 from pydantic import (
@@ -24,14 +25,16 @@ from hotlever.calibration.pulses import PulseCalibration, PulseSection
 from hotlever.calibration.table import (
     STATED,
     TABLE_COLUMNS,
+    TABLES_BY,
     TOTAL_POWER,
     budget_of,
     check_rows,
+    even_rows,
     interpolated,
     stored_table,
 )
 from hotlever.datasets import frame_text
-from hotlever.errors import InputError
+from hotlever.errors import InputError, unknown_name
 from hotlever.estimation.outcome import (
     IF_ANY,
     Columns,
@@ -74,9 +77,10 @@ class Calibration(Outcome):
     knee_tip_K : float
         Tip temperature there.
     table : xarray.Dataset
-        ``TABLE_COLUMNS`` on the dimension ``bias``, evenly spaced over the measured range, and
-        ``budget_K``, the standard error by ``source``. With held supplies, what is shown is of
-        the swept one, and `TOTAL_POWER` that of all.
+        ``TABLE_COLUMNS`` on the dimension ``bias``, evenly spaced over the measured range, with
+        more rows where the tip rises by more than 10 K from one to the next; and ``budget_K``, the
+        standard error by ``source``. With held supplies, what is shown is of the swept one, and
+        `TOTAL_POWER` that of all.
     priors : dict of str to PriorUse
         What was known of each parameter before and after, by name.
     reason : str
@@ -212,12 +216,29 @@ class Calibration(Outcome):
             request=request,
         )
 
-    def table_csv(self) -> str:
-        """Return the table as CSV, to load into an instrument; that of the pulse if there is."""
+    def table_csv(self, by: str = "temperature", step: float | None = None) -> str:
+        """Return the table as CSV, to load into an instrument; that of the pulse if there is.
+
+        Parameters
+        ----------
+        by : {"temperature", "power", "bias"}
+            What its rows are even in; of a pulse its highest temperature, or its height.
+        step : float, optional
+            Between rows, in K, mW or V; a round one by default (`even_rows`).
+
+        Raises
+        ------
+        InputError
+            If there is no such table, as by a power that falls while the tip gets hotter.
+        """
+        if by not in TABLES_BY:
+            raise unknown_name("quantity", by, TABLES_BY)
         if self.pulse is not None:
-            return self.pulse.table_csv()
-        frame = self.table[self.columns].to_dataframe()
-        return frame_text(frame, index=False, float_format="%.6g")
+            return self.pulse.table_csv(by, step)
+        # by temperature and power from the coldest row on
+        table = self.table if by == "bias" else self.heating
+        rows = even_rows(table, self.columns, TABLES_BY[by][0], step)
+        return frame_text(pd.DataFrame(rows), index=False, float_format="%.6g")
 
 
 def rms(difference: Array) -> float:

@@ -272,7 +272,9 @@ class _SmoothCurves:
 
 
 def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> IVCurve:
-    """Return points at evenly spaced biases over the measured range, smoothed.
+    """Return points over the measured range, evenly spaced in bias and also in power, smoothed.
+
+    At the knee, where the bias hardly tells temperatures apart, the power does.
 
     The power of the knee may be measured or estimated; for `like` see `find_knee`.
     """
@@ -282,8 +284,9 @@ def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> I
     fine = smooth.likeliest(power)
     bias = np.maximum.accumulate(fine.bias_V)
     low, high = max(measured.bias_V[0], bias[0]), min(measured.bias_V.max(), bias[-1])
-    even = np.linspace(low, high, _ROWS)
-    return IVCurve(even, np.interp(even, bias, fine.current_mA), curve.circuit)
+    by_power = np.interp(np.linspace(power[0], power[-1], _ROWS), power, bias)
+    rows = np.unique(np.concatenate([np.linspace(low, high, _ROWS), np.clip(by_power, low, high)]))
+    return IVCurve(rows, np.interp(rows, bias, fine.current_mA), curve.circuit)
 
 
 # --- the scale between a measured curve and a lever that resembles it -----------------------------

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import ArrayLike
 from pydantic import ValidationInfo, model_validator
@@ -22,13 +23,14 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from hotlever.calibration.table import (
     budget_of,
     check_rows,
+    even_rows,
     interpolated,
     stored_table,
     table_with_budget,
     total_error,
 )
 from hotlever.calibration.tip_temperature import error_of_model, errors_by_source, measured_range
-from hotlever.datasets import csv_text
+from hotlever.datasets import frame_text
 from hotlever.errors import ComputationError, InputError, unknown_name
 from hotlever.estimation.inverse_problem import Estimate
 from hotlever.estimation.outcome import Columns, Section, Vector
@@ -124,9 +126,19 @@ class PulseCalibration:
         table = {name: self.table[name].values for name in PULSE_COLUMNS}
         return PulseSection.holding(self.timing, table=table, budget_K=budget_of(self.table))
 
-    def table_csv(self) -> str:
-        """Return the table as CSV, to load into an instrument."""
-        return csv_text(self.table, PULSE_COLUMNS)
+    def table_csv(self, by: str = "temperature", step: float | None = None) -> str:
+        """Return the table as CSV, to load into an instrument; see `Calibration.table_csv`.
+
+        Raises
+        ------
+        InputError
+            If there is none by power, which a pulse has no single one of, or the rows are too many.
+        """
+        along = {"temperature": "peak_K", "bias": "height_V"}.get(by)
+        if along is None:
+            raise InputError(f"a table of pulses by {by}: expected by temperature or bias")
+        rows = even_rows(self.table, PULSE_COLUMNS, along, step, tip="peak_K")
+        return frame_text(pd.DataFrame(rows), index=False, float_format="%.6g")
 
 
 class PulseSection(Section):

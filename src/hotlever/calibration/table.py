@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import labelled
+from hotlever.datasets import QUANTITIES, labelled
 from hotlever.errors import InputError
 from hotlever.estimation.outcome import array
 from hotlever.probe import Circuit
@@ -20,6 +21,14 @@ STATED = ("tip_stderr_K", "tip_low_K", "tip_high_K")
 TABLE_COLUMNS = ("bias_V", "lever_V", "current_mA", "power_mW", "tip_K", *STATED)
 #: One more with held supplies: the power of all of them together.
 TOTAL_POWER = "total_power_mW"
+#: A table has more rows where the tip rises by more than this (K) from one to the next.
+STEEP_K = 10.0
+#: Between rows further apart (K) nothing is known, or a lever jumps.
+_FAR_K = 2.5 * STEEP_K
+#: Rows of a table for an instrument.
+MOST_ROWS = 10_000
+#: What rows may be even in, by the word for it: their column and its unit.
+TABLES_BY = {"temperature": ("tip_K", "K"), "power": ("power_mW", "mW"), "bias": ("bias_V", "V")}
 
 
 def table_with_budget(
@@ -45,6 +54,84 @@ def interpolated(table: xr.Dataset, values: ArrayLike, along: str, column: str) 
     """Return a column of a table at values of another one that rises; NaN outside of it."""
     at, rising = np.asarray(values, dtype=float), table[along].values
     return np.interp(at, rising, table[column].values, left=np.nan, right=np.nan)
+
+
+def with_steep_rows(even: Array, bias: Array, tip: Array) -> Array:
+    """Return biases (V), and more between them where the tip rises by more than `STEEP_K`.
+
+    Where a ramp of the bias jumps there are none: no bias leads to what lies between.
+
+    Parameters
+    ----------
+    even : ndarray
+        Rising biases (V).
+    bias, tip : ndarray, shape (n,)
+        Rising biases (V) over the same range, many more of them, and the tip temperature there (K).
+    """
+    rows = [even]
+    for low, high in pairwise(even):
+        inside = (bias >= low) & (bias <= high)
+        here, rises = tip[inside], np.diff(tip[inside])
+        if rises.sum() > STEEP_K and np.all((rises > 0.0) & (rises < STEEP_K)):
+            between = np.linspace(here[0], here[-1], int(np.ceil(rises.sum() / STEEP_K)) + 1)
+            rows.append(np.interp(between[1:-1], here, bias[inside]))
+    return np.unique(np.concatenate(rows))
+
+
+def even_rows(
+    table: xr.Dataset,
+    names: Sequence[str],
+    along: str,
+    step: float | None = None,
+    tip: str = "tip_K",
+    fewest: int = 50,
+) -> dict[str, Array]:
+    """Return columns of a table at even values of one of them, and at its ends.
+
+    Between rows whose tip temperatures are far apart, as a ramp of the bias jumps over some, there
+    are none.
+
+    Parameters
+    ----------
+    table : xarray.Dataset
+        From `table_with_budget`, from the coldest row on.
+    names : sequence of str
+    along : str
+        The column that the rows are even in.
+    step : float, optional
+        In its unit; by default the largest of 1, 2 and 5 times a power of ten that gives enough.
+    tip : str
+        The column of tip temperatures.
+    fewest : int
+        So many rows are enough.
+
+    Raises
+    ------
+    InputError
+        If the column does not rise, or there would be more than `MOST_ROWS`.
+    """
+    values, (unit, meaning) = table[along].values, QUANTITIES[along]
+    if not np.all(np.diff(values) > 0.0):
+        raise InputError(f"a table by {meaning}: it does not rise all along, expected by bias")
+    step = _round_step(np.ptp(values) / fewest) if step is None else step
+    if np.ptp(values) > MOST_ROWS * step:
+        raise InputError(
+            f"a table by {meaning}: found a step of {step:g} {unit} over {np.ptp(values):.4g} "
+            f"{unit}, expected at most {MOST_ROWS} rows"
+        )
+    even = step * np.arange(np.floor(values[0] / step) + 1.0, np.ceil(values[-1] / step))
+    # steps such as 0.1 are no binary numbers
+    even = even[(even > values[0]) & (even < values[-1])]
+    before = np.searchsorted(values, even, side="right") - 1
+    even = even[np.abs(np.diff(table[tip].values))[before] <= _FAR_K]
+    at = np.concatenate([values[:1], even, values[-1:]])
+    return {name: np.interp(at, values, table[name].values) for name in names}
+
+
+def _round_step(largest: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is no larger."""
+    power = 10.0 ** np.floor(np.log10(largest))
+    return float(power * max(digit for digit in (1, 2, 5) if digit * power <= largest))
 
 
 def table_by_bias(

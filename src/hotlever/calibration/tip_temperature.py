@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from hotlever.calibration.table import TOTAL_POWER, table_by_bias, total_error
+from hotlever.calibration.table import TOTAL_POWER, table_by_bias, total_error, with_steep_rows
 from hotlever.datasets import quantity
 from hotlever.errors import InputError
 from hotlever.estimation.experiment import TIP
@@ -30,8 +30,8 @@ from hotlever.probe.surroundings import Surroundings
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
-#: Rows of the table.
-_ROWS = 101
+#: Even rows of the table, and biases by which it is found where the tip is steep.
+_ROWS, _FINE = 101, 10_001
 #: By which source of error a parameter counts that is not the lever's own.
 OF_THE_MEASUREMENT = {
     "series_resistance_ohm": "electronics",
@@ -62,8 +62,8 @@ class TipByBias(NamedTuple):
     Attributes
     ----------
     table : xarray.Dataset
-        At even biases, see `hotlever.calibration.table`; the limits are as far away as the errors
-        say, unless these do not hold.
+        At even biases, and more where the tip is steep, see `hotlever.calibration.table`; the
+        limits are as far away as the errors say, unless these do not hold.
     jumps : list of Jump
         Between measured rows.
     asymmetry : str
@@ -92,7 +92,7 @@ def tip_by_bias(
     InputError
         If samples are asked for of an estimate without priors.
     """
-    probe, circuit, bias = estimate.probe, estimate.probe.circuit, measured_range(estimate)
+    probe, circuit, bias = estimate.probe, estimate.probe.circuit, _rows(estimate)
     predicted = estimate.predicted(bias)
     tip, slopes = predicted.values[TIP], predicted.slopes[TIP][:, estimate.objective.columns]
     parts = errors_by_source(estimate.posterior, slopes)
@@ -124,6 +124,13 @@ def measured_range(estimate: Estimate) -> Array:
     heated = measured.bias_V > estimate.probe.lowest_bias_V
     present = measured.bias_V[np.isfinite(measured.current_mA) & heated]
     return np.linspace(present.min(), min(present.max(), highest_bias(estimate)), _ROWS)
+
+
+def _rows(estimate: Estimate) -> Array:
+    """Return the biases (V) of the table: even ones, and more where the tip rises steeply."""
+    even, branch = measured_range(estimate), estimate.branch
+    fine = np.linspace(even[0], even[-1], _FINE)
+    return with_steep_rows(even, fine, branch.tip_K(branch.read(estimate.probe.circuit, fine).u))
 
 
 def highest_bias(estimate: Estimate) -> float:

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
 import xarray as xr
 
 from hotlever import figures
 from hotlever.calibration import Calibration
 from hotlever.calibration.levers import calibration_rows, calibration_statements, law_rows
 from hotlever.calibration.summary import calibration_parts
-from hotlever.calibration.table import STATED, TABLE_COLUMNS
+from hotlever.calibration.table import STATED, TABLE_COLUMNS, even_rows
 from hotlever.datasets import QUANTITIES
 from hotlever.estimation.batch import Batch
 from hotlever.materials.parameters import sentence
 from hotlever.report.fit_pages import add_remarks
 from hotlever.report.page import Block, Page
 
-#: Rows of a calibration's table that are shown.
-_ROWS = 21
+#: Rows of a calibration's table that are shown, about.
+_ROWS = 15
 
 
 def calibration_page(
@@ -29,7 +28,7 @@ def calibration_page(
 
     ``added`` is called with each block as soon as it is there.
     """
-    described, table = calibration.describes_data, calibration.table
+    described = calibration.describes_data
     page = Page(f"Calibration of {calibration.measurement.path}", added=added)
     parts = calibration_parts(calibration)
     page.text(sentence("; ".join(parts.before)))
@@ -47,10 +46,10 @@ def calibration_page(
         "I-V curve, and what the data differ by.",
     )
     names = [name for name in TABLE_COLUMNS if described or name not in STATED]
-    chosen = np.linspace(0, table.sizes["bias"] - 1, _ROWS).round().astype(int)
+    shown = even_rows(calibration.heating, names, "tip_K", fewest=_ROWS)
     page.table(
         [f"{QUANTITIES[name][1]} ({QUANTITIES[name][0]})" for name in names],
-        [[f"{table[name].values[row]:.4g}" for name in names] for row in chosen],
+        [[f"{value:.4g}" for value in row] for row in zip(*shown.values(), strict=True)],
         "Some rows of the table "
         + ("for the instrument." if described else "of the nearest lever, not for an instrument."),
     )

@@ -70,7 +70,7 @@ _FINER = MeshOptions(refinement=1.3)
 #: Levels of confidence, and their limits in standard deviations.
 LEVELS = {0.68: 0.994, 0.95: BAND}
 PERCENTILES = (50, 90, 100)
-_DECILES, _ROWS = 10, 101  # of the bias, and of a calibration's table
+_DECILES, _ROWS = 10, 101  # of the bias, and even biases of a calibration
 
 
 class MinimosSilicon(NSilicon):
@@ -203,7 +203,7 @@ def judge(
     Returns
     -------
     xarray.Dataset
-        ``off_K`` on ``way`` and ``row`` (of the calibration's table), the error above 400 K, NaN
+        ``off_K`` on ``way`` and ``row`` (at even biases), the error above 400 K, NaN
         below, and throughout for a way that gave no answer; ``tip_K``, the truth, and
         ``stated_K``, the error that the estimate states on that side; ``seconds`` of processor; as
         texts ``refused``, why there is no estimate, and ``doubted``, why it says that the data are
@@ -227,7 +227,10 @@ def judge(
         refused = str(error)
     seconds = time.process_time() - began
     if not refused:
-        table, doubted = calibration.table, calibration.reason
+        doubted = calibration.reason
+        bias = calibration.table.bias_V.values
+        even = np.linspace(bias[0], bias[-1], _ROWS)
+        table = calibration.table.sel(bias=even, method="nearest")
         tip = lever.sweep(table.bias_V.values).tip_K.values
         off[0] = table.tip_K.values - tip
         stated = stated_on_that_side(table, off[0])

@@ -16,7 +16,7 @@ from hotlever.calibration.levers import (
 from hotlever.calibration.power_law import read_power_law
 from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.summary import calibration_text
-from hotlever.errors import ComputationError
+from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import read_fit
 from hotlever.estimation.batch import Batch
 from hotlever.files import Outputs, write_text
@@ -60,7 +60,8 @@ def calibrate_files(reporter: Reporter, request: CalibrateRequest) -> int:
     outputs = request.outputs()
     if request.several:
         at = None if request.at is None else Setting(*parse_setting(request.at))
-        make, summarise = partial(calibrate_many, **how), partial(_summary, at)
+        make = partial(calibrate_many, **how)
+        summarise = partial(_summary, at, request.table_options())
         names = "calibrations", CALIBRATIONS_TABLE
         return estimate_several(reporter, request, outputs, *names, make, summarise)
     (data,) = request.data
@@ -84,7 +85,7 @@ def _write(
         if request.output is not None:
             result.write(request.output)
         if request.table is not None:
-            write_text(request.table, result.table_csv())
+            write_text(request.table, result.table_csv(**request.table_options()))
         draw(request.plot, lambda figures: figures.calibration_curves(result))
         if request.report is not None:
             from hotlever.report.calibration_pages import calibration_page
@@ -93,14 +94,18 @@ def _write(
     reporter.give("\n".join([*texts, ""]))
 
 
-def _summary(at: Setting | None, batch: Batch[Calibration]) -> Summary:
+def _summary(at: Setting | None, table: dict[str, Any], batch: Batch[Calibration]) -> Summary:
     levers = compare_calibrations(batch.results, at)
-    files = {f"{name}{TABLE}": each.table_csv() for name, each in batch.results.items()}
-    files[CALIBRATIONS_TABLE] = calibrations_csv(levers, batch.failures)
+    files, without = {CALIBRATIONS_TABLE: calibrations_csv(levers, batch.failures)}, []
+    for name, each in batch.results.items():
+        try:
+            files[f"{name}{TABLE}"] = each.table_csv(**table)
+        except InputError as error:
+            without.append(f"{name}: {error}")
 
     def page() -> Page:
         from hotlever.report.calibration_pages import calibrations_page
 
         return calibrations_page(batch, levers)
 
-    return Summary(calibrations_text(levers), page, files)
+    return Summary("\n".join([calibrations_text(levers), *without]), page, files)

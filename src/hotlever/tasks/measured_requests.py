@@ -6,7 +6,7 @@ from dataclasses import MISSING, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hotlever.errors import InputError
+from hotlever.errors import InputError, unknown_name
 from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.tasks.requests import (
     DriveRequest,
@@ -18,6 +18,7 @@ from hotlever.tasks.requests import (
     option,
 )
 from hotlever.tasks.texts import USUAL, check_number, parse_number, parse_pairs, parse_priors
+from hotlever.units import setting
 
 if TYPE_CHECKING:
     from hotlever.estimation import FitOptions
@@ -184,6 +185,14 @@ class CalibrateRequest(PlotRequest, LeversRequest):
         help="Write the table for an instrument, or for its pulses, to this CSV file; with several "
         "data files each has one beside its calibration.",
     )
+    table_by: str = option(
+        "temperature", help="What the rows are even in: temperature, power or bias."
+    )
+    table_step: str | None = option(
+        None,
+        metavar="STEP",
+        help="Between the rows, as 10K, 0.05mW or 0.1V; left out: for 50 rows or more.",
+    )
 
     def check(self) -> None:
         """Refuse what does not go together, and a medium that does not exist."""
@@ -202,6 +211,21 @@ class CalibrateRequest(PlotRequest, LeversRequest):
         self.need_single(*(name for name, path in of_one.items() if path is not None))
         if self.at is not None and not self.several:
             raise InputError("--at: expected several data files")
+        self.table_options()
+
+    def table_options(self) -> dict[str, Any]:
+        """Return what the table for an instrument is even in, and its step."""
+        from hotlever.calibration.table import TABLES_BY
+
+        if self.table_by not in TABLES_BY:
+            raise unknown_name("quantity", self.table_by, TABLES_BY, "--table-by")
+        if self.table_step is None:
+            return {"by": self.table_by}
+        unit = TABLES_BY[self.table_by][1]
+        step = setting(self.table_step, unit, "--table-step", bare=True)
+        if step <= 0.0:
+            raise InputError(f"--table-step {step:g}: expected more than 0 {unit}")
+        return {"by": self.table_by, "step": step}
 
     def outputs(self) -> Outputs:
         """Return where files are written to, none of which is read; those of one lever checked."""
