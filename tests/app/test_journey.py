@@ -275,6 +275,12 @@ def test_many_levers_fill_a_table(app: App, page: Page) -> None:
     button(page, "lever-b").click()
     page.wait_for_url("**/fit")
     expect(page.get_by_text("fits/lever-b.json")).to_be_visible(timeout=_WORK)
+    go(page, app, "levers")
+    button(page, "Calibrate all").click()
+    expect(page.get_by_text("on the page Calibrate")).to_be_visible(timeout=_WORK)
+    picture(page, "levers-calibrated")
+    page.get_by_role("button", name="lever-a", exact=True).click()
+    page.wait_for_url("**/calibrate")
 
 
 def test_bad_files_in_every_page_are_a_line(app: App, page: Page) -> None:

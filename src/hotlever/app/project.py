@@ -25,8 +25,8 @@ DATA = (".csv", ".txt", ".tsv", ".dat", ".lvm", ".asc")
 DRAWINGS = (".gds", ".gds2", ".gdsii", ".oas", ".oasis", ".dxf")
 #: What the app writes beside a measurement begins with its name and ends so.
 FIT, CALIBRATION, TABLE = ".fit.json", ".calibration.json", ".table.csv"
-#: Folder of the fits of many levers.
-FITS = "fits"
+#: Folders of the fits and of the calibrations of many levers.
+FITS, CALIBRATIONS = "fits", "calibrations"
 #: Endings of tables that commands write: no measurements.
 _WRITTEN = (
     *(TABLE, ".raman.csv", ".corrections.csv"),

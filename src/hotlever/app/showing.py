@@ -19,9 +19,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hotlever import figures
-from hotlever.app.project import file_stamp
+from hotlever.app.project import CALIBRATIONS, file_stamp
 from hotlever.app.workers import Report
 from hotlever.calibration import Calibration, read_calibration
+from hotlever.calibration.levers import calibration_rows, compare_calibrations
 from hotlever.calibration.table import TABLE_COLUMNS
 from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError
@@ -218,17 +219,25 @@ def refused(report: Report, folder: Path, names: list[str], spectra: bool) -> li
 
 
 def levers(report: Report, folder: Path, names: list[str]) -> dict[str, Any]:
-    """Return the table of fits that are there."""
+    """Return the table of the fits, or of the calibrations, that are there."""
     rows, head = [], ["lever"]
+    calibrations = dict[str, Calibration]()
     for name in names:
+        path, lever = folder / name, Path(name).name.split(".")[0]
         try:
-            fit = _fit(folder / name, file_stamp(folder / name))
+            if path.parent.name == CALIBRATIONS:
+                calibrations[lever] = _calibration(path, file_stamp(path))
+                continue
+            fit = _fit(path, file_stamp(path))
         except InputError:
             continue  # being written, or another kind of file
         cells = parameter_rows(fit)
         head = ["lever", *(f"{label} ({unit})" if unit else label for label, _, unit, _ in cells)]
-        lever = Path(name).name.split(".")[0]
         rows.append([lever, *(value for _, value, _, _ in cells), fit.doubt])
+    if calibrations:
+        head, *all_rows = calibration_rows(compare_calibrations(calibrations))
+        # what follows from all of them is on their page
+        rows = [[*row, calibrations[row[0]].doubt] for row in all_rows if row[0] in calibrations]
     return {"head": [*head, "remark"], "rows": rows}
 
 

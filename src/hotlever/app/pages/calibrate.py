@@ -8,7 +8,7 @@ from hotlever.app.jobs import Task
 from hotlever.app.pages.frame import download_button
 from hotlever.app.pages.measured import MeasuredPage
 from hotlever.app.pages.page import MEDIA, REFERENCE, several
-from hotlever.app.project import CALIBRATION, TABLE
+from hotlever.app.project import CALIBRATION, CALIBRATIONS, TABLE
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 from hotlever.materials.parameters import sentence
@@ -62,6 +62,10 @@ class CalibratePage(MeasuredPage):
             "table": self._table_file,
         }
         return Task("calibrate", (chosen["data"],), options)
+
+    def results(self) -> list[str]:
+        """Return where a calibration may lie: of this measurement alone, or among many."""
+        return [self.output, f"{CALIBRATIONS}/{self.stem}.json"]
 
     async def show(self, name: str) -> None:
         """Show what to set for a temperature, and what a bias or a power gives, or why not."""

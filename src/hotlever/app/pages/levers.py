@@ -1,7 +1,8 @@
-"""Levers: many measurements are fitted, and a table fills with what was found."""
+"""Levers: many measurements are fitted or calibrated, and a table fills with what was found."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,18 +21,41 @@ from hotlever.app.pages.frame import (
     two_columns,
 )
 from hotlever.app.pages.page import Page, Work
-from hotlever.app.project import FITS
+from hotlever.app.project import CALIBRATIONS, FITS
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 
 _DROP = "Drop measurements here, one for each lever"
 _GOES_ON = (
-    "What was fitted before, of the same data, is not fitted again: a run that was cancelled goes "
-    "on where it was."
+    "What was made before, of the same data, is not made again: a run that was cancelled goes on "
+    "where it was."
 )
-#: Folder of the page of the fits, and files that are made beside them.
-_REPORT = "levers"
-_FILES = {f"{FITS}/levers.csv": "Table (CSV)", f"{_REPORT}/index.html": "Page (HTML)"}
+
+
+@dataclass(frozen=True)
+class _Made:
+    """What is made of all measurements: button, folder, table, report, and one lever's page."""
+
+    button: str
+    folder: str
+    table: str
+    report: str
+    page: str
+
+    @property
+    def files(self) -> dict[str, str]:
+        """What is made beside the results."""
+        table, page = f"{self.folder}/{self.table}", f"{self.report}/index.html"
+        return {table: "Table (CSV)", page: "Page (HTML)"}
+
+
+#: By command.
+_MADE = {
+    "fit": _Made("Fit all", FITS, "levers.csv", "levers", "fit"),
+    "calibrate": _Made(
+        *("Calibrate all", CALIBRATIONS, "calibrations.csv", "levers-calibrated", "calibrate")
+    ),
+}
 _LOOK_S = 1.0
 
 
@@ -60,8 +84,10 @@ class LeversPage(Page):
                     flat_button("All", self._take_all)
                     flat_button("None", partial(self._files.set_value, []))
                 self.probe_choice()
-                start = ui.button("Fit all", icon="table_rows", on_click=self.start)
-                start.classes("w-full")
+                with ui.row().classes("w-full"):
+                    for command, made in _MADE.items():
+                        start = ui.button(made.button, icon="table_rows")
+                        start.classes("col").on_click(partial(self._make, command))
                 caption(_GOES_ON)
             with right:
                 Work(session, self.name, self._fitted)
@@ -83,16 +109,29 @@ class LeversPage(Page):
         self._files.set_value(list(dict.fromkeys([*self._files.value, *taken])))
         await say_refused(self.session, self.banner, names, spectra=False)
 
+    @property
+    def _made(self) -> _Made:
+        return _MADE[self.chosen["command"]]
+
     def task(self) -> Task:
-        """Return the task that fits all."""
-        options = {"probe": self.chosen["probe"], "output": FITS, "report": _REPORT}
-        return Task("fit", tuple(self._files.value), options)
+        """Return the task that fits or calibrates all."""
+        made, probe = self._made, self.chosen["probe"]
+        options = {"probe": probe, "output": made.folder, "report": made.report}
+        return Task(self.chosen["command"], tuple(self._files.value), options)
+
+    def _make(self, command: str) -> None:
+        self.chosen["command"] = command
+        self.show_command()
+        self.start()
 
     def start(self) -> bool:
-        """Fit all, if these are several."""
+        """Fit or calibrate all, if these are several."""
         with self.banner.caught():
             if len(self._files.value) < 2:
-                raise InputError("choose two measurements or more; the page Fit fits one")
+                page = self._made.page
+                raise InputError(
+                    f"choose two measurements or more; the page {page.capitalize()} takes one"
+                )
             return super().start()
         return False
 
@@ -100,13 +139,13 @@ class LeversPage(Page):
         await self.open()
 
     async def open(self) -> None:
-        """Show the fits that are there, when there is a new one; first, take the measurements."""
-        if self.chosen["data"] is None:
-            self.chosen["data"] = []
-            await self._take_all()
-        project = self.session.project
-        names = [f"{FITS}/{path.name}" for path in sorted(project.path(FITS).glob("*.json"))]
-        seen = [(name, project.stamp(name)) for name in (*names, *_FILES)]
+        """Show the results that are there, when there is a new one."""
+        project, made = self.session.project, self._made
+        names = [
+            f"{made.folder}/{path.name}"
+            for path in sorted(project.path(made.folder).glob("*.json"))
+        ]
+        seen = [(name, project.stamp(name)) for name in (*names, *made.files)]
         if seen == self._seen:
             return
         self._seen = seen
@@ -119,16 +158,17 @@ class LeversPage(Page):
 
     def _show(self, levers: dict[str, Any]) -> None:
         with ui.row().classes("items-center"):
-            for name, label in _FILES.items():
+            for name, label in self._made.files.items():
                 download_button(self.session, name, label)
         table(levers["head"], levers["rows"], self._open)
-        caption("A click on a lever opens it on the page Fit.")
+        caption(f"A click on a lever opens it on the page {self._made.page.capitalize()}.")
 
     def _open(self, stem: str) -> None:
-        """Open one lever on the page Fit, with the fit that was made here."""
+        """Open one lever on its page, with what was made of it here."""
         source = next((name for name in self.session.project.data if Path(name).stem == stem), None)
         if source is None:
             self.banner.say(f"{stem}: its measurement is not in the folder any more")
             return
-        self.session.chosen.setdefault("fit", {})["data"] = source
-        ui.navigate.to("/fit")
+        page = self._made.page
+        self.session.choices(page)["data"] = source
+        ui.navigate.to(f"/{page}")
