@@ -166,3 +166,10 @@ def test_whatever_is_changed_in_a_file_it_is_a_probe_or_one_line_says_why(tmp_pa
             return str(error)
 
     assert 0 < len(said()) < 500
+
+
+def test_a_tip_on_the_axis_is_at_zero_and_not_at_minus_zero(run, tmp_path):
+    sections = metal_film_sections()
+    sections["probe"]["tip_um"] = [56.0, -0.0]
+    Probe.from_sections(sections, "test").to_file(tmp_path / "lever.toml")
+    assert "tip at (56, 0) µm" in run("probe", "show", tmp_path / "lever.toml")[1]

@@ -123,6 +123,14 @@ def test_without_power_it_stays_as_it_is(coarse):
     np.testing.assert_allclose(data.tip_K, 293.0, atol=1e-9)
 
 
+def test_after_a_pulse_nothing_flows(coarse):
+    data = simulate(coarse, pulse(5.0, 1.0), at=[0.5, 1.5, 3.0])
+    assert data.tip_K.values[-1] > 294.0
+    for name in ("current_mA", "lever_V", "reader_V", "power_mW"):
+        assert data[name].values[0] > 0.01
+        assert not data[name].values[1:].any(), name
+
+
 def test_the_other_polarity_heats_alike(coarse):
     there, back = (simulate(coarse, step(bias), at=[10.0]) for bias in (5.0, -5.0))
     assert back.tip_K.item() == pytest.approx(there.tip_K.item(), abs=1e-6)

@@ -42,6 +42,8 @@ ENERGIES = ("supplied_nJ", "lost_nJ")
 #: Errors are at most this share of the rise that a lever would end with, so that a response is
 #: resolved however weak it is; but never less than this (K), which is near rounding errors.
 _SHARE_OF_RISE, _LEAST_TOLERANCE = 2e-3, 1e-6
+#: Share of the highest current or voltage below which one is a rounding error.
+_ROUNDING = 1e-12
 #: Parts of the time that progress is told in.
 _PARTS = 1000
 _AIR_NOTE = (
@@ -286,6 +288,9 @@ def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Datase
     observer, count = recorder.observer, len(_REPORTED)
     values = np.array(recorder.values).reshape(len(recorder.time), count + observer.monitors.size)
     columns = dict(zip(_REPORTED, values[:, :count].T, strict=True))
+    for name, of in (("reader_V", "lever_V"), ("lever_V", "lever_V"), ("current_mA", "current_mA")):
+        noise = _ROUNDING * np.abs(columns[of]).max()
+        columns[name] = np.where(np.abs(columns[name]) < noise, 0.0, columns[name])
     columns["power_mW"] = columns["lever_V"] * columns["current_mA"]
     # the reader, where there is none, is NaN throughout
     variables = {"time_us": np.array(recorder.time), "bias_V": np.array(recorder.bias)}

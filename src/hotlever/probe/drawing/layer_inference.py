@@ -303,7 +303,7 @@ def _tip(
     """Find the place of the tip."""
     for _, text, point in sheet.labels:
         if "tip" in text.lower() and best.shape.contains(shapely.Point(point)):
-            inferred.tip = (round(point[0], 6), round(point[1], 6))
+            inferred.tip = (round(point[0], 6) + 0.0, round(point[1], 6) + 0.0)  # no -0
             inferred.reasons["tip"] = f"the text '{text.strip()[:20]}' stands there"
             return
     heater = inferred.layers.get(HEATER)
@@ -312,5 +312,5 @@ def _tip(
             parts_of(shapes[heater].intersection(best.shape)), key=lambda piece: piece.area
         )
         middle = inside.centroid if inside.contains(inside.centroid) else inside.point_on_surface()
-        inferred.tip = (round(middle.x, 6), round(middle.y, 6))
+        inferred.tip = (round(middle.x, 6) + 0.0, round(middle.y, 6) + 0.0)
         inferred.reasons["tip"] = "the middle of the heater; no text in the drawing says 'tip'"
