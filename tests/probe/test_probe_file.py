@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from hotlever.errors import InputError
 from hotlever.probe import Probe, ThreeLeg
+from of_materials import metal_film_sections
 
 CONTRACT = """
 [probe]
