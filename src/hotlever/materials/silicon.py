@@ -113,9 +113,8 @@ def thermal_conductivity_of_layer(T: ArrayLike, thickness_um: ArrayLike) -> Eval
 def thermal_conductivity_of_wire(T: ArrayLike, diameter_um: ArrayLike) -> Evaluated:
     """Thermal conductivity of silicon along a round wire, in W cm⁻¹ K⁻¹.
 
-    Bulk and surface scatter the phonons independently (Matthiessen), the surface once a diameter:
-    1/Λ + 1/d in place of 1/Λ, with Λ as in `thermal_conductivity_of_layer`. As that falls as κ
-    does, the surface adds the same to 1/κ at any temperature.
+    Bulk and surface scatter phonons independently (Matthiessen), the surface once a diameter:
+    1/Λ + 1/d in place of 1/Λ, Λ as in a layer. Falling as κ does, it adds the same to 1/κ at any T.
 
     Examples
     --------
