@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from taylor import remainder_orders
 
+from experiments import on_coarse_meshes
+from hotlever import Measurement, fit
+from hotlever.contact.law import INTERFACE
 from hotlever.errors import InputError
 from hotlever.lever import Lever
 from hotlever.lever.contact import history_in_contact, out_of_contact, sweep_in_contact
@@ -16,6 +19,7 @@ from hotlever.lever.transient.reduced import reduced_in_time
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe
 from hotlever.probe.contact import OUT_OF_CONTACT
+from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.solid import SolidMeshOptions
 
 TIP = {"tip.height_um": 0.7, "tip.half_angle_deg": 20.0, "tip.apex_radius_um": 0.1}
@@ -117,3 +121,18 @@ def test_in_air_the_cone_conducts_to_the_sample_beside_the_contact(in_air):
     assert data.beside_mW.item() > data.sample_mW.item() > 0.0
     left = data.end_heat_mW + data.air_heat_mW + data.into_tip_mW
     assert left.item() == pytest.approx(data.power_mW.item(), rel=1e-5)
+
+
+def test_the_resistance_of_an_interface_is_fitted():
+    """To a current measured in contact, of a lever whose material is known."""
+    probe = Probe.reference().with_(**TIP, sample="glass", interface_K_per_mW=500.0)
+    bias, noise = np.linspace(5.0, 10.0, 11), np.random.default_rng(0).normal(size=11)
+    with on_coarse_meshes():
+        lever = Lever(probe.with_(interface_K_per_mW=750.0))
+        current = lever.sweep(bias).current_mA.values * (1.0 + 1e-4 * noise)
+        nothing = np.full(bias.size, np.nan)
+        measured = Measurement(bias, current, nothing, nothing, nothing)
+        fixed = dict.fromkeys(usual_parameters(probe))
+        result = fit(measured, probe, fixed=fixed, free=(INTERFACE,))
+    found = result.parameters[INTERFACE]
+    assert abs(found.value - 750.0) < 4.0 * found.stderr < 75.0

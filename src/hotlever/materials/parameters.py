@@ -42,7 +42,7 @@ _SLOPE = "temperature coefficient of the high-doped resistivity"
 #: What counts in time alone.
 IN_TIME = "in time"
 #: Units by the endings of names in probe files.
-_UNITS = {"um": "µm", "ohm": "Ω", "K": "K", "deg": "°"}
+_UNITS = {"um": "µm", "ohm": "Ω", "K": "K", "deg": "°", "K_per_mW": "K/mW"}
 
 
 class Parameter(NamedTuple):
@@ -349,8 +349,9 @@ def parameter_named(name: str) -> Parameter:
             symbol=f"{declared.symbol} ({material})",
             meaning=f"{declared.meaning}, {material}",
         )
-    stem, _, ending = name.rpartition("_")
-    words = (stem if ending in _UNITS else name).replace("_", " ")
+    ending = max((unit for unit in _UNITS if name.endswith(f"_{unit}")), key=len, default="")
+    stem = name.removesuffix(f"_{ending}")
+    words = stem.replace("_", " ")
     return Parameter(name, words, _UNITS.get(ending, "1"), 1.0, -math.inf, math.inf, words)
 
 

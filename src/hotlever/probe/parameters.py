@@ -9,6 +9,7 @@ from __future__ import annotations
 from hotlever.errors import unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
 from hotlever.materials.parameters import IN_TIME, parameter_named
+from hotlever.probe.contact import OUT_OF_CONTACT
 from hotlever.probe.parts import ProbeParts
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
 
@@ -26,6 +27,8 @@ _TIP = 0.2
 _GAS = 0.1
 #: Of the distance to a surface below.
 _GAP = 0.1
+#: Of an interface, of which nothing is known but its power of ten.
+_OF_THE_INTERFACE = (1e-3, 1e3)
 #: How far off all edges usually are (µm).
 _USUAL_BIAS = 0.1
 #: Dimensions of a tip that matter to its lever, and of a shape that do not matter to the tip.
@@ -136,7 +139,7 @@ def parameters_of(
     'µm'
     """
     table = of_materials(probe, anywhere=anywhere, in_time=in_time)
-    parts = (probe.shape, probe.tip, probe.circuit, probe.surroundings)
+    parts = (probe.shape, probe.tip, probe.contact, probe.circuit, probe.surroundings)
     meaning = {name: text for part in parts if part for name, text in part.description().items()}
 
     def add(name: str, spread: float | None, within: tuple[float, float] = _OF_THE_VALUE) -> None:
@@ -160,6 +163,8 @@ def parameters_of(
         )
     for name in OF_THE_TIP if probe.tip is not None else ():
         add(name, _TIP)
+    if probe.contact is not None and 0 < probe.contact.interface_K_per_mW < OUT_OF_CONTACT:
+        add("interface_K_per_mW", None, _OF_THE_INTERFACE)
     add("base_temperature_K", _BASE_K, _OF_THE_BASE)
     table["base_temperature_K"] = table["base_temperature_K"]._replace(relative=False)
     if probe.circuit.series_resistance_ohm > 0:
