@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import pydoc
 import re
 import subprocess
 import sys
@@ -52,7 +53,7 @@ MODULE = re.compile(r"hotlever(\.\w+)+")
 SINGLE = {"ground", "numbers and files", "texts", "tables and processes"}
 
 
-@pytest.mark.parametrize("name", hotlever.__all__)
+@pytest.mark.parametrize("name", dir(hotlever))
 def test_every_word_exists_and_has_help(name):
     word = getattr(hotlever, name)
     assert name in dir(hotlever)
@@ -62,9 +63,19 @@ def test_every_word_exists_and_has_help(name):
 def test_the_words_of_the_story():
     story = {"Probe", "Circuit", "Material", "Lever", "read_measurement", "fit", "read_fit"}
     story |= {"calibrate", "read_calibration", "PowerLaw", "read_spectra", "Thermometer"}
-    assert story <= set(hotlever.__all__)
+    assert story <= set(dir(hotlever))
     with pytest.raises(AttributeError, match="no attribute 'Prob'"):
         _ = hotlever.Prob
+
+
+def test_help_begins_with_a_tour_and_explains_no_word():
+    text = pydoc.render_doc(hotlever, renderer=pydoc.plaintext)
+    tour, contents = text.split("PACKAGE CONTENTS")
+    assert len(tour.splitlines()) <= 30
+    assert len(contents.splitlines()) < 60
+    assert max(map(len, tour.splitlines())) <= 80
+    names = set(re.findall(r"[A-Za-z_]+", tour))
+    assert {"Probe", "Lever", "simulate", "read_measurement", "fit", "calibrate"} <= names
 
 
 def test_importing_the_package_loads_nothing_heavy():
@@ -73,6 +84,17 @@ def test_importing_the_package_loads_nothing_heavy():
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
     assert not {"numpy", "scipy", "xarray", "skfem", "matplotlib"} & set(done.stdout.split())
+
+
+def test_datasets_offer_figures_before_matplotlib_is_loaded():
+    script = (
+        "import sys; from hotlever.datasets import labelled; data = labelled({'tip_K': [1.0]});"
+        "print(hasattr(data, 'hotlever'), 'matplotlib' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["True", "False"]
 
 
 @pytest.mark.parametrize("name", MODULES)

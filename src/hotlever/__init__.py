@@ -1,9 +1,22 @@
-"""Joule-heated silicon cantilever probes: how hot is the tip, and how sure are we?
+"""Joule-heated AFM probes: how hot is the tip, and how sure are we?
 
-A `Probe` (shape, `Material`, `Circuit`, surroundings) makes a `Lever`, which is solved over a range
-of bias. `read_measurement` reads what an instrument measured, `fit` finds the material that
-explains it, `calibrate` gives the tip temperature with its error. Raman spectra become temperatures
-with `read_spectra`, `calibrate_from` and `Thermometer`. `figures` draws all of it.
+probe = Probe.reference()           or Probe.from_file("probe.toml")
+lever = Lever(probe)                meshed; lever.in_medium("air")
+data = lever.sweep([2, 4, 8])       an xarray.Dataset, such as data.tip_K
+(state,) = lever.solve([8.3])       one state, with its fields
+simulate(lever, wave, until=100)    in time; see hotlever.lever.transient
+
+read_measurement("iv.csv")          what an instrument measured
+fit("iv.csv", probe=probe)          the material that explains it
+calibrate("iv.csv", probe=probe)    tip temperatures for what it shows
+read_spectra, Thermometer           Raman spectra made temperatures
+
+data.hotlever.plot()                the figure of any dataset made here
+figures.temperature_map(state)      maps, films, others; see save_figure
+
+Errors are InputError and ComputationError. dir(hotlever) lists all words,
+help(hotlever.Lever) explains one. On the command line all of this is
+"hotlever --help", and in the browser "hotlever app".
 """
 
 from __future__ import annotations
@@ -32,7 +45,15 @@ _MODULES = {
 }
 _PUBLIC = {name: module for module, names in _MODULES.items() for name in names}
 
-__all__ = ["__version__", "figures", *_PUBLIC]
+
+class _Words(tuple[str, ...]):
+    """What ``import *`` takes; help() explains all that it finds in it, on thousands of lines."""
+
+    def __contains__(self, name: object) -> bool:
+        return False
+
+
+__all__ = _Words(("__version__", "figures", *_PUBLIC))
 
 
 def __getattr__(name: str) -> Any:

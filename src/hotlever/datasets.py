@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +18,7 @@ from hotlever.types import Array
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 #: Name: unit and meaning.
 QUANTITIES: dict[str, tuple[str, str]] = {
@@ -274,11 +276,44 @@ def labelled(
     """
     import xarray as xr  # takes half a second, which not every command has to wait for
 
+    offer_plots()
     return xr.Dataset(
         {name: quantity(name, dimensions, values) for name, values in columns.items()},
         {name: quantity(name, name, values) for name, values in (coordinates or {}).items()},
         {**attributes, "software": f"hotlever {__version__}"},
     )
+
+
+class Plots:
+    """What hotlever does with its datasets: ``data.hotlever.plot()`` draws one."""
+
+    def __init__(self, data: xr.Dataset) -> None:
+        self._data = data
+
+    def plot(self) -> Figure:
+        """Return the figure that belongs to the dataset; see `hotlever.figures.figure_of`.
+
+        `hotlever.save_figure` writes it to a file.
+
+        Examples
+        --------
+        >>> import hotlever
+        >>> sweep = hotlever.sweep(hotlever.Probe.reference(), [1.0, 2.0])
+        >>> len(sweep.hotlever.plot().axes)
+        4
+        """
+        # figures stand above datasets: they are the package's to find
+        from hotlever import figures
+
+        return figures.figure_of(self._data)
+
+
+@cache
+def offer_plots() -> None:
+    """Let all datasets of xarray have `Plots`."""
+    import xarray as xr
+
+    xr.register_dataset_accessor("hotlever")(Plots)
 
 
 def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> xr.Variable:

@@ -11,12 +11,14 @@ from numpy.testing import assert_allclose
 
 import made_up
 from hotlever import figures
+from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement
 from hotlever.figures import save_figure
 from hotlever.files import FIGURE_TYPES
+from hotlever.lever import read_sweep, write_sweep
 from hotlever.lever.fields import heater_profile, seen_from_above
-from hotlever.lever.transient import pulse, simulate
+from hotlever.lever.transient import pulse, simulate, spectrum, time_constants
 from hotlever.probe import Probe
 from hotlever.report.page import Page
 
@@ -110,6 +112,29 @@ def test_each_frame_of_a_film_is_its_state(coarse):
 
 def test_iv_curve_names_the_knee(made):
     assert "knee" in texts(made["iv"])
+
+
+def test_every_dataset_draws_itself(made, coarse, tmp_path):
+    sweep = coarse.sweep([2.0, 8.0])
+    write_sweep(sweep, tmp_path / "a.nc")
+    (state,) = coarse.solve([4.0])
+    history = simulate(coarse, pulse(8.0, 1.0), at=[0.5, 1.0, 2.0])
+    lever = "three-leg lever in vacuum"
+    for data, panels, title in (
+        (read_sweep(tmp_path / "a.nc"), 4, lever),
+        (history, 4, f"{lever}; pulse of 8 V for 1 µs"),
+        (spectrum(state, [10.0, 1e5]), 4, f"{lever}; bias 4 V"),
+        (heater_profile(state), 2, lever),
+        (time_constants(coarse, [4.0, 8.0]), 2, lever),
+        (Measurement.of_sweep(sweep).dataset(coarse.circuit), 6, None),
+    ):
+        figure = data.hotlever.plot()
+        assert len(figure.axes) == panels
+        assert title in (figure.get_suptitle() or None, None)
+        for axes in figure.axes:
+            assert all("(" in label for label in filter(None, [axes.get_ylabel()]))
+    with pytest.raises(InputError, match="without curves"):
+        labelled({"k": ((), 1.0)}).hotlever.plot()
 
 
 def test_unknown_figure_types_are_refused(made, tmp_path):

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from hotlever.air.panels import Panels
 from hotlever.colours import BLACK, BLUE, HEAT, ORANGE, VERMILION
 from hotlever.figures.drawing import outlines
-from hotlever.figures.style import COLOURS, LINES, axis_label, beside, figure
+from hotlever.figures.style import COLOURS, LINES, axis_label, beside, entitle, figure
 from hotlever.probe import Layout
 from hotlever.types import Array
 
@@ -95,7 +95,7 @@ def temperature_slices(slices: xr.Dataset) -> Figure:
             axes.grid(False)
             axes.set_title(name, loc="center")
         made.colorbar(image, ax=grid, label="temperature (K)", shrink=0.7)
-        made.suptitle(f"bias {slices.attrs['bias_V']:.3g} V, tip at {tip:.0f} K", fontsize=9)
+        entitle(made, slices, more=f"bias {slices.attrs['bias_V']:.3g} V, tip at {tip:.0f} K")
     return made
 
 

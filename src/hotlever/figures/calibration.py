@@ -50,8 +50,9 @@ def calibration_curves(calibration: Calibration) -> Figure:
     measured = calibration.measurement.dataset(calibration.probe.circuit)
     with figure(8.0, 6.0, 2, 2, letters=True) as (made, grid):
         by_power, by_bias, iv, budget = grid.ravel()
-        if not described:
-            made.suptitle(NOT_DESCRIBED, color=VERMILION)
+        title = [calibration.probe.title, *([] if described else [NOT_DESCRIBED])]
+        colour = BLACK if described else VERMILION
+        made.suptitle("; ".join(title), x=0.01, ha="left", color=colour)
         name = "calibration and 95 % band" if described else "the nearest lever"
         for axes, along in ((by_power, "power_mW"), (by_bias, "bias_V")):
             if described:

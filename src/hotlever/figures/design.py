@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from hotlever.colours import BLUE, GREEN, ORANGE, PURPLE, VERMILION
-from hotlever.figures.style import figure
+from hotlever.figures.style import entitle, figure
 from hotlever.studies.design import label_of
 
 if TYPE_CHECKING:
@@ -38,7 +38,9 @@ def design_study(data: xr.Dataset) -> Figure:
         "cold_ohm": "cold resistance (Ω)",
     }
     del labels["cold_ohm" if last == "k" else "k"]
-    return (_map if len(data.dims) == 2 else _curves)(data, labels)
+    made = (_map if len(data.dims) == 2 else _curves)(data, labels)
+    entitle(made, data)
+    return made
 
 
 def _map(data: xr.Dataset, labels: dict[str, str]) -> Figure:

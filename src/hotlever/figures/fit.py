@@ -23,6 +23,7 @@ from hotlever.figures.style import (
     NOT_DESCRIBED,
     axis_label,
     curve,
+    entitle,
     figure,
     from_zero,
     panel_letters,
@@ -96,8 +97,9 @@ def data_and_model(
             lower.set(xlabel=axis_label(along))
         if in_time and settled(measured):
             grid[0, 0].set_xscale("log")
-        if band is not None and not _stated(band):
-            made.suptitle(NOT_DESCRIBED, color=VERMILION)
+        stated = band is None or _stated(band)
+        style: Any = {} if stated else {"color": VERMILION}
+        entitle(made, model, more="" if stated else NOT_DESCRIBED, **style)
         panel_letters(grid[0])
         # the tip, which is the last, has a band of its own
         for axes in {grid[0, 0], grid[0, 0 if band is None else -1]}:

@@ -18,6 +18,7 @@ from hotlever.figures.style import (
     MEASURED,
     axis_label,
     curve,
+    entitle,
     figure,
     from_zero,
     marker,
@@ -68,6 +69,7 @@ def sweep_overview(sweep: xr.Dataset) -> Figure:
         voltage.legend()
         curve(tip, sweep, "bias_V", "tip_K", "o-", color=VERMILION)
         curve(iv, sweep, "lever_V", "current_mA", "o-", color=BLUE)
+        entitle(made, sweep)
     return made
 
 
@@ -111,6 +113,7 @@ def iv_curves(
             for name in ("lever_V", "current_mA")
         )
         axes.set(xlim=from_zero(volts), ylim=from_zero(currents))
+        entitle(made, *sweeps.values())
         axes.legend(loc="upper left")
     return made
 
@@ -142,6 +145,7 @@ def temperature_power(
         axes.legend(loc="upper left")
         where: Any = {"xycoords": "axes fraction", "color": "0.4", "fontsize": 8}
         below.annotate(f"±{POWER_LAW_SPREAD_K:.0f} K", (0.02, 0.06), **where)
+        entitle(made, sweep)
     return made
 
 
@@ -156,6 +160,7 @@ def resistances(sweep: xr.Dataset) -> Figure:
             style: Any = {"color": colour, "marker": marker(sweep, "bias", mark), "label": label}
             axes.plot(sweep.tip_K, sweep[name] / 1000, **style)
         axes.set(xlabel=axis_label("tip_K"), ylabel="resistance (kΩ)", ylim=(0, None))
+        entitle(made, sweep)
         axes.legend()
     return made
 
@@ -169,6 +174,7 @@ def doping_profile(profile: xr.Dataset) -> Figure:
         right = axes.twinx()
         right.plot(profile.position, profile.inversion_temperature, "--", color=VERMILION)
         right.set_ylabel("inversion temperature (K)", color=VERMILION)
+        entitle(made, profile)
         right.spines["right"].set_visible(True)
         right.grid(False)
     return made
@@ -201,5 +207,6 @@ def heater_profiles(profiles: Mapping[str, xr.Dataset]) -> Figure:
         upper.legend(handles=[solid, dashed], loc="upper right")
         low, high = lower.get_ylim()
         lower.set_ylim(low, high + 0.35 * (high - low))
+        entitle(made, *profiles.values())
         lower.legend(loc="upper left")
     return made

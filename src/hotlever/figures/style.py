@@ -52,6 +52,7 @@ STYLE: Any = {
     "axes.labelsize": 9,
     "axes.titlesize": 9,
     "axes.titlelocation": "left",
+    "figure.titlesize": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -123,6 +124,14 @@ def curve(axes: Axes, data: xr.Dataset, along: str, name: str, *line: str, **sty
     # of axes above each other the lowest has the label
     if axes.xaxis.get_tick_params().get("labelbottom", True):
         axes.set(xlabel=axis_label(along))
+
+
+def entitle(made: Figure, *datasets: xr.Dataset | None, more: str = "", **style: Any) -> None:
+    """Write above a figure of which levers its datasets are, as far as these say so, and more."""
+    told = [data.attrs["lever"] for data in datasets if data is not None and "lever" in data.attrs]
+    text = "; ".join(filter(None, [" and ".join(dict.fromkeys(told)), more]))
+    if text:
+        made.suptitle(text, x=0.01, ha="left", **style)
 
 
 def marker(data: xr.Dataset, along: str, mark: str = "o") -> str:

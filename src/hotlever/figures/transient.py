@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hotlever.colours import BLUE, GREEN, ORANGE, PURPLE, VERMILION
-from hotlever.figures.style import axis_label, curve, figure, marker, settled
+from hotlever.figures.style import axis_label, curve, entitle, figure, marker, settled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,6 +43,7 @@ def history_overview(history: xr.Dataset) -> Figure:
             axes.legend()
         if settled(history):
             tip.set_xscale("log")
+        entitle(made, history, more=history.attrs.get("waveform", ""))
     return made
 
 
@@ -65,6 +66,7 @@ def small_signals(spectrum: xr.Dataset) -> Figure:
         size.set(ylabel="change of T$_{tip}$ (K/mW, K/V)", yscale="log")
         phase.set(ylabel="phase (°)")
         _along_frequency(bode, size, phase)
+        entitle(made, spectrum, more=f"bias {spectrum.attrs['bias_V']:.3g} V")
     return made
 
 
@@ -88,4 +90,6 @@ def harmonics(data: xr.Dataset) -> Figure:
         size.set(ylabel="amplitude of V$_l$ (V)", yscale="log")
         phase.set(ylabel="phase (°)")
         _along_frequency(size, phase)
+        driven = f"bias {data.attrs['bias_V']:.3g} V + {data.attrs['amplitude_V']:.3g} V sine"
+        entitle(made, data, more=driven)
     return made

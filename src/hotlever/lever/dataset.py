@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import OBSERVABLES, QUANTITIES, csv_text, labelled, quantity, write_dataset
+from hotlever.datasets import (
+    OBSERVABLES,
+    QUANTITIES,
+    csv_text,
+    labelled,
+    offer_plots,
+    quantity,
+    write_dataset,
+)
 from hotlever.errors import InputError
 from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES, balance_columns, balance_names, balance_slopes
@@ -161,7 +169,7 @@ def range_notes(made_of: Mapping[str, Kind], where: str, along: Array, max_K: Ar
 def probe_attributes(probe: Probe) -> dict[str, str]:
     """Return what a dataset says of a probe, which `probe_of` reads."""
     sections = {name: json.dumps(section) for name, section in probe.sections().items()}
-    return {**sections, "medium": probe.surroundings.medium}
+    return {**sections, "medium": probe.surroundings.medium, "lever": probe.title}
 
 
 def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -195,6 +203,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     import xarray as xr  # see `hotlever.datasets.labelled`
 
+    offer_plots()
     if not Path(path).is_file():
         read_text(path)  # says why
     try:

@@ -284,4 +284,4 @@ def heater_profile(state: State, count: int = 161) -> xr.Dataset:
         "resistivity_slope": -sigma_by["T"] / sigma**2,
     }
     seen = {name: getattr(state, name) for name in ("lever_V", "current_mA", "tip_K")}
-    return labelled(columns, "position", {"position": position}, **seen)
+    return labelled(columns, "position", {"position": position}, **seen, lever=lever.probe.title)

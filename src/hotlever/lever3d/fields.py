@@ -170,6 +170,7 @@ def temperature_slices(state: State) -> xr.Dataset:
             "along_um": (("slice", "place"), along),
             "z_um": (("slice", "z"), z),
         },
+        lever=lever.probe.title,
         bias_V=state.bias_V,
         tip_K=state.tip_K,
         base_K=state.lever.circuit.base_temperature_K,

@@ -233,6 +233,7 @@ def vary(
         {name: (name, each, _described(name, base[name])) for name, each in coordinates.items()},
         **{key: json.dumps(section) for key, section in design.probe.sections().items()},
         power_mW=power_mW,
+        lever=design.probe.title,
     )
 
 

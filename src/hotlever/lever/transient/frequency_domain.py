@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
+from hotlever.lever.dataset import probe_attributes
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import State
 from hotlever.lever.space import LEVER
@@ -127,7 +128,10 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
         "tip_per_bias_K_per_V": np.abs(per_bias),
         "tip_per_bias_deg": np.degrees(np.unwrap(np.angle(per_bias))),
     }
-    seen = {name: getattr(state, name) for name in ("bias_V", "lever_V", "current_mA", "tip_K")}
+    seen: dict[str, Any] = {
+        name: getattr(state, name) for name in ("bias_V", "lever_V", "current_mA", "tip_K")
+    }
+    seen |= probe_attributes(state.lever.probe)
     return labelled(columns, "frequency", {"frequency": frequency}, **seen)
 
 
@@ -218,7 +222,8 @@ def harmonics(
     for number, name in enumerate(HARMONICS):
         columns[f"{name}_harmonic_V"] = np.abs(lever_V[:, number])
         columns[f"{name}_harmonic_deg"] = np.degrees(np.unwrap(np.angle(lever_V[:, number])))
-    shown = {"bias_V": offset_V, "amplitude_V": amplitude_V}
+    shown: dict[str, Any] = {"bias_V": offset_V, "amplitude_V": amplitude_V}
+    shown |= probe_attributes(lever.probe)
     return labelled(columns, "frequency", {"frequency": frequency}, **shown)
 
 

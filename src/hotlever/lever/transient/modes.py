@@ -158,6 +158,7 @@ def time_constants(
         },
         coordinates={"bias": np.atleast_1d(bias), "mode": np.arange(1, count + 1)},
         source=source,
+        lever=lever.probe.title,
     )
 
 
@@ -248,5 +249,7 @@ def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
         columns[:, row] = state.tip_K, heating, cooling
     names = ("tip_K", "heating_us", "cooling_us")
     return labelled(
-        dict(zip(names, columns, strict=True)), coordinates={"bias": np.atleast_1d(bias)}
+        dict(zip(names, columns, strict=True)),
+        coordinates={"bias": np.atleast_1d(bias)},
+        lever=lever.probe.title,
     )
