@@ -37,10 +37,7 @@ from hotlever.measurement import FileColumn
 
 #: What is shown where there is no measurement.
 _EXAMPLE = "lever-a.csv"
-_UNDERSTOOD, _OF_EXAMPLE = (
-    "What was understood",
-    f"An example, and what is understood of it: {_EXAMPLE}",
-)
+_UNDERSTOOD, _OF_EXAMPLE = "What was understood", f"An example, {_EXAMPLE}, and what it holds"
 _DROP = "Drop a measurement here (bias, current and what else there is), or press +"
 
 
