@@ -18,11 +18,11 @@ from test_app_pages import drop, shown, until, visit
 from test_pages_at_work import done
 
 from hotlever.app import live, showing
+from hotlever.app.history import CHOICES, SCHEMA
 from hotlever.app.jobs import Task
 from hotlever.app.pages.page import MEDIA
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.session import Session
-from hotlever.app.state import CHOICES, SCHEMA
 from hotlever.probe import Probe
 
 DROPPED = "dropped own.gds"

@@ -5,16 +5,16 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
+from hotlever.app.history import History
 from hotlever.app.jobs import Jobs
 from hotlever.app.project import Project
-from hotlever.app.state import State
 from hotlever.app.workers import Heard, Worker
 
 #: Seconds after which a process is made ready for the first task: the page comes first.
 _LATER_S = 1.5
 
 
-class Session(State):
+class Session(History):
     """One user, one folder, any number of tabs and reloads.
 
     Attributes
@@ -26,8 +26,6 @@ class Session(State):
         ``making`` makes reduced levers, which take some ten seconds.
     reduced : dict
         Whether the reduced lever of a geometry has been made, or is only asked for.
-    shown : dict
-        Results that pages show, of this run of the app.
     """
 
     def __init__(self, project: Project) -> None:
@@ -35,7 +33,6 @@ class Session(State):
         self.project, self.jobs = project, Jobs(project.folder)
         self.workers: dict[str, Worker] = {}
         self.reduced: dict[Any, bool] = {}
-        self.shown: dict[str, Any] = {}
         self._preparing: asyncio.Task[None] | None = None
 
     # --- processes --------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from nicegui import ui
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import caption, figure, number_shown
 from hotlever.app.pages.page import KINDS, Page, Work, outputs
+from hotlever.app.state import Result
 
 
 def stem(lever: Mapping[str, Any]) -> str:
@@ -80,21 +81,29 @@ class DrawnPage(Page):
         if job is None or not job.task.written.endswith(".svg"):
             return False
         if self.written(job):
-            self.session.shown[self.name] = job.task, job.shown.get("table", [])
+            task, numbers = job.task, job.shown.get("table", [])
+            self.session.results[self.name] = Result(
+                command=task.command,
+                files=list(task.files),
+                options=dict(task.options),
+                numbers=numbers,
+                stamp=self.session.project.stamp(task.written),
+            )
         return True
 
     def _show(self) -> None:
         """Show what was computed last, with the figure that was drawn, and give it."""
         self._result.clear()
-        if self.name not in self.session.shown:
+        result = self.session.results.get(self.name)
+        if result is None:
             return
-        task, numbers = self.session.shown[self.name]
+        task = Task(result.command, tuple(result.files), result.options)
         path = self.session.project.path(task.written)
-        if not path.is_file():
-            return
+        if self.session.project.stamp(task.written) != result.stamp:
+            return  # it is gone, or another one by now, of which these are not the numbers
         with self._result:
             with ui.row().classes("w-full items-end gap-6"):
-                for title, value in numbers:
+                for title, value in result.numbers:
                     number_shown(title, title, value)
             self.show_figure(path)
             with ui.row().classes("w-full items-center"):

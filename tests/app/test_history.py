@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +13,20 @@ from nicegui.testing import User
 from test_app_pages import shown, until, visit
 from test_lasting import of, press
 
-from hotlever.app import state as state_module
+from hotlever.app import history as history_module
+from hotlever.app.history import CHOICES, History
 from hotlever.app.session import Session
-from hotlever.app.state import CHOICES, State
+from hotlever.app.state import Result
 
 
-def moved(state: State, page: str, **values: Any) -> None:
+def moved(state: History, page: str, **values: Any) -> None:
     """Choose, and have that be a step of its own."""
     state.choices(page).update(values)
     state.keep()
 
 
 def test_steps_are_undone_and_redone_in_the_dictionaries_that_pages_hold(tmp_path: Path) -> None:
-    state = State(tmp_path)
+    state = History(tmp_path)
     held, of_fit = state.choices("simulate"), state.choices("fit")
     moved(state, "simulate", changes={"n_d": 5e17})
     moved(state, "simulate", bias=6.0)
@@ -48,8 +50,8 @@ def test_steps_are_undone_and_redone_in_the_dictionaries_that_pages_hold(tmp_pat
 
 def test_a_slider_that_moves_is_one_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr(state_module.time, "monotonic", lambda: now[0])
-    state = State(tmp_path)
+    monkeypatch.setattr(history_module.time, "monotonic", lambda: now[0])
+    state = History(tmp_path)
     for bias in (6.0, 6.1, 6.2, 6.3):
         now[0] += 1.0
         moved(state, "simulate", bias=bias)
@@ -68,7 +70,7 @@ def test_a_slider_that_moves_is_one_step(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_the_history_is_there_after_a_restart_where_it_was_left(tmp_path: Path) -> None:
-    state = State(tmp_path)
+    state = History(tmp_path)
     state.choices("fit")  # a page that is opened chooses nothing
     state.keep()
     assert not (tmp_path / CHOICES).exists()
@@ -77,7 +79,7 @@ def test_the_history_is_there_after_a_restart_where_it_was_left(tmp_path: Path) 
     state.told_of("mine.csv")["columns"] = ["V_b (V)=a"]
     state.keep()
     state.step(-1)
-    again = State(tmp_path)
+    again = History(tmp_path)
     assert again.told_of("mine.csv")["columns"] == []
     assert again.choices("lever")["text"] == "[probe]"
     assert again.step(1) == {"files"}
@@ -88,7 +90,7 @@ def test_the_history_is_there_after_a_restart_where_it_was_left(tmp_path: Path) 
 
 
 def test_what_a_page_chooses_by_itself_is_no_step(tmp_path: Path) -> None:
-    state = State(tmp_path)
+    state = History(tmp_path)
     moved(state, "fit", robust=True)
     state.choices("fit")["data"] = "mine.csv"  # the first of the folder
     state.settle()
@@ -101,9 +103,21 @@ def test_what_a_page_chooses_by_itself_is_no_step(tmp_path: Path) -> None:
     assert state.choices("fit")["robust"]
 
 
+def test_results_are_there_after_a_restart_and_are_not_undone(tmp_path: Path) -> None:
+    state = History(tmp_path)
+    options = {"set": ["n_d=5e+17"], "pulse": "10V,5us", "output": "a.csv", "plot": "a.svg"}
+    numbers = [("tip, highest", "409.7 K at 5 µs")]
+    values = {"command": "pulse", "files": [], "options": options, "numbers": numbers}
+    moved(state, "pulse", height=9.0)
+    state.results["pulse"] = Result(**values, stamp=time.time())
+    state.keep()
+    assert state.step(-1) == {"pulse"}
+    assert History(tmp_path).results == state.results != {}
+
+
 def test_the_oldest_steps_are_forgotten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(state_module, "_MOST", 4)
-    state = State(tmp_path)
+    monkeypatch.setattr(history_module, "_MOST", 4)
+    state = History(tmp_path)
     for step in range(10):
         moved(state, "fit", priors=f"{step}", robust=bool(step % 2), drift=step % 4 > 1)
         moved(state, "fit", profiles=bool(step % 2))
@@ -111,7 +125,7 @@ def test_the_oldest_steps_are_forgotten(tmp_path: Path, monkeypatch: pytest.Monk
     while state.step(-1):
         steps += 1
     assert steps == 3
-    monkeypatch.setattr(state_module, "_MOST_TEXT", 1000)
+    monkeypatch.setattr(history_module, "_MOST_TEXT", 1000)
     moved(state, "lever", text="x" * 2000)  # longer than all may be: it is kept alone
     assert len(json.loads((tmp_path / CHOICES).read_text())["history"]) == 1
 
