@@ -27,6 +27,7 @@ from hotlever.studies.design import Design
 REFERENCE = Probe.from_drawing(three_leg)
 #: A rounded slit, slanted legs, a heater that is no strip, a hole, a film.
 POINTED = Probe.from_drawing(pointed, GOLD)
+VARIED = ("front_um", "slit_um", "radius_um", "hole_radius_um", "track_um", "edge_bias_um")
 REACH = Reach(Probe.reference().circuit, 6.0)
 
 
@@ -66,46 +67,50 @@ def test_the_reference_probe_shows_what_it_does_as_a_built_in_shape(lever):
     region, ends = np.argmax(inside, axis=0), terminal_facets(triangles, layout)
     same = Lever(lever.probe, space=FullSpace(ProbeMesh(layout, triangles, region, ends)))
     mine, built_in = (
-        SimilarLevers(one).linearised(one.probe, Reach(one.probe.circuit, 9.0), None, names)
-        for one in (drawn, same)
+        SimilarLevers(one).linearised(one.probe, REACH, None, names) for one in (drawn, same)
     )
     shown = built_in.branch.values[1:, :3]
     np.testing.assert_allclose(mine.branch.values[1:, :3], shown, rtol=1e-11)
     apart = (mine.shown - built_in.shown)[1:, :3] * REFERENCE.values(names) / shown[..., None]
     assert np.abs(apart).max() < 2e-5
     # and on a mesh of its own
-    u = np.linspace(2.0, 20.0, 10)
-    own = lever.branch_to(9.0).curve(u)[:, :3]
+    u = np.linspace(2.0, 9.0, 8)
+    own = lever.branch_to(6.0).curve(u)[:, :3]
     np.testing.assert_allclose(mine.branch.curve(u)[:, :3], own, rtol=1e-5)
 
 
-@pytest.mark.parametrize(
-    "name", ["front_um", "slit_um", "radius_um", "hole_radius_um", "track_um", "edge_bias_um"]
-)
-def test_derivatives_have_taylor_order_two(name):
+@pytest.fixture(scope="module")
+def similar():
+    return SimilarLevers(Lever(POINTED, COARSE))
+
+
+@pytest.fixture(scope="module")
+def start(similar):
+    """With the derivatives by all that is varied below."""
+    return similar.linearised(POINTED, REACH, None, VARIED)
+
+
+@pytest.mark.parametrize("name", VARIED)
+def test_derivatives_have_taylor_order_two(name, similar, start):
     """Of corners that move along curves, borders of any shape, and films that thicken."""
-    lever = Lever(POINTED, COARSE)
-    assert isinstance(lever.probe.layout().heater.taper, BorderTaper)
-    similar = SimilarLevers(lever)
-    start = similar.linearised(POINTED, REACH, None, (name,))
+    assert isinstance(POINTED.layout().heater.taper, BorderTaper)
     (value,), rest = POINTED.values((name,)).tolist(), []
+    slopes = start.shown[1:, :2, VARIED.index(name)]
     for step in (0.02, 0.01):
         way = step * (value or 1.0)
         moved = POINTED.replace({name: value + way})
         branch = similar.linearised(moved, REACH, start, (name,)).branch
         change = (branch.values[: start.branch.u.size] - start.branch.values)[1:, :2]
-        left = (change - way * start.shown[1:, :2, 0]) / start.branch.values[1:, :2]
-        rest.append(np.abs(left).max())
+        rest.append(np.abs((change - way * slopes) / start.branch.values[1:, :2]).max())
     assert rest[0] < 1e-3
     assert np.log2(rest[0] / rest[1]) > 1.9
 
 
-def test_a_moved_mesh_shows_what_a_new_one_does():
+def test_a_moved_mesh_shows_what_a_new_one_does(similar, start):
     """Far away too, where corners on arcs have moved along curves."""
     probe = POINTED.with_(radius_um=1.2, hole_radius_um=1.0, slit_um=3.2, track_um=0.06)
-    similar = SimilarLevers(Lever(POINTED, COARSE))
     u = np.linspace(2.0, 9.0, 8)
-    moved = similar.linearised(probe, REACH).branch.curve(u)[:, :2]
+    moved = similar.linearised(probe, REACH, start, VARIED[:1]).branch.curve(u)[:, :2]
     new = Lever(probe, COARSE).branch_to(6.0).curve(u)[:, :2]
     np.testing.assert_allclose(moved, new, rtol=1e-3)
 
