@@ -137,9 +137,11 @@ class Estimate:
         share = self.optimum.decrement / max(self.objective.squares(self.prediction), 1e-300)
         if self.optimum.converged or (lack_of_fit and share < _LITTLE):
             return True, lack_of_fit
+        refused = self.optimum.optimiser.refused
+        beyond = f"; a lever on the way could not be solved: {refused}" if refused else ""
         return False, (
             f"the search was ended after {self.predictor.evaluations} levers, before it converged: "
-            f"another step would still lower the sum of squares by {share:.1%}"
+            f"another step would still lower the sum of squares by {share:.1%}{beyond}"
         )
 
 

@@ -190,6 +190,8 @@ class Optimiser:
         self.objective, self.residuals = objective, objective.residuals
         self._options, self.steps = options or SearchOptions(), 0
         self.predictor = Predictor(experiment, self._options.kept, **predicting)
+        #: What was wrong with the latest lever that could not be drawn or solved.
+        self.refused = ""
 
     def solve_and_confirm(self, start: Probe, robust: bool) -> Optimum:
         """Find the optimum, make the model exact there, and go on until that matters no more.
@@ -334,7 +336,8 @@ class Optimiser:
         """Solve the lever of a point; None if it cannot be drawn or solved."""
         try:
             return self.predictor.predict(self.objective.at(at.probe, point))
-        except HotleverError:
+        except HotleverError as error:
+            self.refused = str(error)
             return None
 
     def _with_scatter(self, point: Array, region: Array, near: Subproblem) -> tuple[Array, float]:
