@@ -23,6 +23,8 @@ Name = str | os.PathLike[str]
 
 #: What a figure can be written as, and a film.
 FIGURE_TYPES, FILM_TYPES = (".png", ".svg", ".pdf"), (".gif",)
+#: What names of files end in that are made of a measurement: its calibration, and the table.
+CALIBRATION, TABLE = ".calibration.json", ".table.csv"
 #: Bytes that a text file may have, unless its reader says otherwise.
 LARGEST_TEXT = 64 * 2**20
 #: Seconds to wait for a pipe that says nothing.

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hotlever.app.changes import HIDDEN, Changes
 from hotlever.errors import InputError
-from hotlever.files import output_folder, read_text, whole_file, write_text
+from hotlever.files import TABLE, output_folder, read_text, whole_file, write_text
 
 #: Bytes that a dropped file may have.
 LARGEST_FILE = 64 * 2**20
@@ -23,8 +23,8 @@ LARGEST_PROBE = 1_000_000
 
 DATA = (".csv", ".txt", ".tsv", ".dat", ".lvm", ".asc")
 DRAWINGS = (".gds", ".gds2", ".gdsii", ".oas", ".oasis", ".dxf")
-#: What the app writes beside a measurement begins with its name and ends so.
-FIT, CALIBRATION, TABLE = ".fit.json", ".calibration.json", ".table.csv"
+#: What the app writes beside a measurement begins with its name and ends so; see also `files`.
+FIT = ".fit.json"
 #: Folders of the fits and of the calibrations of many levers.
 FITS, CALIBRATIONS = "fits", "calibrations"
 #: Endings of tables that commands write: no measurements.

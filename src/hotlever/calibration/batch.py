@@ -14,11 +14,9 @@ from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.pulses import PulseTiming
 from hotlever.estimation import FitOptions
 from hotlever.estimation.batch import Batch, Work, estimate_many
+from hotlever.files import CALIBRATION
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, known_beforehand
-
-#: What the name of a calibration file ends in.
-ENDING = ".calibration.json"
 
 
 def calibrate_many(
@@ -70,5 +68,5 @@ def calibrate_many(
         pulse=pulse,
         samples=samples,
     )
-    work = Work("calibration", calibration, CalibrationFile, ENDING, like, options, asked)
+    work = Work("calibration", calibration, CalibrationFile, CALIBRATION, like, options, asked)
     return estimate_many(paths, folder, work, **how)

@@ -19,7 +19,7 @@ from hotlever.calibration.summary import calibration_text
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import read_fit
 from hotlever.estimation.batch import Batch
-from hotlever.files import Outputs, write_text
+from hotlever.files import TABLE, Outputs, write_text
 from hotlever.measurement import read_measurement_of
 from hotlever.tasks.batches import Summary, estimate_several
 from hotlever.tasks.files import draw
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
 #: The table of many levers, in the folder of their calibrations.
 CALIBRATIONS_TABLE = "calibrations.csv"
-#: What the name of a table for an instrument ends in.
-TABLE = ".table.csv"
 
 
 def calibrate_files(reporter: Reporter, request: CalibrateRequest) -> int:

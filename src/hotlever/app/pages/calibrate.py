@@ -8,9 +8,10 @@ from hotlever.app.jobs import Task
 from hotlever.app.pages.frame import download_button
 from hotlever.app.pages.measured import MeasuredPage
 from hotlever.app.pages.page import MEDIA, REFERENCE, several
-from hotlever.app.project import CALIBRATION, CALIBRATIONS, TABLE
+from hotlever.app.project import CALIBRATIONS
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
+from hotlever.files import CALIBRATION, TABLE
 from hotlever.materials.parameters import sentence
 from hotlever.text import value_with_error
 
