@@ -14,6 +14,7 @@ from hotlever.app.pages.frame import ErrorBanner, caption, two_columns
 from hotlever.app.pages.page import KINDS, outputs
 from hotlever.app.session import Session
 from hotlever.errors import InputError
+from hotlever.materials.parameters import label
 
 _ABOUT = "Each value is a lever that is solved, in air too for k: some seconds each."
 #: Shares of a value between which it is varied at first.
@@ -46,8 +47,8 @@ class DesignPage(DrawnPage):
 
     def _varied(self, key: str) -> dict[str, Any]:
         """Ask for a number of the probe, and for its values."""
-        label = "Vary" if key == "first" else "and, as a map"
-        name = ui.select([], label=label, with_input=True, clearable=key == "second")
+        title = "Vary" if key == "first" else "and, as a map"
+        name = ui.select({}, label=title, with_input=True, clearable=key == "second")
         name.classes("w-full").on_value_change(partial(self._pick, key))
         with ui.row().classes("w-full no-wrap gap-1") as row:
             ends = {end: self.number(f"{key}_{end}", end) for end in ("from", "to", "count")}
@@ -63,7 +64,8 @@ class DesignPage(DrawnPage):
             self._values = await self.session.ask("full", "showing:design_numbers", probe)
         for key, fields in self._picked.items():
             chosen = self.chosen[key]
-            options = list(dict.fromkeys([*self._values, *([chosen] if chosen else [])]))
+            names = [*self._values, *([chosen] if chosen else [])]
+            options = {name: label(name) for name in names}
             fields["name"].set_options(options, value=chosen)
 
     def changed(self) -> Awaitable[None] | None:

@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -235,6 +236,14 @@ def lines_shown(lines: str, kind: str, what: str) -> None:
         copy = partial(ui.clipboard.write, lines)
         flat_button("", copy, icon="content_copy", label=f"Copy the {kind}")
     caption(what)
+
+
+def text_shown(text: str) -> None:
+    """Show a text as one would on a terminal: its tables scroll, other lines are broken."""
+    lines = text.split("\n")
+    for is_table, part in groupby(lines, lambda line: "   " in line):
+        style = "remark" if len(lines) == 1 else "lines tabular" if is_table else "lines"
+        ui.label("\n".join(part)).classes(f"w-full {style}")
 
 
 def number_shown(key: str, title: str, value: str = "…") -> ui.label:

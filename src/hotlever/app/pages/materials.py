@@ -7,7 +7,7 @@ from collections.abc import Awaitable
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.frame import ErrorBanner, caption, figure
+from hotlever.app.pages.frame import ErrorBanner, caption, figure, text_shown
 from hotlever.app.pages.page import Page
 from hotlever.app.session import Session
 
@@ -50,7 +50,6 @@ class MaterialsPage(Page):
         with self._shown_of:
             alt = "Thermal conductivity and resistivity against the temperature"
             figure(shown["figure"], alt, wide=True)
-            for name, (head, *lines) in shown["kinds"].items():
+            for head, *lines in shown["kinds"].values():
                 with ui.expansion(head.removesuffix(":")).props("header-class=text-bold"):
-                    rows = ui.label("\n".join(lines)).classes("lines").style("white-space: pre")
-                    rows.props(f"data-kind={name}")
+                    text_shown("\n".join(lines))

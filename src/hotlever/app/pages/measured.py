@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Awaitable
 from contextlib import suppress
 from functools import partial
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +25,7 @@ from hotlever.app.pages.frame import (
     hand_over,
     small_button,
     table,
+    text_shown,
     two_columns,
 )
 from hotlever.app.pages.page import Page, Work
@@ -260,7 +260,7 @@ class _ResultBlocks:
         if block["kind"] == "heading":
             ui.label(block["text"]).classes("w-full text-lg text-bold")
         elif block["kind"] == "text":
-            _show_text(block["text"])
+            text_shown(block["text"])
         elif block["kind"] == "table":
             table(block["columns"], block["rows"])
             caption(block["caption"]).classes("w-full")
@@ -279,11 +279,3 @@ class _ResultBlocks:
             asked = self._kind, self._name, shown, suffix
             drawn = self._page.session.ask("full", "showing:drawn", *asked)
             await hand_over(drawn, f"{Path(self._name).name.split('.')[0]}-{shown}{suffix}")
-
-
-def _show_text(text: str) -> None:
-    """Show a text as one would on a terminal: its tables scroll, other lines are broken."""
-    lines = text.split("\n")
-    for is_table, part in groupby(lines, lambda line: "   " in line):
-        style = "remark" if len(lines) == 1 else "lines tabular" if is_table else "lines"
-        ui.label("\n".join(part)).classes(f"w-full {style}")
