@@ -20,7 +20,7 @@ from hotlever.app import showing
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import ErrorBanner
 from hotlever.app.pages.pulses import Pulses
-from hotlever.app.project import CALIBRATION, EXAMPLES
+from hotlever.app.project import EXAMPLES
 from hotlever.app.session import Session
 from hotlever.app.state import Simulate
 from hotlever.app.work import run
@@ -28,6 +28,7 @@ from hotlever.cache import CACHE_VARIABLE
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.procedure import calibrate
 from hotlever.errors import HotleverError
+from hotlever.files import CALIBRATION
 
 
 class Hearing(Here):
