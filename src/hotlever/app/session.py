@@ -23,7 +23,8 @@ class Session(History):
     jobs : Jobs
     workers : dict of str to Worker
         ``quick`` answers sliders while they move, ``full`` solves the full lever and reads results,
-        ``making`` makes reduced levers, which take some ten seconds.
+        ``making`` makes reduced levers, which take some ten seconds; ``beside`` solves a lever that
+        is compared.
     reduced : dict
         Whether the reduced lever of a geometry has been made, or is only asked for.
     """

@@ -50,11 +50,21 @@ class Lever(BaseModel):
     mesh: bool = False
 
 
-class Simulate(BaseModel):
-    """The page Simulate: a probe, its sliders, the bias, and the slider's highest (V)."""
+class Kept(BaseModel):
+    """A lever of the page Simulate: a probe and its sliders."""
 
     probe: str | None = None
     changes: Annotated[Changes, AfterValidator(_fit_together)] = {}
+
+
+class Simulate(Kept):
+    """The page Simulate: a lever, the bias, and the slider's highest (V); and one beside it.
+
+    That is in another medium, of another probe, or one that is ``kept``.
+    """
+
+    beside: Annotated[str, Field(pattern="^(|vacuum|air|now|probe:.*)$")] = ""
+    kept: Kept = Kept()
     bias: float = 8.0
     most: float = 12.0
     view: Literal["rest", "time", "signals"] = "rest"

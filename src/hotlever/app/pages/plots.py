@@ -117,6 +117,10 @@ class LivePlots:
             "marker": {"color": BLUE, "size": 11, "symbol": "diamond-open", "line": {"width": 2}},
             "name": "knee",
         }
+        # the lever beside, and its state
+        other = {**line, "line": {"color": INK, "width": 2, "dash": "dash"}, "name": "beside"}
+        there = {**dot, "marker": {"color": INK, "size": 10, "symbol": "square-open"}}
+        there["name"] = "beside, now"
         # the picture of the map, and a point beside it that brings the bar of its colours
         bar = {
             **dot,
@@ -142,23 +146,24 @@ class LivePlots:
         self._heat = plotted([bar], square, "Map of the temperature")
         with _side_by_side():
             self._iv = plotted(
-                [line, knee, here],
+                [line, knee, here, other, there],
                 axes(_LEVER_V, _CURRENT, 270),
                 "Current against lever voltage, with the knee",
             )
             self._tp = plotted(
-                [line, knee, here],
+                [line, knee, here, other, there],
                 axes("power P<sub>l</sub> (mW)", _TIP, 270, normal="y"),
                 "Tip temperature against power",
             )
             profile = axes("along the current (µm)", "temperature (K)", 270, normal="xy")
             alt = "Temperature along the current from the supply through the tip to the ground"
-            self._profile = plotted([line], profile, alt)
+            self._profile = plotted([line, other], profile, alt)
         # before its first plot a browser takes whole figures only
         self._ready: set[ui.plotly] = set()
         for plot in (self._heat, self._iv, self._tp, self._profile):
             plot.on("plotly_afterplot", lambda _, p=plot: self._ready.add(p), [], throttle=1.0)
         self._curves: Any = None
+        self._beside: Any = None
         self._along: Any = None
         self._map: Any = None
 
@@ -191,6 +196,25 @@ class LivePlots:
             self._profile.update()
         self._show_map(answer["box"], answer["outline"], now["scale_K"], now["picture"])
         self._curves, self._along = curves, answer["along"]
+
+    def beside(self, answer: dict[str, Any] | None) -> None:
+        """Draw an answer of the lever beside; nothing of it if there is none."""
+        if answer is None and self._beside is None:
+            return
+        curves = {} if answer is None else answer["curves"]
+        now = {} if answer is None else answer["now"]
+        same = answer is not None and self._beside is not None and _same(self._beside, curves)
+        for plot, x, y in ((self._iv, "lever_V", "current_mA"), (self._tp, "power_mW", "tip_K")):
+            there = {"x": [now.get(x)], "y": [now.get(y)]}
+            if same:
+                self._move(plot, 4, there)
+                continue
+            plot.figure["data"][3] |= {"x": short(curves.get(x, [])), "y": short(curves.get(y, []))}
+            plot.figure["data"][4] |= there
+            plot.update()
+        line = {"x": short(answer["along"]), "y": short(now["line"])} if answer else {}
+        self._move(self._profile, 1, line or {"x": [], "y": []})
+        self._beside = curves if answer else None
 
     def _show_map(
         self, box: list[float], outline: Any, scale: tuple[float, float], picture: bytes

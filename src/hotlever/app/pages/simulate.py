@@ -8,6 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from hotlever.app.jobs import Task
+from hotlever.app.pages.beside import Beside
 from hotlever.app.pages.drawn import in_python, probe_files, settings, stem
 from hotlever.app.pages.frame import ErrorBanner, two_columns
 from hotlever.app.pages.page import Page, Work, outputs
@@ -31,6 +32,7 @@ class SimulatePage(Page):
         with two_columns("live") as (left, right):
             with left:
                 self.probe_choice()
+                Beside(self, self._moved)
                 self._sliders = Sliders(self, self._moved)
             with right:
                 view = ui.toggle(_VIEWS, value=self.chosen["view"])

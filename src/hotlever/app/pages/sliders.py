@@ -13,6 +13,7 @@ from typing import Any
 
 from nicegui import background_tasks, ui
 
+from hotlever.app.pages.beside import beside_in_words, lever_beside
 from hotlever.app.pages.frame import flat_button, number_shown
 from hotlever.app.pages.page import Page
 from hotlever.app.pages.plots import LivePlots
@@ -171,6 +172,7 @@ class LiveView:
             self._knee = number_shown("knee", "knee of the I-V curve")
         self._model = ui.label("starting").classes("text-xs opacity-70").props("aria-live=polite")
         self._notes = ui.label().classes("text-sm remark")
+        self._beside = ui.label().classes("text-sm remark").props("data-number=beside")
         with ui.column().classes("w-full") as self._drawn:
             self._plots = LivePlots()
 
@@ -238,7 +240,29 @@ class LiveView:
         self._model.set_text(_MODELS[answer["model"]])
         self._notes.set_text("; ".join(now["notes"]))
         self._plots.show(answer)
+        await self._show_beside(ask)
         return True
+
+    async def _show_beside(self, ask: dict[str, Any]) -> None:
+        """Show the lever beside, at the same bias, once that of the page rests."""
+        lever, answer, text = lever_beside(self._chosen), None, ""
+        if lever is not None and not ask["quick"]:
+            text = f"Dashed: {beside_in_words(self._chosen)}"
+            asked = lever["probe"], lever["changes"], {**ask, "reduced": False}
+            try:
+                answer = await self._session.ask("beside", "live:answer", *asked)
+                now = answer["now"]
+                numbers = (
+                    f"{title} {'none' if math.isnan(now[key]) else form.format(now[key])}"
+                    for key, (title, form) in _NUMBERS.items()
+                )
+                text = f"{text}: {', '.join(numbers)}"
+            except HotleverError as error:
+                text = f"{text}: {error}"
+            if self._model.is_deleted or lever != lever_beside(self._chosen):
+                return
+        self._beside.set_text(text)
+        self._plots.beside(answer)
 
     def _blank(self) -> None:
         """Show no numbers where there are none: the last ones were of another state."""

@@ -1,0 +1,68 @@
+"""A second lever in the plots of the page Simulate: another probe or medium, or as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from hotlever.app.pages.page import Page
+
+_NONE, _NOW, _PROBE = "", "now", "probe:"
+_OPTIONS = {
+    _NONE: "nothing",
+    "vacuum": "the same in vacuum",
+    "air": "the same in air",
+    _NOW: "the lever as it is now",
+}
+
+
+class Beside:
+    """Which lever is shown beside the one that is chosen; `changed` is called for another one."""
+
+    def __init__(self, page: Page, changed: Callable[[], None]) -> None:
+        self._chosen, self._changed = page.chosen, changed
+        probes = {f"{_PROBE}{name}": name for name in page.session.project.probes}
+        options = {**_OPTIONS, f"{_PROBE}": "reference probe", **probes}
+        chosen = self._chosen["beside"]
+        if chosen not in options:
+            options[chosen] = f"{chosen.removeprefix(_PROBE)} (not in the folder)"
+        beside = ui.select(options, label="Compare with", value=chosen).classes("w-full")
+        beside.on_value_change(lambda event: self._take(event.value))
+
+    def _take(self, chosen: str) -> None:
+        if chosen == _NOW:
+            self._chosen["kept"] = {key: self._chosen[key] for key in ("probe", "changes")}
+        self._chosen["beside"] = chosen
+        self._changed()
+
+
+def lever_beside(chosen: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the probe and the changes of the lever beside that of the page; None if there is none.
+
+    Examples
+    --------
+    >>> lever_beside({"beside": "air", "probe": None, "changes": {"n_d": 5e17}})
+    {'probe': None, 'changes': {'n_d': 5e+17, 'medium': 'air'}}
+    """
+    beside = chosen["beside"]
+    if beside == _NONE:
+        return None
+    if beside == _NOW:
+        return dict(chosen["kept"])
+    if beside.startswith(_PROBE):
+        return {"probe": beside.removeprefix(_PROBE) or None, "changes": {}}
+    return {"probe": chosen["probe"], "changes": {**chosen["changes"], "medium": beside}}
+
+
+def beside_in_words(chosen: dict[str, Any]) -> str:
+    """Return what the lever beside is called."""
+    if chosen["beside"] == _NOW:
+        kept = chosen["kept"]
+        changes = ", ".join(f"{name} = {value}" for name, value in kept["changes"].items())
+        name = Path(kept["probe"] or "reference probe").stem
+        return f"{name} with {changes}" if changes else name
+    name = chosen["beside"].removeprefix(_PROBE)
+    return _OPTIONS.get(chosen["beside"]) or Path(name or "reference probe").stem
