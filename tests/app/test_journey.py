@@ -157,6 +157,9 @@ def test_sliders_move_the_lever(app: App, page: Page) -> None:
 def test_a_pulse_is_followed_in_time(app: App, page: Page) -> None:
     go(page, app, "simulate")
     button(page, "vacuum").click()
+    page.get_by_role("combobox", name="Compare with").click()
+    page.get_by_role("option", name="the same in air").click()
+    expect(page.locator("[data-number=beside]")).to_contain_text("mA", timeout=_WORK)
     button(page, "in time").click()
     button(page, "Follow").click()
     expect(page.locator("[data-number='tip, highest']")).to_have_text(
@@ -167,6 +170,7 @@ def test_a_pulse_is_followed_in_time(app: App, page: Page) -> None:
     with page.expect_download(timeout=_WORK) as download:
         button(page, "CSV").click()
     assert len(Path(download.value.path()).read_text().splitlines()) > 10
+    expect(page.get_by_text("Dashed: the same in air.")).to_be_visible(timeout=_WORK)
     button(page, "film").click()
     expect(page.locator("img[alt^='The temperature map']")).to_be_visible(timeout=_WORK)
     picture(page, "simulate-film")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Sequence
 from copy import deepcopy
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -103,6 +104,19 @@ class MeasuredPlots:
                 plot.figure["data"][1] |= {"x": short(curve[x]), "y": short(curve[y])}
                 plot.update()
         self._said.set_text("Dots: measured. Line: the lever as the fit has it.")
+
+
+def compare_histories(first: Path, second: Path) -> None:
+    """Show two levers in time in the same plots, of the tables that were written of them."""
+    tables = [np.genfromtxt(path, delimiter=",", names=True) for path in (first, second)]
+    lines: list[dict[str, Any]] = [{"color": BLUE}, {"color": INK, "dash": "dash"}]
+    with _side_by_side():
+        for name, title in (("tip_K", _TIP), ("current_mA", _CURRENT), ("lever_V", _LEVER_V)):
+            drawn: list[dict[str, Any]] = []
+            for table, line in zip(tables, lines, strict=True):
+                values = {"x": short(table["time_us"]), "y": short(table[name])}
+                drawn.append(values | {"mode": "lines", "line": line | {"width": 2}})
+            plotted(drawn, axes("time (µs)", title, 240, normal="y"), f"{name} of two levers")
 
 
 class LivePlots:

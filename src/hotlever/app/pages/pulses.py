@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
 from nicegui import ui
 
 from hotlever.app.jobs import Job, Task
+from hotlever.app.pages.beside import beside_in_words, lever_beside
 from hotlever.app.pages.drawn import DrawnPage, in_python, probe_files, settings, stem
-from hotlever.app.pages.frame import ErrorBanner, figure
-from hotlever.app.pages.page import KINDS, outputs
+from hotlever.app.pages.frame import ErrorBanner, caption, figure
+from hotlever.app.pages.page import KINDS, Work, outputs
+from hotlever.app.pages.plots import compare_histories
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 
@@ -23,6 +26,9 @@ _FIELDS: dict[str, tuple[str, str, tuple[str, ...], str]] = {
     "count": ("Pulses", "", ("train",), ""),
     "until": ("Follow until", "us", ("pulse", "train", "step"), "its end"),
 }
+#: Options of a task that say how a lever is driven, and the name of the work on the lever beside.
+_WAVE = ("pulse", "step", "period", "count", "until")
+_BESIDE = "pulse-beside"
 
 
 class Pulses(DrawnPage):
@@ -43,6 +49,7 @@ class Pulses(DrawnPage):
                 ui.button("Follow", icon="timeline", on_click=self.start)
             with ui.row().classes("w-full items-center"):
                 self._fields = {key: self._field(key) for key in _FIELDS}
+        Work(session, _BESIDE, self._beside_ended)
         self.show_result()
         self._offer()
 
@@ -79,6 +86,10 @@ class Pulses(DrawnPage):
 
     def task(self) -> Task:
         """Return the task that simulates the lever, and writes table and figure."""
+        return self._task(self._lever, outputs(f"{stem(self._lever)}.pulse", "SVG"))
+
+    def _task(self, lever: Mapping[str, Any], files: dict[str, str]) -> Task:
+        """Return the task that simulates a lever under the wave form that is chosen."""
         values = self._values()
         texts = {key: f"{value}{_FIELDS[key][1]}" for key, value in values.items()}
         height = texts.pop("height")
@@ -86,10 +97,18 @@ class Pulses(DrawnPage):
             wave = {"step": values["height"]}
         else:
             wave = {"pulse": f"{height},{texts.pop('length')}"}
-        files = outputs(f"{stem(self._lever)}.pulse", "SVG")
-        return Task(
-            "pulse", probe_files(self._lever), {**settings(self._lever), **wave, **texts, **files}
-        )
+        return Task("pulse", probe_files(lever), {**settings(lever), **wave, **texts, **files})
+
+    def start(self) -> bool:
+        """Simulate the lever, and that beside it at the same time."""
+        started, other = super().start(), lever_beside(self._lever)
+        if started and other is not None:
+            files = outputs(f"{stem(self._lever)}.beside.pulse", "CSV")
+            with self.banner.caught():
+                self.session.jobs.start(_BESIDE, self._task(other, files))
+        if started:
+            self.session.shown[_BESIDE] = "" if other is None else beside_in_words(self._lever)
+        return started
 
     def python(self) -> str:
         """Return the lines of Python that simulate the lever."""
@@ -108,9 +127,25 @@ class Pulses(DrawnPage):
     def show_figure(self, path: Path) -> None:
         """Show the figure that was drawn, and the film of it if there is one."""
         super().show_figure(path)
+        self._show_beside(path)
         film = path.with_suffix(".gif")
         if self.session.project.stamp(film.name) >= self.session.project.stamp(path.name):
             figure(film.read_bytes(), "The temperature map in time", wide=True)
+
+    async def _beside_ended(self, job: Job) -> None:
+        self._show()
+
+    def _show_beside(self, path: Path) -> None:
+        """Show the lever beside in the same plots, if it was followed under the same wave form."""
+        job, (task, _) = self.session.jobs.by_page.get(_BESIDE), self.session.shown[self.name]
+        words = self.session.shown.get(_BESIDE)
+        if not words or job is None or job.standing == "running" or not self.written(job):
+            return
+        if any(job.task.options.get(key) != task.options.get(key) for key in _WAVE):
+            return
+        other = self.session.project.path(job.task.written)
+        compare_histories(path.with_suffix(".csv"), other)
+        caption(f"Line: the lever. Dashed: {words}.").classes("remark")
 
     def _ask(self, task: Task, path: Path, kind: str) -> None:
         if kind == "film":
