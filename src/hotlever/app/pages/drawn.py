@@ -47,6 +47,17 @@ def in_python(lever: Mapping[str, Any]) -> str:
     return f"{made}.with_(**{changes!r})"
 
 
+def result_of(task: Task, numbers: list[Any], stamp: float) -> Result:
+    """Return a task as what is kept of its result."""
+    return Result(
+        command=task.command,
+        files=list(task.files),
+        options=dict(task.options),
+        numbers=numbers,
+        stamp=stamp,
+    )
+
+
 class DrawnPage(Page):
     """A page, or a part of one, that shows the figure of its task and gives what it computed."""
 
@@ -81,14 +92,9 @@ class DrawnPage(Page):
         if job is None or not job.task.written.endswith(".svg"):
             return False
         if self.written(job):
-            task, numbers = job.task, job.shown.get("table", [])
-            self.session.results[self.name] = Result(
-                command=task.command,
-                files=list(task.files),
-                options=dict(task.options),
-                numbers=numbers,
-                stamp=self.session.project.stamp(task.written),
-            )
+            stamp = self.session.project.stamp(job.task.written)
+            numbers = job.shown.get("table", [])
+            self.session.results[self.name] = result_of(job.task, numbers, stamp)
         return True
 
     def _show(self) -> None:

@@ -10,7 +10,7 @@ from nicegui import ui
 
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.beside import beside_in_words, lever_beside
-from hotlever.app.pages.drawn import DrawnPage, in_python, probe_files, settings, stem
+from hotlever.app.pages.drawn import DrawnPage, in_python, probe_files, result_of, settings, stem
 from hotlever.app.pages.frame import ErrorBanner, caption, figure
 from hotlever.app.pages.page import KINDS, Work, outputs
 from hotlever.app.pages.plots import compare_histories
@@ -102,12 +102,14 @@ class Pulses(DrawnPage):
     def start(self) -> bool:
         """Simulate the lever, and that beside it at the same time."""
         started, other = super().start(), lever_beside(self._lever)
-        if started and other is not None:
-            files = outputs(f"{stem(self._lever)}.beside.pulse", "CSV")
-            with self.banner.caught():
-                self.session.jobs.start(_BESIDE, self._task(other, files))
         if started:
-            self.session.shown[_BESIDE] = "" if other is None else beside_in_words(self._lever)
+            self.session.results.pop(_BESIDE, None)
+        if started and other is not None:
+            task = self._task(other, outputs(f"{stem(self._lever)}.beside.pulse", "CSV"))
+            with self.banner.caught():
+                self.session.jobs.start(_BESIDE, task)
+                words = beside_in_words(self._lever)
+                self.session.results[_BESIDE] = result_of(task, [("Dashed", words)], 0.0)
         return started
 
     def python(self) -> str:
@@ -133,19 +135,23 @@ class Pulses(DrawnPage):
             figure(film.read_bytes(), "The temperature map in time", wide=True)
 
     async def _beside_ended(self, job: Job) -> None:
+        result = self.session.results.get(_BESIDE)
+        if result is not None and self.written(job):
+            result.stamp = self.session.project.stamp(job.task.written)
         self._show()
 
     def _show_beside(self, path: Path) -> None:
         """Show the lever beside in the same plots, if it was followed under the same wave form."""
-        job, (task, _) = self.session.jobs.by_page.get(_BESIDE), self.session.shown[self.name]
-        words = self.session.shown.get(_BESIDE)
-        if not words or job is None or job.standing == "running" or not self.written(job):
+        result, own = (self.session.results.get(name) for name in (_BESIDE, self.name))
+        if result is None or own is None or not result.stamp:
             return
-        if any(job.task.options.get(key) != task.options.get(key) for key in _WAVE):
+        other = self.session.project.path(result.options["output"])
+        if self.session.project.stamp(other.name) != result.stamp or any(
+            result.options.get(key) != own.options.get(key) for key in _WAVE
+        ):
             return
-        other = self.session.project.path(job.task.written)
         compare_histories(path.with_suffix(".csv"), other)
-        caption(f"Line: the lever. Dashed: {words}.").classes("remark")
+        caption(f"Line: the lever. Dashed: {result.numbers[0][1]}.").classes("remark")
 
     def _ask(self, task: Task, path: Path, kind: str) -> None:
         if kind == "film":
