@@ -148,13 +148,13 @@ def test_monitors_show_the_fields_of_the_elements(one, branch):
     some = np.flatnonzero(inside)[0]
     (x, y), other = layout.tip, full.mesh.elements.p[:2, full.mesh.elements.t[:, some]].mean(axis=1)
     monitors = {
-        "apex": {"point_um": [x, y]},
+        "top": {"point_um": [x, y]},
         "line": {"line_um": [[x, y], other.tolist()], "points": 2},
         "hot": {"region": "heater"},
     }
     shown = MonitorMap(one.probe.with_monitors(**monitors), equations)
     columns = shown.columns(shown.values(states).T)
-    np.testing.assert_allclose(columns["apex_K"], branch.base_temperature_K + branch.u[-2:] ** 2)
+    np.testing.assert_allclose(columns["top_K"], branch.base_temperature_K + branch.u[-2:] ** 2)
     expanded = equations.space.expanded(states)
     base, ends = equations.base_temperature_K, equations.terminals.end_rises
     basis = full.elements.basis
