@@ -256,6 +256,10 @@ FAULTS = {
         lambda: Probe.from_drawing(lambda width: simple()),
         "argument width: expected a dimension in µm with its default, such as leg_width_um=6.0",
     ),
+    "name": (
+        lambda: Probe.from_drawing(lambda height_um=3.0: simple()),
+        r"argument height_um is a name of \[tip\], expected another",
+    ),
     "neither": (lambda: Probe.from_drawing("lever.gds"), "expected a Drawing or a function"),
 }
 

@@ -15,6 +15,7 @@ from hotlever.errors import InputError, quoted
 from hotlever.probe.drawing.kit import Drawing
 from hotlever.probe.drawing.shape import DrawnShape
 from hotlever.probe.layout import Layout
+from hotlever.probe.parts import PARTS
 from hotlever.probe.shapes import EDGE_BIAS, PARAMETRIC_DRAWING, Shape, edge_bias
 
 #: What a dimension may be (µm).
@@ -181,10 +182,12 @@ def _dimensions(function: Callable[..., Drawing]) -> dict[str, Any]:
             float,
             Field(default=float(default), gt=0, le=_LONGEST_UM, description=meaning),
         )
-    if EDGE_BIAS in fields:
+    taken = {EDGE_BIAS: "every drawing"} | {
+        name: f"[{section}]" for section, part in PARTS.items() for name in part.model_fields
+    }
+    for name in fields.keys() & taken.keys():
         raise InputError(
-            f"{function.__qualname__}: {EDGE_BIAS} is a dimension of every drawing, expected no "
-            "argument of that name"
+            f"{function.__qualname__}: argument {name} is a name of {taken[name]}, expected another"
         )
     return fields
 
