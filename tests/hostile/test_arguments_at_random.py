@@ -94,6 +94,7 @@ WRONG: list[tuple[tuple[str, ...], dict[str | None, list[str]]]] = [
             "--model": WORDS,
             "-o": [*NO_FILE[:4], "a.xls", "a"],
             "--plot": [*NO_FILE[:4], "a.gif", "a"],
+            "--map": [*NO_FILE[:4], "a.gif"],
             "--fields": ["mine.csv", "mine.csv/x"],
             "--nope": ["1"],
         },

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
+from hotlever.figures import field_maps
 from hotlever.figures import temperature_slices as draw
+from hotlever.lever.fields import seen_from_above
 from hotlever.lever.space import TIP
 from hotlever.lever3d import SolidLever
 from hotlever.lever3d.fields import (
@@ -19,6 +21,7 @@ from hotlever.lever3d.fields import (
     write_solid_vtu,
 )
 from hotlever.probe import Probe
+from hotlever.probe.mesh import doubled_areas
 from hotlever.probe.solid import SolidMeshOptions
 
 COARSE = SolidMeshOptions(refinement=0.4, grading=0.7)
@@ -40,6 +43,17 @@ def test_heat_goes_to_the_leg_ends_and_the_air_and_charge_to_ground(sweep):
     lost = sweep.end_heat_mW + sweep.air_heat_mW
     np.testing.assert_allclose(lost, sweep.power_mW, rtol=1e-7)
     np.testing.assert_allclose(sweep.ground_current_mA, sweep.current_mA, rtol=1e-7)
+
+
+def test_a_map_is_of_its_upper_side(state):
+    surface = seen_from_above(state.lever)
+    corners = surface.points[surface.triangles].transpose(2, 1, 0)
+    area = np.abs(doubled_areas(corners)).sum() / 2
+    assert area == pytest.approx(sum(region.area for region in state.lever.probe.layout().regions))
+    hottest = (surface.sampling @ state.nodal[0]).max()
+    assert state.tip_K - 1.0 < hottest < state.nodal[0].max() + 1e-9
+    with pytest.raises(InputError, match="expected a flat one"):
+        field_maps(state)
 
 
 def test_all_heat_that_leaves_the_surface_arrives_at_infinity(state, sweep):
