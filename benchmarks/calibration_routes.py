@@ -29,10 +29,10 @@ from hotlever.errors import HotleverError
 from hotlever.estimation import Measurement, fit
 from hotlever.lever import Branch, Lever
 from hotlever.materials import Material, published
-from hotlever.materials.parameters import SCATTER_OF
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import Circuit, MeshOptions, Probe
 from hotlever.spieser2017 import BASE_TEMPERATURE_K as BASE
+from hotlever.spieser2017 import SCATTER_OF
 from synthetic_curves import current_at, measured_curve
 
 Array = NDArray[np.float64]

@@ -19,7 +19,8 @@ from hotlever.materials.p_silicon import (
 )
 from hotlever.materials.presets import PRESETS
 from hotlever.materials.sections import material_of
-from hotlever.materials.silicon import band_gap, thermal_conductivity_of_layer
+from hotlever.materials.silicon import band_gap
+from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
 
 OPTION_III = published("option III").material
 #: One material of each kind, and of each choice that a kind offers.

@@ -28,13 +28,13 @@ from hotlever.materials.silicon import (
     conductivity_low_doped,
     inversion_temperature,
     thermal_conductivity,
-    thermal_conductivity_of_layer,
 )
 from hotlever.materials.thermopower import (
     thermoelectric_high_doped,
     thermoelectric_n_silicon,
     thermoelectric_p_silicon,
 )
+from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
 from hotlever.types import Array
 
 #: In place of c_κ: κ follows from the thickness.

@@ -12,18 +12,14 @@ import math
 import re
 from typing import Any, NamedTuple
 
-import numpy as np
 from pydantic import Field
 
 from hotlever.errors import InputError
-from hotlever.spieser2017 import PUBLISHED_VALUES
+from hotlever.spieser2017 import PUBLISHED_SCATTER
 
 INVERSION = "inversion_temperature"
 #: What the two kinds of silicon are called that the section ``[material]`` describes.
 LOW_DOPED, HIGH_DOPED = "low-doped", "high-doped"
-#: Levers whose scatter stands for that of any lever of unknown material (Table II of the paper),
-#: and by how much it is widened: four levers of one wafer differ less than those of two makers.
-SCATTER_OF, _WIDENED = ("lever 1", "lever 2", "lever 3", "lever 4"), 1.5
 #: Nominal doping is that good, where the probe file says no better (the makers' own tolerance).
 _DOPING = 0.15
 #: What is known of films of other materials: they differ from the bulk, and from each other.
@@ -91,19 +87,6 @@ class Parameter(NamedTuple):
         return self.lower, self.upper
 
 
-def _scatter() -> dict[str, tuple[float, float]]:
-    """Return mean and widened standard deviation of the logarithms of published parameters."""
-    names = tuple(PUBLISHED_VALUES[SCATTER_OF[0]])
-    levers = [list(PUBLISHED_VALUES[lever].values()) for lever in SCATTER_OF]
-    logarithms = np.log(levers)
-    means, spreads = logarithms.mean(axis=0), logarithms.std(axis=0, ddof=1)
-    rows = zip(np.exp(means).tolist(), (_WIDENED * spreads).tolist(), strict=True)
-    return dict(zip(names, rows, strict=True))
-
-
-#: What is known of the silicon of any lever, by parameter: geometric mean and relative spread of
-#: the published ones, half as much again as that of the four levers.
-PUBLISHED_SCATTER = _scatter()
 _KNOWN = {name: spread for name, (_, spread) in PUBLISHED_SCATTER.items()} | {"n_d": _DOPING}
 
 

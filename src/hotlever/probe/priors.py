@@ -22,10 +22,11 @@ import numpy as np
 from pydantic import Field
 
 from hotlever.errors import InputError, unknown_name
-from hotlever.materials.parameters import PUBLISHED_SCATTER, Parameter
+from hotlever.materials.parameters import Parameter
 from hotlever.probe.parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.parts import ProbeParts
 from hotlever.records import Number
+from hotlever.spieser2017 import PUBLISHED_SCATTER
 from hotlever.text import with_unit
 
 ALL_DIMENSIONS = "dimensions"
