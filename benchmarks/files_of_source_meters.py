@@ -50,7 +50,11 @@ def keithley() -> Iterator[InstrumentFile]:
     yield instrument_file(
         "Keithley", "2460, units in words", buffer(AMPS, "Amp DC", BIAS, "Volt DC")
     )
-    yield instrument_file("Keithley", "preamble", buffer(AMPS, "A", BIAS, "V", preamble=preamble))
+    source = head.replace("Value,Unit,Digits", "Source Value,Source Unit,Source Digits")
+    yield instrument_file(
+        *("Keithley", "preamble, the source by name"),
+        buffer(AMPS, "AMP DC", BIAS, "VOLT DC", source, preamble),
+    )
     yield instrument_file("Keithley", "current sourced", buffer(BIAS, "V", AMPS, "A"))
     yield instrument_file(
         "Keithley",

@@ -13,7 +13,8 @@ from instrument_files import STYLES, outcome
 FILES = {f"{file.style}, {file.name}": file for style in STYLES for file in style()}
 #: Everything that a file of such a name says is enough to read it.
 CLEAR = (
-    *("Keithley, preamble", "Keithley, defbuffer", "Keithley, current sourced"),
+    *("Keithley, preamble, the source by name", "Keithley, 2460, units in words"),
+    *("Keithley, defbuffer", "Keithley, current sourced"),
     *("LabVIEW, tabs", "LabVIEW, semicolons", "LabVIEW, units below", "lvm, times for each"),
     *("lvm, decimal commas", "B1500, own names", "Rohde & Schwarz, supply"),
     *("QCoDeS, Labber, gnuplot", "QCoDeS, Labber, Labber, own names"),
@@ -49,6 +50,11 @@ def test_the_unit_of_a_buffer_is_that_of_its_rows(tmp_path):
 def test_a_buffer_whose_unit_changes_is_refused(tmp_path):
     with pytest.raises(InputError, match="line 3: the unit is 'V', expected 'A' as above"):
         read(tmp_path, HEADER + "1,0.001,A,2,V\n2,0.002,V,3,V\n")
+
+
+def test_a_unit_of_something_else_is_no_unit_of_the_column_before_it(tmp_path):
+    data = read(tmp_path, "V_b (V),I_h (mA),test unit\n1,0.1,A\n2,0.2,mA\n")
+    np.testing.assert_allclose(data.current_mA, [0.1, 0.2])
 
 
 def test_the_units_of_an_lvm_file_are_those_of_its_channels(tmp_path):

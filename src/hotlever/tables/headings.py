@@ -24,9 +24,10 @@ _BETWEEN = {"channels", "setuptitle", "labview measurement"}
 _UNIT_ROWS = ("y_unit_label", "vertical units", "unit", "units")
 #: LabVIEW's column of times, which may stand before that of each channel.
 _X = "X_Value"
-#: Headings of a column that has the unit of the one before it, and what Keithley writes there.
+#: Last words of the heading of a column that has the unit of the one before it, and what Keithley
+#: writes there, in capitals or not.
 _UNIT_COLUMNS = {"unit", "units"}
-_OF_BUFFERS = {"Volt DC": "V", "Amp DC": "A", "VDC": "V", "ADC": "A"}
+_OF_BUFFERS = {"volt dc": "V", "amp dc": "A", "vdc": "V", "adc": "A"}
 #: LabVIEW's last column, for remarks, which most rows leave out.
 _REMARKS = "comment"
 #: Marks of a comment, around it, and quotes.
@@ -191,6 +192,9 @@ def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
 def units_beside(names: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Return the unit of each column that stands in the cells of the next one, '' for others.
 
+    The next one's heading is ``Unit``, behind any column, or ``Source Unit`` behind
+    ``Source Value``.
+
     Raises
     ------
     ValueError
@@ -198,12 +202,13 @@ def units_beside(names: Sequence[str], rows: Sequence[Sequence[str]]) -> list[st
     """
     units = [""] * len(names)
     for index, name in enumerate(names[1:], start=1):
-        if name.casefold() in _UNIT_COLUMNS:
+        of, _, word = name.casefold().rpartition(" ")
+        if word in _UNIT_COLUMNS and names[index - 1].casefold().startswith(of):
             written = [row[index] for row in rows]
             other = next((row for row, cell in enumerate(written) if cell != written[0]), None)
             if other is not None:
                 raise ValueError(other, written[other], written[0])
-            units[index - 1] = _OF_BUFFERS.get(written[0], written[0])
+            units[index - 1] = _OF_BUFFERS.get(written[0].casefold(), written[0])
     return units
 
 
