@@ -1,0 +1,62 @@
+"""Fields of a probe file change what they are of, and leave the rest of its text as it was."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from hotlever.app.edits import LayerRow, with_layer, with_value
+from hotlever.app.fields import settable
+from hotlever.app.project import EXAMPLES
+from hotlever.app.workers import Report
+from hotlever.probe import Probe
+
+FILES = ("palladium-on-nitride.toml", "boron-lever.toml", "uiuc-lever.toml")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_each_number_that_is_set_is_set_and_nothing_else(name: str) -> None:
+    text = (EXAMPLES / name).read_text(encoding="utf-8")
+    content = tomllib.loads(text)
+    for section, values in content.items():
+        for key, value in values.items():
+            if isinstance(value, float):
+                changed = with_value(text, (section,), key, value + 1.0)
+                expected = {**content, section: {**values, key: value + 1.0}}
+                assert tomllib.loads(changed) == expected
+                lines = zip(text.splitlines(), changed.splitlines(), strict=True)
+                assert sum(one != other for one, other in lines) == 1
+                gone = with_value(text, (section,), key, None)
+                assert key not in tomllib.loads(gone).get(section, {})
+
+
+def test_new_keys_and_sections_find_their_place() -> None:
+    text = "[probe]\n# tip_um = [0.0, 0.0]    # not found\n\n[layers]\nsilicon = '1/0'\n"
+    text = with_value(text, ("probe",), "tip_um", [1.0, 2.0])
+    text = with_value(text, ("layers", "a b"), "drawn", "5/0")
+    assert text.splitlines()[1] == "tip_um = [1.0, 2.0]"
+    layers = {"silicon": "1/0", "a b": {"drawn": "5/0"}}
+    assert tomllib.loads(text) == {"probe": {"tip_um": [1.0, 2.0]}, "layers": layers}
+
+
+def test_layers_change_what_they_are_made_of(tmp_path: Path) -> None:
+    name = "palladium-on-nitride.toml"
+    text = (EXAMPLES / name).read_text(encoding="utf-8")
+    row = _row(text, tmp_path, "track")
+    assert (row.role, row.material, row.thickness_um) == ("film", "film", 0.05)
+    changed = with_layer(text, row, "film", "+metal-film/Pt", 0.1)
+    path = tmp_path / name
+    path.write_text(changed, encoding="utf-8")
+    probe = Probe.from_file(path)
+    # the material that nothing is made of any more is gone, and the layer's own name stays
+    assert list(probe.materials) == ["nitride", "Pt"]
+    assert tomllib.loads(changed)["layers"]["track"]["thickness_um"] == 0.1
+    without = with_layer(changed, _row(changed, tmp_path, "track"), "", "", None)
+    assert "track" not in tomllib.loads(without)["layers"]
+
+
+def _row(text: str, folder: Path, name: str) -> LayerRow:
+    rows = settable(Report.__new__(Report), folder, text)["layers"]
+    return next(row for row in rows if row.name == name)
