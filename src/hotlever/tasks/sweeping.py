@@ -35,7 +35,7 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
             states, ended = as_far_as_possible(lambda: lever.solve(data.bias_V.values, update))
             failure = failure or ended
         if request.map is not None:
-            (hottest,) = lever.solve([data.bias_V[data.tip_K.argmax()].item()])
+            (hottest,) = lever.solve([data.bias_V.values[data.tip_K.values.argmax()]])
     reporter.note(*filter(None, data.attrs["notes"].split("\n")))
     with outputs.together():
         if request.output is not None:
