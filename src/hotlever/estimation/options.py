@@ -22,8 +22,6 @@ from hotlever.probe.surroundings import Medium
 Weights = Literal["maximum", "errors"]
 #: What the medium is called if nobody knows it: either is tried.
 UNKNOWN_MEDIUM = "unknown"
-#: What a fit varies of the paper's lever.
-_THE_PAPERS = tuple(PARAMETERS)
 
 
 @dataclass(frozen=True)
@@ -77,16 +75,13 @@ class FitOptions:
     priors: Mapping[str, Prior | str] = field(default_factory=dict)
     usual_priors: bool = False
     free: Sequence[str] = ()
-    usual: Sequence[str] = _THE_PAPERS
+    usual: Sequence[str] = tuple(PARAMETERS)
 
     def __post_init__(self) -> None:
         for name in self.fixed:
             for others, what in ((self.priors, "has a prior"), (self.free, "is free")):
                 if name in others:
                     raise InputError(f"{name} is fixed and {what}, expected one of them")
-        # a material of one's own may have others than these
-        if self.usual is not _THE_PAPERS and not self.varied:
-            raise InputError("all parameters are fixed; nothing is left to fit")
         for kind, names, existing in (
             ("weights", [self.weights], get_args(Weights)),
             ("observable", self.observables or (), tuple(OBSERVABLES)),
@@ -128,7 +123,10 @@ class FitOptions:
         for name in self.free:
             parameter_of(probe, name, in_time=in_time)
         usual = heat_capacities(probe) if in_time else usual_parameters(probe)
-        return replace(self, usual=usual)
+        own = replace(self, usual=usual)
+        if not own.varied:
+            raise InputError("all parameters are fixed; nothing is left to fit")
+        return own
 
     def stated_priors(self, probe: Probe, *, in_time: bool = False) -> dict[str, Prior]:
         """Return the priors of what counts for a probe, those in words included.

@@ -52,6 +52,7 @@ def _fit_one(reporter: Reporter, request: FitRequest, probe: Probe, options: Fit
     measurement = read_measurement_of(probe, data, request.columns, waveform)
     if samples or request.profiles:
         measurement.need_rest("--posterior" if samples else "--profiles")
+    options.of(probe, in_time=measurement.time_us is not None)  # raises before anything is said
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes)
     with reporter.progress("fit") as update:
