@@ -126,7 +126,7 @@ def test_in_air_the_cone_conducts_to_the_sample_beside_the_contact(in_air):
 def test_the_resistance_of_an_interface_is_fitted():
     """To a current measured in contact, of a lever whose material is known."""
     probe = Probe.reference().with_(**TIP, sample="glass", interface_K_per_mW=500.0)
-    bias, noise = np.linspace(5.0, 10.0, 11), np.random.default_rng(0).normal(size=11)
+    bias, noise = np.linspace(5.0, 10.0, 41), np.random.default_rng(0).normal(size=41)
     with on_coarse_meshes():
         lever = Lever(probe.with_(interface_K_per_mW=750.0))
         current = lever.sweep(bias).current_mA.values * (1.0 + 1e-4 * noise)
