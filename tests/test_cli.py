@@ -226,6 +226,10 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
             "emissivity = 2.0: input should be less than or equal to 1",
         ),
         (["sweep", "--physics", "radiation", "--bias=-8:8:3"], "expected 0 <= START <= STOP"),
+        (["contact", "--sample", "polimer"], "did you mean 'polymer'"),
+        (["contact", "--sample", "polymer,100nm"], "--sample: nothing under 100nm of polymer"),
+        (["contact", "--sample", "silicon", "--radius", "5m"], "--radius: found '5m'"),
+        (["contact"], "--sample: found none"),
     ],
 )
 def test_bad_input_gets_one_line_and_status_two(run, tmp_path, arguments, message):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from taylor import remainder_orders
 
 from experiments import on_coarse_meshes
 from hotlever import Measurement, fit
 from hotlever.contact.law import INTERFACE
 from hotlever.errors import InputError
+from hotlever.figures import contact_overview
 from hotlever.lever import Lever
 from hotlever.lever.contact import history_in_contact, out_of_contact, sweep_in_contact
 from hotlever.lever.lever import COARSE
@@ -51,6 +53,11 @@ def test_a_contact_cools_the_heater(touching, free):
     # what is known of the heat at the apex is what the lever loses
     np.testing.assert_allclose(data.sample_mW, data.into_tip_mW, rtol=2e-2)
     assert np.isnan(data.tip_K_per_mW[0])
+    words = " ".join(
+        text.get_text() for text in contact_overview(data, touching.probe).findobj(Text)
+    )
+    assert "interface, r = 100 nm: 1e+05 K/W" in words
+    assert "(µW)" in words
 
 
 def test_without_heat_through_the_interface_nothing_is_touched(touching, free):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
@@ -39,7 +40,11 @@ def contact_overview(data: xr.Dataset, probe: Probe) -> Figure:
     with figure(9.6, 5.2) as (made, axes):
         axes.remove()
         grid = made.add_gridspec(3, 2, width_ratios=(1.15, 1.0))
-        _draw(made.add_subplot(grid[:, 0]), data.isel({dimension: int(data.tip_K.argmax())}), probe)
+        _draw(
+            made.add_subplot(grid[:, 0]),
+            data.isel({dimension: int(np.argmax(data.tip_K.values))}),
+            probe,
+        )
         temperature, heat, current = (made.add_subplot(grid[row, 1]) for row in range(3))
         curve(temperature, data, along, "tip_K", mark, color=VERMILION, label="tip at the lever")
         curve(temperature, data, along, "apex_K", mark, color=PURPLE, label="apex")

@@ -78,10 +78,6 @@ def probe_in_contact(reporter: Reporter, request: ContactRequest) -> Probe:
     changes: dict[str, Any] = {}
     if probe.tip is None:
         changes |= {f"tip.{name}": value for name, value in _CONE.items()}
-        reporter.note(
-            "the probe has no [tip]: a cone {height_um:g} µm high, of half-angle "
-            "{half_angle_deg:g}°".format(**_CONE)
-        )
     height, radius = (
         _CONE[name] if probe.tip is None else float(getattr(probe.tip, name))
         for name in ("height_um", "apex_radius_um")
@@ -107,7 +103,13 @@ def probe_in_contact(reporter: Reporter, request: ContactRequest) -> Probe:
         changes["interface_K_per_mW"] = resistance
     if probe.surroundings.medium == "air" and probe.surroundings.surface_gap_um is None:
         changes["surface_gap_um"] = height
-    return probe.with_(**changes) if changes else probe
+    touching = probe.with_(**changes) if changes else probe
+    if probe.tip is None:
+        reporter.note(
+            "the probe has no [tip]: a cone {height_um:g} µm high, of half-angle "
+            "{half_angle_deg:g}°".format(**_CONE)
+        )
+    return touching
 
 
 def what_the_current_tells(data: xr.Dataset) -> str:
