@@ -12,7 +12,8 @@ from hotlever.contact.law import ContactLaw
 from hotlever.contact.spreading import contact_resistance
 from hotlever.errors import InputError
 from hotlever.materials.air import thermal_conductivity_of_air
-from hotlever.materials.silicon import thermal_conductivity, thermal_conductivity_of_wire
+from hotlever.materials.silicon import thermal_conductivity
+from hotlever.materials.thin_silicon import thermal_conductivity_of_wire
 from hotlever.probe import Probe, Tip
 from hotlever.probe.contact import OUT_OF_CONTACT, interface_of
 
