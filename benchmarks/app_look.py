@@ -79,6 +79,7 @@ def look(page: Page, app: App, address: str, folder: Path) -> Look:
         _settle(page)
         for width in WIDTHS:
             page.set_viewport_size({"width": width, "height": _HEIGHTS[width]})
+            page.evaluate("scrollTo(0, 0)")
             page.wait_for_timeout(_REST_MS)
             picture = folder / f"{made.page}-{theme}-{width}.png"
             page.screenshot(path=picture, full_page=True)

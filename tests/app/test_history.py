@@ -103,6 +103,18 @@ def test_what_a_page_chooses_by_itself_is_no_step(tmp_path: Path) -> None:
     assert state.choices("fit")["robust"]
 
 
+def test_undoing_an_edit_undoes_no_saving(tmp_path: Path) -> None:
+    """What was saved tells edits from the file: with the digest of another text they were lost."""
+    state = History(tmp_path)
+    moved(state, "lever", text="first", saved="digest of first")
+    moved(state, "lever", text="edited")
+    moved(state, "lever", saved="digest of edited")
+    assert state.step(-1) == {"lever"}
+    lever = state.choices("lever")
+    assert (lever["text"], lever["saved"]) == ("first", "digest of edited")
+    assert History(tmp_path).step(1) == {"lever"}
+
+
 def test_results_are_there_after_a_restart_and_are_not_undone(tmp_path: Path) -> None:
     state = History(tmp_path)
     options = {"set": ["n_d=5e+17"], "pulse": "10V,5us", "output": "a.csv", "plot": "a.svg"}

@@ -28,6 +28,8 @@ _MOST, _MOST_TEXT = 100, 2**21
 _MOVING_S = 3.0
 #: How pages look: kept, but no step of the history.
 _LOOKS = "dark"
+#: What files were when they were opened or saved: undoing a choice undoes no saving.
+_OF_FILES = ("saved",)
 
 
 class _File(BaseModel):
@@ -92,7 +94,8 @@ class History:
     def keep(self) -> None:
         """Take what has changed as a step of the history; what goes on changing is one step."""
         record, now = _record(self.chosen), time.monotonic()
-        what = _differing(self._history[self._shown], record)
+        before = self._history[self._shown]
+        what = _differing(before, record)
         if what:
             del self._history[self._shown + 1 :]
             if self._moved[0] == what and now - self._moved[1] < _MOVING_S and self._shown:
@@ -102,7 +105,9 @@ class History:
             self._moved = what, now
             self._forget_oldest()
             self._shown = len(self._history) - 1
-        if what or self._written != self._beside():
+        else:
+            self._history[self._shown] = record
+        if record != before or self._written != self._beside():
             self._write()
 
     def settle(self) -> None:
@@ -129,8 +134,9 @@ class History:
         self._shown, self._moved = to, (set(), 0.0)
         for page in {*self.chosen, *self._history[to]} - {_LOOKS}:
             values = self.chosen.setdefault(page, {})
+            of_files = {key: values[key] for key in _OF_FILES if key in values}
             values.clear()
-            values.update(deepcopy(_AT_FIRST[page] | self._history[to].get(page, {})))
+            values.update(deepcopy(_AT_FIRST[page] | self._history[to].get(page, {})) | of_files)
         self.remark = f"{'Undone' if by < 0 else 'Done again'}: {', '.join(sorted(what))}."
         self._write()
         return {name.partition(",")[0] for name in what}
@@ -213,6 +219,8 @@ def _keys(one: Mapping[str, Any], other: Mapping[str, Any]) -> Iterator[str]:
     """Return the keys of different values, those of values that are themselves of several."""
     for key in {*one, *other}:
         mine, others = one.get(key), other.get(key)
+        if key in _OF_FILES:
+            continue
         if key == "changes":
             yield from _keys(mine or {}, others or {})
         elif mine != others:

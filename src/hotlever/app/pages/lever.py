@@ -58,7 +58,10 @@ class LeverPage(Page):
                 self._drawings = Drawings(self, self._begin, self._show)
                 self._picture = Picture(self, self._draw)
                 with ui.row().classes("items-center w-full"):
-                    self._name = ui.input("Save as", value=self.chosen["name"])
+                    name = self.chosen["save_as"] or self.chosen["name"]
+                    self._name = ui.input(
+                        "Save as", value=name, on_change=self._keep("save_as", "")
+                    )
                     ui.button("Save", icon="save", on_click=self._write)
                     for page, icon in _ON.items():
                         go = ui.button(page.capitalize(), icon=icon)
