@@ -106,7 +106,7 @@ def test_what_a_page_chooses_by_itself_is_no_step(tmp_path: Path) -> None:
 def test_undoing_an_edit_undoes_no_saving(tmp_path: Path) -> None:
     """What was saved tells edits from the file: with the digest of another text they were lost."""
     state = History(tmp_path)
-    moved(state, "lever", text="first", saved="digest of first")
+    moved(state, "lever", name="own.toml", text="first", saved="digest of first")
     moved(state, "lever", text="edited")
     moved(state, "lever", saved="digest of edited")
     assert state.step(-1) == {"lever"}
