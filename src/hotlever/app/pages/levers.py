@@ -139,7 +139,10 @@ class LeversPage(Page):
         await self.open()
 
     async def open(self) -> None:
-        """Show the results that are there, when there is a new one."""
+        """Show the results that are there, when there is a new one; first, take measurements."""
+        if self.chosen["data"] is None:
+            self.chosen["data"] = []
+            await self._take_all()
         project, made = self.session.project, self._made
         names = [
             f"{made.folder}/{path.name}"
