@@ -32,6 +32,7 @@ from hotlever.tables.headings import (
 )
 from hotlever.tables.layouts import below_a_header
 from hotlever.tables.table import TextTable
+from hotlever.tables.tdms import SIGNATURE, tdms_lines
 from hotlever.types import Array
 from hotlever.units import NUMBER, is_unit, key_and_value
 
@@ -47,7 +48,7 @@ def read_table(
     """Read a table of cells separated by tabs, semicolons, commas or, some, by blanks.
 
     Numbers may have decimal commas unless these separate the cells. Lines that start with ``#``
-    are comments.
+    are comments. The channels of a TDMS file are columns too (`hotlever.tables.tdms`).
 
     Parameters
     ----------
@@ -68,7 +69,8 @@ def read_table(
         If there is no such table; the text names file and line.
     """
     raw = read_bytes(path)
-    lines = filled_lines(raw, str(path))
+    is_tdms = raw.startswith(SIGNATURE)
+    lines = tdms_lines(raw, str(path)) if is_tdms else filled_lines(raw, str(path))
     if is_heading is not None and lines:
         lines = below_a_header(lines)
     first = next((i for i, (_, line) in enumerate(lines) if not is_comment(line)), None)

@@ -1,0 +1,80 @@
+"""LabVIEW's TDMS files are read as the tables that they hold."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from hotlever import InputError, read_measurement
+from hotlever.tables.tdms import SIGNATURE
+
+BIAS = np.array([0.1, 1.0, 2.0 / 3.0, 8.25])
+CURRENT = BIAS / 7e3
+
+
+def written(path, *groups, **said):
+    """Write groups of channels: each their name, unit, values and further properties."""
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(path) as writer:
+        objects = [nptdms.RootObject(said)]
+        for number, channels in enumerate(groups):
+            for name, unit, values, *properties in channels:
+                all_properties = {"unit_string": unit} | dict(*properties)
+                objects.append(
+                    nptdms.ChannelObject(f"sweep {number}", name, values, all_properties)
+                )
+        writer.write_segment(objects)
+    return path
+
+
+def test_channels_are_columns_with_their_units(tmp_path):
+    channels = [("Bias", "V", BIAS), ("Current", "A", CURRENT), ("flag", "", np.arange(4))]
+    path = written(tmp_path / "iv.tdms", channels, **{"R_s (kOhm)": 5.6, "author": "a\tb"})
+    data = read_measurement(path)
+    # each number is the one that was written
+    assert data.bias_V.tolist() == BIAS.tolist()
+    np.testing.assert_allclose(data.current_mA, 1e3 * CURRENT, rtol=1e-15)
+    assert data.series_resistance_ohm == 5600.0
+    assert f"{path}: column 'flag' is not used" in data.notes
+
+
+def test_groups_of_the_same_channels_follow_each_other(tmp_path):
+    up = [("V_b", "V", BIAS), ("I_h", "Amps", CURRENT)]
+    down = [("V_b", "V", BIAS[::-1]), ("I_h", "Amps", CURRENT[::-1])]
+    data = read_measurement(written(tmp_path / "iv.tdms", up, down))
+    assert data.bias_V.size == 8
+    path = written(tmp_path / "two.tdms", up, [("V_b", "V", BIAS), ("V_r", "V", BIAS)])
+    with pytest.raises(InputError, match="the group 'sweep 1' has other channels than 'sweep 0'"):
+        read_measurement(path)
+
+
+def test_waveforms_have_their_times(tmp_path):
+    times = {"wf_start_offset": 1e-6, "wf_increment": 2e-6}
+    pulse = [("V_b", "V", BIAS, times), ("I_h", "mA", 1e3 * CURRENT, times)]
+    data = read_measurement(written(tmp_path / "pulse.tdms", pulse))
+    assert data.time_us is not None
+    np.testing.assert_allclose(np.diff(data.time_us), 2.0)
+
+
+def test_a_damaged_file_is_one_line(tmp_path):
+    path = written(tmp_path / "iv.tdms", [("V_b", "V", BIAS), ("I_h", "A", CURRENT)])
+    raw = path.read_bytes()
+    for end in (5, 40, 100):
+        path.write_bytes(raw[:end])
+        with pytest.raises(InputError, match=r"iv\.tdms: "):
+            read_measurement(path)
+    # a length that no file could have
+    path.write_bytes(raw.replace((4).to_bytes(8, "little"), (2**40).to_bytes(8, "little")))
+    with pytest.raises(InputError, match=r"iv\.tdms: "):
+        read_measurement(path)
+
+
+def test_without_its_library_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "nptdms", None)
+    path = tmp_path / "iv.tdms"
+    path.write_bytes(SIGNATURE + bytes(24))
+    with pytest.raises(InputError, match=r"iv\.tdms: .*pip install 'hotlever\[tdms\]'") as error:
+        read_measurement(path)
+    assert "\n" not in str(error.value)
