@@ -67,6 +67,33 @@ def test_materials_are_listed_and_drawn(run, tmp_path):
     assert "did you mean 'materials'" in err
 
 
+def test_materials_of_a_probe_are_listed_as_they_stand(run, tmp_path):
+    (tmp_path / "rho.csv").write_text("T (K),resistivity (Ohm cm)\n250,1e-5\n900,3e-5\n")
+    text = EXAMPLE.with_name("palladium-on-nitride.toml").read_text(encoding="utf-8")
+    for number, law in {
+        "resistivity = 2e-5": 'resistivity = "rho.csv"',
+        "tcr = 2e-3": "seebeck = -9.5",
+        'preset = "SiN"': 'kappa = "k300 * (T/300)**0.33"\nk300 = 0.031',
+    }.items():
+        assert number in text
+        text = text.replace(number, law)
+    (tmp_path / "p.toml").write_text(text, encoding="utf-8")
+    plot = tmp_path / "m.svg"
+    status, out, err = run("materials", str(tmp_path / "p.toml"), "--plot", str(plot))
+    assert status == 0, err
+    nitride, film = out.split("film: metal-film\n")
+    assert nitride.startswith("nitride: dielectric\n")
+    (seebeck,) = [line.split() for line in film.splitlines() if "seebeck" in line]
+    assert seebeck[:6] == ["seebeck", "µV", "K⁻¹", "-100", "100", "-9.5"]
+    assert "resistivity (Ω cm), table rho.csv, monotone cubic (PCHIP); 250 to 900 K" in film
+    assert "kappa (W cm⁻¹ K⁻¹), formula k300 * (T/300)**0.33; " in nitride
+    (constant,) = [line.split() for line in nitride.splitlines() if line.startswith("  k300 ")]
+    assert constant[2:4] == ["0.0062", "0.155"]
+    assert "0.031" in constant
+    assert "p-silicon" not in out
+    assert "film" in plot.read_text(encoding="utf-8")
+
+
 def test_values_of_materials_are_set_by_name(run, tmp_path):
     p_type_probe().to_file(tmp_path / "p.toml")
     sweep = ("sweep", str(tmp_path / "p.toml"), "--bias", "3:3:1")

@@ -255,11 +255,12 @@ def materials(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
     from hotlever.materials import catalogue
 
     if name is None:
-        curves = catalogue.curves()
+        made_of, curves = None, catalogue.curves()
     else:
         probe = _probe(folder, name)
-        curves = catalogue.curves(probe.made_of, probe.layout().thickness_um)
-    return {"kinds": catalogue.sections(), "figure": _svg(figures.material_curves(curves))}
+        made_of = probe.made_of
+        curves = catalogue.curves(made_of, probe.layout().thickness_um)
+    return {"kinds": catalogue.sections(made_of), "figure": _svg(figures.material_curves(curves))}
 
 
 def packed(report: Report, folder: Path, paths: list[Path]) -> bytes:

@@ -1,16 +1,19 @@
-"""All kinds of material and all presets, in words and as curves."""
+"""All kinds of material, all presets and a probe's own materials, in words and as curves."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from hotlever.materials.kind import Kind
 from hotlever.materials.kinds import KINDS
 from hotlever.materials.laws import Law
+from hotlever.materials.parameters import STATED, Parameter
 from hotlever.materials.presets import PRESETS
 from hotlever.materials.sections import material_of
+from hotlever.materials.stated import StatedLaw
 from hotlever.spieser2017 import DOI
 from hotlever.text import aligned
 from hotlever.types import Array
@@ -28,14 +31,16 @@ def _example(kind: str) -> Kind:
     return material_of({"kind": kind, **preset}, kind)
 
 
-def listing() -> list[str]:
-    """Return kinds, parameters, laws and presets, line by line."""
-    lines = [line for section in sections().values() for line in (*section, "")]
+def listing(materials: Mapping[str, Kind] | None = None) -> list[str]:
+    """Return kinds, parameters, laws and presets, or the same of some materials, line by line."""
+    lines = [line for section in sections(materials).values() for line in (*section, "")]
     return [*lines, f"Eq.: of Spieser et al. (2017), doi:{DOI}"]
 
 
-def sections() -> dict[str, list[str]]:
-    """Return the lines of each kind, and of the presets."""
+def sections(materials: Mapping[str, Kind] | None = None) -> dict[str, list[str]]:
+    """Return the lines of each kind and of the presets, or of each of some materials."""
+    if materials is not None:
+        return {name: _own_lines(name, kind) for name, kind in materials.items()}
     lines = {name: _kind_lines(name, kind) for name, kind in KINDS.items()}
     rows = []
     for name, preset in PRESETS.items():
@@ -46,18 +51,41 @@ def sections() -> dict[str, list[str]]:
 
 def _kind_lines(name: str, kind: type[Kind]) -> list[str]:
     example = _example(name)
-    rows = [["  parameter", "unit", "from", "to", "left out", ""]]
-    for own, parameter in kind.declared.items():
-        value = getattr(example, own)
-        given = name not in _EXAMPLES or own not in PRESETS[_EXAMPLES[name]].values
-        default = f"{value:.4g}" if given and isinstance(value, float) else "–"
+    preset = PRESETS[_EXAMPLES[name]].values if name in _EXAMPLES else {}
+    values = {own: getattr(example, own) for own in kind.declared if own not in preset}
+    head = f"{name}: {(kind.__doc__ or '').partition('.')[0]}"
+    laws = _laws(name, example)
+    return _lines(head, kind.declared, "left out", values, {law: law.source for law in laws})
+
+
+def _own_lines(name: str, kind: Kind) -> list[str]:
+    values = {own: getattr(kind, own) for own in kind.parameters}
+    laws: dict[Law | StatedLaw, str] = {law: law.source for law in (*kind.laws, *kind.effects)}
+    for own, law in kind.stated.items():
+        laws[law] = f"{own} ({STATED[own][0]}), {law.source}"
+    return _lines(f"{name}: {kind.kind}", kind.parameters, "value", values, laws)
+
+
+def _lines(
+    head: str,
+    parameters: Mapping[str, Parameter],
+    values_are: str,
+    values: Mapping[str, Any],
+    laws: Mapping[Law | StatedLaw, str],
+) -> list[str]:
+    """Return a heading, the parameters with values, and the laws with what is said of them."""
+    rows = [["  parameter", "unit", "from", "to", values_are, ""]]
+    for own, parameter in parameters.items():
+        value = values.get(own)
+        default = f"{value:.4g}" if isinstance(value, float) else "–"
         limits = f"{parameter.lower:.4g}", f"{parameter.upper:.4g}"
         rows.append([f"  {own}", parameter.unit, *limits, default, parameter.meaning])
-    lines = [f"{name}: {(kind.__doc__ or '').partition('.')[0]}", *aligned(rows)]
-    for law in _laws(name, example):
+    lines = [head, *aligned(rows)]
+    for law, said in laws.items():
         low, high = law.temperature_range
-        first = (law.__doc__ or "").partition("\n")[0].partition(",")[0].rstrip(".")
-        lines.append(f"  {first}: {law.source}; {low:g} to {high:g} K")
+        title = (law.__doc__ or "").partition("\n")[0].partition(",")[0].rstrip(".")
+        first = "" if isinstance(law, StatedLaw) else f"{title}: "
+        lines.append(f"  {first}{said}; {low:g} to {high:g} K")
     return lines
 
 

@@ -54,6 +54,17 @@ class ProbeRequest:
 
 
 @dataclass(kw_only=True)
+class MaterialsRequest(PlotRequest):
+    """Materials to list."""
+
+    probe: File = argument(
+        None,
+        metavar="[PROBE.toml]",
+        help="Probe file whose materials are listed; all kinds and presets if left out.",
+    )
+
+
+@dataclass(kw_only=True)
 class PhysicsRequest:
     """Physics beyond the paper."""
 

@@ -7,6 +7,7 @@ from collections.abc import Awaitable
 from nicegui import ui
 
 from hotlever.app.jobs import Task
+from hotlever.app.pages.drawn import probe_files
 from hotlever.app.pages.frame import ErrorBanner, caption, figure, text_shown
 from hotlever.app.pages.page import Page
 from hotlever.app.session import Session
@@ -29,8 +30,8 @@ class MaterialsPage(Page):
         self.command()
 
     def task(self) -> Task | None:
-        """Return the command that lists all materials and draws them."""
-        return None if self.chosen["probe"] else Task("materials", (), {"plot": "materials.svg"})
+        """Return the command that lists the materials and draws them."""
+        return Task("materials", probe_files(self.chosen), {"plot": "materials.svg"})
 
     def changed(self) -> Awaitable[None]:
         """Show the materials of another probe."""
