@@ -224,6 +224,8 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
         (("sweep", "--bias", "1:11:1"), "COUNT 1 goes with START = STOP"),
         (("sweep", "--bias", "5:1:3"), "expected 0 <= START <= STOP"),
         (("sweep", "--set", "ckappa=1"), "did you mean 'c_kappa'"),
+        # none of sixty names is alike: those that it ends come first
+        (("sweep", "--set", "kind=x"), "'kind' (expected one of: circuit.supply.kind, circuit."),
         (("sweep", "--set", "c_kappa"), "expected NAME=VALUE"),
         (("sweep", "--set", "c_kappa=high"), "--set c_kappa: found 'high', expected a number"),
         (("sweep", "--set", "c_kappa=-1"), "input should be greater than or equal to 0.05"),

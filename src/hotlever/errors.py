@@ -107,15 +107,18 @@ def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") 
     "unknown parameter 'c_kapa': did you mean 'c_kappa'? (expected one of: c_kappa, delta)"
     """
     known = list(choices)
+    # of longer names the last word may be meant, though the whole is less alike than others are
+    ends = [other for other in known if other.endswith(f".{name}")]
     # of names that are less alike, one that begins as it does is meant, not any other
     alike = difflib.get_close_matches(name[:_QUOTED], known, n=_NEAREST, cutoff=0.5)
     near = difflib.get_close_matches(name[:_QUOTED], known, n=1)
     near = near or [other for other in alike if other[:1].lower() == name[:1].lower()]
     if len(known) > _MOST_CHOICES:
         nearest = difflib.get_close_matches(name[:_QUOTED], known, n=_NEAREST, cutoff=0.0)
+        nearest = list(dict.fromkeys([*ends, *nearest]))[:_NEAREST]
         known = [*nearest, f"and {len(known) - len(nearest)} more"]
-    hint = f"did you mean '{near[0]}'? " if near else ""
+    hint = f": did you mean '{near[0]}'?" if near else ""
     prefix = f"{where}: " if where else ""
     return InputError(
-        f"{prefix}unknown {kind} {quoted(name)}: {hint}(expected one of: {', '.join(known)})"
+        f"{prefix}unknown {kind} {quoted(name)}{hint} (expected one of: {', '.join(known)})"
     )

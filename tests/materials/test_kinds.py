@@ -206,6 +206,17 @@ def test_what_a_silicon_leaves_out_is_that_of_the_reference_probe():
         assert material_of({"kind": made.kind}, kind) == made
 
 
+def test_what_a_film_or_a_dielectric_leaves_out_of_its_emissivity_is_its_own():
+    usual = {
+        "metal-film": ({"resistivity": 1e-5, "tcr": 1e-3}, 0.1),
+        "dielectric": ({"kappa": 0.03}, 0.15),
+        "n-silicon": ({}, 0.2),
+    }
+    for kind, (values, emissivity) in usual.items():
+        assert material_of({"kind": kind, **values}, "here").emissivity == emissivity
+    assert material_of({"kind": "metal-film", "preset": "Pt"}, "here").emissivity == 0.1
+
+
 def test_the_papers_material_has_each_parameter_of_its_two_kinds():
     kinds = OPTION_III.kinds.values()
     assert set(type(OPTION_III).model_fields) == {name for kind in kinds for name in kind.declared}

@@ -278,6 +278,16 @@ def test_what_is_no_table_is_refused_with_file_and_line(text, says, tmp_path):
     assert "\n" not in str(caught.value)
 
 
+def test_a_pure_number_is_said_without_a_unit(tmp_path):
+    (tmp_path / "law.csv").write_text("T (K),emissivity\n300,0.1\n400,1.2\n")
+    with pytest.raises(InputError, match=r"line 3: emissivity is 1\.2, expected 0 to 1"):
+        read_law(tmp_path / "law.csv", "emissivity")
+    film = material_of({"kind": "metal-film", "preset": "Pt", "emissivity": "T/500"}, "here")
+    assert re.search(
+        r"emissivity, .* is 1\.\d+ at \d+\.?\d* K, expected 0 to 1 ", film.impossible(293.0)
+    )
+
+
 def test_a_file_that_is_missing_is_named(tmp_path):
     with pytest.raises(InputError, match=r"here: .*none\.csv: no such file"):
         material_of({"kind": "metal-film", "preset": "Pt", "kappa": "none.csv"}, "here", tmp_path)

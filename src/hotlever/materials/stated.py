@@ -21,6 +21,7 @@ from hotlever.materials.heat import STANDARD_TEMPERATURE
 from hotlever.materials.laws import FORMULA_FROM, FORMULA_TO, LEVELLING, Evaluated
 from hotlever.materials.monotone import monotone_cubic
 from hotlever.piecewise import Piecewise
+from hotlever.text import with_unit
 from hotlever.types import Array
 
 #: Temperatures at which a law is checked, and distance (K) of those between which it is integrated.
@@ -149,8 +150,8 @@ class StatedLaw(ABC):
         found = value[first] if not low <= value[first] <= high else by["T"][first]
         kind = "" if found == value[first] else "a slope of "
         return (
-            f"is {kind}{found:.4g} {unit} at {T[first]:.4g} K, expected {low:.4g} to {high:.4g} "
-            f"from {T[0]:.4g} to {T[-1]:.4g} K"
+            f"is {kind}{with_unit(f'{found:.4g}', unit)} at {T[first]:.4g} K, expected "
+            f"{low:.4g} to {high:.4g} from {T[0]:.4g} to {T[-1]:.4g} K"
         )
 
 

@@ -13,6 +13,7 @@ from hotlever.errors import InputError, quoted
 from hotlever.materials.parameters import STATED
 from hotlever.materials.stated import Table
 from hotlever.tables import read_table
+from hotlever.text import with_unit
 from hotlever.units import name_and_unit, product_conversion, unknown_unit
 
 #: Endings of names of files that hold a table.
@@ -65,7 +66,8 @@ def read_law(path: str | Path, name: str, called: str | None = None) -> Table:
     if wrong.any():
         row = int(wrong.argmax())
         raise InputError(
-            f"{table.where(row)}: {name} is {values[row]:.4g} {unit}, expected {low:g} to {high:g}"
+            f"{table.where(row)}: {name} is {with_unit(f'{values[row]:.4g}', unit)}, expected "
+            f"{low:g} to {high:g}"
         )
     if T.size > 1 and T[0] > T[-1]:
         T, values = T[::-1], values[::-1]
