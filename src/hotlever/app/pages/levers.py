@@ -100,8 +100,9 @@ class LeversPage(Page):
         """Choose all measurements of levers that lie in the folder."""
         names = self.session.project.data
         measured = await self.session.ask("full", "showing:measurements", names, len(names))
-        self._files.set_options(names)
-        self._files.set_value(measured)
+        # others may have been dropped meanwhile
+        self._files.set_options(self.session.project.data)
+        self._files.set_value(list(dict.fromkeys([*measured, *self._files.value])))
 
     async def _dropped(self, names: list[str]) -> None:
         self._files.set_options(self.session.project.data)
