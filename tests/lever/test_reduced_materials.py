@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.estimation import FitOptions, Measurement, batch
+from hotlever.estimation import FitOptions, Measurement, batch, fit
 from hotlever.estimation.load_lines import Rows
+from hotlever.estimation.result import FitFile
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE
@@ -92,7 +93,8 @@ def test_a_batch_reduces_what_can_be_reduced(strip, monkeypatch):
     monkeypatch.setattr(batch, "cached_reduction", lambda _, progress, names: made.append(names))
     data, free = Measurement.of_sweep(strip.sweep(BIAS)), ("film.lorenz_ratio",)
     for options in (FitOptions(), FitOptions(free=free), FitOptions(free=("thickness_um",))):
-        assert not batch._not_reduced(strip.probe, options, {"one": data}, None)
+        work = batch.Work("fit", fit, FitFile, ".json", strip.probe, options)
+        assert not batch._not_reduced(work, {"one": data}, None)
     assert made == [
         set(ParameterDomain.of(strip.probe).names),
         {*ParameterDomain.of(strip.probe).names, *free},

@@ -311,6 +311,8 @@ class FitFile(ResultFile[Fit]):
             raise InputError(f"{path}: parameters and correlation do not belong together")
         for name in names:
             parameter_of(self.probe, name, f"{path}: correlation", in_time=in_time)
+        for name in self.options.fixed:
+            parameter_of(self.probe, name, f"{path}: options: fixed", in_time=in_time)
         if in_time != ("time_us" in self.band):
             raise InputError(f"{path}: band: expected time_us in it of data in time, and only then")
         priors_of(self.options.priors, self.probe, f"{path}: options: priors", in_time=in_time)

@@ -98,7 +98,7 @@ class Drawing:
     ...     tip_um=(32, 0),
     ...     thickness_um=0.4,
     ... )
-    >>> [region.name for region in Probe.from_drawing(drawing).layout().regions]
+    >>> sorted(region.name for region in Probe.from_drawing(drawing).layout().regions)
     ['heater', 'silicon at ground', 'silicon at supply']
     """
 
