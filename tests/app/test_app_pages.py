@@ -62,9 +62,11 @@ def visit(folder: Path, story: Callable[[User, Session], Awaitable[None]]) -> No
             await story(user, session)
 
     modules = dict(sys.modules)
-    asyncio.run(told())
-    # the simulation takes out those of its pages, this package among them
-    sys.modules.update(modules)
+    try:
+        asyncio.run(told())
+    finally:
+        # the simulation takes out those of its pages, this package among them
+        sys.modules.update(modules)
 
 
 async def drop(user: User, name: str, content: bytes, zone: int = 0) -> None:
