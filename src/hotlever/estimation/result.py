@@ -311,8 +311,10 @@ class FitFile(ResultFile[Fit]):
             raise InputError(f"{path}: parameters and correlation do not belong together")
         for name in names:
             parameter_of(self.probe, name, f"{path}: correlation", in_time=in_time)
-        for name in self.options.fixed:
-            parameter_of(self.probe, name, f"{path}: options: fixed", in_time=in_time)
+        try:
+            self.options.of(self.probe, in_time=in_time)
+        except InputError as error:
+            raise InputError(f"{path}: options: {error}") from None
         if in_time != ("time_us" in self.band):
             raise InputError(f"{path}: band: expected time_us in it of data in time, and only then")
         priors_of(self.options.priors, self.probe, f"{path}: options: priors", in_time=in_time)
