@@ -26,10 +26,11 @@ MODULES = sorted(
     # scripts of the gallery are data of the package
     if path.stem != "__init__" and "examples" not in path.relative_to(SOURCE).parts
 )
+PACKAGES = {f"hotlever.{path.parent.name}" for path in SOURCE.glob("*/__init__.py")}
 #: From the ground up: what stands on a floor imports of those below it, and nothing beside it but
 #: on the floors of single modules.
 FLOORS = {
-    "ground": ("colours", "errors", "memory", "threads", "types"),
+    "ground": ("colours", "errors", "memory", "plotting", "threads", "types"),
     "numbers and files": ("files", "piecewise", "records", "spieser2017", "steps", "units"),
     "texts": ("cache", "datasets", "text", "unforeseen"),
     "tables and processes": ("cluster", "processes", "tables"),
@@ -119,7 +120,7 @@ def imports_between_modules() -> dict[str, set[str]]:
             elif isinstance(node, ast.ImportFrom):
                 assert node.level == 0, name
                 names = {f"{node.module}.{alias.name}" for alias in node.names}
-                imports[name] |= (names & set(MODULES)) or {node.module}
+                imports[name] |= (names & {*MODULES, *PACKAGES}) or {node.module}
             elif isinstance(node, ast.Constant) and re.fullmatch(
                 r"hotlever(\.\w+)+", str(node.value)
             ):

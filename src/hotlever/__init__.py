@@ -21,9 +21,12 @@ help(hotlever.Lever) explains one. On the command line all of this is
 
 from __future__ import annotations
 
+from functools import partial
 from importlib import import_module
 from importlib.metadata import version
 from typing import Any
+
+from hotlever import plotting
 
 __version__ = version("hotlever")
 
@@ -43,6 +46,7 @@ _MODULES = {
     "hotlever.errors": ("HotleverError", "InputError", "ComputationError", "BranchEndError"),
     "hotlever.figures": ("save_figure",),
 }
+plotting.figures = partial(import_module, "hotlever.figures")
 _PUBLIC = {name: module for module, names in _MODULES.items() for name in names}
 
 
@@ -58,7 +62,7 @@ __all__ = _Words(("__version__", "figures", *_PUBLIC))
 
 def __getattr__(name: str) -> Any:
     if name == "figures":
-        return import_module("hotlever.figures")
+        return plotting.figures()
     if name not in _PUBLIC:
         raise AttributeError(f"module 'hotlever' has no attribute {name!r}")
     return getattr(import_module(_PUBLIC[name]), name)

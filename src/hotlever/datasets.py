@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hotlever import __version__
+from hotlever import __version__, plotting
 from hotlever.errors import InputError
 from hotlever.files import whole_file, write_text
 from hotlever.types import Array
@@ -302,10 +302,8 @@ class Plots:
         >>> len(sweep.hotlever.plot().axes)
         4
         """
-        # figures stand above datasets: they are the package's to find
-        from hotlever import figures
-
-        return figures.figure_of(self._data)
+        made: Figure = plotting.figures().figure_of(self._data)
+        return made
 
 
 @cache

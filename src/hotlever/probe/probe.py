@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hotlever import plotting
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import write_text
 from hotlever.materials import KINDS, REFERENCE, Kind, Material
@@ -345,7 +346,5 @@ class Probe(ProbeParts):
 
     def draw(self, title: str = "") -> Figure:
         """Return a figure of the probe from above, with its heater, terminals and tip."""
-        # figures stand above probes: they are the package's to find
-        from hotlever import figures
-
-        return figures.probe_drawing(self.layout(), title)
+        made: Figure = plotting.figures().probe_drawing(self.layout(), title)
+        return made
