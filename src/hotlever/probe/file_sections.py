@@ -22,7 +22,7 @@ from hotlever.probe.shapes import (
     SHAPES,
     Shape,
 )
-from hotlever.probe.tip import Tip
+from hotlever.probe.tip import EXAMPLE
 from hotlever.text import as_toml
 
 #: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
@@ -189,9 +189,8 @@ def other_sections(probe: ProbeParts) -> str:
     for name, part in (named | probe.parts).items():
         lines += section_lines(name, part.model_dump(), part.description(), optional=True)
     if probe.tip is None:
-        example = Tip(height_um=0.7, half_angle_deg=20, apex_radius_um=0.02)
         lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]
-        values, meaning = example.model_dump(), example.description()
+        values, meaning = EXAMPLE.model_dump(), EXAMPLE.description()
         lines += section_lines("tip", values, meaning, start="# ")[1:]
     if not probe.physics:
         lines += ["", "# Without a section [physics] the physics is the paper's. Beyond it:"]

@@ -70,3 +70,7 @@ class Tip(Record):
         radius = np.clip(np.asarray(distance, dtype=float), self.apex_radius_um, base)
         thickening: Array = base / (self.slope * power) * (1.0 - (radius / base) ** power)
         return thickening
+
+
+#: What is meant where a probe file says nothing of its tip.
+EXAMPLE = Tip(height_um=0.7)

@@ -9,6 +9,7 @@ import numpy as np
 from hotlever.datasets import csv_text, write_dataset
 from hotlever.errors import InputError, shown
 from hotlever.probe.contact import interface_of, length_um, parsed_layers
+from hotlever.probe.tip import EXAMPLE
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import make_lever
 from hotlever.tasks.reporter import Reporter
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 
     from hotlever.probe import Probe
 
-#: The cone where a probe file has none: the example of its section [tip] (µm, degrees).
-_CONE = {"height_um": 0.7, "half_angle_deg": 20.0, "apex_radius_um": 0.02}
 _BIAS = "1:11:25"
 #: Radii that a contact may have (µm).
 _SMALLEST, _LARGEST = 1e-4, 10.0
@@ -76,12 +75,10 @@ def probe_in_contact(reporter: Reporter, request: ContactRequest) -> Probe:
     """
     probe = request.read_probe(reporter)
     changes: dict[str, Any] = {}
+    tip = probe.tip or EXAMPLE
+    radius = tip.apex_radius_um
     if probe.tip is None:
-        changes |= {f"tip.{name}": value for name, value in _CONE.items()}
-    height, radius = (
-        _CONE[name] if probe.tip is None else float(getattr(probe.tip, name))
-        for name in ("height_um", "apex_radius_um")
-    )
+        changes["tip.height_um"] = tip.height_um
     if request.radius is not None:
         stated = length_um(request.radius)
         if stated is None or not _SMALLEST <= stated <= _LARGEST:
@@ -102,12 +99,12 @@ def probe_in_contact(reporter: Reporter, request: ContactRequest) -> Probe:
         resistance = interface_of(request.interface, radius, "--interface")
         changes["interface_K_per_mW"] = resistance
     if probe.surroundings.medium == "air" and probe.surroundings.surface_gap_um is None:
-        changes["surface_gap_um"] = height
+        changes["surface_gap_um"] = tip.height_um
     touching = probe.with_(**changes) if changes else probe
     if probe.tip is None:
         reporter.note(
-            "the probe has no [tip]: a cone {height_um:g} µm high, of half-angle "
-            "{half_angle_deg:g}°".format(**_CONE)
+            f"the probe has no [tip]: a cone {tip.height_um:g} µm high, of half-angle "
+            f"{tip.half_angle_deg:g}°"
         )
     return touching
 
@@ -116,8 +113,7 @@ def what_the_current_tells(data: xr.Dataset) -> str:
     """Say how well the sum of resistances is known by the current, where it tells most of it."""
     with np.errstate(divide="ignore", invalid="ignore"):
         error = _CURRENT_KNOWN * data.current_mA / np.abs(data.current_by_resistance)
-        whole = (data.tip_K - data.apex_K) / data.sample_mW
-        whole = whole + data.interface_K_per_mW + data.spreading_K_per_mW
+        whole = data.tip_K_per_mW + data.interface_K_per_mW + data.spreading_K_per_mW
         relative = (error / whole).values
     if not np.isfinite(relative).any():
         return ""

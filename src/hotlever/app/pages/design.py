@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Awaitable
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any
 
 from nicegui import ui
 
 from hotlever.app.jobs import Task
 from hotlever.app.pages.drawn import DrawnPage, probe_files, stem
 from hotlever.app.pages.frame import ErrorBanner, caption, two_columns
-from hotlever.app.pages.page import KINDS, outputs
+from hotlever.app.pages.page import outputs
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 from hotlever.materials.parameters import label
@@ -26,7 +26,6 @@ class DesignPage(DrawnPage):
 
     name = "design"
     alt = "Knee, tip temperature and loss to air by design"
-    kinds: ClassVar = {kind: meaning for kind, meaning in KINDS.items() if kind != "VTU"}
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)

@@ -63,7 +63,9 @@ class DrawnPage(Page):
 
     #: What the figure shows, and what it may be asked for as.
     alt = ""
-    kinds: ClassVar[Mapping[str, str]] = KINDS
+    kinds: ClassVar[Mapping[str, str]] = {
+        kind: meaning for kind, meaning in KINDS.items() if kind != "VTU"
+    }
 
     def show_result(self) -> None:
         """Show the work here, what it drew last, and the command line."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from nicegui import ui
 
 from hotlever.app.jobs import Task
 from hotlever.app.pages.drawn import DrawnPage, in_python, probe_files, settings, stem
 from hotlever.app.pages.frame import ErrorBanner, caption
-from hotlever.app.pages.page import KINDS, outputs
+from hotlever.app.pages.page import outputs
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 
@@ -24,7 +24,6 @@ class SmallSignals(DrawnPage):
 
     name = "signals"
     alt = "Impedance, and how the tip follows, against the frequency"
-    kinds: ClassVar = {kind: meaning for kind, meaning in KINDS.items() if kind != "VTU"}
 
     def __init__(self, session: Session, banner: ErrorBanner, lever: dict[str, Any]) -> None:
         super().__init__(session, banner)
