@@ -9,18 +9,14 @@ Run: python benchmarks/commands.py
 
 from __future__ import annotations
 
-import os
 import shlex
-import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from resource import RUSAGE_CHILDREN, getrusage
 from statistics import median
 
-from hotlever.cache import CACHE_VARIABLE
-from problems import table
+from problems import processor_seconds, run_python, table
 
 EXAMPLES = Path(__file__).parents[1] / "src" / "hotlever" / "examples"
 COMMANDS = """
@@ -43,28 +39,19 @@ STARTING = (
 ROUNDS = 7
 
 
-def seconds(arguments: Sequence[str], folder: str, surroundings: Mapping[str, str]) -> float:
-    """Return the processor seconds that Python takes for some arguments."""
-    before = getrusage(RUSAGE_CHILDREN)
-    command = [sys.executable, *arguments]
-    subprocess.run(command, cwd=folder, env=surroundings, check=True, capture_output=True)
-    after = getrusage(RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-
 def main() -> None:
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        surroundings = {**os.environ, CACHE_VARIABLE: str(Path(folder, "cache"))}
+
+        def seconds(arguments: Sequence[str]) -> float:
+            return processor_seconds(lambda: run_python(arguments, folder, Path(folder, "cache")))
+
         for line in COMMANDS.strip().splitlines():
             words = shlex.split(line.format(examples=EXAMPLES))
-            used = seconds(["-m", "hotlever", *words], folder, surroundings)
+            used = seconds(["-m", "hotlever", *words])
             rows.append((line.format(examples="examples"), f"{used:.1f}"))
             print(f"{used:6.1f} s  {line}", file=sys.stderr, flush=True)
-        rounds = [
-            [seconds(arguments, folder, surroundings) for arguments in (LEAST, *STARTING)]
-            for _ in range(ROUNDS)
-        ]
+        rounds = [[seconds(arguments) for arguments in (LEAST, *STARTING)] for _ in range(ROUNDS)]
     table(("command", "processor seconds"), rows)
     medians = [median(used) for used in zip(*rounds, strict=True)]
     starts = [

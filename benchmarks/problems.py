@@ -217,16 +217,21 @@ def processor_seconds(action: Callable[[], object], runs: int = 1) -> float:
     return median(times)
 
 
+def run_python(arguments: Sequence[str], folder: str | Path, cache: str | Path) -> None:
+    """Run Python with some arguments in a folder, quietly, with hotlever's cache in another."""
+    subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder,
+        env=os.environ | {CACHE_VARIABLE: str(cache)},
+        check=True,
+        capture_output=True,
+    )
+
+
 def fit_command(cache: str | Path) -> None:
     """Run the whole command ``hotlever fit`` on the example, with its cache in a folder."""
     with tempfile.TemporaryDirectory() as folder:
-        fit = [sys.executable, "-c", "from hotlever.cli import main; main()", "fit"]
-        subprocess.run(
-            [*fit, str(EXAMPLE), "-o", str(Path(folder, "fit.json"))],
-            check=True,
-            env=os.environ | {CACHE_VARIABLE: str(cache)},
-            capture_output=True,
-        )
+        run_python(["-m", "hotlever", "fit", str(EXAMPLE), "-o", "fit.json"], folder, cache)
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:

@@ -1,13 +1,23 @@
 #!/bin/sh
-# Builds sdist and wheel, installs the wheel for every Python from 3.11 on that this machine has, and runs tests there.
+# Builds sdist and wheel twice, the same to the byte, installs the wheel for every Python from 3.11 on that this machine
+# has, and runs tests there, the README's blocks among them.
 set -eu
 cd "$(dirname "$0")/.."
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 # the wheel is made from the sdist, so that what the sdist lacks is noticed
-.venv/bin/python -m build --outdir "$folder" . >/dev/null
-wheel=$(ls "$folder"/*.whl)
+SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
+export SOURCE_DATE_EPOCH
+git clone --quiet . "$folder/clone"
+for source in . "$folder/clone"; do
+    .venv/bin/python -m build --outdir "$source/build/release" "$source" >/dev/null
+done
+for file in "$folder"/clone/build/release/*; do
+    cmp "$file" "build/release/${file##*/}"
+    sha256sum "build/release/${file##*/}"
+done
+wheel=$(ls "$folder"/clone/build/release/*.whl)
 
 tested=
 for python in $(
@@ -20,7 +30,8 @@ for python in $(
     "$folder/$version/bin/pip" install --quiet --disable-pip-version-check "$wheel[app,raman,cluster,test]"
     echo "Python $version"
     "$folder/$version/bin/python" -m pytest -q -p no:cacheprovider -n 2 --dist loadfile \
-        tests/materials tests/probe tests/measurement tests/test_cli.py tests/test_package.py tests/test_processes.py
+        tests/materials tests/probe tests/measurement tests/test_cli.py tests/test_package.py \
+        tests/test_processes.py tests/test_readme.py
     tested="$tested $version"
 done
 [ -n "$tested" ] || { echo "no Python from 3.11 on was found" >&2; exit 1; }
