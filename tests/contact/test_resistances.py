@@ -9,7 +9,7 @@ from scipy.special import j1
 
 from hotlever.contact.cone import AirBeside, cold_resistance, up_the_cone
 from hotlever.contact.law import ContactLaw
-from hotlever.contact.spreading import contact_resistance
+from hotlever.contact.spreading import axis_rise, contact_resistance
 from hotlever.errors import InputError
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.silicon import thermal_conductivity
@@ -146,6 +146,40 @@ def test_through_an_interface_that_resists_the_flux_is_uniform():
     thicknesses = [depth * RADIUS for depth in depths]
     resistance = contact_resistance(RADIUS, kappas, thicknesses, 1e9) - 1e9
     assert resistance == pytest.approx(flux, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("kappas", "thicknesses_um", "interface"),
+    [([0.2, 0.2, 0.2], [0.003, 0.02], 0.0), ([0.2, 1.4, 141.0], [0.005, 0.02], 1e5)],
+)
+def test_under_the_disc_heat_flows_on_and_far_away_it_comes_from_a_point(
+    kappas, thicknesses_um, interface
+):
+    below = RADIUS, kappas, thicknesses_um, interface
+    edge, step = thicknesses_um[0], 1e-4 * thicknesses_um[0]
+    above, under = (
+        axis_rise(*below, edge + way * step * np.arange(1e-9, 3)) @ [3.0, -4.0, 1.0] * way
+        for way in (-1, 1)
+    )
+    assert kappas[0] * above == pytest.approx(kappas[1] * under, rel=1e-4)
+    far = axis_rise(*below, np.array([50.0])).item()
+    point = 1e3 / (2.0 * np.pi * kappas[-1] * 50.0) / contact_resistance(*below)
+    assert far == pytest.approx(point, rel=1e-3)
+    if interface == 0.0:  # all of one material: a disc on a half-space
+        depths = RADIUS * np.array([0.1, 0.5, 1.0, 3.9, 10.0])
+        exact = 2.0 / np.pi * np.arctan(RADIUS / depths)
+        assert axis_rise(*below, depths) == pytest.approx(exact, abs=1e-4)
+
+
+def test_the_temperature_falls_from_the_lever_through_the_contact():
+    law = ContactLaw(probe(interface_K_per_mW=5e4))
+    height, T, under = law.along_axis(900.0, RADIUS * np.array([0.01, 1.0, 100.0]))
+    assert (height[0], height[-1]) == pytest.approx((0.0, 0.7))
+    assert (T[0], T[-1]) == pytest.approx(
+        (law.at(np.array([900.0])).apex_K.item(), 900.0), rel=1e-6
+    )
+    whole = [*T[::-1], *under, 293.0]
+    assert (np.diff(whole) < 0.0).all()
 
 
 def test_the_law_is_a_series_of_resistances():

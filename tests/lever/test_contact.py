@@ -13,7 +13,12 @@ from hotlever.contact.law import INTERFACE
 from hotlever.errors import InputError
 from hotlever.figures import contact_overview
 from hotlever.lever import Lever
-from hotlever.lever.contact import history_in_contact, out_of_contact, sweep_in_contact
+from hotlever.lever.contact import (
+    history_in_contact,
+    out_of_contact,
+    state_in_contact,
+    sweep_in_contact,
+)
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.training import can_be_reduced
 from hotlever.lever.transient import pulse, simulate, step
@@ -43,6 +48,20 @@ def test_heat_goes_somewhere(touching):
     left = data.end_heat_mW + data.into_tip_mW
     np.testing.assert_allclose(left, data.power_mW, rtol=1e-5)
     assert (data.into_tip_mW > 0.05 * data.power_mW).all()
+
+
+def test_a_state_in_contact_needs_no_branch_in_contact(touching):
+    """From the state out of contact, from one nearby, and of another radius."""
+    free, near = out_of_contact(touching), None
+    for bias, radius in ((4.0, 0.1), (4.2, 0.09)):
+        probe = touching.probe.with_(**{"tip.apex_radius_um": radius})
+        shown, near = state_in_contact(free, probe, bias, near)
+        lever = Lever(probe, COARSE)
+        data = sweep_in_contact(lever, [bias], sensitivities=False)
+        # the cone of another radius is a little narrower where it meets the lever
+        close = {"rel": 1e-3} if radius == 0.1 else {"rel": 2e-2}
+        for name, value in shown.items():
+            assert value == pytest.approx(data[name].item(), **close), name
 
 
 def test_a_contact_cools_the_heater(touching, free):

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
+from numpy.typing import ArrayLike
 from PIL import Image
 
 from hotlever.app.project import file_stamp
@@ -82,9 +83,8 @@ class _Map:
 
         A browser shows a picture in a tenth of the time that it takes to draw a map of numbers.
         """
-        shares = np.clip((self._cells @ T - low) / (high - low), 0.0, 1.0)
         dots = np.zeros((self._inside.size, 4), dtype=np.uint8)
-        dots[self._inside] = _COLOURS[(shares * (len(_COLOURS) - 1)).astype(np.intp)]
+        dots[self._inside] = coloured(self._cells @ T, low, high)
         rows = dots.reshape(self.y.size, self.x.size, 4)[::-1]
         written = io.BytesIO()
         Image.fromarray(rows).save(written, "png", compress_level=1)
@@ -93,6 +93,12 @@ class _Map:
     def line(self, T: Array) -> Array:
         """Return the temperature (K) along the current."""
         return np.asarray((self._shares * T[self._on_path]).sum(axis=1))
+
+
+def coloured(T: ArrayLike, low: float, high: float) -> Array:
+    """Return temperatures as colours from `low` to `high` (K): four bytes each."""
+    shares = np.clip((np.asarray(T) - low) / (high - low), 0.0, 1.0)
+    return np.asarray(_COLOURS[(shares * (len(_COLOURS) - 1)).astype(np.intp)])
 
 
 #: Maps by mesh; those of one shape share it.

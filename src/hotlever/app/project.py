@@ -30,7 +30,7 @@ FITS, CALIBRATIONS = "fits", "calibrations"
 #: Endings of tables that commands write: no measurements.
 _WRITTEN = (
     *(TABLE, ".raman.csv", ".corrections.csv"),
-    *(".sweep.csv", ".pulse.csv", ".spectrum.csv", ".design.csv"),
+    *(".sweep.csv", ".pulse.csv", ".spectrum.csv", ".design.csv", ".contact.csv"),
 )
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -14,6 +14,7 @@ from nicegui import app, background_tasks, ui
 
 from hotlever.app.access import Access
 from hotlever.app.pages.calibrate import CalibratePage
+from hotlever.app.pages.contact import ContactPage
 from hotlever.app.pages.design import DesignPage
 from hotlever.app.pages.fit import FitPage
 from hotlever.app.pages.lever import LeverPage
@@ -38,7 +39,7 @@ _MESSAGES = 100
 _SOON_S = 1.0
 LOCAL = ("127.0.0.1", "localhost", "::1")
 _PAGES = (
-    *(StartPage, LeverPage, SimulatePage, DesignPage, MaterialsPage),
+    *(StartPage, LeverPage, SimulatePage, ContactPage, DesignPage, MaterialsPage),
     *(RamanPage, FitPage, CalibratePage, LeversPage),
 )
 

@@ -91,6 +91,21 @@ class Signals(BaseModel):
     amplitude_V: float | None = None
 
 
+class Contact(BaseModel):
+    """The page Contact: a probe, what its tip touches, the bias, and the slider's highest (V).
+
+    What is None or empty is what the probe file says, or what is usual.
+    """
+
+    probe: str | None = None
+    medium: Literal["", "vacuum", "air"] = ""
+    sample: str = ""
+    radius_nm: float | None = None
+    interface: float | None = None
+    bias: float = 8.0
+    most: float = 12.0
+
+
 class Design(BaseModel):
     """The page Design: one or two numbers of a probe that are varied, and the power (mW)."""
 
@@ -169,6 +184,7 @@ class Choices(BaseModel):
     simulate: Simulate = Simulate()
     pulse: Pulse = Pulse()
     signals: Signals = Signals()
+    contact: Contact = Contact()
     design: Design = Design()
     materials: Materials = Materials()
     raman: Raman = Raman()

@@ -16,11 +16,13 @@ from hotlever.app.changes import Changes
 from hotlever.app.jobs import Task
 from hotlever.app.workers import Report
 from hotlever.tasks.calibrating import calibrate_files
+from hotlever.tasks.contacting import touch
 from hotlever.tasks.designing import vary_design
 from hotlever.tasks.fitting import fit_files
 from hotlever.tasks.importing import propose_probe
 from hotlever.tasks.measured_requests import CalibrateRequest, FitRequest, RamanRequest
 from hotlever.tasks.requests import (
+    ContactRequest,
     DesignRequest,
     ImportRequest,
     PulseRequest,
@@ -37,6 +39,7 @@ _TASKS: dict[str, tuple[str, type, Callable[[Report, Any], Any]]] = {
     "fit": ("data", FitRequest, fit_files),
     "calibrate": ("data", CalibrateRequest, calibrate_files),
     "sweep": ("probe", SweepRequest, sweep),
+    "contact": ("probe", ContactRequest, touch),
     "pulse": ("probe", PulseRequest, simulate_in_time),
     "spectrum": ("probe", SpectrumRequest, respond),
     "design": ("probe", DesignRequest, vary_design),
@@ -56,6 +59,19 @@ def run(report: Report, folder: Path, task: Task) -> None:
         If it cannot be done, or only in part.
     """
     os.chdir(folder)
+    request, do = request_of(task)
+    with Changes(folder).recorded(task.line):
+        do(report, request)
+
+
+def request_of(task: Task, folder: Path | None = None) -> tuple[Any, Callable[[Report, Any], Any]]:
+    """Return the request of a task, and what takes it; its files are in a folder that is given.
+
+    Raises
+    ------
+    ValidationError
+        If an option is none of the command's.
+    """
     files_are, request, do = _TASKS[task.command]
     options = {
         name: value for name, value in task.options.items() if value not in (None, "", False, [])
@@ -63,6 +79,6 @@ def run(report: Report, folder: Path, task: Task) -> None:
     switched_off = [name for name in options if name.startswith("no_")]
     options |= {name.removeprefix("no_"): not options.pop(name) for name in switched_off}
     if task.files:
-        options[files_are] = task.files if task.command in _OF_SEVERAL else task.files[0]
-    with Changes(folder).recorded(task.line):
-        do(report, TypeAdapter(request).validate_python(options))
+        files = [str(folder / name) for name in task.files] if folder else list(task.files)
+        options[files_are] = files if task.command in _OF_SEVERAL else files[0]
+    return TypeAdapter(request).validate_python(options), do

@@ -72,6 +72,27 @@ def up_the_cone(
     air : AirBeside, optional
         None in vacuum.
     """
+    T, heat = _climbed(tip, apex_K, apex_mW, base_temperature_K, air)[1][-1]
+    return T, heat
+
+
+def along_the_cone(
+    tip: Tip,
+    apex_K: float,
+    apex_mW: float,
+    base_temperature_K: float,
+    air: AirBeside | None = None,
+) -> tuple[Array, Array]:
+    """Return heights (µm) from the flat end up to the lever, and the temperatures (K) there."""
+    ends = np.array([apex_K]), np.array([apex_mW])
+    height, states = _climbed(tip, *ends, base_temperature_K, air)
+    return height, np.array([T for (T,), _ in states])
+
+
+def _climbed(
+    tip: Tip, apex_K: Array, apex_mW: Array, base_temperature_K: float, air: AirBeside | None
+) -> tuple[Array, list[Array]]:
+    """Return heights (µm) up the cone, and temperatures and heats at each of them."""
     # the radius and, where air matters, the jumps set the scale of what happens near the end
     scale = tip.apex_radius_um
     position = np.linspace(0.0, math.log1p(tip.height_um / scale), 2 * _STEPS + 1)
@@ -92,13 +113,14 @@ def up_the_cone(
         return np.asarray(per_step[at] * np.stack([rise, more]))
 
     state = np.stack([apex_K, apex_mW])
+    states = [state]
     for at in range(0, 2 * _STEPS, 2):  # classical Runge-Kutta
         first = slopes(at, state)
         second = slopes(at + 1, state + first / 2.0)
         third = slopes(at + 1, state + second / 2.0)
         state = state + (first + 2.0 * (second + third) + slopes(at + 2, state + third)) / 6.0
-    T, heat = state
-    return T, heat
+        states.append(state)
+    return height[::2], states
 
 
 def _shell(tip: Tip) -> float:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hotlever.contact.cone import AirBeside, cold_resistance, up_the_cone
-from hotlever.contact.spreading import contact_resistance
+from hotlever.contact.cone import AirBeside, along_the_cone, cold_resistance, up_the_cone
+from hotlever.contact.spreading import axis_rise, contact_resistance
 from hotlever.materials.laws import Evaluated
 from hotlever.probe import Probe
 from hotlever.types import Array
@@ -68,9 +68,8 @@ class ContactLaw:
         self.interface_K_per_mW = contact.interface_K_per_mW
         thicknesses = [layer.thickness_um for layer in layers if layer.thickness_um is not None]
         kappas = [layer.kappa for layer in layers]
-        self.below_apex_K_per_mW = contact_resistance(
-            tip.apex_radius_um, kappas, thicknesses, self.interface_K_per_mW
-        )
+        self._below = tip.apex_radius_um, kappas, thicknesses, self.interface_K_per_mW
+        self.below_apex_K_per_mW = contact_resistance(*self._below)
         self.spreading_K_per_mW = self.below_apex_K_per_mW - self.interface_K_per_mW
         self._air: AirBeside | None = None
         around = probe.surroundings
@@ -117,6 +116,17 @@ class ContactLaw:
         """Return where heat goes at temperatures (K) of the tip's base."""
         into_tip, heat, apex = np.moveaxis(self._table(np.asarray(tip_K) - self._base_K), -1, 0)
         return AtTheContact(self._base_K + apex, heat, into_tip - heat)
+
+    def along_axis(self, tip_K: float, depth_um: Array) -> tuple[Array, Array, Array]:
+        """Return heights (µm) on the cone, the temperatures (K) there, and those under its middle.
+
+        By the temperature of the tip's base, and for depths (µm) in the sample, above zero.
+        """
+        apex, heat, _ = self.at(np.array([tip_K]))
+        ends = float(apex[0]), float(heat[0])
+        height, T = along_the_cone(self._tip, *ends, self._base_K, self._air)
+        rise = (ends[0] - self._base_K) * axis_rise(*self._below, depth_um)
+        return height, T, self._base_K + rise
 
     @property
     def sum_by_interface(self) -> float:

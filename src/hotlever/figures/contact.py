@@ -11,6 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from hotlever.colours import BLUE, HEAT, ORANGE, PURPLE, VERMILION
+from hotlever.contact.picture import contact_picture
 from hotlever.figures.style import axis_label, curve, figure, marker
 from hotlever.probe import Probe
 
@@ -19,9 +20,6 @@ if TYPE_CHECKING:
 
 #: Heat (mW) that is none but for rounding.
 _NONE_MW = 1e-9
-#: Where things stand in the drawing, which is not to scale: half the widths of lever, base and
-#: flat end, and heights.
-_LEVER, _BASE, _END, _TOP, _DEPTH = 1.0, 0.52, 0.1, 1.25, 0.75
 
 
 def contact_overview(data: xr.Dataset, probe: Probe) -> Figure:
@@ -64,61 +62,43 @@ def contact_overview(data: xr.Dataset, probe: Probe) -> Figure:
 
 
 def _draw(axes: Axes, state: xr.Dataset, probe: Probe) -> None:
-    """Draw lever, tip and sample of one state, coloured by temperature; not to scale."""
-    tip, contact = probe.tip, probe.contact
+    """Draw lever, tip and sample of one state, coloured by temperature."""
+    tip = probe.tip
     assert tip is not None
-    assert contact is not None
-    base = probe.circuit.base_temperature_K
-    heat = mpl.colormaps[HEAT]
-    scale = Normalize(base, max(float(state.tip_K), base + 1.0))
-
-    def piece(corners: list[tuple[float, float]], T: float, **style: Any) -> None:
-        axes.fill(*zip(*corners, strict=True), facecolor=heat(scale(T)), edgecolor="0.3", **style)
-
-    hot, apex = float(state.tip_K), float(state.apex_K)
-    piece([(-_LEVER, _TOP), (_LEVER, _TOP), (_LEVER, _TOP + 0.22), (-_LEVER, _TOP + 0.22)], hot)
-    slices = 24
-    for number in range(slices):
-        low, high = number / slices, (number + 1) / slices
-        # most of the fall is where the cone is narrow
-        T = hot + (apex - hot) * (1.0 - low) ** 3
-        left, right = (_END + (_BASE - _END) * share for share in (low, high))
-        corners = [(-left, low), (left, low), (right, high), (-right, high)]
-        piece([(x, _TOP * y) for x, y in corners], T, linewidth=0.0)
-    axes.plot([-_BASE, -_END, _END, _BASE], [_TOP, 0.0, 0.0, _TOP], color="0.3", lw=0.8)
-    layers = contact.layers
-    for number, layer in enumerate(layers):
-        top, bottom = (-_DEPTH * part / len(layers) for part in (number, number + 1))
+    base, hot, apex = probe.circuit.base_temperature_K, float(state.tip_K), float(state.apex_K)
+    drawn = contact_picture(probe, hot)
+    heat, scale = mpl.colormaps[HEAT], Normalize(base, max(hot, base + 1.0))
+    width = drawn.half_width
+    for number, (name, top, bottom) in enumerate(drawn.layers):
         grey = str(0.78 + 0.16 * (number % 2))
-        axes.fill_between([-_LEVER, _LEVER], bottom, top, facecolor=grey, edgecolor="0.3")
-        thick = "" if layer.thickness_um is None else f", {1e3 * layer.thickness_um:.4g} nm"
-        name = layer.material + thick
-        axes.text(-0.95, (top + bottom) / 2.0, name, va="center", fontsize=8)
+        axes.fill_between([-width, width], bottom, top, facecolor=grey)
+        axes.text(-0.97 * width, (top + bottom) / 2.0, name, va="center", fontsize=8)
+    for corners, T in drawn.pieces:
+        axes.fill(*zip(*corners, strict=True), facecolor=heat(scale(T)), lw=0.0)
+    for line in drawn.outlines:
+        axes.plot(*zip(*line, strict=True), color="0.3", lw=0.8)
 
     def word(height: float, text: str) -> None:
-        axes.text(_LEVER + 0.08, height, text, va="center", fontsize=8)
+        axes.text(1.06 * width, height, text, va="center", fontsize=8)
 
-    word(_TOP + 0.11, f"heater: {hot:.0f} K")
-    word(0.75 * _TOP, f"cone, {tip.height_um:g} µm: {_per_watt(state.tip_K_per_mW)}")
-    word(0.36, f"apex: {apex:.0f} K")
-    word(
-        0.0,
-        f"interface, r = {1e3 * tip.apex_radius_um:.4g} nm: {_per_watt(state.interface_K_per_mW)}",
-    )
-    word(-0.35 * _DEPTH, f"spreading: {_per_watt(state.spreading_K_per_mW)}")
-    word(-_DEPTH, f"far away: {base:.0f} K")
-    axes.annotate(
-        "",
-        (0.0, -0.5 * _DEPTH),
-        (0.0, 0.62 * _TOP),
-        arrowprops={"arrowstyle": "-|>", "color": "0.15", "lw": 1.2},
-    )
-    axes.text(0.04, -0.52 * _DEPTH, f"{1e3 * float(state.sample_mW):.3g} µW", fontsize=8, va="top")
+    high, low = drawn.height[0], drawn.bottom
+    end = f"r = {1e3 * tip.apex_radius_um:.4g} nm"
+    word(high + 0.35, f"heater: {hot:.0f} K")
+    word(0.6 * high, f"cone, {tip.height_um:g} µm: {_per_watt(state.tip_K_per_mW)}")
+    word(0.12 * high, f"apex: {apex:.0f} K")
+    word(0.0, f"interface, {end}: {_per_watt(state.interface_K_per_mW)}")
+    word(0.3 * low, f"spreading: {_per_watt(state.spreading_K_per_mW)}")
+    word(0.5 * low, f"heat: {1e3 * float(state.sample_mW):.3g} µW")
+    word(low, f"far away: {base:.0f} K")
     if float(state.beside_mW) > _NONE_MW:
-        axes.text(-0.98, 0.25, f"air: {1e3 * float(state.beside_mW):.3g} µW", fontsize=8)
-    axes.set(xlim=(-1.05, 2.55), ylim=(-_DEPTH - 0.1, _TOP + 0.35))
-    axes.set_axis_off()
-    axes.set_title(f"where it is hottest, at {float(state.bias_V):.4g} V (not to scale)")
+        air = f"air: {1e3 * float(state.beside_mW):.3g} µW"
+        axes.text(-0.97 * width, 0.08 * high, air, fontsize=8)
+    axes.set(xlim=(-1.05 * width, 2.45 * width), ylim=(low - 0.2, drawn.top + 0.2), xticks=[])
+    axes.set_yticks(*zip(*drawn.ticks, strict=True))
+    axes.tick_params(labelsize=8)
+    axes.grid(visible=False)
+    axes.spines[["bottom", "right", "top"]].set_visible(False)
+    axes.set_title(f"where it is hottest, at {float(state.bias_V):.4g} V")
 
 
 def _per_watt(resistance: Any) -> str:

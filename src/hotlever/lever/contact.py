@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,11 +11,13 @@ from numpy.typing import ArrayLike
 
 from hotlever.contact.law import INTERFACE, ContactLaw
 from hotlever.datasets import labelled
-from hotlever.errors import InputError
-from hotlever.lever.lever import Lever
+from hotlever.errors import ComputationError, InputError
+from hotlever.lever.lever import Lever, State
 from hotlever.lever.sensitivities import sensitivities_of
 from hotlever.lever.transient import Waveform, simulate
+from hotlever.probe import Probe
 from hotlever.probe.contact import OUT_OF_CONTACT
+from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
@@ -26,6 +30,8 @@ _OF_THE_CONTACT = (
 #: Columns of a file, by bias and in time.
 CONTACT_COLUMNS: tuple[str, ...] = ("bias_V", "current_mA", *_OF_THE_CONTACT)
 HISTORY_COLUMNS: tuple[str, ...] = ("time_us", *CONTACT_COLUMNS)
+#: By this name probes have the radius of the contact.
+_RADIUS = "apex_radius_um"
 #: A heat (mW) that is none but for rounding: nothing is said of resistances without.
 _NOTHING_MW = 1e-12
 
@@ -50,8 +56,71 @@ def out_of_contact(lever: Lever) -> Lever:
     return lever.with_probe(lever.probe.replace({INTERFACE: OUT_OF_CONTACT}))
 
 
+@one_blas_thread
+def state_in_contact(
+    free: Lever, probe: Probe, bias: float, near: State | None = None
+) -> tuple[dict[str, float], State]:
+    """Return what a tip in contact shows at a bias (V), and its state, without a branch of its own.
+
+    It is solved from a state in contact that may be near, or else from the one out of contact.
+
+    Parameters
+    ----------
+    free : Lever
+        Out of contact.
+    probe : Probe
+        In contact, else the same but for the radius of the flat end: the cone is meshed as that of
+        `free`.
+    bias : float
+    near : State, optional
+
+    Returns
+    -------
+    shown : dict of str to float
+        What `sweep_in_contact` has of this bias, but for ``current_by_resistance``.
+    state : State
+
+    Raises
+    ------
+    BranchEndError, ComputationError
+        As `Lever.solve`.
+    """
+
+    def like_free(probe: Probe) -> Lever:
+        lever = copy(free)
+        lever.probe = probe
+        lever._prepare()
+        return lever
+
+    (away,) = free.solve([bias])
+    # out of contact too, the air beside the cone depends on its radius
+    above = free.probe.replace({_RADIUS: float(probe.values([_RADIUS])[0])})
+    before = like_free(above).polished(away.x, bias)
+    touching, after = like_free(probe), None
+    for guess in (near, before):
+        if guess is not None and after is None:
+            with suppress(ComputationError):
+                after = touching.polished(guess.x, bias)
+    if after is None:
+        (after,) = touching.solve([bias])
+    columns = _columns(touching, np.array([after.tip_K]))
+    shown = {name: float(values[0]) for name, values in columns.items()} | {
+        "bias_V": bias,
+        "tip_K": after.tip_K,
+        "current_mA": after.current_mA,
+        "current_change_mA": after.current_mA - before.current_mA,
+        "tip_change_K": after.tip_K - before.tip_K,
+    }
+    return shown, after
+
+
 def sweep_in_contact(
-    lever: Lever, bias: ArrayLike, *, progress: Progress | None = None
+    lever: Lever,
+    bias: ArrayLike,
+    *,
+    free: Lever | None = None,
+    sensitivities: bool = True,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Read a lever in contact over a range of bias, beside the same out of contact.
 
@@ -60,6 +129,10 @@ def sweep_in_contact(
     lever : Lever
     bias : array_like, shape (n,)
         V.
+    free : Lever, optional
+        The same out of contact, whose branch is then not solved anew.
+    sensitivities : bool
+        Add ``current_by_resistance``, of which each state takes as long as a step of the branch.
     progress : callable, optional
         Called with the states done and how many there usually are.
 
@@ -79,18 +152,19 @@ def sweep_in_contact(
     BranchEndError, ComputationError
         As `Lever.sweep`.
     """
-    free = out_of_contact(lever).sweep(bias, progress=progress)
+    before = (free or out_of_contact(lever)).sweep(bias, progress=progress)
     data = lever.sweep(bias, progress=progress)
-    branch, reading, _ = lever._read(data.bias_V.values)
-    powered = data.current_mA.values != 0
-    slope = np.zeros(powered.size)
-    by = sensitivities_of(branch, reading.u[powered], lever.circuit, [INTERFACE])
-    slope[powered] = by[0, :, 0] / law_of(lever).sum_by_interface
     columns = _columns(lever, data.tip_K.values) | {
-        "current_change_mA": data.current_mA.values - free.current_mA.values,
-        "tip_change_K": data.tip_K.values - free.tip_K.values,
-        "current_by_resistance": slope,
+        "current_change_mA": data.current_mA.values - before.current_mA.values,
+        "tip_change_K": data.tip_K.values - before.tip_K.values,
     }
+    if sensitivities:
+        branch, reading, _ = lever._read(data.bias_V.values)
+        powered = data.current_mA.values != 0
+        slope = np.zeros(powered.size)
+        by = sensitivities_of(branch, reading.u[powered], lever.circuit, [INTERFACE])
+        slope[powered] = by[0, :, 0] / law_of(lever).sum_by_interface
+        columns["current_by_resistance"] = slope
     return data.assign(labelled(columns).variables)
 
 

@@ -23,6 +23,7 @@ PAGES = {
     "": ("Start", "home"),
     "lever": ("Lever", "architecture"),
     "simulate": ("Simulate", "tune"),
+    "contact": ("Contact", "south"),
     "design": ("Design", "insights"),
     "materials": ("Materials", "layers"),
     "raman": ("Raman", "thermostat"),

@@ -45,7 +45,8 @@ def plotted(data: list[dict[str, Any]], layout: dict[str, Any], alt: str) -> ui.
     return made
 
 
-def _side_by_side() -> ui.element:
+def side_by_side() -> ui.element:
+    """Return where plots stand beside one another, as many as there is room for."""
     columns = "grid-template-columns: repeat(auto-fit, minmax(250px, 1fr))"
     return ui.element("div").classes("w-full grid gap-2").style(columns)
 
@@ -68,7 +69,7 @@ class MeasuredPlots:
         model = {"type": "scatter", "name": "model", **line}
         self._plots: dict[str, tuple[ui.element, ui.plotly]] = {}
         # once for all measurements: a browser takes long to make them
-        with _side_by_side():
+        with side_by_side():
             for name, ((_, along), (_, title)) in self._AXES.items():
                 with ui.element("div") as around:
                     layout = axes(along, title, 240, normal="xy")
@@ -110,7 +111,7 @@ def compare_histories(first: Path, second: Path) -> None:
     """Show two levers in time in the same plots, of the tables that were written of them."""
     tables = [np.genfromtxt(path, delimiter=",", names=True) for path in (first, second)]
     lines: list[dict[str, Any]] = [{"color": BLUE}, {"color": INK, "dash": "dash"}]
-    with _side_by_side():
+    with side_by_side():
         for name, title in (("tip_K", _TIP), ("current_mA", _CURRENT), ("lever_V", _LEVER_V)):
             drawn: list[dict[str, Any]] = []
             for table, line in zip(tables, lines, strict=True):
@@ -158,7 +159,7 @@ class LivePlots:
         picture = {"xref": "x", "yref": "y", "sizing": "stretch", "layer": "below"}
         square["images"] = [picture | {"xanchor": "left", "yanchor": "top", "source": ""}]
         self._heat = plotted([bar], square, "Map of the temperature")
-        with _side_by_side():
+        with side_by_side():
             self._iv = plotted(
                 [line, knee, here, other, there],
                 axes(_LEVER_V, _CURRENT, 270),

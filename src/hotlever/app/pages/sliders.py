@@ -5,15 +5,15 @@ While sliders move a quick lever answers, then the full one.
 
 from __future__ import annotations
 
-import asyncio
 import math
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from nicegui import background_tasks, ui
+from nicegui import ui
 
 from hotlever.app.pages.beside import beside_in_words, lever_beside
+from hotlever.app.pages.following import Follower, slider
 from hotlever.app.pages.frame import flat_button, number_shown
 from hotlever.app.pages.page import Page
 from hotlever.app.pages.plots import LivePlots
@@ -22,8 +22,8 @@ from hotlever.materials.parameters import label
 from hotlever.probe.physics import Physics
 
 _GROUPS = {"material": "Material", "dimensions": "Dimensions", "circuit": "Circuit"}
-#: Seconds that sliders rest before the full lever is asked.
-_REST_S = 0.35
+#: What is chosen of a lever, which has to be solved for it, and of a state.
+_OF_LEVER, _OF_BIAS = ("probe", "changes"), ("bias", "most")
 #: What surrounds a lever: each combination gets a reduced lever of its own.
 _AROUND = {"medium", "surface_gap_um"}
 _MODELS = {
@@ -119,19 +119,11 @@ class Sliders:
     def _slider(
         self, meaning: str, name: str, value: float, low: float, high: float, unit: str
     ) -> None:
-        """Show the slider of a parameter, and its number; its name in files on hover."""
+        """Show the slider of a parameter; its name in files on hover."""
+        words, hint = label(name), f"{name}: {meaning}" if meaning else name
         now = self._chosen["changes"].get(name, value)
-        unit = "" if unit == "1" else unit
-        with ui.column().classes("w-full gap-0"):
-            with ui.row().classes("w-full items-center no-wrap justify-between"):
-                words, hint = label(name), f"{name}: {meaning}" if meaning else name
-                ui.label(words).classes("text-sm remark").tooltip(hint)
-                number = ui.number(format="%.4g").classes("w-36 shrink-0").props(remove="outlined")
-                number.props(f'borderless suffix="{unit}" input-class=text-right')
-                number.props(f'aria-label="{words}"')
-            slider = ui.slider(min=low, max=high, step=(high - low) / 400, value=now)
-            number.bind_value(slider.props(f'dense aria-label="{words}"'))
-        slider.on_value_change(lambda event: self._change(name, event.value, {name: value}))
+        number = slider(words, now, low, high, "" if unit == "1" else unit, hint)
+        number.on_value_change(lambda event: self._change(name, event.value, {name: value}))
 
     async def _reset(self) -> None:
         self._chosen["changes"] = {}
@@ -162,57 +154,26 @@ class LiveView:
 
     def __init__(self, page: Page) -> None:
         self._session, self._banner, self._chosen = page.session, page.banner, page.chosen
-        self._wanted: dict[str, Any] | None = None
-        self._settled: Any = None
-        self._rests = 0
-        self._busy = False
         self._free: set[str] = set()
         with ui.row().classes("w-full items-end gap-6 numbers"):
             self._numbers = {key: number_shown(key, title) for key, (title, _) in _NUMBERS.items()}
             self._knee = number_shown("knee", "knee of the I-V curve")
         self._model = ui.label("starting").classes("text-xs opacity-70").props("aria-live=polite")
+        self._follower = Follower(self._model, self._show, self._prepare)
         self._notes = ui.label().classes("text-sm remark")
         self._beside = ui.label().classes("text-sm remark").props("data-number=beside")
         with ui.column().classes("w-full") as self._drawn:
             self._plots = LivePlots()
 
     def follow(self, free: set[str]) -> None:
-        """Have the lever follow; while it does, only what is wanted last counts."""
+        """Have the lever follow what is chosen."""
         self._free = free
-        self._ask()
+        chosen = ({key: self._chosen[key] for key in keys} for keys in (_OF_LEVER, _OF_BIAS))
+        self._follower.follow(*chosen)
 
-    def _ask(self) -> None:
-        self._wanted = {key: self._chosen[key] for key in ("probe", "changes", "bias", "most")}
-        if not self._busy:
-            self._busy = True
-            background_tasks.create(self._follow(), name="live lever")
-
-    async def _follow(self) -> None:
-        try:
-            while self._wanted is not None and not self._model.is_deleted:
-                wanted, self._wanted = self._wanted, None
-                settled = (wanted["probe"], wanted["changes"]) == self._settled
-                await self._show(wanted, quick=not settled)
-                if not settled and self._wanted is None:
-                    self._rests += 1
-                    background_tasks.create(self._settle(wanted, self._rests), name="full lever")
-        finally:
-            self._busy = False
-
-    async def _settle(self, wanted: dict[str, Any], turn: int) -> None:
-        """Ask the full lever once sliders have rested; they may move on meanwhile."""
-        await asyncio.sleep(_REST_S)
-        if turn != self._rests or self._wanted is not None or self._model.is_deleted:
-            return
-        if await self._show(wanted, quick=False):
-            self._settled = (wanted["probe"], wanted["changes"])
-            background_tasks.create(self._prepare(), name="reduced lever")
-            if wanted["bias"] != self._chosen["bias"]:
-                self._ask()
-
-    async def _show(self, wanted: dict[str, Any], quick: bool) -> bool:
-        probe, changes = wanted["probe"], wanted["changes"]
-        ask = {"bias": wanted["bias"], "most": wanted["most"], "quick": quick}
+    async def _show(self, lever: dict[str, Any], at: dict[str, Any], quick: bool) -> bool:
+        probe, changes = lever["probe"], lever["changes"]
+        ask = {**at, "quick": quick}
         ask["reduced"] = self._session.reduced.get(self._geometry(probe, changes), False)
         worker = "quick" if quick else "full"
         try:
@@ -224,10 +185,7 @@ class LiveView:
             return False
         if self._model.is_deleted:  # the tab was closed meanwhile
             return False
-        if not quick and (probe, changes) != (
-            self._chosen["probe"],
-            self._chosen["changes"],
-        ):
+        if not quick and not self._follower.is_wanted(lever):
             return False  # parameters have moved on while the full lever was solved
         self._banner.clear()
         self._drawn.set_visibility(True)

@@ -1,0 +1,129 @@
+"""A tip in contact that sliders move: what it shows at once. Runs in worker processes.
+
+While sliders move, a coarse lever answers whose branch out of contact is solved once, with the
+cone of the probe's file; when they rest, the full lever, whose numbers are those of ``hotlever
+contact``.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from hotlever.app.jobs import Task
+from hotlever.app.live import coloured
+from hotlever.app.work import request_of
+from hotlever.app.workers import Report
+from hotlever.contact.law import INTERFACE
+from hotlever.contact.picture import contact_picture
+from hotlever.lever import Lever
+from hotlever.lever.contact import state_in_contact, sweep_in_contact
+from hotlever.lever.lever import COARSE, State
+from hotlever.probe import Probe
+from hotlever.probe.contact import OUT_OF_CONTACT
+from hotlever.probe.tip import EXAMPLE
+from hotlever.tasks.contacting import probe_in_contact
+from hotlever.tasks.probes import make_lever
+from hotlever.threads import one_blas_thread
+
+#: Biases of the curves, and levers kept.
+_POINTS, _KEPT = 41, 3
+#: What is touched where a probe file says nothing; any sample does for a tip out of contact.
+_SAMPLE, _ANY = "polymer, 100nm, silicon", "silicon"
+_CURVES = ("bias_V", "tip_K", "apex_K", "sample_mW", "beside_mW", "current_change_mA")
+
+
+#: By lever out of contact the last state in contact, from which the next one is solved.
+_near: WeakKeyDictionary[Lever, State] = WeakKeyDictionary()
+
+
+def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
+    """Return radius (nm), interface (K/W) and sample that a probe file states, or usual ones."""
+    probe = Probe.reference() if name is None else Probe.from_file(folder / name)
+    contact = probe.contact
+    return {
+        "radius_nm": 1e3 * (probe.tip or EXAMPLE).apex_radius_um,
+        "interface": 0.0 if contact is None else 1e3 * contact.interface_K_per_mW,
+        "sample": _SAMPLE if contact is None else contact.sample,
+    }
+
+
+@one_blas_thread
+def answer(
+    report: Report, folder: Path, task: Task, bias: float, most: float, quick: bool
+) -> dict[str, Any]:
+    """Return what a tip in contact shows at a bias (V), and unless `quick` by the bias.
+
+    Parameters
+    ----------
+    report : Report
+    folder : path
+    task : Task
+        That of ``hotlever contact``.
+    bias, most : float
+        V; how far the curves go at least, as far as the lever does.
+    quick : bool
+
+    Raises
+    ------
+    HotleverError
+        If there is no such contact, or no state at this bias.
+    """
+    request, _ = request_of(task, folder)
+    probe = probe_in_contact(report, request)
+    curves: dict[str, Any] | None = None
+    if quick:
+        end = 1e-3 * described(report, folder, next(iter(task.files), None))["radius_nm"]
+        free = _out_of_contact(report, probe.with_(**{"tip.apex_radius_um": end}), True, most)
+        now, _near[free] = state_in_contact(free, probe, bias, _near.get(free))
+    else:
+        free, lever = _touching(report, probe, max(most, bias))
+        data = sweep_in_contact(lever, [bias], free=free, sensitivities=False)
+        now = {str(name): float(values.item()) for name, values in data.data_vars.items()}
+        curves = _curves(report, probe, max(most, bias))
+    drawn = contact_picture(probe, now["tip_K"])
+    base = probe.circuit.base_temperature_K
+    scale = base, max(now["tip_K"], base + 1.0)
+    return {
+        "now": now,
+        "curves": curves,
+        "base_K": base,
+        "picture": drawn,
+        "colours": coloured([T for _, T in drawn.pieces], *scale),
+    }
+
+
+def _out_of_contact(report: Report, probe: Probe, quick: bool, most: float) -> Lever:
+    """Return a lever whose tip is just above the sample, solved up to a bias, or to its end."""
+    free = probe.with_(**{"sample": _ANY, INTERFACE: OUT_OF_CONTACT})
+    return _solved(report, free, quick, most)
+
+
+@lru_cache(maxsize=_KEPT)
+def _solved(report: Report, probe: Probe, quick: bool, most: float) -> Lever:
+    lever = Lever(probe, COARSE) if quick else make_lever(report, probe)
+    lever._read(np.array([most]))
+    return lever
+
+
+@lru_cache(maxsize=_KEPT)
+def _touching(report: Report, probe: Probe, most: float) -> tuple[Lever, Lever]:
+    """Return the full lever out of contact and in contact."""
+    free = _out_of_contact(report, probe, False, most)
+    return free, free.with_probe(probe)
+
+
+@lru_cache(maxsize=_KEPT)
+def _curves(report: Report, probe: Probe, most: float) -> dict[str, Any]:
+    """Return the columns of a sweep up to a bias, or as far as both levers go."""
+    levers = _touching(report, probe, most)
+    for lever in levers:
+        branch, *_ = lever._read(np.array([most]))
+        most = branch.highest_bias(lever.circuit, most)
+    free, lever = levers
+    data = sweep_in_contact(lever, np.linspace(0.0, most, _POINTS), free=free, sensitivities=False)
+    return {name: data[name].values for name in _CURVES}

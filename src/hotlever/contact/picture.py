@@ -1,0 +1,151 @@
+"""Tip, contact and sample in one picture, whose lengths lie decades apart.
+
+Heights above and below the contact, and radii, are drawn as asinh(length/r), r the radius of the
+contact: in proportion near it, by their logarithm far from it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hotlever.contact.law import contact_of
+from hotlever.probe import Probe
+from hotlever.probe.contact import SampleContact
+from hotlever.types import Array
+
+#: Slices of the cone and of what is under it; height of the lever's bar in the picture.
+_SLICES, _BAR = 40, 0.7
+#: How deep the sample is shown: in radii, and in its films, whichever is more.
+_RADII, _FILMS = 30.0, 3.0
+#: The picture is at least as wide, for names beside the contact.
+_NARROWEST = 3.0
+#: A layer that is thinner in the picture has no room for its name.
+_THIN = 0.4
+#: The least depth at which temperatures are drawn, over the radius.
+_NEAREST = 1e-3
+
+Corners = list[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class ContactPicture:
+    """What is drawn of a tip in contact; heights and widths are of the picture.
+
+    Attributes
+    ----------
+    pieces : list of (corners, float)
+        Lever, cone, and what is under the contact along its axis, with temperatures (K).
+    outlines : list of corners
+        Lines around lever and cone, and between the layers.
+    layers : list of (str, float, float)
+        Name and thickness, top and bottom; a layer too thin for its name has it in the next one's.
+    ticks : list of (float, str)
+        Heights, and their lengths in words.
+    height, temperature_K : ndarray
+        From the lever down along the axis.
+    apex : int
+        Place of the flat end in these; the next one is the surface of the sample.
+    half_width, bottom, top : float
+    """
+
+    pieces: list[tuple[Corners, float]]
+    outlines: list[Corners]
+    layers: list[tuple[str, float, float]]
+    ticks: list[tuple[float, str]]
+    height: Array
+    temperature_K: Array
+    apex: int
+    half_width: float
+    bottom: float
+    top: float
+
+
+def contact_picture(probe: Probe, tip_K: float) -> ContactPicture:
+    """Return the picture of a probe in contact, by the temperature of the tip at the lever."""
+    tip, contact, law = probe.tip, probe.contact, contact_of(probe)
+    assert tip is not None
+    assert contact is not None
+    assert law is not None
+    end = tip.apex_radius_um
+
+    def shown(length_um: Array | float) -> Array:
+        return np.asarray(np.arcsinh(np.asarray(length_um) / end))
+
+    films = sum(layer.thickness_um or 0.0 for layer in contact.layers)
+    deepest = max(_RADII * end, _FILMS * films)
+    down = end * np.sinh(np.linspace(0.0, float(shown(deepest)), _SLICES + 1))
+    down[0] = _NEAREST * end
+    height, cone_K, under_K = law.along_axis(tip_K, down)
+    up = np.linspace(float(shown(tip.height_um)), 0.0, _SLICES + 1)
+    along_K = np.interp(up, shown(height), cone_K)
+    half = shown(end + tip.slope * end * np.sinh(up))
+    below = -shown(down)
+    below[0] = 0.0
+    width = max(_NARROWEST, 1.2 * float(half[0]))
+    top = float(up[0]) + _BAR
+    low = float(up[0])
+    bar = [(-width, low), (width, low), (width, top), (-width, top)]
+    column = np.full_like(below, float(shown(end)))
+    pieces = [
+        (bar, tip_K),
+        *_slices(up, half, along_K),
+        *_slices(below, column, under_K),
+    ]
+    edges = np.cumsum([0.0, *(layer.thickness_um or deepest for layer in contact.layers)])
+    floors = -shown(np.minimum(edges, deepest))
+    sides = [
+        [(way * float(x), float(y)) for x, y in zip(half, up, strict=True)] for way in (-1.0, 1.0)
+    ]
+    level = [[(-width, y), (width, y)] for y in floors.tolist()]
+    return ContactPicture(
+        pieces,
+        [*sides, [*bar, bar[0]], *level],
+        _named(contact, floors.tolist()),
+        _ticks(end, tip.height_um, deepest),
+        np.concatenate([up, below]),
+        np.concatenate([along_K, under_K]),
+        _SLICES,
+        width,
+        float(floors[-1]),
+        top,
+    )
+
+
+def _named(contact: SampleContact, floors: list[float]) -> list[tuple[str, float, float]]:
+    """Return the names of layers that are thick enough for theirs, with top and bottom."""
+    named, above = [], ""
+    for layer, top, bottom in zip(contact.layers, floors, floors[1:], strict=False):
+        thick = "" if layer.thickness_um is None else f", {_length(layer.thickness_um)}"
+        name = f"{above}{layer.material}{thick}"
+        above = f"{name} on\n" if top - bottom < _THIN else ""
+        named.append(("" if above else name, top, bottom))
+    return named
+
+
+def _slices(heights: Array, halves: Array, T: Array) -> list[tuple[Corners, float]]:
+    """Return slices between heights, each of its mean temperature."""
+    slices = []
+    for number in range(heights.size - 1):
+        high, low = heights[number : number + 2].tolist()
+        wide, narrow = halves[number : number + 2].tolist()
+        corners = [(-wide, high), (wide, high), (narrow, low), (-narrow, low)]
+        slices.append((corners, float(T[number : number + 2].mean())))
+    return slices
+
+
+def _ticks(end_um: float, height_um: float, depth_um: float) -> list[tuple[float, str]]:
+    """Return lengths of one significant digit above and below the contact, zero among them."""
+    ticks = [(0.0, "0")]
+    for way, farthest in ((1.0, height_um), (-1.0, depth_um)):
+        first = math.ceil(math.log10(end_um))
+        for power in range(first, math.floor(math.log10(farthest)) + 1):
+            ticks.append((way * math.asinh(10.0**power / end_um), _length(10.0**power)))
+    return ticks
+
+
+def _length(length_um: float) -> str:
+    """Return a length in words, nm below a µm."""
+    return f"{length_um:.3g} µm" if length_um >= 0.9995 else f"{1e3 * length_um:.3g} nm"
