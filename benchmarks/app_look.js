@@ -12,10 +12,13 @@
         const text = e.getAttribute('aria-label') || e.innerText || e.textContent || e.value || '';
         return `${e.tagName.toLowerCase()} ${text.trim().slice(0, 40)}`.replace(/\s+/g, ' ').trim();
     };
-    const controls = () => [...document.querySelectorAll(CONTROLS)].filter(e =>
+    // what is open over a page hides it
+    const scope = () => document.querySelector('.q-menu') || document.querySelector('.q-dialog')
+        || document.body;
+    const controls = () => [...scope().querySelectorAll(CONTROLS)].filter(e =>
         isShown(e) && !isOff(e) && e.type !== 'file' && !e.closest('.js-plotly-plot, [inert]'));
     const texts = () => {
-        const all = [], walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+        const all = [], walker = document.createTreeWalker(scope(), NodeFilter.SHOW_TEXT);
         while (walker.nextNode()) {
             const node = walker.currentNode, e = node.parentElement;
             if (!node.data.trim() || e.closest('script, style, .q-notifications, .q-tooltip')) continue;
@@ -76,7 +79,7 @@
             const colour = e instanceof SVGElement ? style.fill : style.color;
             all.push([isIcon ? 'icon' : 'text', contrast(e, colour), least, said(e)]);
         }
-        for (const e of document.querySelectorAll('input, textarea')) {
+        for (const e of scope().querySelectorAll('input, textarea')) {
             if (!isShown(e) || isOff(e) || e.type === 'file') continue;
             const part = e.value ? undefined : '::placeholder';
             if (part && !e.placeholder) continue;
@@ -122,7 +125,7 @@
             const fault = within(e, box.left, box.right, box.top, box.bottom);
             if (fault) all.push(`${fault}: ${said(e)}`);
         }
-        for (const e of document.querySelectorAll('img, .js-plotly-plot, input, textarea, button')) {
+        for (const e of scope().querySelectorAll('img, .js-plotly-plot, input, textarea, button')) {
             if (!isShown(e)) continue;
             const box = e.getBoundingClientRect();
             const fault = within(e, box.left, box.right, box.top, box.bottom);

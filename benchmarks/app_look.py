@@ -1,8 +1,8 @@
 """What the app's pages look like: at three widths, light and dark, and by keyboard alone.
 
-``python benchmarks/app_look.py [FOLDER [PAGE …]]`` opens each page in a headless Chromium, prints
-for each the lowest contrast and what is wrong (cut off, covered, unreachable, without a name),
-and keeps a picture of each look in the folder.
+``python benchmarks/app_look.py [FOLDER [PAGE …]]`` opens each page in a headless Chromium, and what
+can be opened on them (`VIEWS`), prints for each the lowest contrast and what is wrong (cut off,
+covered, unreachable, without a name), and keeps a picture of each look in the folder.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,62 @@ _NAMED = (
 )
 #: Times that Tab is pressed at most, and milliseconds for a page to come to rest.
 _MOST_TABS, _REST_MS = 200, 700
+#: Milliseconds that a task may take.
+_WORK_MS = 120_000
+
+
+def _choose(page: Page, field: str, option: str) -> None:
+    page.get_by_role("combobox", name=field).click()
+    page.get_by_role("option", name=option, exact=True).click()
+
+
+def _drawn(page: Page, alt: str, *buttons: str) -> None:
+    """Press buttons, if a figure is not there yet, and wait for it."""
+    figure = page.locator(f"img[alt^='{alt}']")
+    if not figure.count():
+        for button in buttons:
+            page.get_by_role("button", name=button, exact=True).click()
+    figure.wait_for(timeout=_WORK_MS)
+
+
+def _in_time(page: Page) -> None:
+    _choose(page, "Compare with", "the same in air")
+    page.get_by_role("button", name="in time").click()
+    _drawn(page, "Voltages", "Follow")
+    page.get_by_text("Dashed: the same in air.").wait_for(timeout=_WORK_MS)
+    _drawn(page, "The temperature map in time", "film")
+
+
+def _small_signals(page: Page) -> None:
+    page.get_by_role("button", name="small signals").click()
+    _drawn(page, "Impedance", "Respond")
+
+
+def _compared(page: Page) -> None:
+    page.get_by_role("button", name="at a bias").click()
+    page.locator("[data-number=beside]").filter(has_text="tip").wait_for(timeout=_WORK_MS)
+
+
+def _menu(page: Page) -> None:
+    page.set_viewport_size({"width": WIDTHS[0], "height": _HEIGHTS[WIDTHS[0]]})
+    page.get_by_label("Pages: ").click()
+
+
+def _question(page: Page) -> None:
+    page.get_by_role("textbox", name="Probe file").fill("[probe]")
+    _choose(page, "Open", "reference-probe.gds")
+    page.get_by_role("dialog").wait_for()
+
+
+#: What is looked at beside the pages, by name: the page, how it is opened there, the widths.
+VIEWS: dict[str, tuple[str, Callable[[Page], None], tuple[int, ...]]] = {
+    "in time": ("simulate", _in_time, WIDTHS),
+    "small signals": ("simulate", _small_signals, WIDTHS),
+    "compared": ("simulate", _compared, WIDTHS),
+    "menu": ("materials", _menu, WIDTHS[:1]),
+    "changes": ("materials", lambda page: page.get_by_label("What the app wrote").click(), WIDTHS),
+    "question": ("lever", _question, WIDTHS),
+}
 
 
 @dataclass
@@ -68,16 +125,20 @@ def furnish(folder: Path) -> None:
         subprocess.run(command, cwd=folder, check=True, capture_output=True)
 
 
-def look(page: Page, app: App, address: str, folder: Path) -> Look:
-    """Look at a page at all widths, light and dark, and walk through it by keyboard."""
-    made = Look(address or "start")
+def look(page: Page, app: App, view: str, folder: Path) -> Look:
+    """Look at a page, or one of `VIEWS`, at its widths, light and dark, and walk by keyboard."""
+    address, opened, widths = VIEWS.get(view, (view, None, WIDTHS))
+    made = Look(view or "start")
     for theme in ("light", "dark"):
         page.set_viewport_size({"width": 1920, "height": 1080})
         go(page, app, address)
         if (theme == "dark") != page.evaluate("document.body.matches('.body--dark')"):
             page.get_by_label("Light or dark").click()
         _settle(page)
-        for width in WIDTHS:
+        if opened is not None:
+            opened(page)
+            page.wait_for_timeout(_REST_MS)
+        for width in widths:
             page.set_viewport_size({"width": width, "height": _HEIGHTS[width]})
             page.evaluate("scrollTo(0, 0)")
             page.wait_for_timeout(_REST_MS)
@@ -150,8 +211,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         furnish(Path(name))
         with running(Path(name)) as app, browsing(app) as (page, seen):
-            for address in pages or PAGES:
-                made = look(page, app, address, pictures)
+            for view in pages or (*PAGES, *VIEWS):
+                made = look(page, app, view, pictures)
                 lowest = [f"{made.lowest(kind):.2f}" for kind in ("text", "icon", "line")]
                 rows.append((made.page, made.controls, *lowest, len(made.faults)))
                 faults += [f"{made.page} {fault}" for fault in made.faults]

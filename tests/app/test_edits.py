@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from hotlever.app.edits import LayerRow, with_layer, with_value
+from hotlever.app.edits import LayerRow, with_layer, with_material_renamed, with_value
 from hotlever.app.fields import settable
 from hotlever.app.project import EXAMPLES
 from hotlever.app.workers import Report
+from hotlever.errors import InputError
 from hotlever.probe import Probe
 
 FILES = ("palladium-on-nitride.toml", "boron-lever.toml", "uiuc-lever.toml")
@@ -60,3 +61,16 @@ def test_layers_change_what_they_are_made_of(tmp_path: Path) -> None:
 def _row(text: str, folder: Path, name: str) -> LayerRow:
     rows = settable(Report.__new__(Report), folder, text)["layers"]
     return next(row for row in rows if row.name == name)
+
+
+def test_a_material_is_renamed_at_its_layers_too(tmp_path: Path) -> None:
+    name, old = FILES[0], "film"
+    text = (EXAMPLES / name).read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(with_material_renamed(text, old, "my-film"))
+    renamed, before = Probe.from_file(tmp_path / "mine.toml"), Probe.from_file(EXAMPLES / name)
+    assert dict(renamed.materials)["my-film"] == dict(before.materials)[old]
+    with pytest.raises(InputError, match="a name that no material has"):
+        with_material_renamed(text, old, old)
+    inline = "materials = { a = { kind = 'metal-film' } }\n"
+    with pytest.raises(InputError, match="in the text of the probe file"):
+        with_material_renamed(inline, "a", "b")

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from hotlever.errors import InputError, shown
 from hotlever.text import as_toml
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -120,6 +121,47 @@ def _after(entries: list[_Entry], last: _Entry | None, *new: _Entry) -> list[_En
 def without_section(text: str, section: Section) -> str:
     """Return a probe file without a section."""
     return _text([entry for entry in _entries(text) if entry.section != section])
+
+
+def with_material_renamed(text: str, old: str, new: str) -> str:
+    """Return a probe file in which a material has another name, at its layers too.
+
+    Raises
+    ------
+    InputError
+        If the name is taken or empty, or the text says it in a way that is not edited.
+
+    Examples
+    --------
+    >>> text = '[layers.track]\\nmaterial = "film"\\n[materials.film]\\nkind = "metal-film"\\n'
+    >>> print(with_material_renamed(text, "film", "Pt"))
+    [layers.track]
+    material = "Pt"
+    [materials.Pt]
+    kind = "metal-film"
+    <BLANKLINE>
+    """
+    expected = tomllib.loads(text)
+    materials, new = expected.get("materials", {}), new.strip()
+    if not new or new in materials:
+        raise InputError(f"found '{shown(new)}', expected a name that no material has")
+    expected["materials"] = {new if name == old else name: own for name, own in materials.items()}
+    entries = _entries(text)
+    for entry in entries:
+        if entry.is_header and entry.section == ("materials", old):
+            entry.lines = [f"[materials.{_quoted(new)}]"]
+        elif entry.section[:1] == ("layers",) and not entry.is_header:
+            made_of = rf"""(\bmaterial\s*=\s*)(["']){re.escape(old)}\2"""
+            entry.lines = [
+                re.sub(made_of, lambda found: found[1] + as_toml(new), line) for line in entry.lines
+            ]
+    for layer in expected.get("layers", {}).values():
+        if isinstance(layer, dict) and layer.get("material") == old:
+            layer["material"] = new
+    renamed = _text(entries)
+    if tomllib.loads(renamed) != expected:
+        raise InputError(f"'{shown(old)}': expected to be renamed in the text of the probe file")
+    return renamed
 
 
 # --- layers ---------------------------------------------------------------------------------------

@@ -18,7 +18,6 @@ _OTHERS = {
     "probe": ("thickness_um", "tip_um"),
     "circuit": ("series_resistance_ohm", "base_temperature_K"),
 }
-_WORDS = {"melting_point_K": "melting point (K)"}
 _TITLES = {"probe": "The lever", "circuit": "Circuit"}
 _LAST = ("heat_capacity", "heat_capacity_scale", "emissivity", "melting_point_K")
 #: Layers of a drawing that are listed.
@@ -95,18 +94,16 @@ def _new_materials() -> dict[str, str]:
 
 def _other(name: str, section: Mapping[str, Any]) -> dict[str, Any]:
     """Return the numbers of a section that is no material."""
+    from hotlever.materials.parameters import label, parameter_named
     from hotlever.probe.circuit import Circuit
+    from hotlever.probe.drawing.shape import DrawnShape
 
-    meaning = {
-        "thickness_um": "thickness of the body (µm)",
-        "tip_um": "place of the tip: x, y (µm)",
-        "series_resistance_ohm": "series resistance R_s (Ω)",
-        "base_temperature_K": "temperature of the leg ends (K)",
-    }
-    shown = [
-        _field((name,), key, section, _number(getattr(Circuit(), key, "")), meaning[key])
-        for key in _OTHERS[name]
-    ]
+    of_section = DrawnShape if name == "probe" else Circuit
+    shown = []
+    for key in _OTHERS[name]:
+        field = of_section.model_fields[key]
+        meaning = f"{label(key)}: {field.description} ({parameter_named(key).unit})"
+        shown.append(_field((name,), key, section, _number(getattr(Circuit(), key, "")), meaning))
     return {"section": (name,), "title": _TITLES[name], "fields": shown}
 
 
@@ -138,7 +135,7 @@ def _card(path: Section, section: Mapping[str, Any], folder: Path) -> dict[str, 
             continue
         field = kind.model_fields[key]
         default = usual.get(key, field.default if isinstance(field.default, float) else "")
-        meaning = _WORDS.get(key, field.description or "")
+        meaning = field.description or ""
         one = _field(path, key, section, _number(default), meaning)
         shown.append({**one, "used": key not in useless or key in section or not given})
     named = names_stated({key: value for key, value in given.items() if key in STATED})

@@ -75,8 +75,7 @@ def understood(
     columns_shown = ("bias_V", "lever_V", *(column.name for column in OBSERVABLES.values()))
     head, *rows = measurement.understood
     # the page shows all columns
-    _, unused = file_columns(folder / name, assigned, driven=waveform is not None)
-    notes = [note for note in measurement.notes if note not in unused]
+    notes = [note for note in measurement.notes if note not in measurement.unused]
     return {
         "rows": [(Path(name).name, *head[1:]), *rows],
         "notes": [note.replace(f"{folder}/", "") for note in notes],
@@ -112,7 +111,7 @@ def columns(report: Report, folder: Path, name: str, told: Mapping[str, Any]) ->
         assigned = parse_columns(told.get("columns") or [])
     except InputError:
         assigned = {}
-    return file_columns(folder / name, assigned, driven=bool(told.get("waveform")))[0]
+    return file_columns(folder / name, assigned, driven=bool(told.get("waveform")))
 
 
 def page(report: Report, folder: Path, kind: str, name: str) -> None:

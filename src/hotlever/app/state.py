@@ -119,6 +119,8 @@ class Design(BaseModel):
     second_to: float | None = None
     second_count: float | None = 5
     power: float | None = 2.0
+    annealing_K: float | None = None
+    annealing_min: float | None = None
     air: bool = True
 
 

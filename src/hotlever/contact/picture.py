@@ -129,10 +129,12 @@ def _slices(heights: Array, halves: Array, T: Array) -> list[tuple[Corners, floa
     """Return slices between heights, each of its mean temperature."""
     slices = []
     for number in range(heights.size - 1):
-        high, low = heights[number : number + 2].tolist()
-        wide, narrow = halves[number : number + 2].tolist()
+        # each reaches below the next one, so that no gap shows between them
+        lower = min(number + 2, heights.size - 1)
+        (high, low), (wide, narrow) = heights[[number, lower]], halves[[number, lower]]
         corners = [(-wide, high), (wide, high), (narrow, low), (-narrow, low)]
-        slices.append((corners, float(T[number : number + 2].mean())))
+        place = [(float(x), float(y)) for x, y in corners]
+        slices.append((place, float(T[number : number + 2].mean())))
     return slices
 
 

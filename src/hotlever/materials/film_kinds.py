@@ -94,7 +94,9 @@ class MetalFilm(Stored):
     emissivity: Annotated[float | StatedLaw, _law_of(OF_METAL["emissivity"])] = _field_of(
         OF_METAL["emissivity"]
     )
-    melting_point_K: float = Field(default=MELTING_POINT, ge=400, le=4000, description="K")
+    melting_point_K: float = Field(
+        default=MELTING_POINT, ge=400, le=4000, description="melting point (K)"
+    )
 
     @model_validator(mode="after")
     def _a_number_has_a_coefficient(self) -> Self:

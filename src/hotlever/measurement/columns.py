@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -23,6 +23,8 @@ from hotlever.units import TIMES, conversion, name_and_unit, unknown_unit
 _SYMBOLS = {
     heading: measurand.symbol for measurand in MEASURANDS.values() for heading in measurand.headings
 }
+#: In place of a quantity: a column that is not used.
+UNUSED = "unused"
 #: µs that a table in time lasts at most, unless one says that it is one: longer ones are slow
 #: sweeps with the time of each row.
 BRIEF = 1e4
@@ -75,7 +77,8 @@ def _bare(name: str) -> str:
 def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
     """Parse ``I_h (uA)=Current``: which heading, or number, of a column is which quantity.
 
-    What has no ``=`` is a file of such lines; those that start with ``#`` are comments.
+    ``unused=Current`` is a column that is not used, whatever its heading says. What has no ``=`` is
+    a file of such lines; those that start with ``#`` are comments.
 
     Raises
     ------
@@ -94,15 +97,24 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
             raise InputError(
                 f"{where}: found '{shown(line)}', expected one like 'I_h (uA)=Current'"
             )
+        if _is_unused(quantity):
+            headings[f"{UNUSED} {heading}"] = f"{UNUSED} {heading}", heading
+            continue
         symbol, unit = _quantity(quantity, assigned=True)
         if symbol is None:
-            raise unknown_name("quantity", name_and_unit(quantity)[0], MEASURANDS, where)
+            names = [*MEASURANDS, UNUSED]
+            raise unknown_name("quantity", name_and_unit(quantity)[0], names, where)
         if unit is not None and conversion(unit, MEASURANDS[symbol].unit) is None:
             raise unknown_unit(unit, MEASURANDS[symbol].unit, f"{where}: {symbol}")
         if symbol in headings:
             raise InputError(f"{where}: {symbol} is given twice, expected once")
         headings[symbol] = quantity, heading
     return dict(headings.values())
+
+
+def _is_unused(quantity: str) -> bool:
+    """Whether what is assigned to a column says that it is not used."""
+    return quantity.partition(" ")[0] == UNUSED
 
 
 def _lines(text: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
@@ -172,7 +184,10 @@ def find_columns(
     """
     where = table.where(-1)
     columns: dict[str, Column] = {}
+    unused = {table.index(name) for told, name in assigned.items() if _is_unused(told)}
     for quantity, heading in assigned.items():
+        if _is_unused(quantity):
+            continue
         symbol, unit = _quantity(quantity, assigned=True)
         assert symbol is not None
         index = table.index(heading)
@@ -184,7 +199,7 @@ def find_columns(
                 )
         columns[symbol] = _column(table, symbol, index, unit)
     in_time = driven or TIME in columns
-    taken = {column.index for column in columns.values()}
+    taken = unused | {column.index for column in columns.values()}
     candidates = defaultdict[str, list[int]](list)
     for index, heading in enumerate(table.names):
         named, _ = _quantity(heading)
@@ -202,15 +217,17 @@ def find_columns(
     if TIME in columns and not (in_time or _are_brief(table, columns[TIME])):
         del columns[TIME]
     if not driven:
-        _take_the_only_ones(table, columns)
+        _take_the_only_ones(table, columns, unused)
     _require(table, columns, driven)
     return columns
 
 
-def _take_the_only_ones(table: TextTable, columns: dict[str, Column]) -> None:
+def _take_the_only_ones(
+    table: TextTable, columns: dict[str, Column], unused: Collection[int]
+) -> None:
     """Let a plain heading be the bias, or the current, if nothing else in its unit may be it."""
     for symbol, headings in PLAIN.items():
-        used = {column.index for column in columns.values()}
+        used = {*unused, *(column.index for column in columns.values())}
         unit = MEASURANDS[symbol].unit
         may_be = [
             index

@@ -50,6 +50,8 @@ class Measurement:
         Origin; empty for data made in memory.
     notes : tuple of str
         What of the file was not used or not understood, and what looks wrong in it.
+    unused : tuple of str
+        Those of them that say which columns were not used.
     understood : tuple of tuple of str
         What each column and setting of the file was taken for, as rows of a table.
     rows : ndarray, shape (n,), or None
@@ -75,6 +77,7 @@ class Measurement:
     reader_error_V: Array | None = None
     gas_conductivity: float | None = None
     pressure_mbar: float | None = None
+    unused: tuple[str, ...] = ()
     understood: tuple[tuple[str, ...], ...] = ()
     rows: Array | None = None
     time_us: Array | None = None

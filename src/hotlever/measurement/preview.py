@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from hotlever.errors import InputError, shown
-from hotlever.measurement.columns import find_columns, measured_table, note_on_unused, quantity_of
+from hotlever.measurement.columns import find_columns, measured_table, quantity_of
 from hotlever.units import name_and_unit
 
 #: Cells of a column that are shown, and columns.
@@ -40,7 +40,7 @@ class FileColumn:
 
 def file_columns(
     path: str | os.PathLike[str], columns: Mapping[str, str] | None = None, *, driven: bool = False
-) -> tuple[list[FileColumn], list[str]]:
+) -> list[FileColumn]:
     """Return the columns of a measurement file, which may lack what a measurement needs.
 
     Parameters
@@ -51,12 +51,6 @@ def file_columns(
     driven : bool
         Whether a wave form is given, so that no column of the bias is needed.
 
-    Returns
-    -------
-    columns : list of FileColumn
-    notes : list of str
-        Those of `read_measurement` that say which columns are not used.
-
     Raises
     ------
     InputError
@@ -64,11 +58,10 @@ def file_columns(
     """
     assigned = dict(columns or {})
     table = measured_table(path, assigned)
-    symbols, notes = dict[int, str](), list[str]()
+    symbols = dict[int, str]()
     try:
         used = find_columns(table, assigned, driven=driven)
         symbols = {column.index: symbol for symbol, column in used.items()}
-        notes = note_on_unused(table, used)
     except InputError:
         # what is missing or stands twice is for the user to say
         symbols = {i: quantity_of(name) or "" for i, name in enumerate(table.names)}
@@ -83,4 +76,4 @@ def file_columns(
         name = heading if is_alone and not heading.isdecimal() else str(index + 1)
         unit = name_and_unit(heading)[1] or ""
         found.append(FileColumn(heading, unit, name, cells, symbols.get(index, "")))
-    return found, notes
+    return found

@@ -89,11 +89,8 @@ def read_measurement(
         assumed = circuit is not None and is_taken_as_bias(quantities, assigned)
         series_ohm = circuit.series_resistance_ohm if circuit and assumed else 0.0
         order = _complete_at_rest(contents, circuit, series_ohm, symmetric=not signed)
-    notes = [
-        *contents.notes,
-        *note_on_bias(table, quantities, assigned),
-        *note_on_unused(table, quantities),
-    ]
+    unused = note_on_unused(table, quantities)
+    notes = [*contents.notes, *note_on_bias(table, quantities, assigned), *unused]
     more = len(notes) - _MOST_NOTES
     if more > 0:
         notes[_MOST_NOTES:] = [f"{path}: {more} more such notes"]
@@ -106,6 +103,7 @@ def read_measurement(
         path=table.path,
         sha256=table.sha256,
         notes=tuple(notes),
+        unused=tuple(unused),
         understood=_understood(contents, order),
     )
     if not measurement.observables:

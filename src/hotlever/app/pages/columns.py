@@ -10,7 +10,7 @@ from nicegui import ui
 from hotlever.app.pages.frame import caption
 from hotlever.datasets import MEASURANDS
 from hotlever.measurement import FileColumn
-from hotlever.measurement.columns import quantity_of
+from hotlever.measurement.columns import UNUSED, quantity_of
 
 #: Units that are offered for a column whose heading has none.
 _UNITS = {"V": ("V", "mV", "uV"), "mA": ("A", "mA", "uA", "nA"), "K": ("K", "degC")}
@@ -74,7 +74,10 @@ class ColumnPicker:
         """Tell what a column is, and nothing else of it, nor of that quantity."""
         others = [text for text in self._told if not self._is_of(text, column.name, symbol)]
         if not symbol:
-            return self._tell(others)
+            # what was only told to be used is taken back; what the file itself says is not
+            was_told = len(others) < len(self._told)
+            by_itself = quantity_of(column.heading) is not None or not was_told
+            return self._tell([*others, *([f"{UNUSED}={column.name}"] if by_itself else [])])
         # a unit is not guessed: the reader asks for one
         inside = f" ({unit})" if unit else ""
         return self._tell([*others, f"{symbol}{inside}={column.name}"])

@@ -9,7 +9,7 @@ from nicegui import ui
 
 from hotlever.app.pages.frame import caption
 from hotlever.app.pages.plots import INK, axes, plotted, short, side_by_side
-from hotlever.colours import BLUE, ORANGE, PURPLE, VERMILION
+from hotlever.colours import BLUE, PURPLE, VERMILION
 from hotlever.contact.picture import ContactPicture
 
 _FILL = "rgba(128,128,128,{:.2f})"
@@ -29,7 +29,7 @@ _CURVES: tuple[tuple[str, tuple[tuple[str, float, str, str], ...]], ...] = (
     (
         "heat into the sample (µW)",
         (
-            ("sample_mW", 1e3, ORANGE, "through the contact"),
+            ("sample_mW", 1e3, VERMILION, "through the contact"),
             ("beside_mW", 1e3, BLUE, "through air"),
         ),
     ),
@@ -130,9 +130,7 @@ class ContactPlots:
 
 def _filled(corners: list[tuple[float, float]], colour: str) -> dict[str, Any]:
     path = "M" + "L".join(f"{x:.4g},{y:.4g}" for x, y in corners) + "Z"
-    # a line of the same colour closes what a screen leaves open between two pieces
-    line = {"width": 1, "color": colour} if colour.startswith("rgb(") else {"width": 0}
-    return {"type": "path", "path": path, "fillcolor": colour, "line": line}
+    return {"type": "path", "path": path, "fillcolor": colour, "line": {"width": 0}}
 
 
 def _words(x: float, y: float, text: str) -> dict[str, Any]:

@@ -15,8 +15,14 @@ from hotlever.app.pages.page import outputs
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 from hotlever.materials.parameters import label
+from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 
 _ABOUT = "Each value is a lever that is solved, in air too for k: some seconds each."
+#: How the silicon was annealed whose Δ the probe has: label, unit, and what counts without.
+_ANNEALING = {
+    "annealing_K": ("Annealed at", "K", ANNEALING_K),
+    "annealing_min": ("for", "min", ANNEALING_S / 60.0),
+}
 #: Shares of a value between which it is varied at first.
 _FROM, _TO = 0.7, 1.4
 
@@ -36,6 +42,10 @@ class DesignPage(DrawnPage):
                 self.probe_choice()
                 self._picked = {key: self._varied(key) for key in ("first", "second")}
                 self.number("power", "Tip temperature at", "mW")
+                with ui.row().classes("w-full no-wrap gap-1") as self._annealing:
+                    for key, (words, unit, usual) in _ANNEALING.items():
+                        field = self.number(key, words, unit, f"{usual:g}")
+                        field.classes("col", remove="w-36")
                 meaning = "The power of the knee in air over that in vacuum"
                 self.checkbox("air", "in air too", meaning)
                 ui.button("Vary", icon="insights", on_click=self.start).classes("w-full")
@@ -61,6 +71,7 @@ class DesignPage(DrawnPage):
         with self.banner.caught():
             self._probe = probe = self.chosen["probe"]
             self._values = await self.session.ask("full", "showing:design_numbers", probe)
+        self._annealing.set_visibility(bool(_ANNEALING.keys() & self._values.keys()))
         for key, fields in self._picked.items():
             chosen = self.chosen[key]
             names = [*self._values, *([chosen] if chosen else [])]
@@ -98,6 +109,7 @@ class DesignPage(DrawnPage):
     def task(self) -> Task:
         """Return the task that varies the design, and writes table and figure."""
         options = {"vary": self._texts(), "power": self.chosen["power"]}
+        options |= {key: self.chosen[key] for key in _ANNEALING}
         options |= {"no_air": not self.chosen["air"]}
         files = outputs(f"{stem(self.chosen)}.design", "SVG")
         return Task("design", probe_files(self.chosen), {**options, **files})

@@ -17,9 +17,10 @@ from hotlever.app.edits import (
     same,
     typed,
     with_layer,
+    with_material_renamed,
     with_value,
 )
-from hotlever.app.pages.frame import caption
+from hotlever.app.pages.frame import caption, flat_button
 from hotlever.app.pages.page import Page
 
 _ROLES = {"": "not used", "body": "outline of the lever", FILM: "film or part"}
@@ -35,7 +36,7 @@ class ProbeFields:
     """What can be set in the probe file that is open; `edited` is told its new text."""
 
     def __init__(self, page: Page, edited: Callable[[str], Awaitable[None]]) -> None:
-        self._session, self._edited = page.session, edited
+        self._session, self._banner, self._edited = page.session, page.banner, edited
         self._text, self._turn = "", 0
         self._built: Any = None
         self._inputs: dict[tuple[Section, str], ui.input] = {}
@@ -74,7 +75,12 @@ class ProbeFields:
             for row in rows:
                 self._row(row, materials | found["new"])
             for card in found.get("cards", []):
-                ui.label(card["title"]).classes("text-bold")
+                with ui.row().classes("w-full items-center gap-2"):
+                    ui.label(card["title"]).classes("text-bold")
+                    if card["section"][0] == "materials":
+                        name = card["section"][1]
+                        rename = partial(self._rename, name)
+                        flat_button("", rename, icon="edit", label=f"Rename {name}")
                 self._cards[card["section"]] = ui.element("div").classes("w-full fields")
             if found.get("materials"):
                 caption(_LAWS)
@@ -107,6 +113,20 @@ class ProbeFields:
         role = row.role if role is None else role
         material = row.material if material is None else material
         return self._edit(with_layer(self._text, row, role, material, row.thickness_um))
+
+    async def _rename(self, old: str) -> None:
+        """Ask for another name of a material."""
+        with ui.dialog(value=True) as dialog, ui.card():
+            name = ui.input("Name of the material", value=old).props("autofocus")
+            with ui.row().classes("w-full justify-end"):
+                ui.button("Cancel", on_click=dialog.close).props("flat")
+                ui.button("Rename", on_click=lambda: dialog.submit(name.value))
+            name.on("keydown.enter", lambda: dialog.submit(name.value))
+        new = await dialog
+        dialog.delete()
+        if new is not None and new.strip() != old:
+            with self._banner.caught():
+                await self._edited(with_material_renamed(self._text, old, new))
 
     # --- values -----------------------------------------------------------------------------------
 
