@@ -82,6 +82,17 @@ QUANTITIES: dict[str, tuple[str, str]] = {
         for kind, unit, what in (("_V", "V", name), ("_deg", "deg", f"phase of the {name}"))
     },
     "mean_tip_K": ("K", "mean tip temperature"),
+    # over a surface
+    **dict.fromkeys(("distance", "surface_gap_um"), ("µm", "distance to the surface")),
+    **dict.fromkeys(("pressure", "pressure_mbar"), ("mbar", "pressure of the air")),
+    "reader_ohm": ("ohm", "resistance of the reader"),
+    "dV_dz_V_per_um": ("V/µm", "change of the reader voltage with the distance"),
+    "dlnR_dz_per_um": ("1/µm", "relative change of the resistance with the distance"),
+    "noise_V_per_rtHz": ("V/√Hz", "noise of the reader voltage"),
+    "source_V_per_rtHz": ("V/√Hz", "noise by source"),
+    "resolution_nm_per_rtHz": ("nm/√Hz", "distance that equals the noise"),
+    "crosstalk_V_per_V": ("V/V", "change of the reader voltage with the bias of the heater"),
+    "crosstalk_V_per_mW": ("V/mW", "change of the reader voltage with the power of the heater"),
     # along the heater
     "position": ("µm", "position along the heater"),
     "temperature": ("K", "temperature"),

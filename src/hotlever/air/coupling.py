@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from copy import copy
-from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -58,15 +57,10 @@ class AirLoss:
     around : callable
         Makes what a gas of some conductivity takes up in time, once it is asked for; nothing, if
         it is not replaced. It can be pickled, as a lever can.
-    gap_um : float
-        To a surface below; NaN without one.
-    by_inverse_gap : ndarray, shape (sites, sites)
-        How the operator changes with the inverse of the gap; nothing where that was not asked for.
     """
 
-    gas_conductivity, gap_um = 1.0, float("nan")
+    gas_conductivity = 1.0
     around: Callable[[float], HeatInAir]
-    by_inverse_gap = np.empty((0, 0))
 
     def __init__(
         self, operator: Any, unknowns: Index, shares: Array, losses: csr_matrix, size: int
@@ -113,15 +107,12 @@ class AirLoss:
     def in_gap(self, gap_um: float) -> AirLoss:
         """Return the loss with the surface below at another distance."""
         air = copy(self)
-        change = (1.0 / gap_um - 1.0 / self.gap_um) * self.by_inverse_gap
-        air._take(replace(self.operator, matrix=self.operator.matrix + change))
-        air.gap_um = gap_um
+        air._take(self.operator.at_gap(gap_um))
         return air
 
     def change_with_gap(self, theta: Array) -> Array:
         """Return the derivative of `weak_form` by the gap (per µm)."""
-        change = _columnwise(self.by_inverse_gap, theta) * -(self.gap_um**-2)
-        return _columnwise(self.spreading, change)
+        return _columnwise(self.spreading, _columnwise(self.operator.matrix_by_gap, theta))
 
     def rise(self, x: Array) -> Array:
         """Return the rise of the temperature (K) at the sites, (sites, ...)."""

@@ -9,7 +9,11 @@ written as inverse hyperbolic sines: the two differ by terms that cancel between
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from hotlever.air.panels import Panels
 from hotlever.air.single_layer import pairs_by_points
@@ -40,15 +44,20 @@ class Laplace:
 
     def near_pairs(self, first: Panels, second: Panels, i: Index, j: Index) -> Array:
         """Return ∫∫ 1/R over pairs: closed for rectangles in one frame, else by points."""
-        (axis, angle), (other_axis, other_angle) = first.frame, second.frame
-        between = np.abs(angle[i] - other_angle[j])
-        parallel = np.minimum(between, np.pi / 2 - between) < _SAME_ANGLE
-        closed = (axis[i] >= 0) & (other_axis[j] >= 0) & parallel
+        closed = in_one_frame(first, second, i, j)
         result = np.empty(len(i))
         result[closed] = rectangle_pairs(first.chosen(i[closed]), second.chosen(j[closed]))
         others = first.chosen(i[~closed]), second.chosen(j[~closed])
         result[~closed] = pairs_by_points(*others, potential, ORDERS)
         return result
+
+
+def in_one_frame(first: Panels, second: Panels, i: Index, j: Index) -> NDArray[np.bool_]:
+    """Return which pairs of panels are rectangles turned by the same angle, see `frame`."""
+    (axis, angle), (other_axis, other_angle) = first.frame, second.frame
+    between = np.abs(angle[i] - other_angle[j])
+    parallel = np.minimum(between, np.pi / 2 - between) < _SAME_ANGLE
+    return np.asarray((axis[i] >= 0) & (other_axis[j] >= 0) & parallel)
 
 
 def potential(points: Array, corners: Array) -> Array:
@@ -67,6 +76,23 @@ def potential(points: Array, corners: Array) -> Array:
     ndarray, shape (...)
         µm.
     """
+    sides = seen_from(points, corners)
+    return (sides.across * sides.inverse).sum(axis=-1) - np.abs(sides.height) * sides.angle
+
+
+class Sides(NamedTuple):
+    """A polygon as seen from points, shapes (..., k) and (..., k, 3) for its k sides."""
+
+    outward: Array  #: unit vectors in its plane, normal to the sides
+    across: Array  #: distances of the sides from the foot of the point
+    inverse: Array  #: ∫ 1/R along the sides
+    normal: Array  #: of the plane, (..., 3)
+    height: Array  #: of the point above the plane (µm), (...)
+    angle: Array  #: solid angle, (...)
+
+
+def seen_from(points: Array, corners: Array) -> Sides:
+    """Return what the integrals over polygons are made of; see `potential`."""
     lengths = np.linalg.norm(np.roll(corners, -1, axis=-2) - corners, axis=-1)
     along = (np.roll(corners, -1, axis=-2) - corners) / np.maximum(lengths, _TINY)[..., None]
     area_vector = np.cross(
@@ -77,15 +103,14 @@ def potential(points: Array, corners: Array) -> Array:
     # from every corner, seen from the point
     to_corner = corners - points[..., None, :]
     distance = np.sqrt(np.einsum("...kd,...kd->...k", to_corner, to_corner))
-    height = np.abs(np.einsum("...d,...d->...", to_corner[..., 0, :], normal))
+    height = -np.einsum("...d,...d->...", to_corner[..., 0, :], normal)
     across = np.einsum("...kd,...kd->...k", to_corner, outward)
     both = distance + np.roll(distance, -1, axis=-1)
     # ∫ 1/R along an edge is 2 artanh(length / both)
     # at a double corner of a triangle both are nothing
     ratio = np.maximum(both + lengths, _TINY) / np.maximum(both - lengths, _TINY * both + _TINY)
-    terms = across * np.log(ratio)
-    total: Array = terms.sum(axis=-1)
-    return total - height * _solid_angle(to_corner, distance)
+    angle = _solid_angle(to_corner, distance)
+    return Sides(outward, across, np.log(ratio), normal, height, angle)
 
 
 def _solid_angle(to_corner: Array, distance: Array) -> Array:
@@ -122,6 +147,27 @@ def rectangle_pairs(first: Panels, second: Panels) -> Array:
         µm³.
     """
     result = np.empty(len(first))
+    for pairs, (normal, other_normal), d in by_orientation(first, second):
+        if normal == other_normal:
+            u, v = (axis for axis in range(3) if axis != normal)
+            result[pairs] = _parallel(d[:, :, u], d[:, :, v], d[0, :, normal])
+        else:
+            shared = 3 - normal - other_normal
+            # along the normal of one rectangle only the other extends
+            result[pairs] = _perpendicular(
+                d[:, :, shared], d[[0, 1], :, other_normal], d[[0, 2], :, normal]
+            )
+    return result
+
+
+def by_orientation(
+    first: Panels, second: Panels
+) -> Iterator[tuple[NDArray[np.bool_], tuple[int, int], Array]]:
+    """Give pairs of rectangles in one frame by the axes normal to both.
+
+    With the differences of their coordinates, (4, pairs, 3): high − low, low − low, high − high,
+    low − high.
+    """
     (axis, angle), (other_axis, other_angle) = first.frame, second.frame
     # the same axes at angles of next to 0 and π/2
     swapped = np.abs(angle - other_angle) > np.pi / 4
@@ -133,22 +179,12 @@ def rectangle_pairs(first: Panels, second: Panels) -> Array:
         turned = np.stack([cosine * x + sine * y, cosine * y - sine * x, z], axis=2)
         low.append(turned.min(axis=1))
         high.append(turned.max(axis=1))
-    # differences of the coordinates: high − low, low − low, high − high, low − high
     differences = np.stack([high[0] - low[1], low[0] - low[1], high[0] - high[1], low[0] - high[1]])
     for normal in range(3):
         for other_normal in range(3):
             pairs = (axis == normal) & (other_axis == other_normal)
-            d = differences[:, pairs]
-            if normal == other_normal:
-                u, v = (axis for axis in range(3) if axis != normal)
-                result[pairs] = _parallel(d[:, :, u], d[:, :, v], d[0, :, normal])
-            else:
-                shared = 3 - normal - other_normal
-                # along the normal of one rectangle only the other extends
-                result[pairs] = _perpendicular(
-                    d[:, :, shared], d[[0, 1], :, other_normal], d[[0, 2], :, normal]
-                )
-    return result
+            if pairs.any():
+                yield pairs, (normal, other_normal), differences[:, pairs]
 
 
 def _parallel(u: Array, v: Array, w: Array) -> Array:
@@ -207,16 +243,20 @@ def far_pairs(first: Panels, second: Panels, offsets: Array) -> Array:
     """
     square = np.einsum("nmd,nmd->nm", offsets, offsets)
     inverse = 1.0 / np.sqrt(np.maximum(square, _TINY))
-    # pairs of moments with offsets as matrix products: this is done for all pairs of panels
-    flat = (offsets[..., :, None] * offsets[..., None, :]).reshape(*square.shape, 9)
-    spread = np.einsum("nmk,nk->nm", flat, first.moments.reshape(-1, 9))
-    spread += np.einsum("nmk,mk->nm", flat, second.moments.reshape(-1, 9))
-    traces = np.trace(first.moments, axis1=1, axis2=2)[:, None] + np.trace(
-        second.moments, axis1=1, axis2=2
-    )
+    spread, traces = spreads(first, second, offsets)
     correction = 0.5 * (3.0 * spread * inverse**2 - traces) * inverse**2
     expanded: Array = np.outer(first.areas, second.areas) * inverse * (1.0 + correction)
     return expanded
+
+
+def spreads(first: Panels, second: Panels, offsets: Array) -> tuple[Array, Array]:
+    """Return the sums of the moments of pairs, along their offsets and their traces, (n, m)."""
+    # pairs of moments with offsets as matrix products: this is done for all pairs of panels
+    flat = (offsets[..., :, None] * offsets[..., None, :]).reshape(*offsets.shape[:2], 9)
+    spread = np.einsum("nmk,nk->nm", flat, first.moments.reshape(-1, 9))
+    spread += np.einsum("nmk,mk->nm", flat, second.moments.reshape(-1, 9))
+    mine, others = (np.trace(panels.moments, axis1=1, axis2=2) for panels in (first, second))
+    return spread, mine[:, None] + others
 
 
 @one_blas_thread

@@ -10,12 +10,15 @@ what that air would conduct along the plate is taken off the silicon in
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
+from hotlever.air.approach import Approach
 from hotlever.air.chip import BaseLine, chip_panels
 from hotlever.air.laplace import Laplace, layer_potential
 from hotlever.air.panels import Mirror, PanelOptions, Panels, mirror_group
@@ -28,9 +31,6 @@ from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.types import Array, Progress
 
-#: Share of the gap by which it is changed to find how the operator does. The loss to a near surface
-#: goes with the inverse gap, and so does what is taken as linear.
-_OTHER_GAP = 1.05
 #: Panels of a lever that takes no finer ones than the default: its matrix has half a gigabyte.
 _MOST_PANELS = 8000
 
@@ -49,15 +49,44 @@ class AirOperator:
     filling : float
         Share of κ_air by which the air that the single layer puts inside the plate conducts: one,
         and less where the temperature jumps at the surface.
+    gap_um : float
+        To a surface below; NaN without one.
+    matrix_by_gap : ndarray, shape (n, n)
+        Derivative of the matrix by the gap; empty without one.
+    filling_by_gap : float
     """
 
     sites: Array
     matrix: Array
     filling: float = 1.0
+    gap_um: float = math.nan
+    matrix_by_gap: Array = field(default_factory=lambda: np.empty((0, 0)))
+    filling_by_gap: float = 0.0
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Any]) -> AirOperator:
+        """Return what was stored under the names of the attributes."""
+        return cls(**{each.name: arrays[each.name][()] for each in fields(cls)})
 
     def less(self, diagonal: Array) -> Array:
         """Return the matrix less a diagonal one."""
         return self.matrix - np.diag(diagonal)
+
+    def at_gap(self, gap_um: float) -> AirOperator:
+        """Return that with the surface at another distance nearby.
+
+        It is linear in the inverse gap, as the loss to a near surface is.
+        """
+        change = self.gap_um - self.gap_um**2 / gap_um
+        slope = (self.gap_um / gap_um) ** 2
+        return replace(
+            self,
+            matrix=self.matrix + change * self.matrix_by_gap,
+            filling=self.filling + change * self.filling_by_gap,
+            gap_um=gap_um,
+            matrix_by_gap=slope * self.matrix_by_gap,
+            filling_by_gap=slope * self.filling_by_gap,
+        )
 
 
 def air_operator(
@@ -97,31 +126,12 @@ def air_operator(
         "options": asdict(options),
     }
     path = cache_file("air", facts)
-    kept = stored(path, lambda a: AirOperator(a["sites"], a["matrix"], float(a["filling"])))
+    kept = stored(path, AirOperator.from_arrays)
     if kept is not None:
         return kept
     operator = PanelledAir(layout, surroundings, base_temperature_K, options, progress).operator()
     store_arrays(path, {name: np.asarray(value) for name, value in vars(operator).items()})
     return operator
-
-
-def change_with_gap(
-    operator: AirOperator,
-    layout: Layout,
-    surroundings: Surroundings,
-    base_temperature_K: float = BASE_TEMPERATURE_K,
-    options: PanelOptions | None = None,
-) -> Array:
-    """Return how an operator's matrix changes with the inverse of the gap to the surface below.
-
-    In µm², with the shape of the matrix. Parameters and errors are those of `air_operator`.
-    """
-    gap = surroundings.surface_gap_um
-    assert gap is not None
-    other = surroundings.model_copy(update={"surface_gap_um": _OTHER_GAP * gap})
-    farther = air_operator(layout, other, base_temperature_K, options)
-    change: Array = farther.matrix - operator.matrix
-    return change / (1.0 / (_OTHER_GAP * gap) - 1.0 / gap)
 
 
 class PanelledAir:
@@ -162,6 +172,7 @@ class PanelledAir:
                 f"air: this lever takes {len(self.panels)} panels, more than {most}; are its "
                 "thickness and heater too small for its other dimensions?"
             )
+        self._gap = math.nan if (gap := surroundings.surface_gap_um) is None else gap
         below = _mirrors_below(layout, surroundings, base_temperature_K, self.panels)
         mid_plane = [Mirror.in_plane((0, 0, 0), (0, 0, 1), +1.0)] if symmetric else []
         self._halves = 1.0 + len(mid_plane)
@@ -199,8 +210,29 @@ class PanelledAir:
         # of a lever of one temperature: θ of the air at the surface as a share of the lever's; the
         # energy of the air inside goes with its square
         own = len(self.surface.panels)
-        jumped = self._resistances[:own] @ flux[:own].sum(axis=1) / self.panels.areas[:own].sum()
-        return AirOperator(self.surface.sites, 0.5 * (heat + heat.T), float((1.0 - jumped) ** 2))
+        shares = self._resistances[:own] / self.panels.areas[:own].sum()
+        whole = flux.sum(axis=1)
+        jumped = shares @ whole[:own]
+        operator = AirOperator(
+            self.surface.sites, 0.5 * (heat + heat.T), float((1.0 - jumped) ** 2), self._gap
+        )
+        if math.isnan(self._gap):
+            return operator
+        change = self._layer_by_gap()
+        more = -self._halves * (flux.T @ change @ flux)
+        jumped_more = -shares @ cho_solve(self._factors, change @ whole)[:own]
+        return replace(
+            operator,
+            matrix_by_gap=0.5 * (more + more.T),
+            filling_by_gap=float(-2.0 * (1.0 - jumped) * jumped_more),
+        )
+
+    def _layer_by_gap(self) -> Array:
+        """Return the derivative of the single layer by the gap: the images move."""
+        below = self.mirrors[-1]
+        # twice as far as the surface, along its normal
+        motion = (np.eye(3) - below.matrix) @ np.array([0.0, 0.0, -1.0])
+        return np.asarray(single_layer_matrix(self.panels, Approach(motion), [below]))
 
     def admittances(self, q: Numbers, shapes: Array) -> Numbers:
         """Return the heat lost (mW) where θ changes in time, as it is tested with some shapes.

@@ -31,6 +31,7 @@ _MODULES = {
     "pulse": "levers",
     "raman": "raman",
     "raman-check": "raman",
+    "reader": "levers",
     "reproduce": "reproduce",
     "spectrum": "levers",
     "sweep": "levers",

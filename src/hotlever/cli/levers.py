@@ -1,4 +1,4 @@
-"""``hotlever sweep``, ``contact``, ``pulse`` and ``spectrum``: a lever at rest or not."""
+"""Levers: ``hotlever sweep``, ``contact``, ``reader``, ``pulse`` and ``spectrum``."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from hotlever.cli.options import command
 from hotlever.tasks.requests import (
     ContactRequest,
     PulseRequest,
+    ReaderRequest,
     SpectrumRequest,
     SweepRequest,
 )
@@ -34,6 +35,14 @@ def contact_command(request: ContactRequest) -> None:
     from hotlever.tasks.contacting import touch
 
     touch(terminal, request)
+
+
+@command("reader", ReaderRequest)
+def reader_command(request: ReaderRequest) -> None:
+    """Read the distance to a surface: signal, noise, resolution."""
+    from hotlever.tasks.approaching import approach
+
+    approach(terminal, request)
 
 
 @command("spectrum", SpectrumRequest)

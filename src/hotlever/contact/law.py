@@ -30,9 +30,6 @@ _STEP = 1e-3
 INTERFACE = "interface_K_per_mW"
 #: What else of a probe the law depends on.
 _NUMBERS = ("height_um", "half_angle_deg", "apex_radius_um", "base_temperature_K")
-#: Accommodation at the tip and the sample beside it where none is stated: near the contact the gap
-#: is always below the mean free path.
-_ACCOMMODATION = 1.0
 
 
 class AtTheContact(NamedTuple):
@@ -74,8 +71,9 @@ class ContactLaw:
         self._air: AirBeside | None = None
         around = probe.surroundings
         if around.medium == "air":
-            met = around.with_(accommodation=around.accommodation or _ACCOMMODATION)
-            jumps = map(met.jump_length_um, (around.jump_temperature_K, self._base_K))
+            # near the contact the gap is always below the mean free path
+            jump = around.with_jump.jump_length_um
+            jumps = map(jump, (around.jump_temperature_K, self._base_K))
             self._air = AirBeside(around.gas_conductivity, *jumps)
 
     @cached_property

@@ -41,5 +41,6 @@ from hotlever.figures.lever import (
 )
 from hotlever.figures.maps import field_maps, pulse_film, save_film, temperature_map
 from hotlever.figures.raman import one_spectrum, raman_check, thermometry
+from hotlever.figures.reader import reader_overview
 from hotlever.figures.style import save_figure
 from hotlever.figures.transient import harmonics, history_overview, small_signals

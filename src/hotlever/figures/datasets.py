@@ -19,6 +19,7 @@ from hotlever.figures.design import design_study
 from hotlever.figures.fit import lever_parameters, posterior_corner, profile_curves, tip_band
 from hotlever.figures.lever import doping_profile, sweep_overview
 from hotlever.figures.raman import raman_check
+from hotlever.figures.reader import reader_overview
 from hotlever.figures.style import COLOURS, entitle, figure
 from hotlever.figures.transient import harmonics, history_overview, small_signals
 from hotlever.lever import probe_of
@@ -31,6 +32,7 @@ _FIGURES: dict[str, Callable[[Any], Figure]] = {
     "apex_K current_change_mA": lambda data: contact_overview(data, probe_of(data)),
     "supplied_nJ air_stored_nJ bias_V lever_V reader_V tip_K": history_overview,
     "bias_V current_mA lever_V reader_V tip_K heater_ohm": sweep_overview,
+    "dlnR_dz_per_um source_V_per_rtHz": reader_overview,
     "impedance_real_ohm tip_per_bias_deg": small_signals,
     "first_harmonic_V third_harmonic_V": harmonics,
     "doping inversion_temperature": doping_profile,

@@ -24,7 +24,7 @@ from dataclasses import replace
 import numpy as np
 
 from hotlever.lever.at_points import StatesAtPoints
-from hotlever.lever.laws import BASE, GAS
+from hotlever.lever.laws import BASE, GAP, GAS
 from hotlever.lever.newton import refined
 from hotlever.lever.rim import Rim
 from hotlever.lever.space import (
@@ -41,9 +41,6 @@ from hotlever.types import Array
 
 #: What an instrument shows of a state, in the order of `LeverEquations.observed`.
 SHOWN = ("lever_V", "current_mA", "reader_V")
-
-#: A parameter of the air alone.
-GAP = "surface_gap_um"
 
 #: Error (relative) to which derivatives are solved.
 _EXACT = 1e-6

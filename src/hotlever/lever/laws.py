@@ -31,9 +31,9 @@ from hotlever.units import (
     PER_CM_TO_MILLI_PER_UM,
 )
 
-#: Parameters of no material: how many times as well as air the gas conducts, and what moves all
-#: temperatures and that of the surroundings.
-GAS, BASE = "gas_conductivity", "base_temperature_K"
+#: Parameters of no material: how many times as well as air the gas conducts, the distance of a
+#: surface below, and what moves all temperatures and that of the surroundings.
+GAS, GAP, BASE = "gas_conductivity", "surface_gap_um", "base_temperature_K"
 
 
 class FilmLaws:
@@ -225,8 +225,9 @@ class LawsAtPoints:
 
     def _take_off_air(self, total: Array, by: Mapping[str, Properties], T: Array) -> None:
         """Take off what air that fills the plate would conduct; see `hotlever.lever.equations`."""
-        share = PER_CM_TO_MILLI_PER_UM * self.space.air.filling
-        filling = share * self.space.air.gas_conductivity
+        air = self.space.air
+        share = PER_CM_TO_MILLI_PER_UM * air.filling
+        filling = share * air.gas_conductivity
         kappa, kappa_by = thermal_conductivity_of_air(T)
         total -= filling * self.space.plate_um * kappa
         for name, changes in by.items():
@@ -235,6 +236,9 @@ class LawsAtPoints:
                 change -= filling * self.space.plate_um * kappa_by["T"]
             elif name == GAS:
                 change -= share * self.space.plate_um * kappa
+            elif name == GAP:
+                share_more = PER_CM_TO_MILLI_PER_UM * air.operator.filling_by_gap
+                change -= share_more * air.gas_conductivity * self.space.plate_um * kappa
             elif name in self.motions:
                 change -= filling * self.motions[name].plate_um * kappa
 

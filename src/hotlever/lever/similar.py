@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from copy import copy
-from functools import cached_property
 from typing import Protocol, Self
 
 from hotlever.air.coupling import AirLoss
-from hotlever.air.operator import change_with_gap
 from hotlever.lever.branch import Branch, Reach
 from hotlever.lever.continuation import at_places_of, continued
-from hotlever.lever.equations import GAP, LeverEquations
+from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever
 from hotlever.lever.motion import motion_of
 from hotlever.lever.newton import NewtonOptions
 from hotlever.lever.parametrisation import solve_at
 from hotlever.lever.sensitivities import Linearised
-from hotlever.lever.surroundings import plate_of
 from hotlever.probe import Probe
 from hotlever.probe.moving import MovingMesh
 from hotlever.probe.parameters import dimensions_of, usual_parameters
@@ -82,20 +79,13 @@ class SimilarLevers:
         """The probe whose drawing has the mesh."""
         return self._lever.probe
 
-    @cached_property
-    def _by_inverse_gap(self) -> Array:
-        """How the operator of the air changes with the inverse of the gap, in µm²."""
-        drawn, lever = self.drawn, self._lever
-        around = plate_of(drawn), drawn.surroundings, drawn.circuit.base_temperature_K
-        return change_with_gap(lever.space.air.operator, *around, lever.panels)
-
     def lever(self, probe: Probe) -> Lever:
         """Return the lever of a similar probe, on the same mesh moved."""
         return Lever(probe, space=self._space(probe))
 
     def equations(self, probe: Probe, names: tuple[str, ...] = ()) -> LeverEquations:
         """Return the equations of a probe, with the motions of the dimensions among some names."""
-        space = self._space(probe, names)
+        space = self._space(probe)
         dimensions = [name for name in names if name in dimensions_of(probe)]
         motions = {
             name: motion_of(space, self._moving.movement(probe, name)) for name in dimensions
@@ -117,25 +107,22 @@ class SimilarLevers:
         """See `BranchSolver`: its states are solved."""
         return 0.0
 
-    def _space(self, probe: Probe, names: tuple[str, ...] = ()) -> FullSpace:
-        """Return mesh, operators and air of a similar probe, for derivatives by some names."""
+    def _space(self, probe: Probe) -> FullSpace:
+        """Return mesh, operators and air of a similar probe."""
         space = self._lever.space
         if (probe.shape, probe.tip) != (self.drawn.shape, self.drawn.tip):
             space = FullSpace(self._moving.mesh_of(probe), wiring=space.wiring)
         space = copy(space)
         # air takes up from a place nearly what it took before the place moved a little
-        space.air = self._air(probe, names)
+        space.air = self._air(probe)
         return space
 
-    def _air(self, probe: Probe, names: tuple[str, ...]) -> AirLoss:
+    def _air(self, probe: Probe) -> AirLoss:
         """Return the air around a similar probe."""
         air, around = self._lever.space.air, probe.surroundings
         if around.gas_conductivity != air.gas_conductivity:
             air = air.in_gas(around.gas_conductivity)
-        own = self.drawn.surroundings.surface_gap_um
-        if own is not None and (GAP in names or around.surface_gap_um != own):
-            air = copy(air)
-            air.by_inverse_gap, air.gap_um = self._by_inverse_gap, own
+        if around.surface_gap_um != self.drawn.surroundings.surface_gap_um:
             air = air.in_gap(around.surface_gap_um)
         return air
 

@@ -82,6 +82,14 @@ class Surroundings(Record):
         return self
 
     @property
+    def with_jump(self) -> Surroundings:
+        """The same, the accommodation being full where none is stated.
+
+        In a gap that is hardly wider than the mean free path temperatures jump in any case.
+        """
+        return self.with_(accommodation=self.accommodation or 1.0)
+
+    @property
     def symmetric(self) -> bool:
         """Whether what is above the lever's mid-plane mirrors what is below."""
         return self.surface_gap_um is None and not self.chip

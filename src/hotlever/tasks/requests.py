@@ -262,6 +262,35 @@ class SpectrumRequest(TableRequest, LeverRequest):
 
 
 @dataclass(kw_only=True)
+class ReaderRequest(TableRequest, LeverRequest):
+    """A lever that reads its distance to a surface."""
+
+    distance: str = option(
+        "0.3um:3um:10",
+        metavar="START:STOP:COUNT",
+        help="From the lever's lower face to the surface, ends included.",
+    )
+    bias: str | None = option(
+        None,
+        metavar="START:STOP:COUNT",
+        help="In volts, ends included; the one up to 11 V that resolves the distances best if left "
+        "out.",
+    )
+    pressure: str | None = option(
+        None,
+        metavar="START:STOP:COUNT",
+        help="Of the air, in mbar, spaced evenly in the logarithm; what the probe file says if "
+        "left out.",
+    )
+    bandwidth: str = option("1Hz:1kHz", metavar="LOW:HIGH", help="Of what is read.")
+    amplifier: str = option("5nV", metavar="V", help="Noise at its input, for each √Hz.")
+    hooge: float = option(0.0, help="Hooge's parameter of the silicon, for 1/f noise.")
+    vibration: str | None = option(
+        None, metavar="LENGTH", help="Of the lever itself, for each √Hz; none if left out."
+    )
+
+
+@dataclass(kw_only=True)
 class DesignRequest(TableRequest, PhysicsRequest, ProbeRequest):
     """What a change of a probe's design does."""
 

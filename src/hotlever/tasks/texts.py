@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 #: A sweep of so many biases takes minutes, as does a design varied so often.
 MOST_BIASES, MOST_DESIGNS = 10_000, 1000
 MOST_FREQUENCIES = 10_000
+#: Distances to a surface, of which each takes seconds, and between which they are (µm).
+MOST_DISTANCES, NEAREST, FARTHEST = 1000, 0.001, 1e4
 #: Of priors: those of a calibration, where none is stated.
 USUAL = "usual"
 
@@ -208,6 +210,70 @@ def parse_frequencies(text: str) -> Array:
     )
     if not 0 < start <= stop or (count == 1) != (start == stop):
         raise InputError(f"{where}: expected 0 < START < STOP, or START = STOP with COUNT 1")
+    return np.geomspace(start, stop, count)
+
+
+def parse_band(text: str) -> tuple[float, float]:
+    """Parse ``LOW:HIGH``, frequencies with units.
+
+    Examples
+    --------
+    >>> parse_band("1Hz:1kHz")
+    (1.0, 1000.0)
+    """
+    where = f"--bandwidth {shown(text)}"
+    low, _, high = text.partition(":")
+    found = setting(low, "Hz", where), setting(high, "Hz", where)
+    if not 0 < found[0] < found[1]:
+        raise InputError(f"{where}: expected LOW:HIGH, such as 1Hz:1kHz, with 0 < LOW < HIGH")
+    return found
+
+
+def parse_distances(text: str) -> Array:
+    """Parse ``START:STOP:COUNT`` with units of length, ends included (µm).
+
+    Examples
+    --------
+    >>> parse_distances("300nm:3um:4").round(6).tolist()
+    [0.3, 1.2, 2.1, 3.0]
+    """
+    import numpy as np
+
+    from hotlever.probe.contact import length_um
+
+    where = f"--distance {shown(text)}"
+
+    def end(part: str) -> float:
+        length = length_um(part)
+        if length is None or not NEAREST <= length <= FARTHEST:
+            raise InputError(
+                f"{where}: found {quoted(part)}, expected a length from {1e3 * NEAREST:g}nm to "
+                f"{1e-4 * FARTHEST:g}cm, such as 300nm"
+            )
+        return length
+
+    start, stop, count = _parse_range(text, where, "such as 0.3um:3um:10", MOST_DISTANCES, end)
+    if stop < start or (count == 1) != (start == stop):
+        raise InputError(f"{where}: expected START < STOP, or START = STOP with COUNT 1")
+    return np.linspace(start, stop, count)
+
+
+def parse_pressures(text: str) -> Array:
+    """Parse ``START:STOP:COUNT`` in mbar, spaced evenly in the logarithm.
+
+    Examples
+    --------
+    >>> parse_pressures("10:1000:3").round(6).tolist()
+    [10.0, 100.0, 1000.0]
+    """
+    import numpy as np
+
+    where = f"--pressure {shown(text)}"
+    start, stop, count = _parse_range(text, where, "such as 10:1000:3 (mbar)", MOST_DISTANCES)
+    if not 1e-6 <= start <= stop <= 1e6 or (count == 1) != (start == stop):
+        raise InputError(
+            f"{where}: expected 1e-6 <= START < STOP <= 1e6, or START = STOP with COUNT 1"
+        )
     return np.geomspace(start, stop, count)
 
 

@@ -1,0 +1,194 @@
+"""Noise of a voltage of a lever at rest, source by source.
+
+What fluctuates at each point is known, independent of all other points; the voltage is their sum,
+each weighted by the adjoint (`hotlever.lever.response`), of temperature τ and potential φ. So the
+electro-thermal feedback of the circuit counts, as at all frequencies that the lever follows (J. C.
+Mather, Appl. Opt. 21, 1125 (1982)). One-sided spectral densities (V²/Hz):
+
+- Johnson noise (H. Nyquist, Phys. Rev. 32, 110 (1928)), current densities of 4 k_B T σ, which heat
+  as well: 4 k_B ∫ T σ |∇φ − τ ∇V|² dV, for a resistor alone 4 k_B ∫ T ρ |j|² dV / I². Resistors of
+  the circuit are at room temperature.
+- Fluctuations of the temperature, heat fluxes of 4 k_B T² κ: 4 k_B ∫ T² κ |∇τ|² dV over lever and
+  air; of one thermal conductance 4 k_B T² G.
+- 1/f noise (F. N. Hooge, Phys. Lett. A 29, 139 (1969)), conductivities of α σ²/(n f):
+  α/f ∫ σ²/n (∇V·(∇φ − τ ∇V))² dV, for a resistor of N carriers α V²/(N f).
+- Of the amplifier, and of the lever's own vibration, as stated.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.constants import Boltzmann
+
+from hotlever.errors import InputError
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.response import Response
+from hotlever.lever.transport import dot
+from hotlever.materials.air import thermal_conductivity_of_air
+from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
+from hotlever.types import Array
+from hotlever.units import PER_CM_TO_MILLI_PER_UM
+
+#: Where noise comes from.
+SOURCES = (
+    *("Johnson noise of the lever", "Johnson noise of resistors", "temperature fluctuations"),
+    *("1/f noise", "amplifier", "vibration of the lever"),
+)
+#: Temperature of the circuit's resistors (K).
+_ROOM_K = 293.0
+#: 4 k_B in the units of kK, kΩ and mW, for V²/Hz.
+_FOUR_K = 4e3 * Boltzmann
+#: µm⁻³ per cm⁻³.
+_PER_UM3 = 1e-12
+
+
+@dataclass(frozen=True)
+class NoiseOptions:
+    """What is known of noise beside the lever.
+
+    Attributes
+    ----------
+    low_Hz, high_Hz : float
+        The band, over which the density of 1/f noise is a mean.
+    amplifier_V : float
+        Density of the amplifier's noise at its input (V/√Hz).
+    hooge : float
+        Hooge's parameter α of the silicon; 0: no 1/f noise.
+    vibration_nm : float
+        Density of the lever's own motion in the band (nm/√Hz).
+
+    Raises
+    ------
+    InputError
+        If a value makes no sense.
+    """
+
+    low_Hz: float = 1.0
+    high_Hz: float = 1000.0
+    amplifier_V: float = 5e-9
+    hooge: float = 0.0
+    vibration_nm: float = 0.0
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if not (math.isfinite(value) and value >= 0):
+                raise InputError(f"{each.name}: found {value:g}, expected a number of 0 or more")
+        if not 0 < self.low_Hz < self.high_Hz:
+            raise InputError(
+                f"found a band from {self.low_Hz:g} to {self.high_Hz:g} Hz, expected one from a "
+                "frequency above 0 to a higher one"
+            )
+
+    @property
+    def mean_inverse_frequency(self) -> float:
+        """Mean of 1/f over the band (s)."""
+        return math.log(self.high_Hz / self.low_Hz) / (self.high_Hz - self.low_Hz)
+
+
+def spectral_densities(response: Response, options: NoiseOptions, volts_per_um: float) -> Array:
+    """Return the densities (V²/Hz) of the noise from each of `SOURCES`.
+
+    Parameters
+    ----------
+    response : Response
+        Of the voltage.
+    options : NoiseOptions
+    volts_per_um : float
+        How it changes with the distance to a surface, by which the lever's vibration counts.
+    """
+    vibration = volts_per_um * 1e-3 * options.vibration_nm
+    return np.array(
+        [
+            johnson(response),
+            of_resistors(response),
+            of_temperature(response),
+            options.hooge * options.mean_inverse_frequency * per_hooge(response),
+            options.amplifier_V**2,
+            vibration**2,
+        ]
+    )
+
+
+def johnson(response: Response) -> float:
+    """Return the density (V²/Hz) of the Johnson noise of the lever."""
+    equations = response.equations
+    fields_, properties, _ = equations.at(response.x)
+    weight = _by_current(response)
+    return _FOUR_K * _integral(equations, fields_.T * properties.sigma * dot(weight, weight))
+
+
+def of_resistors(response: Response) -> float:
+    """Return the density (V²/Hz) of the Johnson noise of the circuit's resistors."""
+    terminals, circuit = response.equations.terminals, response.equations.circuit
+    by_held = response.adjoint[list(response.equations.space.held.values()), 0]
+    held = terminals.conductance @ by_held**2
+    return _FOUR_K * _ROOM_K * float(held + circuit.series_kohm * response.by_bias**2)
+
+
+def of_temperature(response: Response) -> float:
+    """Return the density (V²/Hz) by fluctuations of the temperature, of lever and air.
+
+    Those of the air are exact where the response is proportional to θ of the air: it is averaged
+    over the air's temperatures between surface and surroundings.
+    """
+    equations, air = response.equations, response.equations.space.air
+    fields_, properties, _ = equations.at(response.x)
+    slope = equations.space.fields(response.adjoint).grad_T
+    within = _integral(equations, fields_.T**2 * properties.kappa * dot(slope, slope))
+    counted = np.sqrt(_mean_noise_of_air(equations, response.x)) * air.rise(response.adjoint)
+    return _FOUR_K * (within + float((counted * (air.operator.matrix @ counted)).sum()))
+
+
+def per_hooge(response: Response) -> float:
+    """Return the density times the frequency (V²) of 1/f noise for Hooge's parameter 1.
+
+    Carriers are those of the doping; metal films and dielectrics are taken to have no such noise.
+    """
+    equations = response.equations
+    fields_, _, _ = equations.at(response.x)
+    by_carrier = np.zeros_like(fields_.T)
+    for laws in equations.laws.films:
+        film, kind = laws.film, laws.kind
+        if isinstance(kind, LowDopedSilicon):
+            doping: Array | float = laws.doping
+        elif isinstance(kind, HighDopedSilicon):
+            doping = kind.n_hd
+        else:
+            continue
+        sigma, _ = kind.electrical_conductivity(fields_.T[film.points], laws.doping)
+        sheet = PER_CM_TO_MILLI_PER_UM * film.counted_um * sigma
+        by_carrier[film.points] += sheet**2 / (_PER_UM3 * doping * film.thickness_um)
+    power = dot(fields_.grad_V, _by_current(response))
+    return _integral(equations, by_carrier * power**2)
+
+
+def _by_current(response: Response) -> Array:
+    """Return how a current density at the points counts (V/(mA µm)), (dimension, points, 1)."""
+    fields_, properties, _ = response.equations.at(response.x)
+    adjoint = response.equations.space.fields(response.adjoint)
+    weight = adjoint.grad_V - adjoint.T * fields_.grad_V
+    if properties.beta is not None:
+        # it carries Peltier heat
+        weight = weight + fields_.T * properties.beta / properties.sigma * adjoint.grad_T
+    return np.asarray(weight)
+
+
+def _integral(equations: LeverEquations, density: Array) -> float:
+    return float((equations.space.weights * density).sum())
+
+
+def _mean_noise_of_air(equations: LeverEquations, x: Array) -> Array:
+    """Return the mean of T² κ over θ of the air (K mW/µm), from the base to each site, (sites, 1).
+
+    Between parallel plates θ is linear in the distance, so that this is the mean over the gap.
+    """
+    air, base = equations.space.air, equations.base_temperature_K
+    rise = air.rise(x)
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    T = base + np.maximum(rise, 1e-9)[..., None] * (1.0 + nodes) / 2.0
+    kappa = PER_CM_TO_MILLI_PER_UM * air.gas_conductivity * thermal_conductivity_of_air(T)[0]
+    return np.asarray(((T * kappa) ** 2 @ weights) / (kappa @ weights))

@@ -1,0 +1,329 @@
+"""A lever that reads its distance to a surface: signal, noise, resolution.
+
+Air conducts heat from the lever to the surface, the better the nearer it is, so that a heated
+resistor cools as the lever approaches. The distance is that of the lever's lower face; that films
+bend the lever when it gets warm, which changes the distance, is left out. All holds at frequencies
+that the lever follows.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hotlever.datasets import labelled
+from hotlever.errors import ComputationError, InputError
+from hotlever.lever.dataset import checked_bias, probe_attributes
+from hotlever.lever.laws import GAP
+from hotlever.lever.lever import Lever
+from hotlever.lever.noise import SOURCES, NoiseOptions, spectral_densities
+from hotlever.lever.response import Response
+from hotlever.probe import Probe
+from hotlever.steps import each
+from hotlever.types import Array, Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hotlever.lever.branch import Branch
+
+#: Columns of a file.
+READER_COLUMNS = (
+    *("surface_gap_um", "bias_V", "reader_ohm", "reader_V", "dV_dz_V_per_um", "dlnR_dz_per_um"),
+    *("noise_V_per_rtHz", "resolution_nm_per_rtHz"),
+)
+#: Biases that are tried for the best one, and on either side of the best of these.
+_TRIED, _REFINED = 11, 4
+
+
+class Signal(NamedTuple):
+    """What a reader shows at a distance and a bias, named as in `hotlever.datasets.QUANTITIES`."""
+
+    reader_ohm: float
+    reader_V: float
+    dV_dz_V_per_um: float
+    dlnR_dz_per_um: float
+    noise_V_per_rtHz: float
+    resolution_nm_per_rtHz: float
+    source_V_per_rtHz: Array
+    crosstalk_V_per_V: float
+    crosstalk_V_per_mW: float
+    tip_K: float
+
+
+_NOTHING = Signal._make([*[np.nan] * 6, np.full(len(SOURCES), np.nan), *[np.nan] * 3])
+
+
+class Reader:
+    """The reader of a probe over a surface.
+
+    It is the terminal ``reader`` if a supply heats it, swept or held, and else the heater itself,
+    behind the series resistor of the swept supply.
+
+    Parameters
+    ----------
+    probe : Probe
+    noise : NoiseOptions, optional
+
+    Attributes
+    ----------
+    terminal : str
+        Where the voltage is read.
+
+    Raises
+    ------
+    InputError
+        If it cannot show anything: in vacuum, or with its voltage held.
+    """
+
+    def __init__(self, probe: Probe, noise: NoiseOptions | None = None) -> None:
+        if probe.surroundings.medium == "vacuum":
+            raise InputError("in vacuum a reader sees no surface, expected air: --medium air")
+        if probe.contact is not None:
+            raise InputError(
+                "[contact]: the tip touches a sample, expected a lever above a surface"
+            )
+        circuit = probe.circuit
+        contact, section = circuit.contact("reader"), "[circuit.reader]"
+        self._noise, self.is_held = noise or NoiseOptions(), contact.is_held
+        self._conductance, self._source_mA = contact.norton
+        behind = contact.series_resistance_ohm or contact.current_mA is not None
+        if not self.is_held:
+            section, behind = "[circuit]", circuit.series_resistance_ohm
+            self._conductance = 1.0 / circuit.series_kohm if behind else np.inf
+        self.terminal = "reader" if self.is_held else circuit.swept
+        if not behind:
+            raise InputError(
+                f"{section}: found a supply that holds the voltage, which then shows nothing; "
+                "expected series_resistance_ohm above 0"
+            )
+
+    def signal(self, lever: Lever, branch: Branch, u: float, bias_V: float) -> Signal:
+        """Return what it shows of a lever over a surface, from a place of its branch."""
+        constraint = branch.parametrisation.constraint(np.array([u]))
+        state = lever.polished(branch.states(np.array([u])), bias_V, constraint)
+        shown = "reader_V" if self.is_held else "lever_V"
+        response = Response.of(lever.equations, state.x, constraint, shown)
+        voltage, current = state.lever_V, state.current_mA
+        if self.is_held:
+            voltage = state.reader_V
+            current = self._source_mA - self._conductance * voltage
+        slope = response.by_parameter(GAP)
+        by_source = spectral_densities(response, self._noise, slope)
+        noise = float(np.sqrt(by_source.sum()))
+        per_V = response.by_bias if self.is_held else np.nan
+        return Signal(
+            reader_ohm=1e3 * voltage / current,
+            reader_V=voltage,
+            dV_dz_V_per_um=slope,
+            dlnR_dz_per_um=slope * (1.0 / voltage + self._conductance / current),
+            noise_V_per_rtHz=noise,
+            resolution_nm_per_rtHz=1e3 * noise / abs(slope),
+            source_V_per_rtHz=np.sqrt(by_source),
+            crosstalk_V_per_V=per_V,
+            crosstalk_V_per_mW=per_V / response.power_by_bias,
+            tip_K=state.tip_K,
+        )
+
+
+def over_surface(
+    lever: Lever,
+    distance_um: ArrayLike,
+    bias: ArrayLike,
+    noise: NoiseOptions | None = None,
+    pressure_mbar: ArrayLike | None = None,
+    *,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Read a lever at distances to a surface, over biases, and at pressures of the air.
+
+    Parameters
+    ----------
+    lever : Lever
+        In air.
+    distance_um : array_like, shape (k,)
+        From the lower face of the lever, at its tip, to the surface (µm).
+    bias : array_like, shape (n,)
+        Of the swept supply (V).
+    noise : NoiseOptions, optional
+    pressure_mbar : array_like, shape (m,), optional
+        With an accommodation; that of the probe if left out.
+    progress : callable, optional
+        Called with the distances done and their number.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dimensions ``distance`` and ``bias``, and ``pressure`` if there are any, one variable
+        for each of `READER_COLUMNS` and a few more, NaN where a bias is not reached;
+        ``source_V_per_rtHz`` by source of the noise as well.
+
+    Raises
+    ------
+    InputError
+        If the reader cannot show anything, see `Reader`; if a bias is not finite, or heats nothing;
+        or if the tip or the lever reaches the surface.
+    ComputationError
+        If no state is found at any bias.
+    """
+    if pressure_mbar is not None:
+        return _over_pressures(lever, distance_um, bias, noise, pressure_mbar, progress)
+    reader = Reader(lever.probe, noise)
+    values, distances = _checked(lever.probe, bias), np.atleast_1d(np.asarray(distance_um, float))
+    check_distances(lever.probe, distances)
+    rows, notes = [], list[str]()
+    for distance in each(distances.tolist(), progress):
+        near = at_distance(lever, distance)
+        branch, reading, failure = near._read(values)
+        if failure is not None:
+            notes.append(f"at {distance:.4g} µm: {failure}")
+        rows.append(
+            [
+                _NOTHING if np.isnan(u) else reader.signal(near, branch, u, value)
+                for u, value in zip(reading.u, values.tolist(), strict=True)
+            ]
+        )
+    columns: dict[str, Any] = {
+        name: np.array([[getattr(signal, name) for signal in row] for row in rows])
+        for name in Signal._fields
+    }
+    by_source = ("distance", "bias", "source"), columns.pop("source_V_per_rtHz")
+    columns["surface_gap_um"] = "distance", distances
+    columns["bias_V"] = "bias", values
+    notes += _turns(distances, values, columns["dV_dz_V_per_um"])
+    return labelled(
+        {**columns, "source_V_per_rtHz": by_source},
+        ("distance", "bias"),
+        {"distance": distances, "bias": values, "source": list(SOURCES)},
+        **probe_attributes(lever.probe),
+        read_at=reader.terminal,
+        notes="\n".join(notes),
+    )
+
+
+def _turns(distances: Array, biases: Array, slopes: Array) -> list[str]:
+    """Say where the voltage turns with the distance, (k, n): there nothing is read."""
+    order = np.argsort(distances)
+    signs = np.sign(slopes[order])
+    notes = []
+    for bias, column in zip(biases, signs.T, strict=True):
+        for number in np.flatnonzero(column[1:] * column[:-1] < 0)[:1]:
+            low, high = distances[order][[number, number + 1]]
+            notes.append(
+                f"at a bias of {bias:.4g} V the voltage has an extremum between {low:.4g} and "
+                f"{high:.4g} µm, where it does not tell the distance"
+            )
+    return notes
+
+
+def _over_pressures(
+    lever: Lever,
+    distance_um: ArrayLike,
+    bias: ArrayLike,
+    noise: NoiseOptions | None,
+    pressure_mbar: ArrayLike,
+    progress: Progress | None,
+) -> xr.Dataset:
+    import xarray as xr
+
+    pressures, parts = np.atleast_1d(np.asarray(pressure_mbar, float)), []
+    for number, pressure in enumerate(pressures.tolist()):
+
+        def told(done: int, total: int, before: int = number) -> None:
+            if progress is not None:
+                progress(before * total + done, pressures.size * total)
+
+        thin = lever.with_probe(lever.probe.with_(pressure_mbar=pressure))
+        part = over_surface(thin, distance_um, bias, noise, progress=told)
+        parts.append(part.expand_dims(pressure=[pressure]))
+    data = xr.concat(parts, "pressure", data_vars="minimal", combine_attrs="drop_conflicts")
+    notes = [f"{part.pressure.item():g} mbar: {part.notes}" for part in parts if part.notes]
+    more = labelled({"pressure_mbar": pressures}, "pressure", {"pressure": pressures})
+    return (
+        data.assign_coords(more.coords).assign(more.variables).assign_attrs(notes="\n".join(notes))
+    )
+
+
+def rows_of(data: xr.Dataset) -> xr.Dataset:
+    """Return the columns of a file of what `over_surface` gives, a row for each point."""
+    import xarray as xr
+
+    columns = [*READER_COLUMNS, *(["pressure_mbar"] if "pressure" in data.sizes else [])]
+    full = xr.broadcast(*(data[name] for name in columns))
+    order = [name for name in ("pressure", "distance", "bias") if name in data.sizes]
+    return labelled(
+        {
+            name: values.transpose(*order).values.ravel()
+            for name, values in zip(columns, full, strict=True)
+        },
+        "row",
+    )
+
+
+def best_bias(
+    lever: Lever, distance_um: ArrayLike, highest_V: float, noise: NoiseOptions | None = None
+) -> float:
+    """Return the bias (V), up to a highest one, at which distances are resolved best.
+
+    It is the best for the one that is resolved worst; the voltage changes with all in the same
+    sense.
+
+    Raises
+    ------
+    InputError, ComputationError
+        As `over_surface`.
+    """
+    reader = Reader(lever.probe, noise)
+    tried = highest_V * np.arange(1, _TRIED + 1) / _TRIED
+    levers = [at_distance(lever, distance) for distance in np.unique(distance_um).tolist()]
+
+    def resolution(bias_V: float) -> float:
+        signals = []
+        for near in levers:
+            branch, reading, _ = near._read(np.array([bias_V]))
+            if np.isnan(reading.u[0]):
+                return np.inf
+            signals.append(reader.signal(near, branch, reading.u[0], bias_V))
+        slopes = np.array([signal.dV_dz_V_per_um for signal in signals])
+        same = (slopes > 0).all() or (slopes < 0).all()
+        return max(signal.resolution_nm_per_rtHz for signal in signals) if same else np.inf
+
+    found = np.array([resolution(value) for value in tried.tolist()])
+    if not np.isfinite(found).any():
+        raise ComputationError(f"no bias up to {highest_V:g} V resolves all distances")
+    best = int(found.argmin())
+    low, high = tried[max(best - 1, 0)], tried[min(best + 1, _TRIED - 1)]
+    around = np.linspace(low, high, 2 * _REFINED + 1)
+    finer = [resolution(value) for value in around.tolist()]
+    return float(around[int(np.argmin(finer))])
+
+
+def at_distance(lever: Lever, distance_um: float) -> Lever:
+    """Return the lever with a surface below at a distance (µm)."""
+    return lever.with_probe(lever.probe.with_(surface_gap_um=distance_um))
+
+
+def check_distances(probe: Probe, distance_um: Array) -> None:
+    """Refuse distances at which the tip reaches the surface.
+
+    Raises
+    ------
+    InputError
+        Naming the nearest, or the contact of a tip that touches a sample.
+    """
+    if probe.contact is not None:
+        raise InputError("[contact]: the tip touches a sample, expected a lever above a surface")
+    height = 0.0 if probe.tip is None else probe.tip.height_um
+    if not distance_um.size or not (distance_um > height).all():
+        found = f"{distance_um.min():g} µm" if distance_um.size else "none"
+        least = "above 0" if probe.tip is None else f"above the tip's height, {height:g} µm"
+        raise InputError(f"found a distance of {found}, expected distances {least}")
+
+
+def _checked(probe: Probe, bias: ArrayLike) -> Array:
+    values = checked_bias(bias, probe)
+    if probe.circuit.starts_cold and not values.all():
+        raise InputError("found a bias of 0 V, which heats no reader; expected others")
+    return values
