@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -28,12 +28,14 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "current_mA": ("mA", "heater current"),
     "lever_V": ("V", "lever voltage"),
     "reader_V": ("V", "reader voltage"),
+    "bridge_output_V": ("V", "bridge voltage"),
     "tip_K": ("K", "tip temperature"),
     "power_mW": ("mW", "power dissipated in the lever"),
     "total_power_mW": ("mW", "power into the lever by all supplies"),
     "tip_error_K": ("K", "standard error of the measured tip temperature"),
     "current_error_mA": ("mA", "standard error of the measured current"),
     "reader_error_V": ("V", "standard error of the measured reader voltage"),
+    "bridge_output_error_V": ("V", "standard error of the measured bridge voltage"),
     # inside a lever
     "heater_ohm": ("ohm", "heater resistance"),
     "legs_ohm": ("ohm", "resistance of both legs"),
@@ -76,8 +78,11 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "tip_per_power_deg": ("deg", "phase of the tip temperature against the power"),
     "tip_per_bias_K_per_V": ("K/V", "change of the tip temperature by that of the bias"),
     "tip_per_bias_deg": ("deg", "phase of the tip temperature against the bias"),
+    "bridge_per_bias_V_per_V": ("V/V", "change of the bridge voltage by that of the bias"),
+    "bridge_per_bias_deg": ("deg", "phase of the bridge voltage against the bias"),
     **{
-        f"{name}_harmonic{kind}": (unit, f"{what} harmonic of the lever voltage")
+        f"{name}_{start}harmonic{kind}": (unit, f"{what} harmonic of the {of} voltage")
+        for start, of in (("", "lever"), ("bridge_", "bridge"))
         for name in ("first", "second", "third")
         for kind, unit, what in (("_V", "V", name), ("_deg", "deg", f"phase of the {name}"))
     },
@@ -213,6 +218,10 @@ class Measurand(NamedTuple):
     headings: tuple[str, ...] = ()
     #: Where the largest value of a column can lie; else its unit is wrong.
     plausible: tuple[float, float] = (0.0, math.inf)
+    #: Whether it may be of either sign at a positive bias.
+    signed: bool = False
+    #: Unit of differences between data and model, and how many of it make one of its own.
+    small: tuple[str, float] = ("", 1.0)
 
     @property
     def heading(self) -> str:
@@ -232,6 +241,10 @@ _CURRENT = (
     *("strom", "heizstrom", "heizerstrom", "hebelstrom"),
 )
 _READER = ("vr", "ur", "vreader", "ureader", "reader", "readervoltage", "readerspannung")
+_BRIDGE = (
+    *("vbridge", "ubridge", "bridge", "bridgevoltage", "bridgeoutput", "bridgeoutputvoltage"),
+    *("bridgesignal", "ubrücke", "brücke", "brückenspannung", "diagonalspannung"),
+)
 _TIP = ("ttip", "tip", "tiptemperature", "spitzentemperatur")
 #: Everything that a measurement may hold, by symbol; ``d`` begins that of a standard error.
 MEASURANDS = {
@@ -240,29 +253,46 @@ MEASURANDS = {
         Measurand("t", "time_us", "us"),
         Measurand("V_l", "lever_V", "V", _LEVER),
         Measurand("V_b", "bias_V", "V", _BIAS, (1e-3, 1e3)),
-        Measurand("I_h", "current_mA", "mA", _CURRENT, (1e-9, 1e3)),
-        Measurand("V_r", "reader_V", "V", _READER, (1e-9, 1e3)),
-        Measurand("T_tip", "tip_K", "K", _TIP, (0.0, 5e3)),
+        Measurand("I_h", "current_mA", "mA", _CURRENT, (1e-9, 1e3), small=("µA", 1e3)),
+        Measurand("V_r", "reader_V", "V", _READER, (1e-9, 1e3), small=("mV", 1e3)),
+        Measurand("V_bridge", "bridge_output_V", "V", _BRIDGE, (1e-9, 1e3), True, ("mV", 1e3)),
+        Measurand("T_tip", "tip_K", "K", _TIP, (0.0, 5e3), small=("K", 1.0)),
         Measurand("dT_tip", "tip_error_K", "K", ("dttip", "δttip")),
         Measurand("dI_h", "current_error_mA", "mA", ("dih", "δih")),
         Measurand("dV_r", "reader_error_V", "V", ("dvr", "δvr")),
+        Measurand("dV_bridge", "bridge_output_error_V", "V", ("dvbridge", "δvbridge")),
     )
 }
 _BUFFER = ("source", "sourcevalue", "value", "reading")
 #: Headings that say no more than the unit does: what a file has of this unit counts as the
 #: quantity where it is the only one.
 PLAIN = {"V_b": ("voltage", "spannung", "u", *_BUFFER), "I_h": _BUFFER}
-#: What a fit compares, by the name that users give it.
-OBSERVABLES = {
-    "current": MEASURANDS["I_h"],
-    "reader": MEASURANDS["V_r"],
-    "tip": MEASURANDS["T_tip"],
-}
+#: What a fit compares, by the name that users give it. How each follows from what a lever shows is
+#: said in `hotlever.lever.observables`.
+Observable = Literal["current", "reader", "bridge", "tip"]
+OBSERVABLES: dict[str, Measurand] = dict(
+    zip(
+        get_args(Observable),
+        (MEASURANDS[symbol] for symbol in ("I_h", "V_r", "V_bridge", "T_tip")),
+        strict=True,
+    )
+)
 
 
 def observables_of(data: xr.Dataset) -> Array:
-    """Return current (mA), reader voltage (V) and tip temperature (K) of a dataset, (3, n)."""
-    return np.stack([data[measurand.name].values for measurand in OBSERVABLES.values()])
+    """Return `OBSERVABLES` of a dataset, (observables, n); NaN of what it does not have."""
+    nothing = np.full(data["tip_K"].shape, np.nan)
+    names = [measurand.name for measurand in OBSERVABLES.values()]
+    return np.stack([data[name].values if name in data else nothing for name in names])
+
+
+def in_a_file(data: xr.Dataset, columns: Sequence[str]) -> list[str]:
+    """Return the columns of a file: the usual ones, and those that only some levers have.
+
+    These are of a bridge, and of terminals and monitors, which are named by users.
+    """
+    own = (str(name) for name in data.data_vars)
+    return [*columns, *(name for name in own if "bridge_" in name or name not in QUANTITIES)]
 
 
 def labelled(

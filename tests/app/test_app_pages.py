@@ -228,7 +228,7 @@ def test_a_dropped_measurement_is_understood(tmp_path: Path) -> None:
         await drop(user, "mine.csv", (EXAMPLES / "lever-a.csv").read_bytes())
         await user.should_see("What was understood", retries=50)
         await user.should_see("hotlever fit mine.csv -o mine.fit.json")
-        user.find("tip temperature").click()
+        user.find("tip T_tip").click()
         await user.should_see("hotlever fit mine.csv --observables current,reader -o mine.fit.json")
 
     visit(tmp_path, story)

@@ -72,7 +72,7 @@ def understood(
     (along,) = data.sizes
     data = data.isel({along: slice(None, None, data.sizes[along] // _POINTS + 1)})
     in_time = {"time_us": data.time.values.tolist()} if along == "time" else {}
-    columns_shown = ("bias_V", "lever_V", *(column.name for column in OBSERVABLES.values()))
+    columns_shown = ["bias_V", "lever_V", *(column.name for column in OBSERVABLES.values())]
     head, *rows = measurement.understood
     # the page shows all columns
     notes = [note for note in measurement.notes if note not in measurement.unused]
@@ -81,7 +81,8 @@ def understood(
         "notes": [note.replace(f"{folder}/", "") for note in notes],
         "observables": list(measurement.observables),
         "medium": measurement.medium,
-        "data": in_time | {column: data[column].values.tolist() for column in columns_shown},
+        "data": in_time
+        | {column: data[column].values.tolist() for column in columns_shown if column in data},
     }
 
 

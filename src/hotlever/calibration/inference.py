@@ -125,8 +125,11 @@ def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Pri
 
 
 def _same_data(first: Measurement, second: Measurement) -> bool:
-    same = np.array_equal(first.bias_V, second.bias_V, equal_nan=True)
-    return same and np.array_equal(first.current_mA, second.current_mA, equal_nan=True)
+    one, other = (
+        (data.bias_V, data.observable("current"), data.observable("bridge"))
+        for data in (first, second)
+    )
+    return np.array_equal(one, other, equal_nan=True)
 
 
 # --- the calibration of an estimated lever ------------------------------------------------------
@@ -148,7 +151,7 @@ def calibrated_by_estimate(
     circuit, medium = probe.circuit, probe.surroundings.medium
     tip = tip_by_bias(estimate, samples, progress)
     converged, reason = _verdict(estimate, priors)
-    notes = [*what_data_lack(measured, tip.table.tip_K.values), *estimate.notes]
+    notes = [*what_data_lack(measured, circuit, tip.table.tip_K.values), *estimate.notes]
     notes += [tip.asymmetry] if tip.asymmetry and not reason else []
     notes += [jump.note for jump in tip.jumps]
     notes += outlier_notes(estimate.residuals, estimate.prediction.values, robust=True)
@@ -213,7 +216,7 @@ def _tips(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
     """Return the tip temperatures of a branch at the measured power; or bias, if not that tells."""
     one_way = measured.bias_V.min() >= 0.0
     if one_way and branch.starts_cold and branch.power_turns_K is None:
-        return branch.tip_temperature(circuit.power(measured.bias_V, measured.current_mA))
+        return branch.tip_temperature(circuit.power(measured.bias_V, measured.current(circuit)))
     return branch.tip_K(branch.read(circuit, measured.bias_V).u)
 
 

@@ -131,7 +131,8 @@ def calibrated_by_knee(
         raise InputError(f"the paper's rule: {turns}; expected a lever of which it is")
     model, similar = curve_of_model(vacuum), _similar_branches(probe, vacuum)
     reference = model if law is None else curve_of_law(law, circuit.base_temperature_K)
-    curve = IVCurve.of(measured.bias_V, measured.current_mA, circuit)
+    current = measured.current(circuit)
+    curve = IVCurve.of(measured.bias_V, current, circuit)
     notes = []
     try:
         knee = find_knee(curve, vacuum)
@@ -167,7 +168,7 @@ def calibrated_by_knee(
         notes.append(
             f"{beyond} rows of the table are hotter than the models go, and have no temperature"
         )
-    own = reference.at(circuit.power(measured.bias_V, measured.current_mA), knee_mW)
+    own = reference.at(circuit.power(measured.bias_V, current), knee_mW)
     return Calibration(
         table=table_by_bias(circuit, rows.bias_V, rows.current_mA, tip, parts),
         route=route,

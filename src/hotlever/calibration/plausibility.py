@@ -16,7 +16,7 @@ from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
 from hotlever.measurement.contents import colder_than_base
-from hotlever.probe import Probe
+from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import Moved, Prior, PriorUse
 
@@ -51,10 +51,11 @@ def check_plausible(
     """
     where = measured.path or "measurement"
     alone, size = probe.circuit.starts_cold, np.abs(measured.bias_V)
-    here = np.isfinite(measured.current_mA) & (measured.bias_V > 0) & (measured.current_mA > 0)
+    current = measured.current(probe.circuit)
+    here = np.isfinite(current) & (measured.bias_V > 0) & (current > 0)
     if not alone:
         # other supplies drive a current as well, which is known less well than what is added
-        here = np.isfinite(measured.current_mA) & (size > _HARDLY * size.max())
+        here = np.isfinite(current) & (size > _HARDLY * size.max())
     different = np.unique(measured.bias_V[here]).size
     if different < _FEWEST:
         above = " above 0" if alone else ""
@@ -63,7 +64,7 @@ def check_plausible(
             f"{_FEWEST} or more"
         )
     _check_temperatures(measured, probe, where)
-    bias, current = measured.bias_V[here], measured.current_mA[here]
+    bias, current = measured.bias_V[here], current[here]
     low = np.argsort(np.abs(bias))[: max(_FEWEST, bias.size // 8)]
     # what a cold lever shows does not depend on what is around it
     cold = probe.in_medium("vacuum") if alone else probe
@@ -114,17 +115,17 @@ def _check_temperatures(measured: Measurement, probe: Probe, where: str) -> None
         )
 
 
-def what_data_lack(measured: Measurement, tip_K: np.ndarray) -> list[str]:
+def what_data_lack(measured: Measurement, circuit: Circuit, tip_K: np.ndarray) -> list[str]:
     """Say what the data lack, to tell more of a lever."""
-    remarks, current = [], measured.current_mA[np.isfinite(measured.current_mA)]
-    if current.size < _FEW:
+    remarks, count = [], np.isfinite(measured.current(circuit)).sum()
+    if count < _FEW:
         remarks.append(
-            f"{current.size} rows say little of a lever: the answer leans on what was known "
+            f"{count} rows say little of a lever: the answer leans on what was known "
             f"beforehand; {_FEW} or more would tell"
         )
-    levels = np.unique(current)
+    levels = np.unique(measured.current_mA[np.isfinite(measured.current_mA)])
     step = float(np.diff(levels).min()) if levels.size > 1 else 0.0
-    share = step / float(levels[-1])
+    share = step / float(levels[-1]) if step else 0.0
     if share > _COARSE and np.allclose(levels / step, np.round(levels / step), atol=_EVEN):
         remarks.append(
             f"I_h has a resolution of {step:.2g} mA only, {share:.1%} of its largest value, in "

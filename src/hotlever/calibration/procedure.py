@@ -96,8 +96,11 @@ def calibrate(
     whole = given_measurement(measurement, origin)
     measured = averaged(whole, robust=True)
     measured.need_rest("a calibration")
-    if "current" not in measured.observables:
-        raise InputError(f"{measured.path}: no values of I_h, which a calibration needs beside V_b")
+    if np.isnan(measured.current(origin.circuit)).all():
+        raise InputError(
+            f"{measured.path}: no values of I_h, which a calibration needs beside V_b, or of "
+            "V_bridge, of a probe with bridge_upper_ohm and bridge_lower_ohm in [circuit]"
+        )
     notes = note_on_averages(whole, measured)
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
         if samples:

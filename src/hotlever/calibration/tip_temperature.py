@@ -34,7 +34,9 @@ from hotlever.types import Array, Progress
 _ROWS, _FINE = 101, 10_001
 #: By which source of error a parameter counts that is not the lever's own.
 OF_THE_MEASUREMENT = {
-    "series_resistance_ohm": "electronics",
+    **dict.fromkeys(
+        ("series_resistance_ohm", "bridge_upper_ohm", "bridge_lower_ohm"), "electronics"
+    ),
     "gas_conductivity": "air",
     "surface_gap_um": "air",
     "base_temperature_K": "base temperature",
@@ -122,7 +124,8 @@ def measured_range(estimate: Estimate) -> Array:
     measured = estimate.measurement
     # without a bias nothing is known of a lever that is cold then
     heated = measured.bias_V > estimate.probe.lowest_bias_V
-    present = measured.bias_V[np.isfinite(measured.current_mA) & heated]
+    current = measured.current(estimate.probe.circuit)
+    present = measured.bias_V[np.isfinite(current) & heated]
     return np.linspace(present.min(), min(present.max(), highest_bias(estimate)), _ROWS)
 
 

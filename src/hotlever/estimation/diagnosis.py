@@ -137,8 +137,9 @@ class Diagnosis:
     def __init__(
         self, measured: Measurement, probe: Probe, priors: Mapping[str, Prior | str] | None = None
     ) -> None:
-        here = np.isfinite(measured.current_mA) & np.isfinite(measured.bias_V)
-        data = measured.bias_V[here], measured.current_mA[here]
+        current = measured.current(probe.circuit)
+        here = np.isfinite(current) & np.isfinite(measured.bias_V)
+        data = measured.bias_V[here], current[here]
         self._rows = MeasuredRows(*data, probe.circuit.series_kohm, np.ones(here.sum(), dtype=bool))
         self._probe, self._stated = probe, priors or None
 

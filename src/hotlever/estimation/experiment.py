@@ -15,8 +15,8 @@ from hotlever.estimation.surrogate import Surrogate
 from hotlever.probe import Probe
 from hotlever.types import Array
 
-#: Where predictions have the tip temperature; see `hotlever.datasets.OBSERVABLES`.
-TIP = 2
+#: Where predictions have the tip temperature.
+TIP = list(OBSERVABLES).index("tip")
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,9 @@ class Prediction:
     Attributes
     ----------
     probe : Probe
-    values : ndarray, shape (3, n)
-        I_h (mA), V_r (V) and T_tip (K) at the rows of the measurement.
-    slopes : ndarray, shape (3, n, k)
+    values : ndarray, shape (observables, n)
+        `hotlever.datasets.OBSERVABLES` at the rows of the measurement.
+    slopes : ndarray, shape (observables, n, k)
         Derivatives by the experiment's parameters.
     surrogate : Surrogate
         Predictions for similar probes.
@@ -48,7 +48,7 @@ class Prediction:
 
 
 def named(values: Array) -> dict[str, Array]:
-    """Return what is shown, (3, n), by the names that a sweep or a history has."""
+    """Return what is shown, (observables, n), by the names that a sweep or a history has."""
     return {column.name: row for column, row in zip(OBSERVABLES.values(), values, strict=True)}
 
 

@@ -58,7 +58,7 @@ class _Times:
         ]
 
     def at_rows(self, values: Array) -> Array:
-        """Return what is seen at the rows, (3, n, ...), of that at the times, (3, m, ...)."""
+        """Return what is seen at the rows, (k, n, ...), of that at the times, (k, m, ...)."""
         at_rows = np.empty((len(values), self._count, *values.shape[2:]))
         for indices, nodes, rows, start in self._parts:
             part = values[:, nodes]
@@ -91,9 +91,9 @@ class PredictionInTime(Prediction):
 
     Attributes
     ----------
-    coarse : ndarray, shape (3, m)
+    coarse : ndarray, shape (observables, m)
         What the coarse lever itself shows at the times at which it was followed.
-    coarse_slopes : ndarray, shape (3, m, k)
+    coarse_slopes : ndarray, shape (observables, m, k)
     """
 
     coarse: Array
@@ -115,7 +115,7 @@ class ExperimentInTime:
         What it is corrected by; None where it is right as it is.
     times : _Times
         When it is followed, and how rows are read off that.
-    offset : ndarray, shape (3, m), or float
+    offset : ndarray, shape (observables, m), or float
         That correction.
     """
 

@@ -51,6 +51,11 @@ from hotlever.types import Array, Progress
 #: The share of the sum of squares that another step would take away, below which a search that has
 #: not come to its end has come to a verdict.
 _LITTLE = 0.5
+#: Why a probe does not show what was measured.
+_MISSING = {
+    "reader": "the probe has no reader",
+    "bridge": "the probe has no bridge (bridge_upper_ohm and bridge_lower_ohm in [circuit])",
+}
 #: Data that are enough to tell, with priors, which of them are outliers.
 _ENOUGH = 15
 
@@ -186,7 +191,7 @@ def estimate(
         priors, more = known_in_time(probe, measurement, priors, options.varied)
         options, notes = replace(options, priors=priors), notes + more
     informed = bool(priors) or bool(before.names)
-    enough = int(np.isfinite(measurement.current_mA).sum()) >= _ENOUGH
+    enough = int(np.isfinite(measurement.current(probe.circuit)).sum()) >= _ENOUGH
     options = replace(options, robust=options.robust or (enough and informed))
     observables = _observables(options, measurement, probe, notes)
     # priors are in standard deviations, so the data must be too
@@ -226,22 +231,22 @@ def _observables(
 ) -> tuple[str, ...]:
     """Return what is to be fitted: by default all that has data and that the probe can show."""
     where = measurement.path or "measurement"
-    shown = measurement.observables
-    if "reader" not in probe.layout().terminal_names:
-        shown = tuple(name for name in shown if name != "reader")
-        if "reader" in (options.observables or ()):
-            raise InputError(f"{where}: reader: the probe has no reader; fit {', '.join(shown)}")
-        if shown != measurement.observables and options.observables is None:
-            notes.append("V_r: the probe has no reader, so that these values are not fitted")
-    if options.observables is None:
-        return shown
-    for name in options.observables:
-        if not np.isfinite(measurement.observable(name)).any():
+    shown = tuple(name for name in measurement.observables if name in probe.observables)
+    for name in options.observables or measurement.observables:
+        symbol = OBSERVABLES[name].symbol
+        if name not in measurement.observables:
             raise InputError(
-                f"{where}: no values of {name} (column {OBSERVABLES[name].symbol}); it has "
+                f"{where}: no values of {name} (column {symbol}); it has "
                 f"{', '.join(measurement.observables)}"
             )
-    return tuple(options.observables)
+        if name in shown:
+            continue
+        if options.observables is None and shown:
+            notes.append(f"{symbol}: {_MISSING[name]}, so that these values are not fitted")
+        else:
+            expected = f"fit {', '.join(shown)}" if shown else "there is nothing else to fit"
+            raise InputError(f"{where}: {symbol}: {_MISSING[name]}; {expected}")
+    return shown if options.observables is None else tuple(options.observables)
 
 
 Answer = TypeVar("Answer", bound=Outcome)

@@ -27,7 +27,7 @@ _OUTLYING, _NAMED = 8.0, 10
 
 
 def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
-    """Return where data are not described by predicted values (3, n); empty if they are.
+    """Return where data are not described by predicted values (m, n); empty if they are.
 
     Tip temperatures are left out: a thermometer's scale may be off by more than its readings
     scatter.

@@ -16,7 +16,7 @@ import numpy as np
 
 from hotlever.lever.branch import TIP_RISE, Branch
 from hotlever.lever.curve import crossing, spline_through
-from hotlever.lever.sensitivities import at_fixed_bias
+from hotlever.lever.observables import at_fixed_bias, observed, observed_by
 from hotlever.piecewise import Piecewise
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array, Index
@@ -33,9 +33,9 @@ class Rows:
     Attributes
     ----------
     bias_V : ndarray, shape (n,)
-    shown : ndarray, shape (3, n), optional
-        I_h (mA), V_r (V) and T_tip (K); NaN where nothing was measured. Without them the states
-        are those of a slow ramp.
+    shown : ndarray, shape (observables, n), optional
+        What was measured, `hotlever.datasets.OBSERVABLES`; NaN where nothing was. Without it the
+        states are those of a slow ramp.
     """
 
     bias_V: Array
@@ -59,16 +59,14 @@ class Rows:
         return reading.u, np.ones(reading.u.shape)
 
     def values(self, branch: Branch, circuit: Circuit) -> Array:
-        """Return I_h (mA), V_r (V) and T_tip (K), (3, n); see `states`."""
+        """Return the observables of the states, (observables, n); see `states`."""
         u, short = self.states(branch, circuit)
-        values = shown_at(branch, circuit, u)
-        values[:2] *= short
-        return values
+        return observed(circuit, _reaching(branch, u, short))
 
     def differentiated(
         self, branch: Branch, by_parameter: Array, circuit: Circuit, names: Sequence[str]
     ) -> tuple[Array, Array]:
-        """Return the same, and their derivatives (3, n, p) by parameters; see `states`.
+        """Return the same, and derivatives (observables, n, p) by parameters; see `states`.
 
         Parameters
         ----------
@@ -80,25 +78,22 @@ class Rows:
             The parameters.
         """
         u, short = self.states(branch, circuit)
-        values = shown_at(branch, circuit, u)
+        shown = _reaching(branch, u, short)
         by_state = spline_through(branch.u, by_parameter)(u)
-        of_circuit = np.stack([circuit.bias_by(name, values[0]) for name in names], axis=1)
-        of_base = np.array([circuit.base_by(name) for name in names])
+        of_circuit = np.stack([circuit.bias_by(name, shown[1] / short) for name in names], axis=1)
         along = branch.curve(u, 1)
         if self.shown is not None:
             self._steepen(along, circuit, u)
-        slopes = at_fixed_bias(along, circuit, by_state, of_circuit, of_base)
+        slopes = at_fixed_bias(along, circuit, by_state, of_circuit)
         ends = np.flatnonzero(short > 1.0)
         if ends.size:
             # the end of a branch stays where it is, to first order; what it lacks in bias changes
             bias_by = circuit.bias(by_state[ends, 0], by_state[ends, 1]) + of_circuit[ends]
-            more = short[ends] / self.bias_V[ends] * short[ends]
-            for row, value in enumerate(values[:2, ends]):
-                slopes[row, ends] = short[ends, None] * by_state[ends, row + 1]
-                slopes[row, ends] -= (value * more)[:, None] * bias_by
-            slopes[2, ends] = of_base + by_state[ends, TIP_RISE]
-            values[:2, ends] *= short[ends]
-        return values, slopes
+            more = (short[ends] / self.bias_V[ends])[:, None] * bias_by
+            slopes[:, ends] = np.moveaxis(by_state[ends], 1, 0)
+            slopes[:TIP_RISE, ends] *= short[ends, None]
+            slopes[:TIP_RISE, ends] -= shown[:TIP_RISE, ends, None] * more
+        return observed(circuit, shown), observed_by(circuit, shown, slopes, names)
 
     def _nearest(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
         """Return the states nearest to what was measured; see `states`."""
@@ -120,7 +115,7 @@ class Rows:
                 continue
             sign = 1.0 if last >= first else -1.0
             at = crossing(Piecewise(sign * curve.c, curve.x), low, high, sign * bias[here])
-            away = self._distance(shown_at(branch, branch.equations.circuit, at), here)
+            away = self._distance(observed(circuit, branch.curve(at).T), here)
             nearer = away < distance[here]
             u[here[nearer]], distance[here[nearer]] = at[nearer], away[nearer]
         height = curve(np.array(ends))
@@ -133,7 +128,7 @@ class Rows:
         return u, short
 
     def _distance(self, values: Array, rows: Index) -> Array:
-        """Return how far predicted values (3, m) are from some rows, as squares of shares, (m,)."""
+        """Return how far values (observables, m) are from some rows, as squares of shares."""
         assert self.shown is not None
         largest = np.nanmax(np.abs(self.shown), axis=1, keepdims=True, initial=1e-300)
         return np.asarray(np.nansum(((values - self.shown[:, rows]) / largest) ** 2, axis=0))
@@ -146,11 +141,8 @@ class Rows:
         along[flat, 0] += (np.where(slope < 0, -least, least) - slope)[flat]
 
 
-def shown_at(branch: Branch, circuit: Circuit, u: Array) -> Array:
-    """Return I_h, V_r and T_tip (3, n) of the states at some u, in the circuit of a similar lever.
-
-    Its base temperature may be another one.
-    """
-    warmer = circuit.base_temperature_K - branch.base_temperature_K
-    shown, tip_K = branch.shown(u), branch.tip_K(u) + warmer
-    return np.stack([shown["current_mA"], shown["reader_V"], tip_K])
+def _reaching(branch: Branch, u: Array, short: Array) -> Array:
+    """Return V_l, I_h, V_r and the rise of the tip at some u, (4, n), as far as the bias goes."""
+    shown = branch.curve(u).T.copy()
+    shown[:TIP_RISE] *= short
+    return shown

@@ -23,11 +23,11 @@ class Quantity(Protocol):
     """A number that follows from a lever."""
 
     def value(self, values: Array, parameters: Array) -> float:
-        """Return it for predicted values (3, n) and the varied parameters (p,)."""
+        """Return it for predicted values (m, n) and the varied parameters (p,)."""
         ...
 
     def gradient(self, slopes: Array) -> Array:
-        """Return its derivatives by the parameters, (p,), for those of the values (3, n, p)."""
+        """Return its derivatives by the parameters, (p,), for those of the values (m, n, p)."""
         ...
 
 
@@ -161,7 +161,7 @@ class Objective:
     # --- residuals --------------------------------------------------------------------------------
 
     def residual(self, values: Array, point: Array) -> Array:
-        """Return the residuals of data and priors, for predicted values (3, n)."""
+        """Return the residuals of data and priors, for predicted values (m, n)."""
         parts = [self.residuals.weighted(values), self.from_priors(point)]
         if self._penalty is not None:
             penalty, parameters = self._penalty, self.coordinates.values(point)
@@ -176,7 +176,7 @@ class Objective:
         return np.concatenate([data, self.from_priors(point), penalty])
 
     def jacobian(self, slopes: Array, point: Array) -> Array:
-        """Return their derivatives by the coordinates, for predicted slopes (3, n, k)."""
+        """Return their derivatives by the coordinates, for predicted slopes (m, n, k)."""
         rows = [self.of_data(slopes, point), self.of_priors(point)]
         if self._penalty is not None:
             by = self._penalty.quantity.gradient(slopes[:, :, self.columns])

@@ -30,9 +30,9 @@ class FitOptions:
 
     Attributes
     ----------
-    observables : sequence of {"current", "reader", "tip"}, optional
+    observables : sequence of {"current", "reader", "bridge", "tip"}, optional
         Option I of the paper is ``["current"]``, option II ``["current", "reader"]``, option
-        III all three. All that the measurement has, by default.
+        III adds the tip. All that the measurement has, by default.
     fixed : mapping of str to float or None
         Parameters to hold, at a value or (None) at the probe's.
     robust : bool
@@ -43,7 +43,7 @@ class FitOptions:
         Divide every observable by its largest measured value, as in the paper, or every datum by
         its measurement error; an observable without errors then takes its scatter about the fit.
     drift : bool
-        Let the zeros of I_h and V_r lie on straight lines over the order of the rows.
+        Let the zeros of I_h, V_r and V_bridge lie on straight lines over the order of the rows.
     medium : {"vacuum", "air", "unknown"}, optional
         What the lever was measured in; wins over measurement and probe. If it is unknown both are
         tried (`hotlever.estimation.inverse_problem`).

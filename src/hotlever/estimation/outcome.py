@@ -28,14 +28,13 @@ from hotlever.errors import InputError
 from hotlever.files import json_text, read_json, without_nan, write_text
 from hotlever.lever.transient.waveform import Polyline, Sine
 from hotlever.measurement import MEASURED, Measurement
+from hotlever.measurement.data import OPTIONAL
 from hotlever.probe import Probe
 from hotlever.probe.priors import PriorUse
 from hotlever.probe.surroundings import Medium
 from hotlever.records import Number, explained, stored_as
 from hotlever.types import Array
 
-#: Columns of a measurement that are NaN where a file has none; the other errors are None then.
-_NEEDED = ("current_mA", "reader_V", "tip_K", "tip_error_K")
 #: No column of a measurement has larger values, in the units inside.
 _LARGEST = 1e9
 
@@ -171,8 +170,9 @@ class MeasurementSection(Section):
 
     def measurement(self) -> Measurement:
         """Return the measurement."""
-        columns: dict[str, Any] = dict.fromkeys(_NEEDED, np.full(self.columns["V_b"].size, np.nan))
+        nothing, columns = np.full(self.columns["V_b"].size, np.nan), dict[str, Any]()
         for column in MEASURED:
+            columns[column.name] = None if column.name in OPTIONAL else nothing
             if column.symbol in self.columns:
                 columns[column.name] = self.columns[column.symbol]
         return Measurement(**self.attributes_of(Measurement), **columns)

@@ -107,7 +107,7 @@ class Posterior:
 
     @property
     def slopes(self) -> Array:
-        """Derivatives of what is predicted by the varied parameters, (3, n, p)."""
+        """Derivatives of what is predicted by the varied parameters, (m, n, p)."""
         return self.at.slopes[:, :, self.objective.columns]
 
     def principal_steps(self, least: float = 0.0) -> list[dict[str, float]]:
@@ -192,7 +192,7 @@ class PosteriorDensity:
     at : Prediction
         About which it is approximated.
     shown : callable
-        Return I_h, V_r and T_tip (3, n) at a point; picklable, if it is sampled in processes.
+        Return the observables (m, n) at a point; picklable, if it is sampled in processes.
     noise : {"each", "common"}
         What shares a noise scale: an observable, or all.
     """

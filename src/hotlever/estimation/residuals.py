@@ -1,8 +1,8 @@
 """Data minus prediction, weighted: what fits, profiles and posteriors have in common.
 
-The zero of I_h and of V_r may drift: it is a straight line over the order of the rows, which is
-that of time. It enters linearly, so for every trial of the parameters the best one follows at once
-(variable projection, Golub and Pereyra, Inverse Problems 19, R1 (2003)).
+The zeros of I_h, V_r and V_bridge may drift: each is a straight line over the order of the rows,
+which is that of time. It enters linearly, so for every trial of the parameters the best one follows
+at once (variable projection, Golub and Pereyra, Inverse Problems 19, R1 (2003)).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from hotlever.probe.priors import Moved
 from hotlever.types import Array
 
 #: Observables that have a zero.
-ZEROED = ("current", "reader")
+ZEROED = ("current", "reader", "bridge")
 #: A zero is worth a note beyond this many standard errors.
 _NOTICED = 7.0
 
@@ -121,7 +121,7 @@ class Residuals:
 
     @property
     def shown(self) -> Array:
-        """All that was measured at these rows, fitted or not, (3, n)."""
+        """All that was measured at these rows, fitted or not, (observables, n)."""
         every = [self._measurement.observable(name)[self._used] for name in OBSERVABLES]
         return np.stack(every)
 
@@ -142,7 +142,7 @@ class Residuals:
         full[:, self._used] = np.where(self.present, self.errors.weights, 0.0)
         return full
 
-    # --- for predicted values (3, n) and slopes (3, n, p) ---------------------------------------
+    # --- for predicted values (observables, n) and slopes (observables, n, p) -------------------
 
     def difference(self, values: Array) -> Array:
         """Return data minus prediction minus drifting zeros, NaN where nothing was measured."""
@@ -182,7 +182,8 @@ class Residuals:
     def in_common(self, values: Array, slopes: Array, covariance: Array) -> dict[str, Moved]:
         """Return the errors that data have in common as the data tell them.
 
-        The slopes (3, n, p) are those by parameters of which the fit leaves this covariance.
+        The slopes (observables, n, p) are those by parameters of which the fit leaves this
+        covariance.
         """
         each = self._each(values), self._each_by(slopes)
         return self._common_covariance.told(*each, covariance)

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Any, Self, cast
 
 import numpy as np
 import xarray as xr
@@ -21,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from hotlever.datasets import labelled
+from hotlever.datasets import Observable, labelled
 from hotlever.errors import InputError
 from hotlever.estimation.noise import errors_of_scales
 from hotlever.estimation.objective import Objective
@@ -291,7 +291,7 @@ class FitFile(ResultFile[Fit]):
 
     parameters: dict[str, FittedParameter]
     correlation: _Correlation
-    observables: tuple[Literal["current", "reader", "tip"], ...]
+    observables: tuple[Observable, ...]
     inversion_temperature_K: Number = np.nan
     inversion_temperature_stderr_K: Number = np.nan
     residual_rms: dict[str, float]

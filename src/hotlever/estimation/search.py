@@ -118,7 +118,8 @@ class Search:
             self.prior if self.prior.names else PriorDensity.of_priors(_closing(start, self.varied))
         )
         bias = np.abs(measurement.bias_V)
-        heated = np.unique(bias[np.isfinite(measurement.current_mA) & (bias > 0)])
+        current = measurement.current(start.circuit)
+        heated = np.unique(bias[np.isfinite(current) & (bias > 0)])
         for portion in range(1, _PORTIONS):
             count = max(_FEWEST_ROWS, -(-heated.size * portion // _PORTIONS))
             if count >= heated.size:

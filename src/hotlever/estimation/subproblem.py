@@ -69,7 +69,7 @@ class Subproblem:
         return other
 
     def predict(self, point: Array) -> tuple[Array, Array]:
-        """Return I_h, V_r and T_tip (3, n), and their derivatives by all parameters (3, n, k).
+        """Return the observables (m, n), and their derivatives by all parameters (m, n, k).
 
         Raises
         ------

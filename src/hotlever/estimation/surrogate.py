@@ -25,7 +25,7 @@ class Surrogate(Protocol):
     """A local model of what a lever shows, exact at the parameters of one that was solved."""
 
     def predict(self, parameters: Array) -> tuple[Array, Array]:
-        """Return I_h, V_r and T_tip (3, n), and their derivatives (3, n, k), by parameters (k,).
+        """Return the observables (m, n), and their derivatives (m, n, k), by parameters (k,).
 
         Raises
         ------
@@ -46,7 +46,7 @@ class LinearSurrogate:
     Attributes
     ----------
     parameters : ndarray, shape (k,)
-    values, slopes : ndarray, shapes (3, n) and (3, n, k)
+    values, slopes : ndarray, shapes (observables, n) and (observables, n, k)
         At the parameters.
     """
 

@@ -44,9 +44,6 @@ _LIGHT, _DARK = "#BFDBEB", "#5DA5CC"
 #: Quantiles of a band, for those that are stated by a standard error.
 _QUANTILES = (0.025, 0.16, 0.5, 0.84, 0.975)
 
-#: Unit of differences of each observable, and what it is of the observable's own.
-_DIFFERENCES = {"current": ("µA", 1000.0), "reader": ("mV", 1000.0), "tip": ("K", 1.0)}
-
 
 def data_and_model(
     measured: xr.Dataset,
@@ -74,12 +71,13 @@ def data_and_model(
     panels = {
         name: column.name
         for name, column in OBSERVABLES.items()
-        if data[column.name].notnull().any() or (in_time and name == "tip")
+        if (column.name in data and data[column.name].notnull().any())
+        or (in_time and name == "tip")
     }
     size, heights = (3.4 if in_time else 2.8) * len(panels), (1.8, 1.0)
     with figure(size, 4.6, 2, len(panels), sharex=True, height_ratios=heights) as (made, grid):
         for (upper, lower), (name, column) in zip(grid.T, panels.items(), strict=True):
-            seen = measured[column].notnull().any()
+            seen = column in measured and measured[column].notnull().any()
             if band is not None and name == "tip":
                 _tip_in_time(upper, band)
             else:
@@ -119,7 +117,11 @@ def _tip_in_time(axes: Axes, band: xr.Dataset) -> None:
 
 def _differences(axes: Axes, measured: xr.Dataset, model: xr.Dataset, name: str) -> None:
     """Draw data minus model of an observable, and mark what is off by more than is usual."""
-    (along,), column, (unit, factor) = measured.sizes, OBSERVABLES[name].name, _DIFFERENCES[name]
+    (along,), column, (unit, factor) = (
+        measured.sizes,
+        OBSERVABLES[name].name,
+        OBSERVABLES[name].small,
+    )
     x, data = measured[along].values, measured[column].values
     difference = data - model[column].values
     axes.axhline(0, color="0.4", lw=0.8)

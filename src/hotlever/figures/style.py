@@ -43,6 +43,7 @@ _SYMBOLS = {
     "current_mA": "heater current I$_h$",
     "lever_V": "lever voltage V$_l$",
     "reader_V": "reader voltage V$_r$",
+    "bridge_output_V": "bridge voltage V$_{bridge}$",
     "power_mW": "power P$_l$",
 }
 

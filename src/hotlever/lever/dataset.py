@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from hotlever.datasets import (
     OBSERVABLES,
-    QUANTITIES,
     csv_text,
+    in_a_file,
     labelled,
     offer_plots,
     quantity,
@@ -26,6 +26,7 @@ from hotlever.lever.balances import BALANCES, balance_columns, balance_names, ba
 from hotlever.lever.branch import Branch
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.monitors import MonitorMap, with_meanings
+from hotlever.lever.observables import with_bridge
 from hotlever.materials import Kind
 from hotlever.materials.sections import LAWS
 from hotlever.probe import Circuit, Probe
@@ -71,7 +72,7 @@ def dataset_of_branch(
 ) -> xr.Dataset:
     """Return what is observed of a probe's lever at some places u (n,) of its branch.
 
-    Sensitivities, (3, n, p), are of `OBSERVABLES` by what a fit usually varies.
+    Sensitivities, (observables, n, p), are of `OBSERVABLES` by what a fit usually varies.
     """
     equations, shown = branch.equations, branch.shown(u)
     shown["tip_K"] = branch.tip_K(u)
@@ -113,7 +114,7 @@ def _dataset(
     whole = np.where(np.isnan(columns["legs_ohm"]), 0.0, columns["legs_ohm"])
     columns["lever_ohm"] = whole + columns["heater_ohm"]
     every = dict.fromkeys((*SWEEP_COLUMNS, *at_terminals, *_MORE, *shown))
-    kept = {name: columns[name] for name in every}
+    kept = with_bridge(probe.circuit, {name: columns[name] for name in every})
     variables, coordinates = with_meanings(probe, kept, "bias")
     coordinates["bias"] = columns["bias_V"]
     if sensitivities is not None:
@@ -186,11 +187,6 @@ def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
 def sweep_csv(data: xr.Dataset) -> str:
     """Return a sweep as CSV text, one row per bias; empty where a value does not exist."""
     return csv_text(data, in_a_file(data, SWEEP_COLUMNS))
-
-
-def in_a_file(data: xr.Dataset, columns: Sequence[str]) -> list[str]:
-    """Return the columns of a file: the usual ones, and those of other terminals and monitors."""
-    return [*columns, *(str(name) for name in data.data_vars if name not in QUANTITIES)]
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:

@@ -250,7 +250,7 @@ class Lever:
             Biases (V) in any order, met by a slow ramp from zero; negative ones, met by another,
             where held supplies make them differ.
         sensitivities : bool
-            Add the derivatives of I_h, V_r and T_tip, at fixed bias, by the parameters that a fit
+            Add the derivatives of what a fit compares, at fixed bias, by the parameters that it
             usually varies.
         progress : callable, optional
             Called with the states done and how many there usually are.
@@ -363,6 +363,11 @@ class State:
     def bias_V(self) -> float:
         """Bias V_b (V) in the lever's circuit."""
         return float(self.lever.circuit.bias(self.lever_V, self.current_mA))
+
+    @property
+    def bridge_output_V(self) -> float:
+        """Bridge voltage V_bridge (V); NaN without a bridge."""
+        return float(self.lever.circuit.bridge_voltage(self.lever_V, self.bias_V))
 
     @property
     def tip_K(self) -> float:

@@ -11,6 +11,7 @@ from hotlever.lever.branch import TIP_RISE, Branch
 from hotlever.lever.continuation import Enough, continued
 from hotlever.lever.curve import spline_through
 from hotlever.lever.equations import LeverEquations
+from hotlever.lever.observables import at_fixed_bias, observed_by
 from hotlever.lever.space import TIP, Constraint, Factors
 from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit
@@ -71,51 +72,11 @@ def with_changes(
     return changes, shown.swapaxes(0, 1)
 
 
-def at_fixed_bias(
-    along: Array,
-    circuit: Circuit,
-    shown: Array,
-    of_circuit: Array | float = 0.0,
-    of_base: Array | float = 0.0,
-) -> Array:
-    """Return derivatives of I_h, V_r and T_tip by parameters at a fixed bias.
-
-    A parameter moves the curves at fixed rises of the tip, or another constraint; the circuit then
-    moves the state along its branch until the bias is what it was.
-
-    Parameters
-    ----------
-    along : ndarray, shape (n, 4)
-        Derivatives by u of what `Branch.curve` has.
-    circuit : Circuit
-    shown : ndarray, shape (n, 4, p)
-        Derivatives of V_l, I_h, V_r and the rise of the tip, see `by_parameter`.
-    of_circuit : ndarray, shape (n, p)
-        Derivatives of the bias for a given state, see `Circuit.bias_by`.
-    of_base : ndarray, shape (p,)
-        Derivatives of the base temperature, see `Circuit.base_by`.
-
-    Returns
-    -------
-    ndarray, shape (3, n, p)
-        In the order of `hotlever.datasets.OBSERVABLES`; mA, V and K per unit of the
-        parameter.
-    """
-    lever_V, current_mA, reader_V, tip = np.moveaxis(shown, 1, 0)
-    by_u = along[:, :, None]
-    missing = circuit.bias(lever_V, current_mA) + of_circuit
-    moved = -missing / circuit.bias(by_u[:, 0], by_u[:, 1])
-    return np.stack(
-        [
-            current_mA + by_u[:, 1] * moved,
-            reader_V + by_u[:, 2] * moved,
-            of_base + tip + by_u[:, TIP_RISE] * moved,
-        ]
-    )
-
-
 def sensitivities_of(branch: Branch, u: Array, circuit: Circuit, names: Sequence[str]) -> Array:
-    """Return the derivatives of `at_fixed_bias` by parameters at any u of a branch."""
+    """Return derivatives of the observables by parameters of the lever, at fixed bias.
+
+    They are at any u of a branch, (observables, n, p); see `hotlever.lever.observables`.
+    """
     shown = np.zeros((u.size, TIP_RISE + 1, len(names)))
     # without power nothing depends on the material
     powered = np.flatnonzero(branch.has_power(u))
@@ -124,7 +85,8 @@ def sensitivities_of(branch: Branch, u: Array, circuit: Circuit, names: Sequence
         constraint = branch.parametrisation.constraint(u[some])
         x = branch.states(u[some])
         shown[some] = by_parameter(branch.equations, x, names, constraint=constraint)
-    return at_fixed_bias(branch.curve(u, 1), circuit, shown)
+    slopes = at_fixed_bias(branch.curve(u, 1), circuit, shown)
+    return observed_by(circuit, branch.curve(u).T, slopes, names)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hotlever.datasets import OBSERVABLES
+from hotlever.datasets import MEASURANDS, OBSERVABLES
 from hotlever.errors import InputError
 from hotlever.lever.transient.waveform import Polyline, Waveform
 from hotlever.measurement.contents import NOISE, Contents
@@ -19,6 +19,8 @@ _ENOUGH = 2.0
 _FALLS = 0.002
 #: Part of the largest current below which resistances are noise.
 _COLD = 0.1
+#: What changes its sign with the polarity.
+_TURNED = ("V_b", LEVER, "I_h", "V_r", "V_bridge")
 #: Part by which V_b - V_l may be off what R_s I_h says, of the largest bias.
 _VOLTAGES_AGREE = 0.05
 
@@ -146,11 +148,13 @@ def mirror(contents: Contents) -> None:
     if (sign > 0.0).all():
         return
     bias = "V_b" if "V_b" in contents.columns else LEVER
-    for symbol in ("V_b", LEVER, "I_h", "V_r"):
+    for symbol in _TURNED:
         values[symbol] = sign * values[symbol]
         size = np.nanmax(np.abs(values[symbol]), initial=0.0)
-        contents.refuse(values[symbol] < -NOISE * size, "the same sign", bias, symbol)
-    contents.note_rows(sign < 0.0, "V_b is negative, and counts as positive with I_h and V_r")
+        if not MEASURANDS[symbol].signed:
+            contents.refuse(values[symbol] < -NOISE * size, "the same sign", bias, symbol)
+    others = " and ".join(symbol for symbol in _TURNED[2:] if symbol in contents.columns)
+    contents.note_rows(sign < 0.0, f"V_b is negative, and counts as positive with {others}")
 
 
 #: By what a bias may differ from straight lines: a share of the largest, and so many standard

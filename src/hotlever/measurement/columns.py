@@ -305,7 +305,8 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
     example = next(voltages, "HEADING" if table.is_named else "1")
     raise InputError(
         f"{table.where(-1)}: {given}; expected 'V_b (V)' and at least one of 'I_h (mA)', "
-        "'V_r (mV)', 'T_tip (K)', or 'V_l (V)' and 'I_h (mA)'; beside a time V_b, or a wave form "
+        "'V_r (mV)', 'V_bridge (mV)', 'T_tip (K)', or 'V_l (V)' and 'I_h (mA)'; beside a time V_b, "
+        "or a wave form "
         f"such as --pulse 10V,5us, and any of them; other names with {_assignment('V_b', example)}"
     )
 

@@ -128,9 +128,10 @@ def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) 
             if symbol == "T_tip":
                 contents.refuse(data <= 0.0, "a temperature above 0 K", symbol)
             where = f"{contents.table.path}: the largest {symbol}"
-            plausible(where, unit, size if signed else np.nanmax(data), low, high)
+            either = signed or MEASURANDS[of].signed
+            plausible(where, unit, size if either else np.nanmax(data), low, high)
             plausible(where, unit, size, low, high)
-            negative = (data < -NOISE * size) & (not signed)
+            negative = (data < -NOISE * size) & (not either)
             contents.note_rows(negative, f"{symbol} is negative")
 
     base = settings.get("base_temperature_K", _COLDEST_BASE_K)

@@ -40,6 +40,8 @@ class Measurement:
         The last is the standard error of the tip temperature.
     current_error_mA, reader_error_V : ndarray, shape (n,), or None
         Standard errors of the others.
+    bridge_output_V, bridge_output_error_V : ndarray, shape (n,), or None
+        Of a Wheatstone bridge, with its standard error.
     series_resistance_ohm, base_temperature_K : float or None
         If the file gives them.
     medium : {"vacuum", "air"} or None
@@ -82,6 +84,8 @@ class Measurement:
     rows: Array | None = None
     time_us: Array | None = None
     waveform: Waveform | None = None
+    bridge_output_V: Array | None = None
+    bridge_output_error_V: Array | None = None
 
     @classmethod
     def in_time(
@@ -157,9 +161,9 @@ class Measurement:
         >>> Measurement.of_sweep(sweep(Probe.reference(), [1.0, 2.0])).observables
         ('current', 'reader', 'tip')
         """
-        circuit, symbols = circuit_of(sweep), ("V_b", "I_h", "V_r", "T_tip")
-        shown = [MEASURANDS[symbol].name for symbol in symbols]
-        columns: dict[str, Any] = {name: sweep[name].values for name in shown}
+        circuit = circuit_of(sweep)
+        shown = ["bias_V", *(measurand.name for measurand in OBSERVABLES.values())]
+        columns: dict[str, Any] = {name: sweep[name].values for name in shown if name in sweep}
         return cls(
             **columns,
             tip_error_K=np.full(sweep.bias_V.size, np.nan),
@@ -175,30 +179,38 @@ class Measurement:
         """
         named = ((column.name, getattr(self, column.name)) for column in MEASURED)
         columns = {name: values for name, values in named if values is not None}
-        columns["lever_V"] = circuit.lever_voltage(self.bias_V, self.current_mA)
-        columns["power_mW"] = circuit.power(self.bias_V, self.current_mA)
+        current = self.current(circuit)
+        columns["lever_V"] = circuit.lever_voltage(self.bias_V, current)
+        columns["power_mW"] = circuit.power(self.bias_V, current)
         if self.time_us is not None:
             return labelled(columns, "time", {"time": self.time_us})
         return labelled(columns, coordinates={"bias": self.bias_V}).sortby("bias")
 
     def observable(self, name: str) -> Array:
-        """Return the data of ``current`` (mA), ``reader`` (V) or ``tip`` (K).
+        """Return the data of one of `hotlever.datasets.OBSERVABLES`, NaN where there are none.
 
         Raises
         ------
         InputError
             If there is no observable of this name.
         """
-        if name not in OBSERVABLES:
-            raise unknown_name("observable", name, OBSERVABLES)
-        values: Array = getattr(self, OBSERVABLES[name].name)
-        return values
+        return self._column(name)
 
     def error(self, name: str) -> Array:
         """Return the standard errors of an observable's data, NaN where there are none."""
-        self.observable(name)
-        values = getattr(self, MEASURANDS["d" + OBSERVABLES[name].symbol].name)
+        return self._column(name, "d")
+
+    def _column(self, observable: str, start: str = "") -> Array:
+        if observable not in OBSERVABLES:
+            raise unknown_name("observable", observable, OBSERVABLES)
+        symbol = start + OBSERVABLES[observable].symbol
+        values: Array | None = getattr(self, MEASURANDS[symbol].name)
         return np.full(self.bias_V.shape, np.nan) if values is None else values
+
+    def current(self, circuit: Circuit) -> Array:
+        """Return the heater current (mA), measured or as the bridge of a circuit shows it."""
+        bridge = circuit.current_of_bridge(self.observable("bridge"), self.bias_V)
+        return np.where(np.isnan(self.current_mA), bridge, self.current_mA)
 
     def part(self, rows: Mask) -> Measurement:
         """Return some rows, (n,) of bool, as a measurement."""
@@ -210,6 +222,12 @@ class Measurement:
     def observables(self) -> tuple[str, ...]:
         """Names of the observables that have any data."""
         return tuple(name for name in OBSERVABLES if np.isfinite(self.observable(name)).any())
+
+
+#: Columns that a measurement may be without; of the others it has NaN where nothing was measured.
+OPTIONAL = [
+    column.name for column in MEASURED if getattr(Measurement, column.name, MEASURED) is None
+]
 
 
 def with_measured_circuit(

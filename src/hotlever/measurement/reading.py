@@ -21,7 +21,7 @@ from hotlever.measurement.columns import (
     parse_columns,
 )
 from hotlever.measurement.contents import Contents, check
-from hotlever.measurement.data import MEASURED, TIME, Measurement
+from hotlever.measurement.data import MEASURED, OPTIONAL, TIME, Measurement
 from hotlever.measurement.rows import described, disagreements, sweeps_of
 from hotlever.measurement.settings import Settings
 from hotlever.probe import Circuit, Probe
@@ -95,6 +95,8 @@ def read_measurement(
     if more > 0:
         notes[_MOST_NOTES:] = [f"{path}: {more} more such notes"]
     rows: dict[str, Any] = {column.name: contents.values[column.symbol] for column in MEASURED}
+    absent = [name for name in OPTIONAL if np.isnan(rows[name]).all()]
+    rows |= dict.fromkeys(absent)
     measurement = Measurement(
         **rows,
         **settings.values,
@@ -107,7 +109,8 @@ def read_measurement(
         understood=_understood(contents, order),
     )
     if not measurement.observables:
-        raise InputError(f"{path}: no values in any of the columns I_h, V_r, T_tip")
+        symbols = ", ".join(column.symbol for column in OBSERVABLES.values())
+        raise InputError(f"{path}: no values in any of the columns {symbols}")
     return measurement
 
 

@@ -156,7 +156,7 @@ def averaged(measurement: Measurement, robust: bool = False) -> Measurement:
     if robust:
         for name in (OBSERVABLES[observable].name for observable in measurement.observables):
             columns[name] = np.where(_far_off(columns[name], step), np.nan, columns[name])
-    shown = np.isfinite([columns[column.name] for column in OBSERVABLES.values()]).any(axis=0)
+    shown = np.isfinite([measurement.observable(name) for name in OBSERVABLES]).any(axis=0)
     used = {name: values[shown] for name, values in columns.items()}
     # rows with the same columns filled have the same mean bias for all of them
     filled = np.isfinite(list(used.values()))

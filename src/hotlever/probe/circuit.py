@@ -16,8 +16,8 @@ import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from hotlever.errors import InputError, unknown_name
+from hotlever.probe.supply import SweptSupply, resistance
 from hotlever.records import Record
-from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.types import Array
 
 #: Resistance (kΩ) behind which a voltage is held where none is given: ten nano-ohm, far less than
@@ -25,10 +25,6 @@ from hotlever.types import Array
 _NEARLY_NONE = 1e-11
 #: Largest voltage (V) and current (mA) of a held supply.
 _MOST = 1000.0
-
-
-def _resistance(meaning: str, default: float) -> Any:
-    return Field(default=default, ge=0, le=1e7, description=meaning)
 
 
 class Contact(Record):
@@ -47,7 +43,7 @@ class Contact(Record):
     current_mA: float | None = Field(
         default=None, ge=-_MOST, le=_MOST, description="of a supply that holds a current"
     )
-    series_resistance_ohm: float = _resistance("between the terminal and its supply or ground", 0.0)
+    series_resistance_ohm: float = resistance("between the terminal and its supply or ground", 0.0)
     base_temperature_K: float | None = Field(
         default=None, ge=250, le=1000, description="of this leg end, if it is another"
     )
@@ -117,7 +113,7 @@ class Wiring:
         return (*self.grounds, *self.held)
 
 
-class Circuit(Record):
+class Circuit(SweptSupply):
     """The measuring circuit (section ``[circuit]`` of a probe file).
 
     The bias V_b drives the heater current I_h through the series resistor R_s and the lever,
@@ -133,10 +129,6 @@ class Circuit(Record):
     8.268
     """
 
-    series_resistance_ohm: float = _resistance("between the bias source and the lever, R_s", 5600.0)
-    base_temperature_K: float = Field(
-        default=BASE_TEMPERATURE_K, ge=250, le=1000, description="of the leg ends"
-    )
     swept: str = Field(default="supply", description="terminal of the supply that is swept")
     contacts: dict[str, Contact] = Field(default_factory=dict)
 
@@ -187,38 +179,8 @@ class Circuit(Record):
         return {**values, **contacts}
 
     def __hash__(self) -> int:
-        own = (self.series_resistance_ohm, self.base_temperature_K, self.swept)
+        own = (getattr(self, name) for name in type(self).model_fields if name != "contacts")
         return hash((*own, *self.contacts.items()))
-
-    # --- the swept supply -------------------------------------------------------------------------
-
-    @property
-    def series_kohm(self) -> float:
-        """R_s in kΩ, which makes volts of milliamperes."""
-        return self.series_resistance_ohm / 1000.0
-
-    def bias(self, lever_V: Any, current_mA: Any) -> Any:
-        """Return the bias V_b (V) of a lever voltage (V) and a current (mA).
-
-        It is linear, so changes of both give the change of the bias.
-        """
-        return lever_V + self.series_kohm * current_mA
-
-    def bias_by(self, name: str, current_mA: Any) -> Any:
-        """Return how the bias (V) changes with a value of the circuit, the lever being the same."""
-        return current_mA / 1000.0 if name == "series_resistance_ohm" else 0.0 * current_mA
-
-    def base_by(self, name: str) -> float:
-        """Return how the base temperature changes with a value of the circuit."""
-        return float(name == "base_temperature_K")
-
-    def lever_voltage(self, bias_V: Any, current_mA: Any) -> Any:
-        """Return the lever voltage V_l (V) of a bias (V) and a current (mA)."""
-        return bias_V - self.series_kohm * current_mA
-
-    def power(self, bias_V: Any, current_mA: Any) -> Any:
-        """Return the power P_l = V_l I_h (mW) of a bias (V) and a current (mA)."""
-        return self.lever_voltage(bias_V, current_mA) * current_mA
 
     # --- the other terminals ----------------------------------------------------------------------
 

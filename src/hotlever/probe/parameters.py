@@ -169,6 +169,9 @@ def parameters_of(
     table["base_temperature_K"] = table["base_temperature_K"]._replace(relative=False)
     if probe.circuit.series_resistance_ohm > 0:
         add("series_resistance_ohm", RESISTANCE)
+    if probe.circuit.has_bridge:
+        add("bridge_upper_ohm", RESISTANCE)
+        add("bridge_lower_ohm", RESISTANCE)
     if anywhere or probe.surroundings.medium == "air":
         add("gas_conductivity", _GAS, _OF_THE_GAS)
         if probe.surroundings.surface_gap_um is not None:

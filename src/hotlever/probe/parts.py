@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 from pydantic import ConfigDict, Field, SerializeAsAny, model_validator
 
+from hotlever.datasets import OBSERVABLES
 from hotlever.errors import unknown_name
 from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED, REFERENCE, Kind, Material, full_name
 from hotlever.materials.kind import class_name
@@ -195,6 +196,15 @@ class ProbeParts(Record):
     def wiring(self) -> Wiring:
         """Which of its terminals are what."""
         return self.circuit.wiring(self.layout().terminal_names)
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """Which of `hotlever.datasets.OBSERVABLES` it can show."""
+        without = {
+            "reader": "reader" not in self.wiring.measurable,
+            "bridge": not self.circuit.has_bridge,
+        }
+        return tuple(name for name in OBSERVABLES if not without.get(name))
 
     def layout(self) -> Layout:
         """Return the regions, terminals and tip."""

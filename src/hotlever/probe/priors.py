@@ -31,7 +31,12 @@ from hotlever.text import with_unit
 
 ALL_DIMENSIONS = "dimensions"
 #: Scales of what is shown, and the observable that each belongs to.
-SCALES = {"current_scale": "current", "reader_scale": "reader", "raman_scale": "tip"}
+SCALES = {
+    "current_scale": "current",
+    "reader_scale": "reader",
+    "bridge_scale": "bridge",
+    "raman_scale": "tip",
+}
 #: The share of a prior's variance below which nothing is told of it.
 _LEAST_TOLD = 1e-3
 #: Relative spreads that mean something.

@@ -105,7 +105,7 @@ class FitRequest(DriveRequest, LeversRequest):
     """Material parameters from measurements."""
 
     observables: str | None = option(
-        None, help="Some of current,reader,tip; all that the file has if left out."
+        None, help="Some of current,reader,bridge,tip; all that the file has if left out."
     )
     fix: list[str] | None = option(None, metavar="NAME[=VALUE]", help="Hold a parameter.")
     free: str | None = option(
@@ -116,7 +116,7 @@ class FitRequest(DriveRequest, LeversRequest):
     )
     robust: bool = option(False, "--robust", help="Lessen the weight of points far off the others.")
     drift: bool = option(
-        False, "--drift", help="Let the zeros of I_h and V_r drift along the file."
+        False, "--drift", help="Let the zeros of I_h, V_r and V_bridge drift along the file."
     )
     weights: str = option(
         "maximum", help="maximum: of each observable, as in the paper; or errors, as measured."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hotlever.datasets import csv_text, write_dataset
+from hotlever.datasets import csv_text, in_a_file, write_dataset
 from hotlever.lever.transient.frequency_domain import (
     HARMONIC_COLUMNS,
     SPECTRUM_COLUMNS,
@@ -29,7 +29,7 @@ def respond(reporter: Reporter, request: SpectrumRequest) -> None:
             data = spectrum(state, frequencies)
         else:
             data = harmonics(lever, volts, swing, frequencies, update)
-    columns = SPECTRUM_COLUMNS if swing is None else HARMONIC_COLUMNS
+    columns = in_a_file(data, SPECTRUM_COLUMNS if swing is None else HARMONIC_COLUMNS)
     with outputs.together():
         if request.output is not None:
             write_dataset(data, request.output, columns)

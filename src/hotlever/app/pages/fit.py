@@ -11,11 +11,11 @@ from hotlever.app.pages.frame import download_button
 from hotlever.app.pages.measured import MeasuredPage
 from hotlever.app.pages.page import MEDIA, several
 from hotlever.app.project import FIT, FITS
+from hotlever.datasets import OBSERVABLES
 
-_OBSERVABLES = {"current": "current I_h", "reader": "reader V_r", "tip": "tip temperature"}
 _FLAGS = {
     "robust": ("robust", "Lessen the weight of points far off the others"),
-    "drift": ("drifting zeros", "Let the zeros of I_h and V_r drift along the file"),
+    "drift": ("drifting zeros", "Let the zeros of I_h, V_r and V_bridge drift along the file"),
     "profiles": ("profiles", "Profile the likelihood of each parameter (some 10 s, on a page)"),
     "posterior": ("posterior", "Sample the posterior (half a minute, on a page of its own)"),
 }
@@ -35,8 +35,8 @@ class FitPage(MeasuredPage):
         with ui.column().classes("gap-0"):
             ui.label("Fitted").classes("text-sm text-bold")
             self._boxes = {}
-            for name, label in _OBSERVABLES.items():
-                fitted = name not in self.chosen["without"]
+            for name, measurand in OBSERVABLES.items():
+                label, fitted = f"{name} {measurand.symbol}", name not in self.chosen["without"]
                 self._boxes[name] = ui.checkbox(label, value=fitted, on_change=self._choose)
         with ui.expansion("More"):
             for name, (label, meaning) in _FLAGS.items():

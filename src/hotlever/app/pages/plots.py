@@ -59,6 +59,10 @@ class MeasuredPlots:
     _AXES: ClassVar = {
         "current": (("lever_V", _LEVER_V), ("current_mA", _CURRENT)),
         "reader": (("bias_V", _BIAS), ("reader_V", "reader voltage V<sub>r</sub> (V)")),
+        "bridge": (
+            ("bias_V", _BIAS),
+            ("bridge_output_V", "bridge voltage V<sub>bridge</sub> (V)"),
+        ),
         "tip": (("bias_V", _BIAS), ("tip_K", _TIP)),
     }
 

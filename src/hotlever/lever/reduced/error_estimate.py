@@ -12,8 +12,8 @@ import numpy as np
 from hotlever.lever.branch import TIP_RISE, Branch
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import Lever
+from hotlever.lever.observables import at_fixed_bias
 from hotlever.lever.parametrisation import Constrained
-from hotlever.lever.sensitivities import at_fixed_bias
 from hotlever.lever.space import TIP
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
@@ -54,6 +54,7 @@ def estimated_error(lever: Lever, branch: Branch, u: Array) -> Array:
     away = np.zeros((u.size, TIP_RISE + 1, 2))
     away[:, :TIP_RISE, 0] = equations.observed(first + second).T - branch.curve(u)[:, :TIP_RISE]
     away[:, :TIP_RISE, 1] = equations.observed_change(first, second).T
-    errors = np.abs(at_fixed_bias(branch.curve(u, 1), lever.circuit, away))
+    # without that of V_l, which follows at a bias
+    errors = np.abs(at_fixed_bias(branch.curve(u, 1), lever.circuit, away))[1:]
     both, second_alone = np.moveaxis(errors, 2, 0)
     return np.maximum(_SAFETY * both + second_alone, _FLOOR[:, None])

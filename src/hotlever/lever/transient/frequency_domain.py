@@ -65,7 +65,7 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
     xarray.Dataset
         On the dimension ``frequency`` (Hz): the impedance dV_l/dI_h, real and imaginary (Ω); the
         change of the tip temperature per change of the power and of the bias, each as size and
-        phase (degrees).
+        phase (degrees); with a bridge, that of its voltage per change of the bias.
 
     Raises
     ------
@@ -128,6 +128,10 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
         "tip_per_bias_K_per_V": np.abs(per_bias),
         "tip_per_bias_deg": np.degrees(np.unwrap(np.angle(per_bias))),
     }
+    if state.lever.circuit.has_bridge:
+        out = state.lever.circuit.bridge_voltage(1.0 / bias, 1.0)
+        columns["bridge_per_bias_V_per_V"] = np.abs(out)
+        columns["bridge_per_bias_deg"] = np.degrees(np.unwrap(np.angle(out)))
     seen: dict[str, Any] = {
         name: getattr(state, name) for name in ("bias_V", "lever_V", "current_mA", "tip_K")
     }
@@ -186,7 +190,7 @@ def harmonics(
     -------
     xarray.Dataset
         On the dimension ``frequency``: amplitude (V) and phase (degrees, against the bias) of the
-        first three harmonics of V_l, and the mean tip temperature.
+        first three harmonics of V_l, and of a bridge; and the mean tip temperature.
 
     Raises
     ------
@@ -219,9 +223,16 @@ def harmonics(
             progress(done, frequency.size)
     lever_V, mean = np.array([volts for volts, _ in answers]), [kelvin for _, kelvin in answers]
     columns: dict[str, ArrayLike] = {"frequency_Hz": frequency, "mean_tip_K": mean}
-    for number, name in enumerate(HARMONICS):
-        columns[f"{name}_harmonic_V"] = np.abs(lever_V[:, number])
-        columns[f"{name}_harmonic_deg"] = np.degrees(np.unwrap(np.angle(lever_V[:, number])))
+    seen = {"": lever_V}
+    if lever.circuit.has_bridge:
+        # the bias has a first harmonic alone
+        driven_V = np.array([amplitude_V, *np.zeros(len(HARMONICS) - 1)])
+        seen["bridge_"] = lever.circuit.bridge_voltage(lever_V, driven_V)
+    for of, volts in seen.items():
+        for number, name in enumerate(HARMONICS):
+            angle = np.angle(volts[:, number])
+            columns[f"{name}_{of}harmonic_V"] = np.abs(volts[:, number])
+            columns[f"{name}_{of}harmonic_deg"] = np.degrees(np.unwrap(angle))
     shown: dict[str, Any] = {"bias_V": offset_V, "amplitude_V": amplitude_V}
     shown |= probe_attributes(lever.probe)
     return labelled(columns, "frequency", {"frequency": frequency}, **shown)

@@ -18,6 +18,7 @@ from hotlever.datasets import OBSERVABLES, labelled
 from hotlever.errors import HistoryEndError, InputError, unknown_name
 from hotlever.lever.dataset import probe_attributes
 from hotlever.lever.newton import refined
+from hotlever.lever.observables import observed, observed_by
 from hotlever.lever.transient.history import checked_times, time_steps
 from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import INSTANT_RATE, METHOD, LinearSolver, Step
@@ -75,8 +76,8 @@ def with_sensitivities(
     Returns
     -------
     xarray.Dataset
-        ``bias_V``, ``current_mA``, ``reader_V`` and ``tip_K`` on the dimension ``time``; and
-        ``sensitivity`` on (observable, time, parameter).
+        ``bias_V`` and the observables that the probe has on the dimension ``time``; and
+        ``sensitivity`` on (observable, time, parameter), NaN of observables that it has not.
 
     Raises
     ------
@@ -118,13 +119,12 @@ def with_sensitivities(
             bias.append(piece.bias(step.end))
             shown.append(along.shown(step.x[:, 1:]))
             slopes.append(along.slopes(step.x[:, 1:]))
-    names_shown = [column.name for column in OBSERVABLES.values()]
-    values = dict(zip(names_shown, np.array(shown).T, strict=True))
+    values = dict(zip(OBSERVABLES, np.array(shown).T, strict=True))
     table = np.array(slopes).transpose(1, 0, 2)
     return labelled(
         {
             "bias_V": bias,
-            **values,
+            **{OBSERVABLES[name].name: values[name] for name in lever.probe.observables},
             "sensitivity": (("observable", "time", "parameter"), table),
         },
         "time",
@@ -202,16 +202,20 @@ class _Along:
         return float(self._lever.space.rises(x[: self._lever.space.size + 1]).max())
 
     def shown(self, x: Array) -> Array:
-        """Return I_h (mA), V_r (V) and T_tip (K), (3,)."""
+        """Return the observables, (observables,)."""
+        return observed(self._lever.circuit, self._of_lever(x))[:, 0]
+
+    def _of_lever(self, x: Array) -> Array:
+        """Return V_l, I_h, V_r and the rise of the tip, (4, 1)."""
         own = x[: self._lever.space.size + 1]
-        _, current, reader = self._lever.equations.observed(own)[:, 0]
-        tip = self._lever.circuit.base_temperature_K + self._lever.space.tip_rise(own)[0]
-        return np.array([current, reader, tip])
+        rise = self._lever.space.tip_rise(own)
+        return np.concatenate([self._lever.equations.observed(own), rise[None]])
 
     def slopes(self, x: Array) -> Array:
-        """Return their derivatives by the parameters, (3, k)."""
+        """Return their derivatives by the parameters, (observables, k)."""
         size, equations = self._lever.space.size + 1, self._lever.equations
         own, moved = x[:size], self._changes[:size]
-        _, current, reader = equations.observed_change(own, moved)[:, 0]
-        current = current + equations.by_parameter(own, self._names)[-1, 0]
-        return np.stack([current, reader, self._lever.space.tip_rise(moved)[0]])
+        change = equations.observed_change(own, moved)
+        change[1] += equations.by_parameter(own, self._names)[-1]
+        change = np.concatenate([change, self._lever.space.tip_rise(moved)[None]])
+        return observed_by(self._lever.circuit, self._of_lever(x), change, self._names)[:, 0]
