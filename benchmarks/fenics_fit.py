@@ -29,11 +29,11 @@ import lmfit
 import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.datasets import OBSERVABLES
 from hotlever.estimation import fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.lever.reduced.training import cached_reduction
 from hotlever.materials import PARAMETERS
+from hotlever.measurands import OBSERVABLES
 from hotlever.measurement import with_measured_circuit
 from hotlever.probe import Probe
 from problems import EXAMPLE, fit_command, peer_problem, peer_server, processor_time, table

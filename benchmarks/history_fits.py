@@ -16,11 +16,11 @@ import sys
 import numpy as np
 import xarray as xr
 
-from hotlever.datasets import observables_of
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.transient import pulse
 from hotlever.lever.transient.sensitivities import with_sensitivities
 from hotlever.materials import PARAMETERS
+from hotlever.measurands import observables_of
 from hotlever.probe import Probe
 from hotlever.probe.priors import default_priors
 from problems import table

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -206,84 +206,6 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "error": ("K", "line reads less true temperature"),
     "paper_error": ("K", "error stated in the paper"),
 }
-
-
-class Measurand(NamedTuple):
-    """A quantity that instruments measure, or its standard error."""
-
-    symbol: str  #: heads its column in measurement files
-    name: str  #: in datasets, and of the attribute of a `Measurement`
-    unit: str  #: in datasets
-    #: Other headings of its column, in small letters without blanks and marks.
-    headings: tuple[str, ...] = ()
-    #: Where the largest value of a column can lie; else its unit is wrong.
-    plausible: tuple[float, float] = (0.0, math.inf)
-    #: Whether it may be of either sign at a positive bias.
-    signed: bool = False
-    #: Unit of differences between data and model, and how many of it make one of its own.
-    small: tuple[str, float] = ("", 1.0)
-
-    @property
-    def heading(self) -> str:
-        """Symbol and unit, as a header row has them."""
-        return f"{self.symbol} ({self.unit})"
-
-    @property
-    def meaning(self) -> str:
-        """What it is."""
-        return QUANTITIES[self.name][1]
-
-
-_BIAS = ("vb", "ub", "vbias", "ubias", "bias", "biasvoltage", "vorspannung", "versorgungsspannung")
-_LEVER = ("vl", "ul", "vlever", "ulever", "lever", "levervoltage", "hebelspannung")
-_CURRENT = (
-    *("ih", "i", "current", "heatercurrent", "levercurrent"),
-    *("strom", "heizstrom", "heizerstrom", "hebelstrom"),
-)
-_READER = ("vr", "ur", "vreader", "ureader", "reader", "readervoltage", "readerspannung")
-_BRIDGE = (
-    *("vbridge", "ubridge", "bridge", "bridgevoltage", "bridgeoutput", "bridgeoutputvoltage"),
-    *("bridgesignal", "ubrücke", "brücke", "brückenspannung", "diagonalspannung"),
-)
-_TIP = ("ttip", "tip", "tiptemperature", "spitzentemperatur")
-#: Everything that a measurement may hold, by symbol; ``d`` begins that of a standard error.
-MEASURANDS = {
-    measurand.symbol: measurand
-    for measurand in (
-        Measurand("t", "time_us", "us"),
-        Measurand("V_l", "lever_V", "V", _LEVER),
-        Measurand("V_b", "bias_V", "V", _BIAS, (1e-3, 1e3)),
-        Measurand("I_h", "current_mA", "mA", _CURRENT, (1e-9, 1e3), small=("µA", 1e3)),
-        Measurand("V_r", "reader_V", "V", _READER, (1e-9, 1e3), small=("mV", 1e3)),
-        Measurand("V_bridge", "bridge_output_V", "V", _BRIDGE, (1e-9, 1e3), True, ("mV", 1e3)),
-        Measurand("T_tip", "tip_K", "K", _TIP, (0.0, 5e3), small=("K", 1.0)),
-        Measurand("dT_tip", "tip_error_K", "K", ("dttip", "δttip")),
-        Measurand("dI_h", "current_error_mA", "mA", ("dih", "δih")),
-        Measurand("dV_r", "reader_error_V", "V", ("dvr", "δvr")),
-        Measurand("dV_bridge", "bridge_output_error_V", "V", ("dvbridge", "δvbridge")),
-    )
-}
-_BUFFER = ("source", "sourcevalue", "value", "reading")
-#: Headings that say no more than the unit does: what a file has of this unit counts as the
-#: quantity where it is the only one.
-PLAIN = {"V_b": ("voltage", "spannung", "u", *_BUFFER), "I_h": _BUFFER}
-#: What a fit compares, by the name that users give it. How each follows from what a lever shows is
-#: said in `hotlever.lever.observables`.
-Observable = Literal["current", "reader", "bridge", "tip"]
-OBSERVABLES: dict[str, Measurand] = dict(
-    zip(
-        get_args(Observable),
-        (MEASURANDS[symbol] for symbol in ("I_h", "V_r", "V_bridge", "T_tip")),
-        strict=True,
-    )
-)
-
-
-def observables_of(data: xr.Dataset) -> Array:
-    """Return `OBSERVABLES` of a dataset, (observables, n); NaN of what it does not have."""
-    nothing = np.full(data["tip_K"].shape, np.nan)
-    names = [measurand.name for measurand in OBSERVABLES.values()]
-    return np.stack([data[name].values if name in data else nothing for name in names])
 
 
 def in_a_file(data: xr.Dataset, columns: Sequence[str]) -> list[str]:

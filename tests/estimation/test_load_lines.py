@@ -9,6 +9,7 @@ from hotlever.estimation.experiment_at_rest import experiment_of
 from hotlever.estimation.load_lines import Rows
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
+from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Probe
 
 NAMES = ("n_d", "heater_width_um", "series_resistance_ohm")
@@ -21,13 +22,18 @@ def folded():
     return Lever(probe, COARSE).branch()
 
 
+def current_alone(current):
+    """What was measured, if it was nothing else."""
+    nothing = np.full((len(OBSERVABLES) - 1, current.size), np.nan)
+    return np.concatenate([current[None], nothing])
+
+
 def rows_on(branch, tip_K):
     """Rows that lie on a branch, by their tip temperatures."""
     circuit = branch.equations.circuit
     current = branch.current(tip_K)
     bias = circuit.bias(branch.lever_voltage(tip_K), current)
-    nothing = np.full(tip_K.size, np.nan)
-    return Rows(bias, np.stack([current, nothing, nothing]))
+    return Rows(bias, current_alone(current))
 
 
 def test_rows_stay_on_their_part_of_a_branch_that_folds(folded):
@@ -44,8 +50,7 @@ def test_rows_stay_on_their_part_of_a_branch_that_folds(folded):
 def test_beyond_its_highest_bias_a_lever_goes_on_with_the_resistance_it_has_there(folded):
     circuit = folded.equations.circuit
     highest = float(circuit.bias(*folded.curve(np.linspace(0, folded.end_u, 4000))[:, :2].T).max())
-    nothing = np.full(2, np.nan)
-    rows = Rows(np.array([1.1, 1.3]) * highest, np.stack([[0.9, 1.0], nothing, nothing]))
+    rows = Rows(np.array([1.1, 1.3]) * highest, current_alone(np.array([0.9, 1.0])))
     u, short = rows.states(folded, circuit)
     assert np.allclose(short, [1.1, 1.3], rtol=1e-6)
     assert u[0] == u[1]
@@ -58,8 +63,7 @@ def test_derivatives_by_parameters_are_those_of_the_values(highest):
     knee_V = 3.4
     bias = np.linspace(0.4, highest, 5) * knee_V
     current = 0.3 * bias
-    shown = np.stack([current, np.full(5, np.nan), np.full(5, np.nan)])
-    model = experiment_of(probe, bias, names=NAMES).measuring(bias, shown)
+    model = experiment_of(probe, bias, names=NAMES).measuring(bias, current_alone(current))
     at = model.predict(probe)
     start, step = probe.values(NAMES), np.array([0.02, -0.01, 0.01])
     misses = []

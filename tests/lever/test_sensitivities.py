@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.datasets import OBSERVABLES
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
+from hotlever.measurands import OBSERVABLES
 from hotlever.probe import MeshOptions, Probe
 
 #: States of the branch (360, 600 and 1170 K): between them sensitivities are those of nearby ones.
@@ -17,19 +17,26 @@ NODES = [3, 7, 19]
 STEPS = (0.004, 0.002, 0.001)
 
 
+@pytest.fixture(scope="module")
+def bridged(coarse):
+    """The coarse lever in a Wheatstone bridge, so that it shows every observable."""
+    bridge = {"bridge_upper_ohm": 5600.0, "bridge_lower_ohm": 2000.0, "bridge_gain": 10.0}
+    return coarse.with_probe(coarse.probe.with_(**bridge))
+
+
 def solved(lever, bias):
     return lever.dataset(lever.solve(bias))
 
 
 @pytest.mark.parametrize("name", PARAMETERS)
-def test_sensitivities_have_taylor_order_two(coarse, name):
-    lever_V, current_mA, *_ = coarse.branch().values[NODES].T
-    bias = coarse.circuit.bias(lever_V, current_mA)
-    start, slopes = solved(coarse, bias), coarse.sweep(bias, sensitivities=True).sensitivity
-    value = getattr(coarse.probe.material, name)
-    material = coarse.probe.material
+def test_sensitivities_have_taylor_order_two(bridged, name):
+    lever_V, current_mA, *_ = bridged.branch().values[NODES].T
+    bias = bridged.circuit.bias(lever_V, current_mA)
+    start, slopes = solved(bridged, bias), bridged.sweep(bias, sensitivities=True).sensitivity
+    value = getattr(bridged.probe.material, name)
+    material = bridged.probe.material
     moved = [
-        solved(coarse.with_material(material.with_(**{name: value * (1 + step)})), bias)
+        solved(bridged.with_material(material.with_(**{name: value * (1 + step)})), bias)
         for step in STEPS
     ]
     for observable, column in OBSERVABLES.items():

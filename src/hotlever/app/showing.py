@@ -24,12 +24,12 @@ from hotlever.app.workers import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.levers import calibration_rows, compare_calibrations
 from hotlever.calibration.table import TABLE_COLUMNS
-from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError
 from hotlever.estimation import Fit, read_fit
 from hotlever.estimation.summary import parameter_rows
 from hotlever.lever.meshing import chosen_space
 from hotlever.lever.transient.waveform_texts import waveform_from_text
+from hotlever.measurands import OBSERVABLES
 from hotlever.measurement import (
     FileColumn,
     file_columns,

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
-from hotlever.datasets import OBSERVABLES
 from hotlever.estimation.surrogate import Surrogate
+from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Probe
 from hotlever.types import Array
 
@@ -27,7 +27,7 @@ class Prediction:
     ----------
     probe : Probe
     values : ndarray, shape (observables, n)
-        `hotlever.datasets.OBSERVABLES` at the rows of the measurement.
+        `hotlever.measurands.OBSERVABLES` at the rows of the measurement.
     slopes : ndarray, shape (observables, n, k)
         Derivatives by the experiment's parameters.
     surrogate : Surrogate

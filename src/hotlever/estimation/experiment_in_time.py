@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from hotlever.datasets import observables_of
 from hotlever.errors import InputError
 from hotlever.estimation.experiment import TIP, Prediction, named
 from hotlever.estimation.surrogate import LinearSurrogate
@@ -22,6 +21,7 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.transient.history import integrate
 from hotlever.lever.transient.sensitivities import derivable, with_sensitivities
 from hotlever.lever.transient.waveform import Piece, Waveform
+from hotlever.measurands import observables_of
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior

@@ -14,7 +14,6 @@ from typing import Any, TypeVar, cast, get_args
 import numpy as np
 
 from hotlever import memory
-from hotlever.datasets import OBSERVABLES
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.experiment_at_rest import (
@@ -33,6 +32,7 @@ from hotlever.estimation.prior_density import FLAT, PriorDensity
 from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.search import Search
 from hotlever.lever.branch import Branch
+from hotlever.measurands import OBSERVABLES
 from hotlever.measurement import (
     Measurement,
     with_measured_circuit,

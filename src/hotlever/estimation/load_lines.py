@@ -34,7 +34,7 @@ class Rows:
     ----------
     bias_V : ndarray, shape (n,)
     shown : ndarray, shape (observables, n), optional
-        What was measured, `hotlever.datasets.OBSERVABLES`; NaN where nothing was. Without it the
+        What was measured, `hotlever.measurands.OBSERVABLES`; NaN where nothing was. Without it the
         states are those of a slow ramp.
     """
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal, cast, get_args
 
-from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
+from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Probe
 from hotlever.probe.parameters import (
     heat_capacities,
@@ -30,7 +30,7 @@ class FitOptions:
 
     Attributes
     ----------
-    observables : sequence of {"current", "reader", "bridge", "tip"}, optional
+    observables : sequence of {"current", "reader", "tip", "bridge"}, optional
         Option I of the paper is ``["current"]``, option II ``["current", "reader"]``, option
         III adds the tip. All that the measurement has, by default.
     fixed : mapping of str to float or None

@@ -13,10 +13,10 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from hotlever.datasets import OBSERVABLES
 from hotlever.errors import InputError
 from hotlever.estimation.noise import CommonCovariance, CommonError, DataErrors
 from hotlever.estimation.options import Weights
+from hotlever.measurands import OBSERVABLES
 from hotlever.measurement import Measurement
 from hotlever.probe.priors import Moved
 from hotlever.types import Array

@@ -21,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from hotlever.datasets import Observable, labelled
+from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.estimation.noise import errors_of_scales
 from hotlever.estimation.objective import Objective
@@ -40,6 +40,7 @@ from hotlever.estimation.residuals import Residuals
 from hotlever.lever.lever import Lever
 from hotlever.lever.transient import simulate
 from hotlever.materials import full_name
+from hotlever.measurands import Observable
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameter_of, parameters_of, usual_parameters

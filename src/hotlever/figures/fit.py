@@ -15,7 +15,6 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import chdtri, ndtri
 
 from hotlever.colours import BLACK, BLUE, ORANGE, SKY, VERMILION
-from hotlever.datasets import OBSERVABLES
 from hotlever.estimation.lack_of_fit import USUAL_SCATTER
 from hotlever.figures.style import (
     MEASURED,
@@ -32,6 +31,7 @@ from hotlever.figures.style import (
     values_by_lever,
 )
 from hotlever.materials.parameters import parameter_named
+from hotlever.measurands import OBSERVABLES
 from hotlever.text import BAND, value_with_error
 from hotlever.types import Array
 
@@ -99,8 +99,8 @@ def data_and_model(
         style: Any = {} if stated else {"color": VERMILION}
         entitle(made, model, more="" if stated else NOT_DESCRIBED, **style)
         panel_letters(grid[0])
-        # the tip, which is the last, has a band of its own
-        for axes in {grid[0, 0], grid[0, 0 if band is None else -1]}:
+        # the tip has a band of its own
+        for axes in {grid[0, 0], grid[0, 0 if band is None else list(panels).index("tip")]}:
             axes.legend(loc="best")
     return made
 

@@ -17,6 +17,7 @@ from hotlever.figures.style import (
     LINES,
     MEASURED,
     axis_label,
+    bridge_beside,
     curve,
     entitle,
     figure,
@@ -67,6 +68,7 @@ def sweep_overview(sweep: xr.Dataset) -> Figure:
         curve(voltage, sweep, "bias_V", "reader_V", "s-", color=GREEN, label="reader V$_r$")
         voltage.set(ylabel="voltage (V)")
         voltage.legend()
+        bridge_beside(voltage, sweep, "bias_V", marker="^")
         curve(tip, sweep, "bias_V", "tip_K", "o-", color=VERMILION)
         curve(iv, sweep, "lever_V", "current_mA", "o-", color=BLUE)
         entitle(made, sweep)

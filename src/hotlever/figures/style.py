@@ -127,6 +127,17 @@ def curve(axes: Axes, data: xr.Dataset, along: str, name: str, *line: str, **sty
         axes.set(xlabel=axis_label(along))
 
 
+def bridge_beside(axes: Axes, data: xr.Dataset, along: str, **style: Any) -> None:
+    """Draw the voltage of a bridge, if there is one, along an axis of its own: it is amplified."""
+    name = "bridge_output_V"
+    if name in data:
+        right = axes.twinx()
+        right.plot(data[along], data[name], color=ORANGE, **style)
+        right.set_ylabel(axis_label(name), color=ORANGE)
+        right.spines["right"].set_visible(True)
+        right.grid(False)
+
+
 def entitle(made: Figure, *datasets: xr.Dataset | None, more: str = "", **style: Any) -> None:
     """Write above a figure of which levers its datasets are, as far as these say so, and more."""
     told = [data.attrs["lever"] for data in datasets if data is not None and "lever" in data.attrs]

@@ -8,7 +8,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hotlever.colours import BLUE, GREEN, ORANGE, PURPLE, VERMILION
-from hotlever.figures.style import axis_label, curve, entitle, figure, marker, settled
+from hotlever.figures.style import (
+    axis_label,
+    bridge_beside,
+    curve,
+    entitle,
+    figure,
+    marker,
+    settled,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +49,7 @@ def history_overview(history: xr.Dataset) -> Figure:
         heat.set(ylabel="energy (nJ)")
         for axes in (voltage, heat):
             axes.legend()
+        bridge_beside(voltage, data, "time", **style)
         if settled(history):
             tip.set_xscale("log")
         entitle(made, history, more=history.attrs.get("waveform", ""))
@@ -63,7 +72,15 @@ def small_signals(spectrum: xr.Dataset) -> Figure:
             change = spectrum[f"{name}_{unit.replace('/', '_per_')}"]
             size.plot(spectrum.frequency, change, color=colour, label=f"{label} ({unit})")
             phase.plot(spectrum.frequency, spectrum[f"{name}_deg"], color=colour, label=label)
-        size.set(ylabel="change of T$_{tip}$ (K/mW, K/V)", yscale="log")
+        changes = "change of T$_{tip}$ (K/mW, K/V)"
+        if "bridge_per_bias_deg" in spectrum:
+            change, style = spectrum.bridge_per_bias_V_per_V, {"color": ORANGE}
+            size.plot(spectrum.frequency, change, label="V$_{bridge}$ by bias (V/V)", **style)
+            phase.plot(
+                spectrum.frequency, spectrum.bridge_per_bias_deg, label="V$_{bridge}$", **style
+            )
+            changes = "change of T$_{tip}$, V$_{bridge}$"
+        size.set(ylabel=changes, yscale="log")
         phase.set(ylabel="phase (°)")
         _along_frequency(bode, size, phase)
         entitle(made, spectrum, more=f"bias {spectrum.attrs['bias_V']:.3g} V")
@@ -77,17 +94,23 @@ def _along_frequency(*panels: Axes) -> None:
 
 
 def harmonics(data: xr.Dataset) -> Figure:
-    """Draw amplitude and phase of the harmonics of the lever voltage."""
+    """Draw amplitude and phase of the harmonics of the lever voltage, and of a bridge's."""
+    shown = {"": ("-", "V$_l$")}
+    if "first_bridge_harmonic_V" in data:
+        shown["bridge_"] = "--", "V$_{bridge}$"
     with figure(7.4, 3.2, 1, 2, letters=True) as (made, (size, phase)):
-        for name, colour in (("first", BLUE), ("second", GREEN), ("third", VERMILION)):
-            volts = data[f"{name}_harmonic_V"]
-            # without an offset there is no second harmonic, but for rounding errors
-            if float(volts.max()) < 1e-9 * float(data.first_harmonic_V.max()):
-                continue
-            size.plot(data.frequency, volts, color=colour, label=f"{name} harmonic")
-            angle = data[f"{name}_harmonic_deg"]
-            phase.plot(data.frequency, angle, color=colour, label=f"{name} harmonic")
-        size.set(ylabel="amplitude of V$_l$ (V)", yscale="log")
+        for of, (line, symbol) in shown.items():
+            for name, colour in (("first", BLUE), ("second", GREEN), ("third", VERMILION)):
+                volts = data[f"{name}_{of}harmonic_V"]
+                # without an offset there is no second harmonic, but for rounding errors
+                if float(volts.max()) < 1e-9 * float(data.first_harmonic_V.max()):
+                    continue
+                label = f"{name} harmonic" + (f", {symbol}" if len(shown) > 1 else "")
+                size.plot(data.frequency, volts, line, color=colour, label=label)
+                angle = data[f"{name}_{of}harmonic_deg"]
+                phase.plot(data.frequency, angle, line, color=colour, label=label)
+        volts_of = ", ".join(symbol for _, symbol in shown.values())
+        size.set(ylabel=f"amplitude of {volts_of} (V)", yscale="log")
         phase.set(ylabel="phase (°)")
         _along_frequency(size, phase)
         driven = f"bias {data.attrs['bias_V']:.3g} V + {data.attrs['amplitude_V']:.3g} V sine"

@@ -11,15 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import (
-    OBSERVABLES,
-    csv_text,
-    in_a_file,
-    labelled,
-    offer_plots,
-    quantity,
-    write_dataset,
-)
+from hotlever.datasets import csv_text, in_a_file, labelled, offer_plots, quantity, write_dataset
 from hotlever.errors import InputError
 from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES, balance_columns, balance_names, balance_slopes
@@ -29,6 +21,7 @@ from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.lever.observables import with_bridge
 from hotlever.materials import Kind
 from hotlever.materials.sections import LAWS
+from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.parts import SECTIONS

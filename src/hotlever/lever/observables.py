@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hotlever.datasets import OBSERVABLES
+from hotlever.measurands import OBSERVABLES
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 
@@ -18,7 +18,7 @@ _BRIDGE = OBSERVABLES["bridge"].name
 
 
 def observed(circuit: Circuit, shown: Array) -> Array:
-    """Return `hotlever.datasets.OBSERVABLES` in the order of that table, (observables, n).
+    """Return `hotlever.measurands.OBSERVABLES` in the order of that table, (observables, n).
 
     Parameters
     ----------

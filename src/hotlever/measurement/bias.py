@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hotlever.datasets import MEASURANDS, OBSERVABLES
 from hotlever.errors import InputError
 from hotlever.lever.transient.waveform import Polyline, Waveform
+from hotlever.measurands import MEASURANDS, OBSERVABLES
 from hotlever.measurement.contents import NOISE, Contents
 from hotlever.measurement.data import LEVER, TIME, noise_about_neighbours
 from hotlever.probe import Circuit

@@ -11,9 +11,9 @@ from functools import partial
 
 import numpy as np
 
-from hotlever.datasets import MEASURANDS, OBSERVABLES, PLAIN
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_bytes
+from hotlever.measurands import MEASURANDS, OBSERVABLES, PLAIN
 from hotlever.measurement.data import LEVER, MEASURED, TIME
 from hotlever.tables import TextTable, read_table
 from hotlever.tables.cells import text_lines

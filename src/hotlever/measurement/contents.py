@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hotlever.datasets import MEASURANDS
 from hotlever.errors import InputError, shown
+from hotlever.measurands import MEASURANDS
 from hotlever.measurement.columns import Column
 from hotlever.measurement.data import LEVER, MEASURED, TIME
 from hotlever.measurement.settings import Settings

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import MEASURANDS, OBSERVABLES, labelled
+from hotlever.datasets import labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.lever.dataset import circuit_of
 from hotlever.lever.transient.history import checked_times
 from hotlever.lever.transient.waveform import Waveform
+from hotlever.measurands import MEASURANDS, OBSERVABLES
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.surroundings import Medium
 from hotlever.types import Array, Mask
@@ -175,11 +176,11 @@ class Measurement:
     def dataset(self, circuit: Circuit) -> xr.Dataset:
         """Return the data by the names that a sweep has, V_l and P_l included.
 
-        Rising in bias, or in time.
+        Rising in bias, or in time; the current as in `current`.
         """
         named = ((column.name, getattr(self, column.name)) for column in MEASURED)
         columns = {name: values for name, values in named if values is not None}
-        current = self.current(circuit)
+        current = columns["current_mA"] = self.current(circuit)
         columns["lever_V"] = circuit.lever_voltage(self.bias_V, current)
         columns["power_mW"] = circuit.power(self.bias_V, current)
         if self.time_us is not None:
@@ -187,7 +188,7 @@ class Measurement:
         return labelled(columns, coordinates={"bias": self.bias_V}).sortby("bias")
 
     def observable(self, name: str) -> Array:
-        """Return the data of one of `hotlever.datasets.OBSERVABLES`, NaN where there are none.
+        """Return the data of one of `hotlever.measurands.OBSERVABLES`, NaN where there are none.
 
         Raises
         ------

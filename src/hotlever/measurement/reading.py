@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.datasets import MEASURANDS, OBSERVABLES
 from hotlever.errors import InputError, shown
 from hotlever.lever.transient.waveform import Waveform
+from hotlever.measurands import MEASURANDS, OBSERVABLES
 from hotlever.measurement.bias import check_times, find_bias, find_waveform, leave_out_jumps, mirror
 from hotlever.measurement.columns import (
     find_columns,

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.datasets import OBSERVABLES
+from hotlever.measurands import OBSERVABLES
 from hotlever.measurement.data import MEASURED, Measurement
 from hotlever.types import Array, Index, Mask
 

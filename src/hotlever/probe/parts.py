@@ -10,11 +10,11 @@ from typing import Any, Self
 import numpy as np
 from pydantic import ConfigDict, Field, SerializeAsAny, model_validator
 
-from hotlever.datasets import OBSERVABLES
 from hotlever.errors import unknown_name
 from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED, REFERENCE, Kind, Material, full_name
 from hotlever.materials.kind import class_name
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
+from hotlever.measurands import OBSERVABLES
 from hotlever.probe.circuit import Circuit, Contact, Wiring
 from hotlever.probe.contact import SampleContact
 from hotlever.probe.layout import Layout
@@ -199,7 +199,7 @@ class ProbeParts(Record):
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """Which of `hotlever.datasets.OBSERVABLES` it can show."""
+        """Which of `hotlever.measurands.OBSERVABLES` it can show."""
         without = {
             "reader": "reader" not in self.wiring.measurable,
             "bridge": not self.circuit.has_bridge,

@@ -105,7 +105,7 @@ class FitRequest(DriveRequest, LeversRequest):
     """Material parameters from measurements."""
 
     observables: str | None = option(
-        None, help="Some of current,reader,bridge,tip; all that the file has if left out."
+        None, help="Some of current,reader,tip,bridge; all that the file has if left out."
     )
     fix: list[str] | None = option(None, metavar="NAME[=VALUE]", help="Hold a parameter.")
     free: str | None = option(

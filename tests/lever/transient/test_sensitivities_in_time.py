@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.datasets import observables_of
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.lever.transient import pulse, simulate, step, switched_off
 from hotlever.lever.transient.history import time_steps
 from hotlever.lever.transient.sensitivities import with_sensitivities
 from hotlever.materials import PARAMETERS
+from hotlever.measurands import observables_of
 
+#: So that every observable is there.
+BRIDGE = {"bridge_upper_ohm": 5600.0, "bridge_lower_ohm": 2000.0}
 NAMES = ["heat_capacity_scale", "series_resistance_ohm"]
 OF_SILICON = [*PARAMETERS, "impurity_exponent", "n_hd"]
 #: What each parameter moves the tip by (K), and the largest share of its value that it moves by.
@@ -32,6 +34,7 @@ def values_of(data):
 def test_they_have_taylor_order_two(coarse, in_air, medium, names):
     """All parameters move at once, each by as much as it matters, on the same steps."""
     lever = coarse if medium == "vacuum" else in_air
+    lever = lever.with_probe(lever.probe.with_(**BRIDGE))
     wave = pulse(10.0, 1.0)
     ends = [0.0, *(step.end for _, step in time_steps(lever, wave, 2.0, 0.1))]
     # with stops at half of what errors allow nothing but the stops makes steps

@@ -8,7 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from hotlever.app.pages.frame import caption
-from hotlever.datasets import MEASURANDS
+from hotlever.measurands import MEASURANDS
 from hotlever.measurement import FileColumn
 from hotlever.measurement.columns import UNUSED, quantity_of
 

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import OBSERVABLES, labelled
+from hotlever.datasets import labelled
 from hotlever.errors import HistoryEndError, InputError, unknown_name
 from hotlever.lever.dataset import probe_attributes
 from hotlever.lever.newton import refined
@@ -23,6 +23,7 @@ from hotlever.lever.transient.history import checked_times, time_steps
 from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import INSTANT_RATE, METHOD, LinearSolver, Step
 from hotlever.lever.transient.waveform import Piece, Waveform
+from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, parameters_of
 from hotlever.threads import one_blas_thread
