@@ -27,6 +27,14 @@ def probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
         f"  tip at ({x:g}, {y:g}) µm; terminals {', '.join(layout.terminal_names)}",
         f"circuit: series resistance {circuit.series_resistance_ohm:g} ohm, "
         f"base temperature {circuit.base_temperature_K:g} K",
+        *(
+            [
+                f"  bridge: {circuit.bridge_upper_ohm:g} ohm above {circuit.bridge_lower_ohm:g} ohm, "
+                f"gain {circuit.bridge_gain or 1.0:g}"
+            ]
+            if circuit.has_bridge
+            else []
+        ),
         *(f"  {name}: {contact}" for name, contact in circuit.contacts.items()),
         *_materials(probe),
         *(
