@@ -29,8 +29,8 @@ def probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
         f"base temperature {circuit.base_temperature_K:g} K",
         *(
             [
-                f"  bridge: {circuit.bridge_upper_ohm:g} ohm above {circuit.bridge_lower_ohm:g} ohm, "
-                f"gain {circuit.bridge_gain or 1.0:g}"
+                f"  bridge: {circuit.bridge_upper_ohm:g} ohm above "
+                f"{circuit.bridge_lower_ohm:g} ohm, gain {circuit.bridge_gain or 1.0:g}"
             ]
             if circuit.has_bridge
             else []
