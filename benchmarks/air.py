@@ -94,7 +94,7 @@ def accuracy(air, model, count=8):
         material = ParameterDomain.of(air.probe).probe(air.probe, rng.random(len(PAPER))).material
         material = material.with_(c_kappa=rng.uniform(0.6, 0.76))
         full = air.with_material(material).sweep(BIAS)
-        current, reader, tip = model.predict(air.with_material(material).probe).values
+        current, reader, tip, _ = model.predict(air.with_material(material).probe).values
         rows.append(
             (
                 np.abs(current / full.current_mA.values - 1).max(),

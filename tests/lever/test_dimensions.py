@@ -104,16 +104,22 @@ def test_a_mesh_that_would_turn_over_is_refused(coarse):
         SimilarLevers(coarse).linearised(probe, REACH)
 
 
+@pytest.fixture(scope="module")
+def bridged(coarse):
+    """A lever in a bridge far from balance: of every observable relative errors mean something."""
+    return coarse.with_probe(coarse.probe.with_(bridge_upper_ohm=5600.0, bridge_lower_ohm=100.0))
+
+
 @pytest.mark.parametrize(
     "name",
     ["series_resistance_ohm", "base_temperature_K", "heater_width_um", "thickness_um"],
 )
-def test_derivatives_at_a_fixed_bias(coarse, name):
+def test_derivatives_at_a_fixed_bias(bridged, name):
     """Circuit and dimensions together, as a fit takes them."""
     bias = np.array([2.0, 5.0, 7.0])
     names = (name,)
-    model = replace(full_experiment(coarse, bias), names=names)
-    probe, rest = coarse.probe, []
+    model = replace(full_experiment(bridged, bias), names=names)
+    probe, rest = bridged.probe, []
     start = model.predict(probe)
     for step in (0.02, 0.01):
         (value,) = probe.values(names)
@@ -121,22 +127,22 @@ def test_derivatives_at_a_fixed_bias(coarse, name):
         change = moved.values - start.values
         rest.append(np.abs(change - step * value * start.slopes[..., 0]) / start.values)
     # between its states a branch's slopes are splines
-    assert np.all(rest[0] < 2e-3)
+    assert np.all(rest[0] < 3e-3)
     assert np.all(rest[1] < 0.35 * rest[0] + 2e-5)
 
 
-def test_predictions_nearby_agree_with_a_new_branch(coarse):
+def test_predictions_nearby_agree_with_a_new_branch(bridged):
     """To second order, at four per cent."""
     bias = np.array([2.0, 5.0, 7.0])
     names = ("n_d", "heater_length_um", "series_resistance_ohm", "base_temperature_K")
-    model = replace(full_experiment(coarse, bias), names=names)
-    start = model.predict(coarse.probe)
-    values = coarse.probe.values(names) * np.array([1.04, 0.96, 1.01, 1.02])
+    model = replace(full_experiment(bridged, bias), names=names)
+    start = model.predict(bridged.probe)
+    values = bridged.probe.values(names) * np.array([1.04, 0.96, 1.01, 1.02])
     nearby, slopes = start.surrogate.predict(values)
-    moved = coarse.probe.replace(dict(zip(names, values.tolist(), strict=True)))
+    moved = bridged.probe.replace(dict(zip(names, values.tolist(), strict=True)))
     exact = model.predict(moved)
     np.testing.assert_allclose(nearby, exact.values, rtol=3e-3)
-    assert slopes.shape == exact.slopes.shape == (3, 3, 4)
+    assert slopes.shape == exact.slopes.shape == (4, 3, 4)
 
 
 def test_dimensions_that_hold_parts_together_are_held():

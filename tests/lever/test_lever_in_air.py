@@ -43,7 +43,7 @@ def test_a_lever_can_be_sent_to_another_process(coarse, medium):
 
 @pytest.mark.parametrize("name", ["c_kappa", "n_d", "a1"])
 def test_sensitivities_have_taylor_order_two(in_air, name):
-    start = in_air
+    start = in_air.with_probe(in_air.probe.with_(bridge_upper_ohm=5600.0, bridge_lower_ohm=100.0))
     value = getattr(start.probe.material, name)
     at = start.sweep(BIAS, sensitivities=True)
     steps = (0.02, 0.01)

@@ -41,7 +41,7 @@ def test_it_follows_the_full_lever_as_its_error_estimate_says(strip, reduced, se
     u = branch.read(lever.circuit, BIAS).u
     assert estimated_error(lever, branch, u[u > 0])[2].max() < 0.02
     full = lever.sweep(BIAS)
-    current, _, tip = Rows(BIAS).values(branch, lever.circuit)
+    current, _, tip, _ = Rows(BIAS).values(branch, lever.circuit)
     np.testing.assert_allclose(current, full.current_mA, rtol=1e-5)
     np.testing.assert_allclose(tip, full.tip_K, atol=0.02)
     assert found.names == reduced.names == domain.names

@@ -24,7 +24,7 @@ from hotlever.estimation.chains import (
     rhat_of_ensembles,
     sample,
 )
-from hotlever.estimation.experiment import TIP
+from hotlever.estimation.experiment import TIP, named
 from hotlever.estimation.experiment_at_rest import (
     ExperimentAtRest,
     experiment_of,
@@ -345,9 +345,9 @@ def predictive_band(
     chosen = flat[np.linspace(0, len(flat) - 1, min(samples, len(flat))).round().astype(int)]
     tips, powers = [], []
     for done, row in enumerate(chosen, start=1):
-        current, _, tip = surrogate.shown(row)
-        tips.append(tip)
-        powers.append(surrogate.circuit(row).power(grid, current))
+        shown = named(surrogate.shown(row))
+        tips.append(shown["tip_K"])
+        powers.append(surrogate.circuit(row).power(grid, shown["current_mA"]))
         if progress is not None:
             progress(done, len(chosen))
     power = np.linspace(np.min(powers, axis=1).max(), np.max(powers, axis=1).min(), grid.size)
