@@ -146,7 +146,8 @@ def test_temperatures_in_degrees_celsius_are_refused(curve):
 def test_what_the_data_lack_is_remarked(curve, reference, rows, step, remark):
     current = np.round(curve.current_mA / step) * step if step else curve.current_mA
     data = shown(curve, rows, current_mA=current)
-    remarks = what_data_lack(data, reference.tip_temperature(curve.power_mW[rows]))
+    tips = reference.tip_temperature(curve.power_mW[rows])
+    remarks = what_data_lack(data, curve.circuit, tips)
     assert [text for text in remarks if remark in text]
 
 
