@@ -138,7 +138,7 @@ def sampled(coarse, reduced, bias=BIAS):
 def test_the_surrogate_shows_nearby_what_the_full_lever_does(coarse, reduced):
     there = coarse.probe.material.with_(c_kappa=0.70, p=2.70)
     exact = coarse.with_material(there).sweep(BIAS)
-    current, reader, tip = sampled(coarse, reduced)(there)
+    current, reader, tip, _ = sampled(coarse, reduced)(there)
     np.testing.assert_allclose(current, exact.current_mA, rtol=2e-4)
     np.testing.assert_allclose(reader, exact.reader_V, rtol=2e-4)
     np.testing.assert_allclose(tip, exact.tip_K, atol=0.2)
