@@ -15,7 +15,7 @@ import numpy as np
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimation import fit, read_measurement
 from hotlever.estimation.experiment_at_rest import ExperimentAtRest, experiment_of
-from hotlever.estimation.load_lines import Rows, shown_at
+from hotlever.estimation.load_lines import Rows
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.reduced.error_estimate import estimated_error
@@ -52,8 +52,9 @@ def accuracy(lever, reduced, cases):
         bias = np.sort(rng.uniform(1.0, 11.0, BIASES))
         same = lever.with_material(material)
         branch = reduced.linearised(same.probe, Reach(circuit, bias[-1])).branch
-        u, _ = Rows(bias).states(branch, circuit)
-        shown = shown_at(branch, circuit, u)
+        rows = Rows(bias)
+        u, _ = rows.states(branch, circuit)
+        shown = rows.values(branch, circuit)[:3]
         guesses = reduced.space.expanded(branch.states(u))
         exact = same.dataset(
             [same.polished(x[:, None], v) for x, v in zip(guesses.T, bias, strict=True)]
