@@ -68,6 +68,7 @@ def _small_signals(page: Page) -> None:
 
 def _compared(page: Page) -> None:
     page.get_by_role("button", name="at a bias").click()
+    _choose(page, "Compare with", "the same in air")
     page.locator("[data-number=beside]").filter(has_text="tip").wait_for(timeout=_WORK_MS)
 
 
@@ -207,7 +208,7 @@ def main() -> None:
     folder, *pages = sys.argv[1:] or ["benchmarks/results/look"]
     pictures = Path(folder)
     pictures.mkdir(parents=True, exist_ok=True)
-    rows, faults = [], []
+    rows = []
     with tempfile.TemporaryDirectory() as name:
         furnish(Path(name))
         with running(Path(name)) as app, browsing(app) as (page, seen):
@@ -215,10 +216,9 @@ def main() -> None:
                 made = look(page, app, view, pictures)
                 lowest = [f"{made.lowest(kind):.2f}" for kind in ("text", "icon", "line")]
                 rows.append((made.page, made.controls, *lowest, len(made.faults)))
-                faults += [f"{made.page} {fault}" for fault in made.faults]
-            faults += seen.errors
-    for fault, times in Counter(faults).items():
-        print(fault, f"({times} times)" if times > 1 else "")
+                for fault, times in Counter(made.faults).items():
+                    print(made.page, fault, f"({times} times)" if times > 1 else "", flush=True)
+        print(*seen.errors, sep="\n")
     table(("page", "controls", "contrast of text", "of icons", "of lines", "faults"), rows)
 
 
