@@ -30,7 +30,8 @@ FITS, CALIBRATIONS = "fits", "calibrations"
 #: Endings of tables that commands write: no measurements.
 _WRITTEN = (
     *(TABLE, ".raman.csv", ".corrections.csv"),
-    *(".sweep.csv", ".pulse.csv", ".spectrum.csv", ".design.csv", ".contact.csv"),
+    *(".sweep.csv", ".pulse.csv", ".spectrum.csv", ".design.csv"),
+    *(".contact.csv", ".reader.csv"),
 )
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -21,6 +21,7 @@ from hotlever.app.pages.lever import LeverPage
 from hotlever.app.pages.levers import LeversPage
 from hotlever.app.pages.materials import MaterialsPage
 from hotlever.app.pages.raman import RamanPage
+from hotlever.app.pages.reader import ReaderPage
 from hotlever.app.pages.simulate import SimulatePage
 from hotlever.app.pages.start import StartPage, serve_pictures
 from hotlever.app.project import LARGEST_FILE, Project
@@ -39,8 +40,8 @@ _MESSAGES = 100
 _SOON_S = 1.0
 LOCAL = ("127.0.0.1", "localhost", "::1")
 _PAGES = (
-    *(StartPage, LeverPage, SimulatePage, ContactPage, DesignPage, MaterialsPage),
-    *(RamanPage, FitPage, CalibratePage, LeversPage),
+    *(StartPage, LeverPage, SimulatePage, ContactPage, ReaderPage, DesignPage),
+    *(MaterialsPage, RamanPage, FitPage, CalibratePage, LeversPage),
 )
 
 

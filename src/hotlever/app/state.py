@@ -106,6 +106,22 @@ class Contact(BaseModel):
     most: float = 12.0
 
 
+class Reader(BaseModel):
+    """The page Reader: a probe over a surface, the bias (V), the slider's highest, and noise.
+
+    What is None is what the probe file says, or what is usual.
+    """
+
+    probe: str | None = None
+    distance_um: float = 0.5
+    tilt_deg: float | None = None
+    accommodation: float | None = None
+    amplifier_nV: float = 5.0
+    hooge: float = 0.0
+    bias: float = 9.0
+    most: float = 12.0
+
+
 class Design(BaseModel):
     """The page Design: one or two numbers of a probe that are varied, and the power (mW)."""
 
@@ -187,6 +203,7 @@ class Choices(BaseModel):
     pulse: Pulse = Pulse()
     signals: Signals = Signals()
     contact: Contact = Contact()
+    reader: Reader = Reader()
     design: Design = Design()
     materials: Materials = Materials()
     raman: Raman = Raman()

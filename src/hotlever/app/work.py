@@ -15,6 +15,7 @@ from pydantic import TypeAdapter
 from hotlever.app.changes import Changes
 from hotlever.app.jobs import Task
 from hotlever.app.workers import Report
+from hotlever.tasks.approaching import approach
 from hotlever.tasks.calibrating import calibrate_files
 from hotlever.tasks.contacting import touch
 from hotlever.tasks.designing import vary_design
@@ -26,6 +27,7 @@ from hotlever.tasks.requests import (
     DesignRequest,
     ImportRequest,
     PulseRequest,
+    ReaderRequest,
     SpectrumRequest,
     SweepRequest,
 )
@@ -40,6 +42,7 @@ _TASKS: dict[str, tuple[str, type, Callable[[Report, Any], Any]]] = {
     "calibrate": ("data", CalibrateRequest, calibrate_files),
     "sweep": ("probe", SweepRequest, sweep),
     "contact": ("probe", ContactRequest, touch),
+    "reader": ("probe", ReaderRequest, approach),
     "pulse": ("probe", PulseRequest, simulate_in_time),
     "spectrum": ("probe", SpectrumRequest, respond),
     "design": ("probe", DesignRequest, vary_design),

@@ -8,7 +8,7 @@ import numpy as np
 from nicegui import ui
 
 from hotlever.app.pages.frame import caption
-from hotlever.app.pages.plots import INK, axes, plotted, short, side_by_side
+from hotlever.app.pages.plots import INK, axes, filled, plotted, short, side_by_side
 from hotlever.colours import BLUE, PURPLE, VERMILION
 from hotlever.contact.picture import ContactPicture
 
@@ -95,10 +95,10 @@ class ContactPlots:
         shapes = []
         for number, (_, top, bottom) in enumerate(drawn.layers):
             corners = [(-width, top), (width, top), (width, bottom), (-width, bottom)]
-            shapes.append(_filled(corners, _FILL.format(0.12 + 0.16 * (number % 2))))
+            shapes.append(filled(corners, _FILL.format(0.12 + 0.16 * (number % 2))))
         for (corners, _), colour in zip(drawn.pieces, colours, strict=True):
             red, green, blue, _ = map(int, colour)
-            shapes.append(_filled(corners, f"rgb({red},{green},{blue})"))
+            shapes.append(filled(corners, f"rgb({red},{green},{blue})"))
         for line in drawn.outlines:
             path = "M" + "L".join(f"{x:.4g},{y:.4g}" for x, y in line)
             shapes.append({"type": "path", "path": path, "line": {"color": INK, "width": 1.5}})
@@ -126,11 +126,6 @@ class ContactPlots:
             "hovertext": ["tip at the lever", "apex", "sample under the middle of the contact"],
         }
         self._picture.update()
-
-
-def _filled(corners: list[tuple[float, float]], colour: str) -> dict[str, Any]:
-    path = "M" + "L".join(f"{x:.4g},{y:.4g}" for x, y in corners) + "Z"
-    return {"type": "path", "path": path, "fillcolor": colour, "line": {"width": 0}}
 
 
 def _words(x: float, y: float, text: str) -> dict[str, Any]:

@@ -75,14 +75,6 @@ class DrawnPage(Page):
         self._keep_result(self.session.jobs.by_page.get(self.name))
         self._show()
 
-    def number(self, key: str, label: str, unit: str = "", empty: str = "") -> ui.number:
-        """Ask for a number; `empty` is what counts where there is none."""
-        number = ui.number(label, value=self.chosen[key], on_change=self._keep(key))
-        number.props(f"debounce=200 suffix={unit.replace('u', 'µ')}" if unit else "debounce=200")
-        if empty:
-            number.props(f'clearable stack-label placeholder="{empty}"')
-        return number.classes("w-36")
-
     async def _ended(self, job: Job) -> None:
         if self._keep_result(job):
             self._show()

@@ -24,6 +24,7 @@ PAGES = {
     "lever": ("Lever", "architecture"),
     "simulate": ("Simulate", "tune"),
     "contact": ("Contact", "south"),
+    "reader": ("Reader", "height"),
     "design": ("Design", "insights"),
     "materials": ("Materials", "layers"),
     "raman": ("Raman", "thermostat"),
@@ -291,7 +292,7 @@ def table(
 
 async def asked(question: str, yes: str, no: str) -> bool:
     """Ask something, and wait for the answer; whoever closes the question says no."""
-    with ui.dialog() as dialog, ui.card():
+    with ui.dialog().props('aria-label="Question"') as dialog, ui.card():
         ui.label(question).classes("remark")
         with ui.row().classes("w-full justify-end"):
             ui.button(no, on_click=lambda: dialog.submit(False)).props("autofocus")
@@ -304,7 +305,8 @@ async def asked(question: str, yes: str, no: str) -> bool:
 @contextmanager
 def opened_dialog(title: str, width: str) -> Iterator[ui.row]:
     """Open a dialog with a title and a way out of it; give the row of its title."""
-    with ui.dialog(value=True) as dialog, ui.card().classes("w-full").style(f"max-width: {width}"):
+    dialog = ui.dialog(value=True).props(f'aria-label="{_attribute(title)}"')
+    with dialog, ui.card().classes("w-full").style(f"max-width: {width}"):
         with ui.row().classes("w-full items-center no-wrap"):
             ui.label(title).classes("text-lg text-bold col")
             buttons = ui.row()

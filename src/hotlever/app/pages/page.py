@@ -107,6 +107,14 @@ class Page:
         shown = ui.input(label, value=self.chosen[key], on_change=self._keep(key, ""))
         return shown.classes("w-full")
 
+    def number(self, key: str, label: str, unit: str = "", empty: str = "") -> ui.number:
+        """Ask for a number; `empty` is what counts where there is none."""
+        number = ui.number(label, value=self.chosen[key], on_change=self._keep(key))
+        number.props(f"debounce=200 suffix={unit.replace('u', 'µ')}" if unit else "debounce=200")
+        if empty:
+            number.props(f'clearable stack-label placeholder="{empty}"')
+        return number.classes("w-36")
+
     def checkbox(self, key: str, label: str, meaning: str) -> ui.checkbox:
         """Ask whether something is wanted."""
         box = ui.checkbox(label, value=self.chosen[key], on_change=self._keep(key, False))

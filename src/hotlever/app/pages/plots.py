@@ -51,6 +51,11 @@ def side_by_side() -> ui.element:
     return ui.element("div").classes("w-full grid gap-2").style(columns)
 
 
+def filled(corners: Sequence[tuple[float, float]], colour: str) -> dict[str, Any]:
+    """Return a polygon of a plot, without an outline."""
+    return {"type": "path", "path": _closed(corners), "fillcolor": colour, "line": {"width": 0}}
+
+
 class MeasuredPlots:
     """A measurement, by observable, and a lever that is brought near to it."""
 

@@ -116,7 +116,8 @@ class ProbeFields:
 
     async def _rename(self, old: str) -> None:
         """Ask for another name of a material."""
-        with ui.dialog(value=True) as dialog, ui.card():
+        dialog = ui.dialog(value=True).props('aria-label="Another name"')
+        with dialog, ui.card():
             name = ui.input("Name of the material", value=old).props("autofocus")
             with ui.row().classes("w-full justify-end"):
                 ui.button("Cancel", on_click=dialog.close).props("flat")

@@ -1,0 +1,194 @@
+"""A reader over a surface that sliders move. Runs in worker processes.
+
+A coarse lever is solved at some distances, once for all biases. What it shows at another distance
+is read off the curves through these, whose slopes are exact.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hotlever.air.chip import BaseLine
+from hotlever.app.jobs import Task
+from hotlever.app.live import coloured
+from hotlever.app.work import request_of
+from hotlever.app.workers import Report
+from hotlever.errors import ComputationError, InputError
+from hotlever.lever import Branch, Lever
+from hotlever.lever.elements import FiniteElements
+from hotlever.lever.lever import COARSE
+from hotlever.lever.reader import Reader, Signal, at_distance
+from hotlever.probe import Layout, Probe
+from hotlever.probe.shapes import Shape
+from hotlever.steps import each
+from hotlever.tasks.approaching import noise_of, probe_over_surface
+from hotlever.tasks.texts import parse_distances
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array, Index
+
+#: Distances at which levers are solved, levers kept, and pieces of the drawn lever.
+_DISTANCES, _KEPT, _PIECES = 9, 3, 80
+#: The nearest and the farthest distance (µm), and the least below any part of the lever.
+_NEAREST_UM, _FARTHEST_UM, _CLEAR_UM = 0.2, 5.0, 0.1
+#: What is read off by the distance.
+_READ = tuple(name for name in Signal._fields if not name.startswith(("source", "crosstalk")))
+#: What is drawn by the distance.
+_CURVES = ("reader_V", "dlnR_dz_per_um", "noise_V_per_rtHz", "resolution_nm_per_rtHz", "tip_K")
+
+
+def described(
+    report: Report, folder: Path, name: str | None, tilt_deg: float | None
+) -> dict[str, Any]:
+    """Return the distances (µm) that a probe allows, and what its file says of its surroundings."""
+    probe = Probe.reference() if name is None else Probe.from_file(folder / name)
+    around = probe.surroundings
+    tilt = around.surface_tilt_deg if tilt_deg is None else tilt_deg
+    line = _Line(probe.layout())
+    beyond = (line.end if tilt > 0 else line.start) - line.tip
+    height = 0.0 if probe.tip is None else probe.tip.height_um
+    clear = max(height, math.tan(math.radians(tilt)) * beyond) + _CLEAR_UM
+    nearest = max(_NEAREST_UM, float(f"{1.05 * clear:.2g}"))
+    return {
+        "nearest_um": nearest,
+        "farthest_um": max(_FARTHEST_UM, 4.0 * nearest),
+        "tilt_deg": around.surface_tilt_deg,
+        "accommodation": around.with_jump.accommodation,
+    }
+
+
+@one_blas_thread
+def answer(
+    report: Report, folder: Path, task: Task, bias: float, distance: float
+) -> dict[str, Any]:
+    """Return what a reader shows at a bias (V) and a distance (µm), and by the distance.
+
+    Parameters
+    ----------
+    report : Report
+    folder : path
+    task : Task
+        That of ``hotlever reader``, over the distances of the curves.
+    bias, distance : float
+
+    Raises
+    ------
+    HotleverError
+        If the reader can show nothing, or has no state at this bias.
+    """
+    request, _ = request_of(task, folder)
+    ends = parse_distances(request.distance)
+    distances = np.geomspace(ends[0], ends[-1], _DISTANCES)
+    probe = probe_over_surface(report, request, distances)
+    reader = Reader(probe, noise_of(request))
+    levers = _levers(report, probe, tuple(distances.tolist()))
+    signals: dict[float, Signal] = {}
+    failures: list[ComputationError] = []
+    states = {}
+    for z, lever in zip(distances.tolist(), levers, strict=True):
+        branch, reading, failure = lever._read(np.array([bias]))
+        if failure is None:
+            u = float(reading.u[0])
+            signals[z], states[z] = reader.signal(lever, branch, u, bias), (lever, branch, u)
+        else:
+            failures.append(failure)
+    if not signals:
+        raise failures[0]
+    z = np.array(list(signals))
+    columns = {
+        name: np.array([getattr(signal, name) for signal in signals.values()]) for name in _READ
+    }
+    nearest = min(states, key=lambda at: abs(math.log(at / distance)))
+    hottest, line = _hottest(*states[nearest]), _Line(probe.layout())
+    base = probe.circuit.base_temperature_K
+    around = probe.surroundings
+    return {
+        "now": {"bias_V": bias, "surface_gap_um": distance, **_at(distance, z, columns)},
+        "curves": {"surface_gap_um": z, **{name: columns[name] for name in _CURVES}},
+        "colours": coloured(hottest, base, max(float(hottest.max()), base + 1.0)),
+        "ends": (line.start, line.tip, line.end),
+        "thickness_um": probe.layout().thickest_um,
+        "tip": None if probe.tip is None else (probe.tip.height_um, probe.tip.base_radius_um),
+        "slope": math.tan(math.radians(around.surface_tilt_deg)),
+        "read_at": reader.terminal,
+    }
+
+
+@lru_cache(maxsize=_KEPT)
+def _levers(report: Report, probe: Probe, distances: tuple[float, ...]) -> list[Lever]:
+    """Return coarse levers at some distances (µm)."""
+    lever = Lever(probe, COARSE)
+    with report.progress("the lever at some distances, once") as update:
+        return [at_distance(lever, distance) for distance in each(list(distances), update)]
+
+
+def _at(distance: float, z: Array, columns: dict[str, Array]) -> dict[str, float]:
+    """Return what curves by the distance have at one of them; nothing beyond their ends."""
+    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
+    if z.size < 2:
+        inside = np.isclose(z[0], distance)
+        return {name: float(values[0]) if inside else math.nan for name, values in columns.items()}
+    x, at = np.log(z), math.log(distance)
+    now = {
+        name: float(PchipInterpolator(x, values, extrapolate=False)(at))
+        for name, values in columns.items()
+    }
+    exact = {
+        "reader_V": columns["dV_dz_V_per_um"],
+        "reader_ohm": columns["reader_ohm"] * columns["dlnR_dz_per_um"],
+    }
+    for name, slope in exact.items():
+        now[name] = float(CubicHermiteSpline(x, columns[name], z * slope, extrapolate=False)(at))
+    # where the voltage turns with the distance this has no bounds, and no curve to be read off
+    now["resolution_nm_per_rtHz"] = 1e3 * now["noise_V_per_rtHz"] / abs(now["dV_dz_V_per_um"])
+    return now
+
+
+def _hottest(lever: Lever, branch: Branch, u: float) -> Array:
+    """Return the highest temperature (K) in each of the pieces in which a lever is drawn."""
+    x = branch.equations.space.expanded(branch.states(np.array([u])))
+    rises = lever.circuit.end_rises()
+    T = lever.space.nodal(x[:, 0], branch.base_temperature_K, rises)[0]
+    piece, cells = _cells(lever.probe.shape, lever.space.elements)
+    hottest = np.full(_PIECES, -np.inf)
+    np.maximum.at(hottest, piece, cells @ T)
+    met = np.flatnonzero(np.isfinite(hottest))
+    return np.interp(np.arange(_PIECES), met, hottest[met])
+
+
+@lru_cache(maxsize=_KEPT)
+def _cells(shape: Shape, elements: FiniteElements) -> tuple[Index, Any]:
+    """Return cells of a grid inside a lever: the piece that each is of, and what reads it off."""
+    layout, line = shape.layout(), _Line(shape.layout())
+    low, high = layout.box
+    step = float(max(high - low)) / (2 * _PIECES)
+    points = np.stack(
+        np.meshgrid(*(np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True))),
+        axis=-1,
+    ).reshape(-1, 2)
+    points = points[layout.contains(points)]
+    edges = np.linspace(line.start, line.end, _PIECES + 1)
+    return np.searchsorted(edges[1:-1], line.of(points)), elements.basis.probes(points.T)
+
+
+class _Line:
+    """The direction of a lever, from its base to its front; positions (µm) along it."""
+
+    def __init__(self, layout: Layout) -> None:
+        self._origin, self._along = np.zeros(2), np.array([1.0, 0.0])
+        with suppress(InputError):  # leg ends that are not on one line
+            base = BaseLine.of(layout, "the drawing")
+            self._origin, self._along = base.origin, base.along
+        outline = self.of(np.array([point for ring in layout.outline for point in ring]))
+        self.start, self.end = float(outline.min()), float(outline.max())
+        self.tip = float(self.of(np.array(layout.tip)))
+
+    def of(self, points: Array) -> Array:
+        """Return where points (n, 2) are along it."""
+        return np.asarray((points - self._origin) @ self._along)

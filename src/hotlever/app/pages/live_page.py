@@ -1,0 +1,192 @@
+"""What pages have in common whose numbers and plots follow sliders: see `LivePage`."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Any, ClassVar, Protocol
+
+from nicegui import ui
+
+from hotlever.app.jobs import Task
+from hotlever.app.pages.drawn import DrawnPage, stem
+from hotlever.app.pages.following import Follower, slider
+from hotlever.app.pages.frame import ErrorBanner, caption, number_shown, two_columns
+from hotlever.app.pages.page import Page, Work, outputs
+from hotlever.app.session import Session
+from hotlever.errors import HotleverError
+
+_LEAST_BIAS_V = 0.1
+
+
+class Plots(Protocol):
+    """What is drawn of an answer."""
+
+    def show(self, answer: dict[str, Any]) -> None:
+        """Draw it."""
+
+
+class LivePage(Page):
+    """A page whose task is shown at once, at a state that sliders move, and gives its table.
+
+    Attributes
+    ----------
+    of_file : dict
+        What the probe's file says, or what is usual, of what can be chosen.
+    """
+
+    #: Numbers that are shown: title, form, and factor, by their names in an answer.
+    numbers: ClassVar[dict[str, tuple[str, str, float]]]
+    #: What is chosen of a state, beside the task, in the order in which it is asked for.
+    state: ClassVar[tuple[str, ...]]
+
+    def __init__(self, session: Session, banner: ErrorBanner, plots: Callable[[], Plots]) -> None:
+        super().__init__(session, banner)
+        self.of_file: dict[str, Any] = {}
+        with two_columns("live") as (left, right):
+            with left:
+                self.probe_choice()
+                self.controls()
+                self._sliders = ui.column().classes("w-full gap-1")
+            with right, ui.column().classes("w-full gap-3 parts"):
+                with ui.row().classes("w-full items-end gap-6 numbers"):
+                    self._numbers = {
+                        key: number_shown(key, title) for key, (title, *_) in self.numbers.items()
+                    }
+                self._model = caption("starting").props("aria-live=polite")
+                self._remarks = ui.label().classes("text-sm remark")
+                with ui.column().classes("w-full gap-1") as self._drawn:
+                    self._plots = plots()
+                with ui.card().classes("w-full last").props("flat bordered"):
+                    ui.label("Take it with you").classes("text-bold")
+                    self.kind_buttons(lambda kind: self.run(self._writing(kind)), DrawnPage.kinds)
+                    Work(session, self.name, self.give)
+                    self.command()
+        self._follower = Follower(self._model, self._show)
+
+    # --- for the page to say ----------------------------------------------------------------------
+
+    def controls(self) -> None:
+        """Show what is chosen beside sliders."""
+
+    @abstractmethod
+    async def described(self) -> dict[str, Any]:
+        """Return what the probe's file says."""
+
+    @abstractmethod
+    def show_sliders(self) -> None:
+        """Show the sliders."""
+
+    @abstractmethod
+    def of_lever(self) -> Task:
+        """Return the task, whatever the state; its probe and options are the lever's."""
+
+    @abstractmethod
+    def of_table(self, task: Task) -> dict[str, Any]:
+        """Return the options that a table has more than the task."""
+
+    @abstractmethod
+    async def ask(self, task: Task, state: list[float], quick: bool, heard: Any) -> dict[str, Any]:
+        """Return what the lever shows in a state, of which ``now`` has the numbers."""
+
+    @abstractmethod
+    def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
+        """Return what the numbers are of, and what else is said of an answer."""
+
+    # --- what is chosen ---------------------------------------------------------------------------
+
+    async def open(self) -> None:
+        """Show the sliders of the probe, and so the first state."""
+        with self.banner.caught():
+            self.of_file = await self.described()
+            self._sliders.clear()
+            with self._sliders:
+                self.show_sliders()
+            self._moved()
+            return
+        self._blank()
+
+    async def changed(self) -> None:
+        """Show another probe, or another value of what is no slider."""
+        await self.open()
+
+    def value(self, key: str) -> Any:
+        """Return what is chosen, or what the probe's file says."""
+        chosen = self.chosen[key]
+        return self.of_file[key] if chosen in (None, "") else chosen
+
+    def slider(self, key: str, words: str, low: float, high: float, *more: str, **how: Any) -> None:
+        """Show the slider of a value; more is its unit and what it says on hover."""
+        number = slider(words, self.value(key), low, high, *more, **how)
+        number.on_value_change(lambda event: self.set_value(key, event.value))
+
+    def slider_of_bias(self) -> None:
+        """Show the slider of the bias; one may type more than it has."""
+        self.slider("bias", "Bias V_b", _LEAST_BIAS_V, self.chosen["most"], "V")
+
+    def set_value(self, key: str, value: Any) -> None:
+        """Choose a value, and have what is shown follow."""
+        if value is None:
+            return
+        self.chosen[key] = value
+        if key == "bias" and value > self.chosen["most"]:
+            self.chosen["most"] = float(math.ceil(value))
+        self._moved()
+
+    def _moved(self) -> None:
+        self.show_command()
+        self._follower.follow(self.of_lever(), [self.chosen[key] for key in self.state])
+
+    def task(self) -> Task | None:
+        """Return the task that writes the table."""
+        return self._writing("CSV") if self.of_file else None
+
+    def _writing(self, kind: str) -> Task:
+        task = self.of_lever()
+        files = outputs(f"{stem(self.chosen)}.{task.command}", kind)
+        options = {**task.options, **self.of_table(task), **files}
+        return Task(task.command, task.files, options)
+
+    # --- what is shown ----------------------------------------------------------------------------
+
+    async def _show(self, task: Task, state: list[float], quick: bool) -> bool:
+        notes = dict[str, None]()
+
+        def heard(kind: str, content: Any) -> None:
+            if kind == "note" and content:
+                notes[content] = None
+            elif kind == "progress" and not self._model.is_deleted:
+                self._blank()
+                label, done, total = content
+                self._model.set_text(f"{label}: {done} of {total}")
+
+        try:
+            answer = await self.ask(task, state, quick, heard)
+        except HotleverError as error:
+            if not self._model.is_deleted:
+                self._blank()
+                self.banner.say(str(error))
+            return False
+        if self._model.is_deleted or (not quick and not self._follower.is_wanted(task)):
+            return False
+        self.banner.clear()
+        now = answer["now"]
+        for key, (_, form, factor) in self.numbers.items():
+            number = now[key]
+            text = "none" if math.isnan(number) else form.format(factor * number)
+            self._numbers[key].set_text(text)
+        model, remark = self.said(answer, quick)
+        self._model.set_text(model)
+        self._remarks.set_text("; ".join(filter(None, [remark, *notes])))
+        self._drawn.set_visibility(True)
+        self._plots.show(answer)
+        return True
+
+    def _blank(self) -> None:
+        """Show no numbers where there are none: the last ones were of another state."""
+        for number in self._numbers.values():
+            number.set_text("–")
+        self._model.set_text("no state is shown")
+        self._remarks.set_text("")
+        self._drawn.set_visibility(False)

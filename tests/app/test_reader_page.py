@@ -1,0 +1,64 @@
+"""The page Reader: what a lever reads at a distance that is none of those that are solved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from nicegui.testing import User
+from test_app_pages import shown, until, visit
+
+from hotlever.app import approaching
+from hotlever.app.session import Session
+from hotlever.lever import Lever
+from hotlever.lever.reader import over_surface
+from hotlever.probe import MeshOptions, Probe
+
+#: What is tested does not depend on it.
+CHEAP = MeshOptions(heater=0.5, corner=0.25, lever=0.2, panels=0.25)
+
+
+def test_reader_shows_what_the_lever_reads_between_the_distances_that_are_solved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changed = {"_DISTANCES": 3, "_NEAREST_UM": 0.4, "_FARTHEST_UM": 1.0, "COARSE": CHEAP}
+    for name, value in changed.items():
+        monkeypatch.setattr(approaching, name, value)
+    over = {"medium": "air", "accommodation": 1.0, "surface_gap_um": 0.5}
+    lever = Lever(Probe.reference().with_(**over), CHEAP)
+    data = over_surface(lever, [0.5], [9.0]).squeeze()
+
+    async def story(user: User, session: Session) -> None:
+        session.chosen["reader"] = {"probe": None, "distance_um": 0.5, "bias": 9.0}
+        await user.open("/reader")
+        await until(lambda: "coarse lever" in shown(user, "aria-live=polite"))
+
+        def number(key: str) -> float:
+            return float(shown(user, f"data-number={key}").split()[0].partition("·")[0])
+
+        # cubic between values and slopes, and what has no slope of its own
+        assert number("reader_V") == pytest.approx(data.reader_V.item(), rel=1e-4)
+        assert number("reader_ohm") == pytest.approx(data.reader_ohm.item(), rel=2e-4)
+        slope = 10.0 * data.dlnR_dz_per_um.item()
+        assert number("dlnR_dz_per_um") == pytest.approx(slope, rel=2e-2)
+        resolution = 1e3 * data.resolution_nm_per_rtHz.item()
+        assert number("resolution_nm_per_rtHz") == pytest.approx(resolution, rel=2e-2)
+        await user.should_see("it is taken as 1")
+        await user.should_see(
+            "hotlever reader --distance 0.4um:1.6um:10 --medium air --amplifier 5nV --bias 9:9:1 "
+            "-o reference.reader.csv"
+        )
+
+    visit(tmp_path, story)
+
+
+def test_a_tilted_surface_is_asked_for_only_where_it_is_below_the_lever(tmp_path: Path) -> None:
+    described = [
+        approaching.described(None, tmp_path, None, tilt)["nearest_um"]  # type: ignore[arg-type]
+        for tilt in (0.0, 2.0, -2.0)
+    ]
+    front, base = np.tan(np.radians(2.0)) * np.array([54.4 - 48.58, 48.58])
+    assert described[0] == 0.2
+    assert front < described[1] < front + 0.2
+    assert base < described[2] < base + 0.3
