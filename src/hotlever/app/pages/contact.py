@@ -34,7 +34,10 @@ _RESISTANCES = {
     "interface_K_per_mW": "interface",
     "spreading_K_per_mW": "spreading in the sample",
 }
-_MOVING = "moving: coarse lever, within some 2 K, changes within some 10 %"
+_MOVING = (
+    "moving: coarse lever, within some 2 K, 10 K near the knee; changes within some 10 % unless "
+    "they are about to turn"
+)
 _AT_REST = "full lever: the numbers of hotlever contact"
 
 
