@@ -35,10 +35,11 @@ from scipy.integrate import quad
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.optimize import brentq
 
-from hotlever.contact.law import ContactLaw
+from hotlever.contact.law import INTERFACE, ContactLaw
 from hotlever.lever import Lever
 from hotlever.lever.contact import sweep_in_contact
 from hotlever.probe import Probe
+from hotlever.probe.contact import OUT_OF_CONTACT
 from hotlever.probe.mesh import face_of
 from problems import table
 
@@ -54,8 +55,12 @@ OUT = 60.0
 AT_300, PATH = 0.1 / 0.707, 0.3
 #: Rounds in which κ follows the temperature, and edges on the disc of the contact, over its radius.
 ROUNDS, FINE = 8, 0.15
-#: Contact radius (nm), height (µm) and half-angle (°) of cones in air.
-IN_AIR = ((5.0, 0.7, 20.0), (20.0, 0.7, 35.0), (20.0, 3.0, 14.0))
+#: Contact radius (nm), height (µm) and half-angle (°) of cones in air, and their distance to the
+#: sample (µm).
+IN_AIR = (
+    *((5.0, 0.7, 20.0, 0.0), (20.0, 0.7, 35.0, 0.0), (20.0, 3.0, 14.0, 0.0)),
+    *((20.0, 0.7, 35.0, 0.05), (20.0, 0.7, 35.0, 0.5), (20.0, 3.0, 14.0, 1.0)),
+)
 #: Temperature at the base of these cones (K), and how far the plate reaches, over the height.
 HOT_K, REACH = 800.0, 6.0
 
@@ -174,15 +179,18 @@ def solid(
     ]
 
 
-def in_air(radius: float, height: float, angle: float) -> list[str]:
+def in_air(radius: float, height: float, angle: float, distance: float) -> list[str]:
     """Return a row: a cone, and where its heat goes beside a mesh of cone and air."""
     end = 1e-3 * radius
     tip = {"tip.height_um": height, "tip.half_angle_deg": angle, "tip.apex_radius_um": end}
     probe = Probe.reference().with_(**tip, sample="polymer", medium="air", surface_gap_um=height)
+    if distance:
+        probe = probe.replace({"surface_gap_um": height + distance, INTERFACE: OUT_OF_CONTACT})
     law, base = ContactLaw(probe), probe.circuit.base_temperature_K
     around = probe.surroundings.with_(accommodation=1.0)
     jumps = [around.jump_length_um(T) for T in (around.jump_temperature_K, base)]
-    wide, reach = probe.tip.base_radius_um, REACH * height
+    wide, gap = probe.tip.base_radius_um, height + distance
+    reach = REACH * gap
 
     def polygon(corners: list[tuple[float, float]], name: str) -> Any:
         plane = WorkPlane().MoveTo(*corners[0])
@@ -192,30 +200,31 @@ def in_air(radius: float, height: float, angle: float) -> list[str]:
         face.name = name
         return face
 
-    cone = polygon([(0, 0), (end, 0), (wide, height), (0, height)], "cone")
-    air = polygon([(end, 0), (reach, 0), (reach, height), (wide, height)], "air")
+    below = [(end, distance), (0, distance), (0, 0)] if distance else [(end, 0)]
+    cone = polygon([(0, distance), (end, distance), (wide, gap), (0, gap)], "cone")
+    air = polygon([*below, (reach, 0), (reach, gap), (wide, gap)], "air")
     shape = Glue([cone, air])
     for edge in shape.edges:
         x, y = edge.center.x, edge.center.y
-        low, high = abs(y) < 1e-9, abs(y - height) < 1e-9
-        inner = x < end if low else x < wide
+        low, high = abs(y) < 1e-9, abs(y - gap) < 1e-9
+        inner = x < end and not distance if low else x < wide
         if low or high:
             edge.name = {(1, 1): "touched", (1, 0): "sample", (0, 1): "base", (0, 0): "plate"}[
                 int(low), int(inner)
             ]
         elif 0.0 < x < wide:
-            edge.name = "side"
+            edge.name = "end" if abs(y - distance) < 1e-9 else "side"
     for vertex in shape.vertices:
-        if abs(vertex.p[1]) < 1e-9 and vertex.p[0] <= end * 1.001:
+        if abs(vertex.p[1] - distance) < 1e-9 and vertex.p[0] <= end * 1.001:
             vertex.maxh = end / 6.0
-    mesh = ng.Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=height / 6.0, grading=0.15))
+    mesh = ng.Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=gap / 6.0, grading=0.15))
     solid_space = ng.H1(mesh, order=3, definedon="cone", dirichlet="base")
     air_space = ng.H1(mesh, order=3, definedon="air")
     both = solid_space * air_space
     (u, w), (v, z) = both.TnT()
     rise = ng.GridFunction(both)
     around_axis = 2.0 * math.pi * ng.x
-    diameter = 2.0 * (end + probe.tip.slope * ng.y)
+    diameter = 2.0 * (end + probe.tip.slope * (ng.y - distance))
     through = 1.0 / (law.below_apex_K_per_mW * math.pi * end**2)
     for _ in range(ROUNDS):
         upper, lower = rise.components
@@ -226,7 +235,7 @@ def in_air(radius: float, height: float, angle: float) -> list[str]:
         form += around_axis * of_cone * ng.grad(u) * ng.grad(v) * ng.dx("cone")
         form += around_axis * of_air * ng.grad(w) * ng.grad(z) * ng.dx("air")
         form += around_axis * through * u * v * ng.ds("touched")
-        form += around_axis * of_air / jumps[0] * (u - w) * (v - z) * ng.ds("side")
+        form += around_axis * of_air / jumps[0] * (u - w) * (v - z) * ng.ds("side|end")
         form += around_axis * of_air / jumps[1] * w * z * ng.ds("sample")
         form += around_axis * of_air / jumps[0] * w * z * ng.ds("plate")
         hot = around_axis * of_air / jumps[0] * (HOT_K - base) * z * ng.ds("plate")
@@ -239,13 +248,13 @@ def in_air(radius: float, height: float, angle: float) -> list[str]:
     into = around_axis * kappa_air(base + lower) / jumps[1] * lower
     into_mW = float(ng.Integrate(into, mesh.Boundaries("sample")))
     # the lever's own surface is a plate that gives its heat without a tip
-    beside_mW = into_mW - math.pi * reach**2 * plate_flux(base, height, jumps)
-    touched = mesh.Boundaries("touched")
-    heat = float(ng.Integrate(around_axis * through * upper, touched))
-    apex = base + heat * law.below_apex_K_per_mW
+    beside_mW = into_mW - math.pi * reach**2 * plate_flux(base, gap, jumps)
+    touched, bottom = mesh.Boundaries("touched"), mesh.Boundaries("touched|end")
+    heat = 0.0 if distance else float(ng.Integrate(around_axis * through * upper, touched))
+    apex = base + float(ng.Integrate(upper * ng.x, bottom) / ng.Integrate(ng.x, bottom))
     ours = law.at(np.array([HOT_K]))
     return [
-        f"{radius:g} nm, {height:g} µm, {angle:g}°",
+        f"{radius:g} nm, {height:g} µm, {angle:g}°, {distance:g} µm away",
         f"{1e3 * ours.beside_mW.item():.3g}",
         f"{1e3 * beside_mW:.3g}",
         f"{1e3 * ours.sample_mW.item():.4g}",

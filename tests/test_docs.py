@@ -35,7 +35,7 @@ PAGES = {
 #: Pages whose examples take minutes.
 SLOW = {
     *("how-to/calibrate", "how-to/design", "how-to/fit", "how-to/levers", "how-to/uncertainty"),
-    *("how-to/unknown-lever", "how-to/draw-in-python"),
+    *("how-to/unknown-lever", "how-to/draw-in-python", "how-to/melting-points"),
     *("examples/reference-probe", "examples/boron-lever", "examples/palladium-on-nitride"),
 }
 #: Modules whose numbers the theory page states.

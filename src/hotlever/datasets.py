@@ -51,6 +51,12 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "sensitivity": ("of the observable by the parameter", "derivative at fixed bias"),
     # a tip in contact
     "apex_K": ("K", "temperature of the apex"),
+    "surface_K": ("K", "temperature of the sample's surface under the apex"),
+    "apex_stderr_K": ("K", "standard error of the temperature of the apex"),
+    "surface_stderr_K": ("K", "standard error of the temperature of the sample's surface"),
+    "apex_error_K": ("K", "standard error of the measured temperature of the apex"),
+    "surface_error_K": ("K", "standard error of the measured temperature of the surface"),
+    "distance_um": ("µm", "distance of the apex to the sample, 0 in contact"),
     "sample_mW": ("mW", "heat into the sample through the contact"),
     "beside_mW": ("mW", "heat from the tip's side into the sample through air"),
     "tip_K_per_mW": ("K/mW", "thermal resistance of the tip"),
@@ -138,6 +144,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "mean_K": ("K", "mean tip temperature during the pulse"),
     "mean_stderr_K": ("K", "standard error of the mean tip temperature"),
     "budget_K": ("K", "standard error of the tip temperature by source"),
+    "apex_budget_K": ("K", "standard error of the temperature of the apex by source"),
     # knee, design and air
     "knee_K": ("K", "tip temperature at the knee"),
     "knee_mW": ("mW", "power at the knee"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -52,6 +52,9 @@ _BRIDGE = (
     *("bridgesignal", "ubrücke", "brücke", "brückenspannung", "diagonalspannung"),
 )
 _TIP = ("ttip", "tip", "tiptemperature", "spitzentemperatur")
+_APEX = ("tapex", "apex", "apextemperature")
+_MELTING = ("tmelt", "meltingpoint", "meltingtemperature", "schmelzpunkt", "schmelztemperatur")
+_DISTANCE = ("d", "distance", "separation", "tipsampledistance", "tipsampleseparation", "abstand")
 #: Everything that a measurement may hold, by symbol; ``d`` begins that of a standard error.
 MEASURANDS = {
     measurand.symbol: measurand
@@ -67,17 +70,30 @@ MEASURANDS = {
         Measurand("dI_h", "current_error_mA", "mA", ("dih", "δih")),
         Measurand("dV_r", "reader_error_V", "V", ("dvr", "δvr")),
         Measurand("dV_bridge", "bridge_output_error_V", "V", ("dvbridge", "δvbridge")),
+        Measurand("T_apex", "apex_K", "K", _APEX, (0.0, 5e3), small=("K", 1.0)),
+        Measurand("dT_apex", "apex_error_K", "K", ("dtapex", "δtapex")),
+        Measurand("T_melt", "surface_K", "K", _MELTING, (0.0, 5e3), small=("K", 1.0)),
+        Measurand("dT_melt", "surface_error_K", "K", ("dtmelt", "δtmelt")),
+        Measurand("D", "distance_um", "um", _DISTANCE),
     )
 }
 _BUFFER = ("source", "sourcevalue", "value", "reading")
 #: Headings that say no more than the unit does: what a file has of this unit counts as the
 #: quantity where it is the only one.
 PLAIN = {"V_b": ("voltage", "spannung", "u", *_BUFFER), "I_h": _BUFFER}
-#: What a fit compares, by the name that users give it. How each follows from what a lever shows is
-#: said in `hotlever.lever.observables`.
-Observable = Literal["current", "reader", "tip", "bridge"]
-_OBSERVED = zip(get_args(Observable), ("I_h", "V_r", "T_tip", "V_bridge"), strict=True)
-OBSERVABLES: dict[str, Measurand] = {name: MEASURANDS[symbol] for name, symbol in _OBSERVED}
+#: What a lever shows, by the name that users give it. How each follows is said in
+#: `hotlever.lever.observables`.
+OBSERVABLES = {
+    "current": MEASURANDS["I_h"],
+    "reader": MEASURANDS["V_r"],
+    "tip": MEASURANDS["T_tip"],
+    "bridge": MEASURANDS["V_bridge"],
+}
+#: What a tip in contact shows of its sample: its apex, and the surface under it, which melts.
+OF_A_CONTACT = {"apex": MEASURANDS["T_apex"], "melting": MEASURANDS["T_melt"]}
+#: What a fit compares.
+FITTED = OBSERVABLES | OF_A_CONTACT
+Observable = Literal["current", "reader", "tip", "bridge", "apex", "melting"]
 
 
 def observables_of(data: xr.Dataset) -> Array:

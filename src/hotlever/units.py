@@ -30,7 +30,7 @@ _PREFIXES |= {"a": -18, "da": 1, "h": 2, "k": 3, "K": 3, "M": 6, "G": 9, "T": 12
 _PREFIX_WORDS = {"": 0, "milli": -3, "micro": -6, "nano": -9, "pico": -12, "kilo": 3, "mega": 6}
 #: Quantity (its unit), and what one of a unit is of it.
 _SYMBOLS = {
-    **{symbol: (symbol, 1.0) for symbol in ("V", "A", "W", "K", "s", "Hz", "bar")},
+    **{symbol: (symbol, 1.0) for symbol in ("V", "A", "W", "K", "s", "Hz", "m", "bar")},
     **dict.fromkeys(("ohm", "Ohm", "OHM", "Ω"), ("ohm", 1.0)),
     **dict.fromkeys(("torr", "Torr"), ("bar", 1.01325 / 760.0)),
     "Pa": ("bar", 1e-5),
@@ -64,8 +64,8 @@ _UNIT_WORDS = {
     for prefix, power in _PREFIX_WORDS.items()
     for word, (quantity, factor) in _WORDS.items()
 }
-#: Of settings alone: in a heading `V_s` is no voltage in seconds.
-_OF_SETTINGS = {"s", "Hz", "W"}
+#: In brackets alone: in a heading `V_s` is no voltage in seconds.
+_OF_SETTINGS = {"s", "Hz", "W", "m"}
 #: Headings that name a time; of these alone a unit of time is one.
 TIMES = {"t", "time", "relative time", "elapsed time", "zeit", "relative zeit"}
 _CELSIUS = {"°C", "degC", "C", "oC", "celsius", "Celsius", "degreesC", "degreesCelsius"}
@@ -112,8 +112,8 @@ def is_unit(text: str) -> bool:
 def conversion(unit: str, inside: str, difference: bool = False) -> tuple[float, float] | None:
     """Return factor and offset that turn a value in one unit into another's; None if they differ.
 
-    Units are V, A, ohm, K, bar, Pa or Torr with an SI prefix, atm, or degrees Celsius; where the
-    other is one of time, seconds. Differences of temperatures have the same zero on any scale.
+    Units are V, A, ohm, K, m, bar, Pa or Torr with an SI prefix, atm, or degrees Celsius; where
+    the other is one of time, seconds. Differences of temperatures have the same zero on any scale.
 
     Examples
     --------

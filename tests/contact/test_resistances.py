@@ -186,9 +186,10 @@ def test_the_law_is_a_series_of_resistances():
     law = ContactLaw(probe(interface_K_per_mW=5e4))
     rise = np.array([1.0, 300.0, 600.0])
     heat, _ = law.heat(rise)
-    apex, sample, beside = law.at(293.0 + rise)
+    apex, surface, sample, beside = law.at(293.0 + rise)
     assert sample == pytest.approx(heat)
     assert beside == pytest.approx(0.0, abs=1e-12)
+    assert apex - surface == pytest.approx(heat * 5e4, rel=1e-9)
     assert apex - 293.0 == pytest.approx(heat * (5e4 + law.spreading_K_per_mW), rel=1e-9)
     T, _ = up_the_cone(SHARP, apex, heat, 293.0)
     assert pytest.approx(293.0 + rise, rel=1e-7) == T

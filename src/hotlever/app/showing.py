@@ -23,13 +23,12 @@ from hotlever.app.project import CALIBRATIONS, file_stamp
 from hotlever.app.workers import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.levers import calibration_rows, compare_calibrations
-from hotlever.calibration.table import TABLE_COLUMNS
 from hotlever.errors import InputError
 from hotlever.estimation import Fit, read_fit
 from hotlever.estimation.summary import parameter_rows
 from hotlever.lever.meshing import chosen_space
 from hotlever.lever.transient.waveform_texts import waveform_from_text
-from hotlever.measurands import OBSERVABLES
+from hotlever.measurands import FITTED
 from hotlever.measurement import (
     FileColumn,
     file_columns,
@@ -72,7 +71,7 @@ def understood(
     (along,) = data.sizes
     data = data.isel({along: slice(None, None, data.sizes[along] // _POINTS + 1)})
     in_time = {"time_us": data.time.values.tolist()} if along == "time" else {}
-    columns_shown = ["bias_V", "lever_V", *(column.name for column in OBSERVABLES.values())]
+    columns_shown = ["bias_V", "lever_V", *(column.name for column in FITTED.values())]
     head, *rows = measurement.understood
     # the page shows all columns
     notes = [note for note in measurement.notes if note not in measurement.unused]
@@ -161,7 +160,10 @@ def settings(
         bias = value if inside else np.nan
     if not np.isfinite(bias):
         return None
-    row = {column: float(np.interp(bias, table.bias_V, table[column])) for column in TABLE_COLUMNS}
+    row = {
+        column: float(np.interp(bias, table.bias_V, table[column]))
+        for column in calibration.columns
+    }
     return {**row, "bias_V": bias, **({along: value} if along != "bias_V" else {})}
 
 

@@ -23,6 +23,8 @@ from hotlever.calibration.knee import Knee
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseCalibration, PulseSection
 from hotlever.calibration.table import (
+    BUDGETS,
+    OF_THE_CONTACT,
     STATED,
     TABLE_COLUMNS,
     TABLES_BY,
@@ -80,7 +82,8 @@ class Calibration(Outcome):
         ``TABLE_COLUMNS`` on the dimension ``bias``, evenly spaced over the measured range, with
         more rows where the tip rises by more than 10 K from one to the next; and ``budget_K``, the
         standard error by ``source``. With held supplies, what is shown is of the swept one, and
-        `TOTAL_POWER` that of all.
+        `TOTAL_POWER` that of all. Of a tip in contact it has `OF_THE_CONTACT` too, and
+        ``apex_budget_K``.
     priors : dict of str to PriorUse
         What was known of each parameter before and after, by name.
     reason : str
@@ -118,7 +121,8 @@ class Calibration(Outcome):
     lever = "lever like this one"
 
     def _without_errors(self) -> dict[str, Any]:
-        errors = (*STATED, "budget_K")
+        every = (*STATED, *OF_THE_CONTACT[1::2], *BUDGETS)
+        errors = [name for name in every if name in self.table]
         unknown = {name: xr.full_like(self.table[name], np.nan) for name in errors}
         return {
             "table": self.table.assign(unknown),
@@ -194,7 +198,8 @@ class Calibration(Outcome):
     @property
     def columns(self) -> list[str]:
         """The columns of the table in a file."""
-        return [name for name in (*TABLE_COLUMNS, TOTAL_POWER) if name in self.table]
+        names = (*TABLE_COLUMNS, TOTAL_POWER, *OF_THE_CONTACT)
+        return [name for name in names if name in self.table]
 
     def __repr__(self) -> str:
         hottest = self.table.isel(bias=int(np.nanargmax(self.table.tip_K)))
@@ -212,6 +217,7 @@ class Calibration(Outcome):
             uncertainty_budget_K={source: part.max() for source, part in budget.items()},
             table={name: self.table[name].values for name in self.columns},
             budget_K=budget,
+            apex_budget_K=budget_of(self.table, BUDGETS[1]) or None,
             data=MeasurementSection.of(self.measurement),
             request=request,
         )
@@ -282,6 +288,7 @@ class CalibrationFile(ResultFile[Calibration]):
     base_temperature_K: Number = np.nan
     table: Columns
     budget_K: dict[str, Vector]
+    apex_budget_K: dict[str, Vector] | None = IF_ANY
     measured_rms_K: Number = np.nan
     pulse: _Pulse | None = IF_ANY
 
@@ -291,20 +298,21 @@ class CalibrationFile(ResultFile[Calibration]):
 
     @model_validator(mode="after")
     def _rows_belong_together(self, info: ValidationInfo) -> Self:
-        check_rows(self.table, self.budget_K, "bias", str(info.context))
+        check_rows(self.table, self.budget_K, "bias", str(info.context), self.apex_budget_K)
         return self
 
     def result(self) -> Calibration:
         """Return the calibration, to go on with as if it had just been made."""
         knee = {name: self.knee[name] for name in Knee.__dataclass_fields__ if name in self.knee}
-        names = [*TABLE_COLUMNS, *({TOTAL_POWER} & self.table.keys())]
+        more = [name for name in (TOTAL_POWER, *OF_THE_CONTACT) if name in self.table]
+        names, apex = [*TABLE_COLUMNS, *more], self.apex_budget_K
         return Calibration(
             law_residual_K=self.power_law_residual_K,
             knee_tip_K=self.knee.get("tip_K", np.nan),
             **self.attributes_of(Calibration)
             | {
                 "knee": Knee(**knee),
-                "table": stored_table(self.table, self.budget_K, names),
+                "table": stored_table(self.table, self.budget_K, names, of_apex=apex),
             },
         )
 

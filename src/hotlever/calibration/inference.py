@@ -21,10 +21,10 @@ from hotlever.calibration.tip_temperature import (
     highest_bias,
     not_of_a_ramp,
     tip_by_bias,
+    tips_in_contact,
 )
 from hotlever.errors import ComputationError
 from hotlever.estimation import Fit, FitOptions, Measurement
-from hotlever.estimation.experiment import TIP
 from hotlever.estimation.experiment_at_rest import PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate, estimate
 from hotlever.estimation.lack_of_fit import outlier_notes
@@ -175,6 +175,11 @@ def calibrated_by_estimate(
         k_stderr = k * knee.power_mW_stderr / knee.power_mW
     if turns:
         notes.append(f"{turns}; there is no power law, and the table is read by bias")
+    if probe.contact is not None and probe.contact.interface_K_per_mW == 0.0:
+        notes.append(
+            "no interface is stated, so that the apex has no error of one; interface_K_per_mW in "
+            "[contact] would give it one"
+        )
     if not probe.shape.outline_moves:
         notes.append("the outline is taken to be as drawn: no error of it is in the result")
     if by_power:
@@ -189,7 +194,7 @@ def calibrated_by_estimate(
         k_stderr=k_stderr,
         knee=knee,
         knee_tip_K=np.nan if own.knee is None else own.knee.tip_K,
-        measured_rms_K=rms(measured.tip_K - _tips(estimate.branch, measured, circuit)),
+        measured_rms_K=rms(_missed(estimate.branch, measured, circuit)),
         probe=probe,
         measurement=measured,
         priors=priors,
@@ -204,12 +209,19 @@ def _verdict(estimate: Estimate, priors: Mapping[str, PriorUse]) -> tuple[bool, 
     residuals, values = estimate.residuals, estimate.prediction.values
     lack_of_fit = misfit(residuals, values, priors, estimate.posterior.moved)
     converged, reason = estimate.verdict(lack_of_fit)
-    circuit, bias = estimate.probe.circuit, residuals.bias
-    reason = reason or not_of_a_ramp(estimate.branch, circuit, bias, values[TIP])
+    circuit = estimate.probe.circuit
+    reason = reason or not_of_a_ramp(estimate.branch, circuit, *tips_in_contact(estimate))
     highest = highest_bias(estimate)
-    if not reason and highest < _REACHED * float(bias.max()):
+    if not reason and highest < _REACHED * float(residuals.bias.max()):
         reason = f"the lever that comes nearest has no steady state above {highest:.4g} V"
     return converged, reason
+
+
+def _missed(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
+    """Return how far tips were measured from those of a branch, NaN away from a sample."""
+    return np.where(
+        measured.out_of_contact, np.nan, measured.tip_K - _tips(branch, measured, circuit)
+    )
 
 
 def _tips(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:

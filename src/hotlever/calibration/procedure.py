@@ -14,7 +14,7 @@ from hotlever.calibration.knee_scaling import calibrated_by_knee
 from hotlever.calibration.plausibility import check_plausible
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
-from hotlever.calibration.table import budget_of, table_with_budget, total_error
+from hotlever.calibration.table import BUDGETS, budget_of, table_with_budget
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
@@ -145,15 +145,23 @@ def calibrate(
 
 def _in_either(result: Calibration, other: Calibration) -> Calibration:
     """Return a calibration whose errors hold another of the same data as well."""
-    table, bias = result.table, result.table.bias_V.values
-    tip, low, high = (
-        np.interp(bias, other.table.bias_V.values, other.table[name].values)
-        for name in ("tip_K", "tip_low_K", "tip_high_K")
-    )
-    parts = budget_of(table) | {"medium": error_of_choice(table.tip_K.values, tip)}
-    columns = {name: table[name].values for name in result.columns} | {
-        "tip_stderr_K": total_error(parts),
-        "tip_low_K": np.minimum(table.tip_low_K.values, low),
-        "tip_high_K": np.maximum(table.tip_high_K.values, high),
+    columns = {name: result.table[name].values for name in result.columns}
+    others = {
+        name: np.interp(columns["bias_V"], other.table.bias_V.values, other.table[name].values)
+        for name in columns
     }
-    return replace(result, table=table_with_budget(columns, parts))
+    columns["tip_low_K"] = np.minimum(columns["tip_low_K"], others["tip_low_K"])
+    columns["tip_high_K"] = np.maximum(columns["tip_high_K"], others["tip_high_K"])
+    choices = {}
+    for error in (name for name in columns if name.endswith("_stderr_K")):
+        name = error.replace("_stderr", "")
+        choices[name] = error_of_choice(columns[name], others[name])
+        columns[error] = np.hypot(columns[error], choices[name])
+    parts, of_apex = (
+        known and known | {"medium": choices[name]}
+        for known, name in (
+            (budget_of(result.table), "tip_K"),
+            (budget_of(result.table, BUDGETS[1]), "apex_K"),
+        )
+    )
+    return replace(result, table=table_with_budget(columns, parts, of_apex=of_apex))

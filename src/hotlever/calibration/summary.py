@@ -9,10 +9,15 @@ import xarray as xr
 
 from hotlever.calibration.calibration import Calibration
 from hotlever.calibration.pulses import PulseCalibration
+from hotlever.calibration.table import BUDGETS
 from hotlever.estimation.summary import NEAREST, prior_lines
 from hotlever.text import aligned, significant, value_with_error
 from hotlever.types import Array
 
+#: Caption of the temperatures at a contact.
+_OF_THE_APEX = (
+    "in contact: the apex with its error by source, and the surface of the sample under it"
+)
 #: Tip temperatures (K) at which the error budget is printed.
 _SHOWN, _FEW = (400.0, 600.0, 800.0, 900.0, 1000.0, 1100.0, 1200.0), 4
 #: What each route rests on, in words.
@@ -32,6 +37,7 @@ _ADVICE = {
     "k": "a finer measurement near the knee would help",
     "constant k": "--medium air would not assume a constant k",
     "electronics": "better known meters would help",
+    "contact": "melting points, or the current in and out of contact, would help",
     "base temperature": "a thermometer at the chip would help",
 }
 #: Errors (K) up to which a calibration is called good, and fair.
@@ -53,6 +59,8 @@ def calibration_parts(calibration: Calibration) -> Parts:
     if calibration.describes_data:
         before = [basis, *_knee_lines(calibration), _law_line(calibration)]
         tables = [("", _budget_rows(calibration))]
+        if BUDGETS[1] in calibration.table:
+            tables.append((_OF_THE_APEX, _apex_rows(calibration)))
         if calibration.pulse is not None:
             tables.append((calibration.pulse.timing.text, _pulse_rows(calibration.pulse)))
         stated = significant(calibration.tip_temperature_uncertainty_K)
@@ -137,6 +145,14 @@ def _budget_rows(calibration: Calibration) -> list[list[str]]:
     return _rows(table, columns, shown)
 
 
+def _apex_rows(calibration: Calibration) -> list[list[str]]:
+    """Return temperatures at the contact for some of the tip, with the apex's error by source."""
+    shown = [float(row[0]) for row in _budget_rows(calibration)[1:]]
+    columns = [("T_tip (K)", "tip_K", 0), ("apex (K)", "apex_K", 0), ("± (K)", "apex_stderr_K", 1)]
+    columns += [("surface (K)", "surface_K", 0), ("± (K)", "surface_stderr_K", 1)]
+    return _rows(calibration.heating, columns, np.array(shown), BUDGETS[1])
+
+
 def _pulse_rows(pulse: PulseCalibration) -> list[list[str]]:
     """Return heights of the pulse for some peak temperatures, with the error by source."""
     first, last = pulse.table.peak_K.values[[0, -1]]
@@ -147,14 +163,16 @@ def _pulse_rows(pulse: PulseCalibration) -> list[list[str]]:
     return _rows(pulse.table, columns, np.minimum(peak, last))
 
 
-def _rows(table: xr.Dataset, columns: list[tuple[str, str, int]], at: Array) -> list[list[str]]:
-    """Return columns of a table as cells where the first has some values, then its budget.
+def _rows(
+    table: xr.Dataset, columns: list[tuple[str, str, int]], at: Array, budget: str = BUDGETS[0]
+) -> list[list[str]]:
+    """Return columns of a table as cells where the first has some values, then a budget.
 
     Of a column are given its head, its name in the table, and the digits behind the point.
     """
     along = table[columns[0][1]].values
     numbers = [(head, table[name].values, digits) for head, name, digits in columns]
-    numbers += [(error.source.item(), error.values, 1) for error in table.budget_K]
+    numbers += [(error.source.item(), error.values, 1) for error in table[budget]]
     cells = [
         [head, *(f"{number:.{digits}f}" for number in np.interp(at, along, values))]
         for head, values, digits in numbers

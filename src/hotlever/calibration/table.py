@@ -21,6 +21,10 @@ STATED = ("tip_stderr_K", "tip_low_K", "tip_high_K")
 TABLE_COLUMNS = ("bias_V", "lever_V", "current_mA", "power_mW", "tip_K", *STATED)
 #: One more with held supplies: the power of all of them together.
 TOTAL_POWER = "total_power_mW"
+#: More of a tip in contact: its apex and the sample's surface under it, and their standard errors.
+OF_THE_CONTACT = ("apex_K", "apex_stderr_K", "surface_K", "surface_stderr_K")
+#: The standard errors of the tip and the apex by source.
+BUDGETS = ("budget_K", "apex_budget_K")
 #: A table has more rows where the tip rises by more than this (K) from one to the next.
 STEEP_K = 10.0
 #: Between rows further apart (K) nothing is known, or a lever jumps.
@@ -32,17 +36,31 @@ TABLES_BY = {"temperature": ("tip_K", "K"), "power": ("power_mW", "mW"), "bias":
 
 
 def table_with_budget(
-    columns: Mapping[str, Array], budget: Mapping[str, Array], along: str = "bias"
+    columns: Mapping[str, Array],
+    budget: Mapping[str, Array],
+    along: str = "bias",
+    of_apex: Mapping[str, Array] | None = None,
 ) -> xr.Dataset:
-    """Return columns on a dimension, rising in ``{along}_V``, and ``budget_K`` by ``source``."""
-    errors = (("source", along), np.array(list(budget.values())))
+    """Return columns on a dimension, rising in ``{along}_V``, and `BUDGETS` by ``source``.
+
+    That of the apex, if there is one, has the same sources.
+    """
+    budgets = zip(BUDGETS, (budget, of_apex), strict=True)
+    errors = {
+        name: (("source", along), np.array([parts[source] for source in budget]))
+        for name, parts in budgets
+        if parts
+    }
     coordinates = {along: columns[f"{along}_V"], "source": list(budget)}
-    return labelled({**columns, "budget_K": errors}, along, coordinates)
+    return labelled({**columns, **errors}, along, coordinates)
 
 
-def budget_of(table: xr.Dataset) -> dict[str, Array]:
-    """Return the standard errors (K) of a table by source, independent of each other."""
-    return {error.source.item(): error.values for error in table.budget_K}
+def budget_of(table: xr.Dataset, name: str = BUDGETS[0]) -> dict[str, Array]:
+    """Return the standard errors (K) of a table by source, independent of each other.
+
+    There are none of an apex that touches nothing.
+    """
+    return {error.source.item(): error.values for error in table[name]} if name in table else {}
 
 
 def total_error(parts: Mapping[str, Array]) -> Array:
@@ -141,37 +159,48 @@ def table_by_bias(
     tip: Array,
     parts: Mapping[str, Array],
     limits: tuple[Array, Array] | None = None,
+    more: Mapping[str, Array] | None = None,
+    of_apex: Mapping[str, Array] | None = None,
 ) -> xr.Dataset:
     """Return the table of bias (V), current (mA) and tip temperature (K), with its errors.
 
-    95 % lie between the limits, or as far away as the errors say.
+    95 % lie between the limits, or as far away as the errors say. There may be `more` columns, and
+    the errors of the apex by source.
     """
     stderr, lever = total_error(parts), circuit.lever_voltage(bias, current)
     low, high = limits or (tip - BAND * stderr, tip + BAND * stderr)
     values = (bias, lever, current, lever * current, tip, stderr, low, high)
-    return table_with_budget(dict(zip(TABLE_COLUMNS, values, strict=True)), parts)
+    columns = dict(zip(TABLE_COLUMNS, values, strict=True))
+    return table_with_budget({**columns, **(more or {})}, parts, of_apex=of_apex)
 
 
 # --- in files -----------------------------------------------------------------------------------
 
 
 def check_rows(
-    columns: Mapping[str, Array], budget: Mapping[str, Array], along: str, where: str
+    columns: Mapping[str, Array],
+    budget: Mapping[str, Array],
+    along: str,
+    where: str,
+    of_apex: Mapping[str, Array] | None = None,
 ) -> None:
     """Refuse what a file holds in place of a table with its budget; `where` names the file.
 
     Raises
     ------
     InputError
-        If its rows do not rise, or the budget is not one of them.
+        If its rows do not rise, or the budget, or that of the apex, is not one of them.
     """
     rising = columns.get(f"{along}_V", np.array([]))
     if not rising.size or not budget or not np.all(np.diff(rising) > 0):
         raise InputError(
             f"{where}: table: expected rows of rising {along}, and a budget of their errors"
         )
-    for source, errors in budget.items():
-        array(errors, rising.shape, f"{where}: budget_K: {source}")
+    for name, parts in zip(BUDGETS, (budget, of_apex or budget), strict=True):
+        if parts.keys() != budget.keys():
+            raise InputError(f"{where}: {name}: expected the sources {', '.join(budget)}")
+        for source, errors in parts.items():
+            array(errors, rising.shape, f"{where}: {name}: {source}")
 
 
 def stored_table(
@@ -179,7 +208,9 @@ def stored_table(
     budget: Mapping[str, Array],
     names: Sequence[str],
     along: str = "bias",
+    of_apex: Mapping[str, Array] | None = None,
 ) -> xr.Dataset:
     """Return the table that a file holds; columns are NaN that an older file has not."""
     unknown = np.full_like(columns[f"{along}_V"], np.nan)
-    return table_with_budget({name: columns.get(name, unknown) for name in names}, budget, along)
+    own = {name: columns.get(name, unknown) for name in names}
+    return table_with_budget(own, budget, along, of_apex)

@@ -8,7 +8,7 @@ still be cold, or hot already.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,12 +19,14 @@ from hotlever.calibration.table import TOTAL_POWER, table_by_bias, total_error, 
 from hotlever.datasets import quantity
 from hotlever.errors import InputError
 from hotlever.estimation.experiment import TIP
+from hotlever.estimation.experiment_at_rest import PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.profile import profile_of_tip
 from hotlever.lever import Branch
 from hotlever.lever.curve import spline_through
 from hotlever.materials.parameters import is_of_material, own_name
+from hotlever.measurands import FITTED, OF_A_CONTACT
 from hotlever.probe import Circuit
 from hotlever.probe.surroundings import Surroundings
 from hotlever.text import BAND
@@ -40,6 +42,7 @@ OF_THE_MEASUREMENT = {
     "gas_conductivity": "air",
     "surface_gap_um": "air",
     "base_temperature_K": "base temperature",
+    "interface_K_per_mW": "contact",
 }
 #: Share of the rise by which the flat lever, or air as panels, differ from full 3-D where the tip
 #: is no steeper in bias than that of a lever of constant properties (benchmarks/air_3d.py).
@@ -51,6 +54,8 @@ _JUMP = 7e-3
 #: The same by the law of the mobility: how far two estimates of a lever are apart, with another law
 #: (MINIMOS) in place of Eq. 8 (rms of seven pairs of simulated levers from number 1000 on).
 _MOBILITY = 4e-3
+#: Share by which the resistances of tip and sample differ from full 3-D (benchmarks/contact_3d.py).
+_CONTACT = 0.022
 #: Rows that are on another part of the branch than a ramp takes by more than so many kelvins, so
 #: many of them, show no such lever: one or two beside a jump may.
 _ASIDE_K, _ROWS_ASIDE = 20.0, 3
@@ -104,19 +109,59 @@ def tip_by_bias(
     low, high, asymmetry = _credible_interval(
         estimate, tip, stderr, parts["model"], samples, progress
     )
-    measured = estimate.residuals.bias, estimate.prediction.values[TIP]
-    jumps = jumps_of(estimate.branch, circuit, *measured)
+    jumps = jumps_of(estimate.branch, circuit, *tips_in_contact(estimate))
     for jump in jumps:
         here = jump.unknown(bias)
         low = np.where(here, np.minimum(low, jump.cold_K), low)
         high = np.where(here, np.maximum(high, jump.hot_K), high)
         either = here * (jump.hot_K - jump.cold_K) / (2.0 * BAND)
         parts["jump"] = np.hypot(parts.get("jump", 0.0), either)
-    table = table_by_bias(circuit, bias, predicted.values[0], tip, parts, (low, high))
+    more, of_apex = _at_the_contact(estimate, predicted, parts)
+    limits = low, high
+    table = table_by_bias(circuit, bias, predicted.values[0], tip, parts, limits, more, of_apex)
     if not circuit.starts_cold:
         total = table.power_mW.values + _held_power(estimate, bias)
         table[TOTAL_POWER] = quantity(TOTAL_POWER, "bias", total)
     return TipByBias(table, jumps, asymmetry)
+
+
+def tips_in_contact(estimate: Estimate) -> tuple[Array, Array]:
+    """Return biases (V) and tip temperatures (K) of the rows in contact, or all without a sample.
+
+    They are those that lie on the branch of the lever.
+    """
+    residuals, tip = estimate.residuals, estimate.prediction.values[TIP]
+    touching = np.ones(tip.size, dtype=bool)
+    if residuals.distance_um is not None and estimate.probe.contact is not None:
+        touching = residuals.distance_um <= 0.0
+    return residuals.bias[touching], tip[touching]
+
+
+def _at_the_contact(
+    estimate: Estimate, predicted: PredictionAtRest, of_tip: Mapping[str, Array]
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return columns of apex and surface, and the errors of the apex by source; or nothing.
+
+    What is left out of the model of the lever, and where it jumps, are those of the tip as far as
+    the apex follows it.
+    """
+    columns: dict[str, Array] = {}
+    of_apex: dict[str, Array] = {}
+    if estimate.probe.contact is None:
+        return columns, of_apex
+    base_K = estimate.probe.circuit.base_temperature_K
+    rise = predicted.values[TIP] - base_K
+    for name, of in OF_A_CONTACT.items():
+        row = list(FITTED).index(name)
+        slopes = predicted.slopes[row][:, estimate.objective.columns]
+        parts = errors_by_source(estimate.posterior, slopes)
+        risen = predicted.values[row] - base_K
+        share = np.divide(risen, rise, out=np.zeros_like(rise), where=rise != 0.0)
+        parts |= {source: share * error for source, error in of_tip.items() if source not in parts}
+        parts["model"] = np.hypot(parts["model"], _CONTACT * share * (1.0 - share) * rise)
+        columns |= {of.name: base_K + risen, of.name.replace("_K", "_stderr_K"): total_error(parts)}
+        of_apex = of_apex or parts
+    return columns, of_apex
 
 
 def measured_range(estimate: Estimate) -> Array:

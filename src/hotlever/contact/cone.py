@@ -5,8 +5,10 @@ the conductivity of a wire of the local diameter. Air between the side and the s
 arcs about the edge of the contact: for a sharp cone, whose arcs are circles about the apex, that is
 exact. Temperatures jump at both surfaces, and near the contact it is the jumps that limit the heat.
 The lever's own surface is a plate above the sample, and near it the cone adds nothing to what that
-plate gives: of the arcs at the height z of h a share (1 − z/h)^1.5 counts, whose exponent is
-fitted to meshes of cone, plate and air (``benchmarks/contact_3d.py``).
+plate gives: of the arcs at the height z above the sample, with the plate at H, a share
+(1 − z/H)^1.5 counts, whose exponent is fitted to meshes of cone, plate and air
+(``benchmarks/contact_3d.py``). Of a cone of height h away from the sample it is less by
+(h/H)^1.5: a small one hardly changes what flows between plates.
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ class AirBeside(NamedTuple):
     gas_conductivity: float  #: over that of air
     jump_um: float  #: temperature jump length at the tip
     jump_at_sample_um: float
+    distance_um: float = 0.0  #: from the flat end to the sample
 
     def conductance(self, tip: Tip, height_um: Array) -> Array:
         """Return the heat that passes per height (µm) and θ: a number for each height.
@@ -44,11 +47,13 @@ class AirBeside(NamedTuple):
         nodes, weights = np.polynomial.legendre.leggauss(_NODES)
         width = (math.pi / 2.0 - half_angle) / 2.0
         angles = half_angle + width * (1.0 + nodes)
-        away, end = height_um / math.cos(half_angle), tip.apex_radius_um
+        above, whole = height_um + self.distance_um, tip.height_um + self.distance_um
+        away, end = above / math.cos(half_angle), tip.apex_radius_um
         along = away * (width * weights / (end + away[..., None] * np.sin(angles))).sum(axis=-1)
         jumps = self.jump_um / (end + away * math.sin(half_angle))
         jumps = jumps + self.jump_at_sample_um / (end + away)
-        beyond = np.clip(1.0 - height_um / tip.height_um, 0.0, 1.0) ** _BEYOND
+        left = np.clip(1.0 - above / whole, 0.0, 1.0)
+        beyond = (left * tip.height_um / whole) ** _BEYOND
         return np.asarray(2.0 * math.pi / math.cos(half_angle) * beyond / (along + jumps))
 
 

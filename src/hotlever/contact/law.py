@@ -7,7 +7,7 @@ heat spreads over a few radii, or through the films.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Rises of the temperature at the base between which the law is tabulated, and how often.
 _LOWEST_K, _HIGHEST_K, _COOLER, _TABULATED = -60.0, 1500.0, 5, 115
+#: Rise (K) below which the apex's share of it is that at this rise.
+_WARM_K = 1.0
 #: Share of a parameter, or of all resistances, by which it is changed for a derivative.
 _STEP = 1e-3
 #: By this name the interface stands in probe files and fits.
@@ -36,6 +38,7 @@ class AtTheContact(NamedTuple):
     """Where heat goes in some states, shape (n,) each."""
 
     apex_K: Array
+    surface_K: Array  #: of the sample under the apex, its mean over the contact
     sample_mW: Array  #: through the contact
     beside_mW: Array  #: from the side of the cone through the air to the sample
 
@@ -60,7 +63,7 @@ class ContactLaw:
         assert tip is not None
         assert contact is not None
         self._probe, self._tip = probe, tip
-        self._base_K = probe.circuit.base_temperature_K
+        self.base_temperature_K = probe.circuit.base_temperature_K
         layers = contact.layers
         self.interface_K_per_mW = contact.interface_K_per_mW
         thicknesses = [layer.thickness_um for layer in layers if layer.thickness_um is not None]
@@ -73,8 +76,9 @@ class ContactLaw:
         if around.medium == "air":
             # near the contact the gap is always below the mean free path
             jump = around.with_jump.jump_length_um
-            jumps = map(jump, (around.jump_temperature_K, self._base_K))
-            self._air = AirBeside(around.gas_conductivity, *jumps)
+            hot, cold = map(jump, (around.jump_temperature_K, self.base_temperature_K))
+            away = max((around.surface_gap_um or 0.0) - tip.height_um, 0.0)
+            self._air = AirBeside(around.gas_conductivity, hot, cold, away)
 
     @cached_property
     def _table(self) -> CubicSpline:
@@ -82,13 +86,13 @@ class ContactLaw:
         from scipy.interpolate import CubicSpline  # takes long, and few levers are in contact
 
         below = self.below_apex_K_per_mW
-        above = cold_resistance(self._tip, self._base_K)
+        above = cold_resistance(self._tip, self.base_temperature_K)
         # where nothing else conducts and the cone is cold, this is the rise at the base
         driving = _rises(_HIGHEST_K)
         for _ in range(2):
             at_apex = driving / (1.0 + above / below)
             heat = driving / (below + above)
-            base, air = self._base_K, self._air
+            base, air = self.base_temperature_K, self._air
             T, into_tip = up_the_cone(self._tip, base + at_apex, heat, base, air)
             rise = T - base
             # a hot cone resists more: no more of the table than is of use
@@ -104,7 +108,9 @@ class ContactLaw:
         inside = np.clip(rise, self._table.x[0], self._table.x[-1])
         slope = self._table(inside, 1)[..., 0]
         by = {
-            name: self._by(name, rise) if name in self.names else np.zeros_like(rise)
+            name: self._by(name, lambda law: law.heat(rise)[0])
+            if name in self.names
+            else np.zeros_like(rise)
             for name in names
         }
         value = self._table(inside)[..., 0] + slope * (rise - inside)
@@ -112,19 +118,49 @@ class ContactLaw:
 
     def at(self, tip_K: Array) -> AtTheContact:
         """Return where heat goes at temperatures (K) of the tip's base."""
-        into_tip, heat, apex = np.moveaxis(self._table(np.asarray(tip_K) - self._base_K), -1, 0)
-        return AtTheContact(self._base_K + apex, heat, into_tip - heat)
+        into_tip, heat, apex = np.moveaxis(
+            self._table(np.asarray(tip_K) - self.base_temperature_K), -1, 0
+        )
+        surface = self.spreading_K_per_mW * heat
+        return AtTheContact(
+            self.base_temperature_K + apex, self.base_temperature_K + surface, heat, into_tip - heat
+        )
+
+    def log_odds(self, rise: Array, names: Sequence[str] = ()) -> Evaluated:
+        """Return how rises (K) of the tip's base are divided, (n,): at apex and surface, (2, n).
+
+        It is the logarithm of how much warmer than the base temperature each is over how much
+        colder than the tip: that of a ratio of resistances, which go as powers of what is unknown.
+        With its derivatives by ``T`` and by numbers of the probe at the same rise, zero by those on
+        which the law does not depend.
+        """
+        # the ratio of a tip that is hardly warm is that of one that is a little warmer
+        warm = np.maximum(rise, _WARM_K)
+
+        def odds(law: ContactLaw, more: float = 1.0) -> Array:
+            tip = more * warm
+            at = law.at(law.base_temperature_K + tip)
+            risen = np.stack([at.apex_K, at.surface_K]) - law.base_temperature_K
+            return np.asarray(np.log(risen / (tip - risen)))
+
+        value = odds(self)
+        by = {
+            name: self._by(name, odds) if name in self.names else np.zeros_like(value)
+            for name in names
+        }
+        change = odds(self, 1.0 + _STEP) - odds(self, 1.0 - _STEP)
+        return value, {**by, "T": np.where(rise > _WARM_K, change / (2.0 * _STEP * warm), 0.0)}
 
     def along_axis(self, tip_K: float, depth_um: Array) -> tuple[Array, Array, Array]:
         """Return heights (µm) on the cone, the temperatures (K) there, and those under its middle.
 
         By the temperature of the tip's base, and for depths (µm) in the sample, above zero.
         """
-        apex, heat, _ = self.at(np.array([tip_K]))
+        apex, _, heat, _ = self.at(np.array([tip_K]))
         ends = float(apex[0]), float(heat[0])
-        height, T = along_the_cone(self._tip, *ends, self._base_K, self._air)
-        rise = (ends[0] - self._base_K) * axis_rise(*self._below, depth_um)
-        return height, T, self._base_K + rise
+        height, T = along_the_cone(self._tip, *ends, self.base_temperature_K, self._air)
+        rise = (ends[0] - self.base_temperature_K) * axis_rise(*self._below, depth_um)
+        return height, T, self.base_temperature_K + rise
 
     @property
     def sum_by_interface(self) -> float:
@@ -138,13 +174,13 @@ class ContactLaw:
         """The numbers of a probe on which the law depends."""
         return (INTERFACE, *_NUMBERS, *(("gas_conductivity",) if self._air else ()))
 
-    def _by(self, name: str, rise: Array) -> Array:
-        """Return how the heat changes with a number of the probe."""
+    def _by(self, name: str, what: Callable[[ContactLaw], Array]) -> Array:
+        """Return how something of the law changes with a number of the probe."""
         (value,) = self._probe.values([name])
         step = _STEP * (self.below_apex_K_per_mW if name == INTERFACE else value)
         # an interface may have none, and no less: by both sides further up, then
         ways = (0.0, 1.0, 2.0) if name == INTERFACE else (-1.0, 0.0, 1.0)
-        low, middle, high = (self._changed(name, value + way * step).heat(rise)[0] for way in ways)
+        low, middle, high = (what(self._changed(name, value + way * step)) for way in ways)
         slope = (high - low) / (2.0 * step)
         return np.asarray(slope - (high - 2.0 * middle + low) / step if ways[0] == 0.0 else slope)
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 from hotlever.estimation.surrogate import Surrogate
-from hotlever.measurands import OBSERVABLES
+from hotlever.measurands import FITTED
 from hotlever.probe import Probe
 from hotlever.types import Array
 
 #: Where predictions have the tip temperature.
-TIP = list(OBSERVABLES).index("tip")
+TIP = list(FITTED).index("tip")
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,8 @@ class Prediction:
     ----------
     probe : Probe
     values : ndarray, shape (observables, n)
-        `hotlever.measurands.OBSERVABLES` at the rows of the measurement.
+        `hotlever.measurands.OBSERVABLES` at the rows of the measurement, and behind them those of
+        a contact, if there is one.
     slopes : ndarray, shape (observables, n, k)
         Derivatives by the experiment's parameters.
     surrogate : Surrogate
@@ -49,7 +50,7 @@ class Prediction:
 
 def named(values: Array) -> dict[str, Array]:
     """Return what is shown, (observables, n), by the names that a sweep or a history has."""
-    return {column.name: row for column, row in zip(OBSERVABLES.values(), values, strict=True)}
+    return {column.name: row for column, row in zip(FITTED.values(), values, strict=False)}
 
 
 class Experiment(Protocol):

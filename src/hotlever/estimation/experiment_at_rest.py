@@ -9,6 +9,7 @@ branches is added to the fast one's from then on. Parameters are what
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -84,8 +85,13 @@ class ExperimentAtRest:
     correction: Correction | None = None
     shown: Array | None = None
 
-    def measuring(self, bias: Array, shown: Array | None) -> ExperimentAtRest:
-        """Return the model at other biases (V), with what was measured there, if that is known."""
+    def measuring(
+        self, bias: Array, shown: Array | None, distance_um: Array | None = None
+    ) -> ExperimentAtRest:
+        """Return the model at other biases (V), with what was measured there, if that is known.
+
+        Distances count over a sample, see `hotlever.estimation.over_a_sample`.
+        """
         return replace(self, bias=bias, shown=shown)
 
     @property
@@ -93,12 +99,12 @@ class ExperimentAtRest:
         """The probe whose drawing has the meshes that others move."""
         return self.fast.drawn
 
-    def coarse(self) -> ExperimentAtRest:
+    def coarse(self) -> Self:
         """Return the model with a lever that is solved for any parameters, not corrected."""
         fast = self.fast.for_any_parameters()
         return self if fast is self.fast else replace(self, fast=fast, correction=None)
 
-    def drawn_anew(self, probe: Probe) -> ExperimentAtRest:
+    def drawn_anew(self, probe: Probe) -> Self:
         """Return the model on meshes of a probe's own drawing, not corrected."""
         full = None if self.full is None else SimilarLevers(Lever(probe))
         return replace(self, fast=SimilarLevers(Lever(probe, COARSE)), full=full, correction=None)
@@ -130,14 +136,15 @@ class ExperimentAtRest:
             branch = self.correction.added(branch, probe.values(self.names))
             by_parameter = by_parameter + self.correction.slopes(branch.u)
         rows = Rows(self.bias, self.shown)
-        values, slopes = rows.differentiated(branch, by_parameter, probe.circuit, self.names)
+        shown = rows.differentiated(branch, by_parameter, probe.circuit, self.names)
+        surrogate = CurveSurrogate(probe, self.names, branch, by_parameter, rows)
+        values, slopes = surrogate.contact.differentiated(*shown, probe.values(self.names))
         lever = probe.circuit.lever_voltage(self.bias, values[0])
         columns = {"bias_V": self.bias, "lever_V": lever, **named(values)}
-        surrogate = CurveSurrogate(probe, self.names, branch, by_parameter, rows)
         return PredictionAtRest(probe, values, slopes, surrogate, columns, slopes[TIP], linearised)
 
     @one_blas_thread
-    def confirmed(self, at: PredictionAtRest) -> ExperimentAtRest:
+    def confirmed(self, at: PredictionAtRest) -> Self:
         """Return a model that is exact at the probe of a prediction, if so wanted to first order.
 
         Raises
@@ -165,7 +172,7 @@ class ExperimentAtRest:
         lacking = spline_through(u, values), spline_through(u, slopes)
         return replace(self, correction=Correction(probe.values(self.names), *lacking))
 
-    def exact_at(self, probe: Probe) -> tuple[ExperimentAtRest, PredictionAtRest]:
+    def exact_at(self, probe: Probe) -> tuple[Self, PredictionAtRest]:
         """Return a model that is exact at a probe, and its prediction there.
 
         Raises

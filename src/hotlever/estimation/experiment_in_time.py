@@ -14,6 +14,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from hotlever.errors import InputError
+from hotlever.estimation.contact_temperatures import ContactTemperatures
 from hotlever.estimation.experiment import TIP, Prediction, named
 from hotlever.estimation.surrogate import LinearSurrogate
 from hotlever.lever.lever import COARSE, Lever
@@ -169,8 +170,11 @@ class ExperimentInTime:
             "bias_V": self.waveform.bias(self.times.at),
             **named(corrected),
         }
-        values, slopes = map(self.times.at_rows, (corrected, coarse_slopes))
-        surrogate = LinearSurrogate(probe.values(self.names), values, slopes)
+        parameters = probe.values(self.names)
+        values, slopes = ContactTemperatures(probe, self.names).differentiated(
+            self.times.at_rows(corrected), self.times.at_rows(coarse_slopes), parameters
+        )
+        surrogate = LinearSurrogate(parameters, values, slopes)
         tip_slopes = coarse_slopes[TIP]
         return PredictionInTime(
             probe, values, slopes, surrogate, columns, tip_slopes, coarse, coarse_slopes

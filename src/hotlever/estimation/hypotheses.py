@@ -185,7 +185,9 @@ def _of_the_lever(probe: Probe) -> list[Hypothesis]:
         ),
         Hypothesis(
             lambda _: f"is the drawing that of another lever, {shape.shape}?",
-            probe=lambda probe, _: probe.model_copy(update={"shape": shape, "tip": None}),
+            probe=lambda probe, _: probe.model_copy(
+                update={"shape": shape, "tip": None, "contact": None}
+            ),
         ),
         Hypothesis(
             lambda warmer: f"is the base temperature rather about {base + warmer:.0f} K?",

@@ -27,17 +27,19 @@ from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimum, Predictor
 from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
 from hotlever.estimation.outcome import Outcome
+from hotlever.estimation.over_a_sample import with_distances
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.prior_density import FLAT, PriorDensity
 from hotlever.estimation.residuals import Residuals
 from hotlever.estimation.search import Search
 from hotlever.lever.branch import Branch
-from hotlever.measurands import OBSERVABLES
+from hotlever.measurands import FITTED, OF_A_CONTACT
 from hotlever.measurement import (
     Measurement,
     with_measured_circuit,
 )
 from hotlever.measurement.rows import averaged, note_on_averages
+from hotlever.measurement.sample import check_sample
 from hotlever.probe import Probe
 from hotlever.probe.priors import (
     ALL_DIMENSIONS,
@@ -174,7 +176,7 @@ def estimate(
     if in_time:
         given.circuit.need_cold_start("a fit in time")
     probe, notes = with_measured_circuit(given, measurement, options.medium)
-    notes += note_on_averages(whole, measurement)
+    notes += note_on_averages(whole, measurement) + check_sample(measurement, probe)
     options = options.of(probe, in_time=in_time)
     priors = options.stated_priors(probe, in_time=in_time)
     without_effect = [name for name in options.priors if name not in (*priors, ALL_DIMENSIONS)]
@@ -220,7 +222,8 @@ def estimate(
         assert isinstance(experiment, ExperimentAtRest)
         # with priors errors are a matter of standard deviations; the fast lever's slopes do
         experiment = replace(experiment, names=names, first_order=not informed)
-        experiment = experiment.measuring(residuals.bias, residuals.shown)
+        experiment = with_distances(experiment, probe, residuals.distance_um)
+        experiment = experiment.measuring(*residuals.at_rest)
         optimum = search.from_anywhere(experiment, measurement)
     seconds = time.perf_counter() - began
     return Estimate(optimum, probe, measurement, options, seconds, notes)
@@ -231,9 +234,11 @@ def _observables(
 ) -> tuple[str, ...]:
     """Return what is to be fitted: by default all that has data and that the probe can show."""
     where = measurement.path or "measurement"
-    shown = tuple(name for name in measurement.observables if name in probe.observables)
+    # without a contact there is no such measurement
+    can_be = {*probe.observables, *OF_A_CONTACT}
+    shown = tuple(name for name in measurement.observables if name in can_be)
     for name in options.observables or measurement.observables:
-        symbol = OBSERVABLES[name].symbol
+        symbol = FITTED[name].symbol
         if name not in measurement.observables:
             raise InputError(
                 f"{where}: no values of {name} (column {symbol}); it has "

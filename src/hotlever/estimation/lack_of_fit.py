@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hotlever.estimation.residuals import Residuals
+from hotlever.measurands import FITTED
 from hotlever.measurement.data import noise_about_neighbours
 from hotlever.types import Array
 
@@ -29,7 +30,7 @@ _OUTLYING, _NAMED = 8.0, 10
 def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
     """Return where data are not described by predicted values (m, n); empty if they are.
 
-    Tip temperatures are left out: a thermometer's scale may be off by more than its readings
+    Temperatures are left out: a thermometer's scale may be off by more than its readings
     scatter.
     """
     scatter = USUAL_SCATTER if residuals.errors.measured else _HELD_SCATTER
@@ -39,7 +40,7 @@ def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
         residuals.observables, difference, residuals.errors.down, strict=True
     ):
         present = np.isfinite(whole)
-        if name == "tip" or present.sum() < _ROWS:
+        if FITTED[name].unit == "K" or present.sum() < _ROWS:
             continue
         # what a robust fit has forgotten stands alone, or is seen as a run
         squares = float(np.sum((down * whole)[present] ** 2))
@@ -72,7 +73,7 @@ def run_of_outliers(residuals: Residuals, values: Array) -> str:
     in_order = np.argsort(residuals.along, kind="stable")
     along = residuals.along[in_order]
     for name, row in zip(residuals.observables, residuals.deviations(values), strict=True):
-        if name == "tip" or row.size < _ROWS:
+        if FITTED[name].unit == "K" or row.size < _ROWS:
             continue
         far = np.append(np.abs(row[in_order]) > _FAR, True)
         together = np.lib.stride_tricks.sliding_window_view(far, _NEIGHBOURS).all(axis=1)

@@ -130,8 +130,9 @@ class Rows:
     def _distance(self, values: Array, rows: Index) -> Array:
         """Return how far values (observables, m) are from some rows, as squares of shares."""
         assert self.shown is not None
-        largest = np.nanmax(np.abs(self.shown), axis=1, keepdims=True, initial=1e-300)
-        return np.asarray(np.nansum(((values - self.shown[:, rows]) / largest) ** 2, axis=0))
+        shown = self.shown[: len(values)]
+        largest = np.nanmax(np.abs(shown), axis=1, keepdims=True, initial=1e-300)
+        return np.asarray(np.nansum(((values - shown[:, rows]) / largest) ** 2, axis=0))
 
     def _steepen(self, along: Array, circuit: Circuit, u: Array) -> None:
         """Let the bias rise where it hardly does, in derivatives by u (n, 5) of what is shown."""

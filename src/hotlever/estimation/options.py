@@ -8,7 +8,7 @@ from typing import Any, Literal, cast, get_args
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
-from hotlever.measurands import OBSERVABLES
+from hotlever.measurands import FITTED
 from hotlever.probe import Probe
 from hotlever.probe.parameters import (
     heat_capacities,
@@ -84,7 +84,7 @@ class FitOptions:
                     raise InputError(f"{name} is fixed and {what}, expected one of them")
         for kind, names, existing in (
             ("weights", [self.weights], get_args(Weights)),
-            ("observable", self.observables or (), tuple(OBSERVABLES)),
+            ("observable", self.observables or (), tuple(FITTED)),
             (
                 "medium",
                 [] if self.medium is None else [self.medium],
@@ -97,8 +97,8 @@ class FitOptions:
         if self.observables is None:
             return
         if not self.observables:
-            raise InputError(f"no observables; expected some of {', '.join(OBSERVABLES)}")
-        chosen = tuple(name for name in OBSERVABLES if name in self.observables)
+            raise InputError(f"no observables; expected some of {', '.join(FITTED)}")
+        chosen = tuple(name for name in FITTED if name in self.observables)
         object.__setattr__(self, "observables", chosen)
 
     @property

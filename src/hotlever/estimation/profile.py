@@ -20,6 +20,7 @@ from hotlever.estimation.experiment import TIP, Experiment, Prediction
 from hotlever.estimation.experiment_at_rest import experiment_of
 from hotlever.estimation.objective import Objective, ParameterValue, Penalty, TipTemperature
 from hotlever.estimation.optimiser import Optimiser
+from hotlever.estimation.over_a_sample import with_distances
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.result import Fit
 from hotlever.estimation.subproblem import Subproblem
@@ -207,9 +208,9 @@ def profile_likelihood(
     objective = result.objective(names)
     residuals = objective.residuals
     # exact to first order at the optimum, and used as it is from there
-    experiment, at_optimum = experiment_of(
-        result.probe, residuals.bias, names=names, reduce=True
-    ).exact_at(result.probe)
+    experiment = experiment_of(result.probe, residuals.bias, names=names, reduce=True)
+    experiment = with_distances(experiment, result.probe, residuals.distance_um)
+    experiment, at_optimum = experiment.exact_at(result.probe)
     # with priors, residuals are in standard deviations
     variance = 1.0 if objective.informed else _noise_variance(result, name, residuals.size)
     least = objective.squares(at_optimum) if objective.informed else result.sum_of_squares

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hotlever.errors import InputError
 from hotlever.estimation.noise import CommonCovariance, CommonError, DataErrors
 from hotlever.estimation.options import Weights
-from hotlever.measurands import OBSERVABLES
+from hotlever.measurands import FITTED
 from hotlever.measurement import Measurement
 from hotlever.probe.priors import Moved
 from hotlever.types import Array
@@ -49,8 +49,10 @@ class Residuals:
         Of the rows that have data (V).
     along, unit : ndarray, shape (n,), and str
         What tells these rows apart: their bias (V), or their time (µs).
+    distance_um : ndarray, shape (n,), or None
+        From the apex to a sample, at most 0 in contact.
     rows : list of int
-        Places of the observables among `OBSERVABLES`.
+        Places of the observables among `FITTED`.
     data, present : ndarray, shape (observables, n)
         NaN where nothing was measured; which data count.
     largest : ndarray, shape (observables, 1)
@@ -76,12 +78,14 @@ class Residuals:
         self._measurement, self._drift = measurement, drift
         self._where = measurement.path or "measurement"
         self.observables = tuple(observables)
-        self.rows = [list(OBSERVABLES).index(name) for name in observables]
+        self.rows = [list(FITTED).index(name) for name in observables]
         every = np.stack([measurement.observable(name) for name in observables])
         self._used = np.isfinite(every).any(axis=0)
         self.bias, self.data = measurement.bias_V[self._used], every[:, self._used]
         along, self.unit = measurement.along
         self.along = along[self._used]
+        distance = measurement.distance_um
+        self.distance_um = None if distance is None else np.nan_to_num(distance[self._used])
         self.present = np.isfinite(self.data)
         self.largest = np.nanmax(np.abs(self.data), axis=1, keepdims=True)
         for name, size in zip(observables, self.largest, strict=True):
@@ -122,8 +126,13 @@ class Residuals:
     @property
     def shown(self) -> Array:
         """All that was measured at these rows, fitted or not, (observables, n)."""
-        every = [self._measurement.observable(name)[self._used] for name in OBSERVABLES]
+        every = [self._measurement.observable(name)[self._used] for name in FITTED]
         return np.stack(every)
+
+    @property
+    def at_rest(self) -> tuple[Array, Array, Array | None]:
+        """The biases of these rows, what was measured there, and how far from a sample."""
+        return self.bias, self.shown, self.distance_um
 
     @property
     def size(self) -> int:
@@ -133,7 +142,9 @@ class Residuals:
     @property
     def different(self) -> int:
         """How many of them are at different places: the same again tells of noise only."""
-        return sum(np.unique(self.along[row]).size for row in self.present)
+        distance = np.zeros(self.along.size) if self.distance_um is None else self.distance_um
+        places = np.stack([self.along, distance])
+        return sum(np.unique(places[:, row], axis=1).shape[1] for row in self.present)
 
     @property
     def data_weights(self) -> Array:
@@ -217,11 +228,11 @@ class Residuals:
 
     def rms(self, values: Array) -> dict[str, float]:
         """Return the rms of data minus prediction by column, for every observable with data."""
-        difference = self.shown - values
+        difference = self.shown[: len(values)] - values
         difference[self.rows] = self.difference(values)
         return {
             column.name: float(np.sqrt(np.nanmean(row**2)))
-            for column, row in zip(OBSERVABLES.values(), difference, strict=True)
+            for column, row in zip(FITTED.values(), difference, strict=False)
             if np.isfinite(row).any()
         }
 
@@ -280,7 +291,7 @@ class Drift:
         """Describe lines from `line`; some of them, if not all."""
         which = np.any(self._columns, axis=(1, 2)) if which is None else which
         return [
-            f"{name}: the zero goes from {first:+.3g} to {last:+.3g} {OBSERVABLES[name].unit} "
+            f"{name}: the zero goes from {first:+.3g} to {last:+.3g} {FITTED[name].unit} "
             "along the file"
             for name, first, last, asked in zip(
                 self._names, *line[:, [0, -1]].T, which, strict=True

@@ -23,6 +23,7 @@ from pydantic import (
 
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
+from hotlever.estimation.experiment_at_rest import experiment_of
 from hotlever.estimation.noise import errors_of_scales
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.options import FitOptions
@@ -35,12 +36,14 @@ from hotlever.estimation.outcome import (
     Vector,
     array,
 )
+from hotlever.estimation.over_a_sample import with_distances
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.residuals import Residuals
+from hotlever.lever.dataset import probe_attributes
 from hotlever.lever.lever import Lever
 from hotlever.lever.transient import simulate
 from hotlever.materials import full_name
-from hotlever.measurands import Observable
+from hotlever.measurands import FITTED, OF_A_CONTACT, Observable
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameter_of, parameters_of, usual_parameters
@@ -216,12 +219,29 @@ class Fit(Outcome):
     def model(self, bias: ArrayLike | None = None) -> xr.Dataset:
         """Solve the fitted lever, at the measured biases by default; see `Lever.sweep`.
 
-        Of what was measured in time: follow it at the measured times (`simulate`).
+        Of what was measured in time: follow it at the measured times (`simulate`). Of a tip in
+        contact: as far from the sample as it was, with the temperatures of the contact.
         """
         lever, measured = Lever(self.probe), self.measurement
         if bias is None and measured.waveform is not None:
             return simulate(lever, measured.waveform, at=measured.time_us)
+        if bias is None and self.probe.contact is not None:
+            return self._over_a_sample()
         return lever.sweep(measured.bias_V if bias is None else bias)
+
+    def _over_a_sample(self) -> xr.Dataset:
+        """Return what is shown at the measured biases and distances, in the order of the rows."""
+        bias, distance = self.measurement.bias_V, self.measurement.distance_um
+        experiment = experiment_of(self.probe, bias)
+        experiment = with_distances(experiment, self.probe, distance)
+        _, at = experiment.measuring(bias, None, distance).exact_at(self.probe)
+        away = self.measurement.out_of_contact
+        of_contact = {
+            column.name: np.where(away, np.nan, at.values[list(FITTED).index(name)])
+            for name, column in OF_A_CONTACT.items()
+        }
+        columns, coordinates = at.columns | of_contact, {"bias": bias}
+        return labelled(columns, coordinates=coordinates, **probe_attributes(self.probe))
 
     def residuals(self) -> Residuals:
         """Return the data with the fit's own weights, to be compared with predictions."""

@@ -31,6 +31,7 @@ from hotlever.estimation.experiment_at_rest import (
 )
 from hotlever.estimation.objective import TipTemperature
 from hotlever.estimation.optimiser import Predictor
+from hotlever.estimation.over_a_sample import with_distances
 from hotlever.estimation.posterior import Noise, Posterior, PosteriorDensity
 from hotlever.estimation.profile import ErrorProfile, hotter_rows
 from hotlever.estimation.result import Fit
@@ -78,9 +79,12 @@ class SampledLever:
             self.at = replace(self.at, surrogate=surrogate)
 
     @classmethod
-    def of_fit(cls, fit: Fit, probe: Probe, bias: Array) -> SampledLever:
-        """Return a lever that was fitted, at some biases (V), exact at a probe."""
-        return cls(experiment_of(probe, bias, names=tuple(fit.names), reduce=True), probe)
+    def of_fit(
+        cls, fit: Fit, probe: Probe, bias: Array, distance_um: Array | None = None
+    ) -> SampledLever:
+        """Return a lever that was fitted, at some biases (V) and distances, exact at a probe."""
+        experiment = experiment_of(probe, bias, names=tuple(fit.names), reduce=True)
+        return cls(with_distances(experiment, probe, distance_um), probe)
 
     def error_K(self, probe: Probe) -> float:
         """Return by how much the tip temperature of a similar probe may be off.
@@ -169,7 +173,8 @@ def sample_tip(
 def _density_at(fit: Fit, probe: Probe, noise: Noise) -> tuple[PosteriorDensity, SampledLever]:
     """Return the density of a fit's parameters, approximated about a probe, and levers near it."""
     objective = fit.objective(fit.names)
-    lever = SampledLever.of_fit(fit, probe, objective.residuals.bias)
+    residuals = objective.residuals
+    lever = SampledLever.of_fit(fit, probe, residuals.bias, residuals.distance_um)
     near = Subproblem(objective, lever.at)
     return PosteriorDensity(objective, lever.at, near.shown, noise), lever
 

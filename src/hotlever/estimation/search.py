@@ -131,7 +131,7 @@ class Search:
             )
             if _has_moved(experiment.drawn, start):
                 experiment = experiment.drawn_anew(start)
-            of_part = experiment.measuring(residuals.bias, residuals.shown)
+            of_part = experiment.measuring(*residuals.at_rest)
             objective = Objective(residuals, start, of_part.names, self.varied, prior)
             # what is seen of a portion is not seen at the rows of the measurement
             optimiser = Optimiser(objective, of_part, _OF_PORTIONS, progress=self.progress)

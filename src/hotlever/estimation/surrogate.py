@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from hotlever.estimation.contact_temperatures import ContactTemperatures
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.prior_density import Coordinates
 from hotlever.lever.branch import TIP_RISE, Branch, shifted
@@ -86,7 +87,7 @@ class CurveSurrogate:
         self, probe: Probe, names: tuple[str, ...], branch: Branch, by_parameter: Array, rows: Rows
     ) -> None:
         self.probe, self.names, self.branch, self.rows = probe, names, branch, rows
-        self.by_parameter = by_parameter
+        self.by_parameter, self.contact = by_parameter, ContactTemperatures(probe, names)
         self._origin = probe.values(names)
         scale = Coordinates.of(probe, names).scale
         self._unit = np.maximum(np.abs(self._origin), 0.1 * scale)
@@ -119,11 +120,13 @@ class CurveSurrogate:
         if not self._straight:
             by_parameter = branch.values[:, :, None] * self._rates
         circuit = self.circuit(parameters)
-        return self.rows.differentiated(branch, by_parameter / self._unit, circuit, self.names)
+        shown = self.rows.differentiated(branch, by_parameter / self._unit, circuit, self.names)
+        return self.contact.differentiated(*shown, parameters)
 
     def shown(self, parameters: Array) -> Array:
         """See `Surrogate`."""
-        return self.rows.values(self.branch_at(parameters), self.circuit(parameters))
+        shown = self.rows.values(self.branch_at(parameters), self.circuit(parameters))
+        return self.contact.shown(shown, parameters)
 
     def circuit(self, parameters: Array) -> Circuit:
         """Return the circuit, with those of the parameters that are its own."""

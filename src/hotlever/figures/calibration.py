@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 #: What levers are compared by.
 _COMPARED = ("tip_K", "knee_lever_V", "knee_current_mA", "knee_power_mW")
+#: What is drawn of a tip in contact.
+_OF_THE_CONTACT = {"apex_K": ("apex", GREEN), "surface_K": ("the sample under it", VERMILION)}
 #: Colour of each way of calibrating.
 _BY_WAY = (BLUE, GREEN, ORANGE, VERMILION)
 
@@ -54,12 +56,21 @@ def calibration_curves(calibration: Calibration) -> Figure:
         colour = BLACK if described else VERMILION
         made.suptitle("; ".join(title), x=0.01, ha="left", color=colour)
         name = "calibration and 95 % band" if described else "the nearest lever"
+        if described and "apex_K" in table:
+            name = "tip and 95 % band"
         for axes, along in ((by_power, "power_mW"), (by_bias, "bias_V")):
             if described:
                 low, high = table.tip_low_K, table.tip_high_K
                 axes.fill_between(table[along], low, high, color=SKY, alpha=0.6, lw=0)
             curve(axes, table, along, "tip_K", color=BLUE, label=name)
             curve(axes, measured, along, "tip_K", **MEASURED)
+            for column, (label, colour) in _OF_THE_CONTACT.items():
+                if column in table:
+                    curve(axes, table, along, column, color=colour, label=label)
+                if column in measured:
+                    curve(axes, measured, along, column, **MEASURED | {"mfc": colour})
+            if "apex_K" in table:
+                axes.set_ylabel("temperature (K)")
         if calibration.power_law is not None and np.isfinite(calibration.k):
             law = calibration.power_law.scaled(calibration.k)
             expected = law.tip_temperature(power, calibration.base_temperature_K)

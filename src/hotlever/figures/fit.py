@@ -31,7 +31,7 @@ from hotlever.figures.style import (
     values_by_lever,
 )
 from hotlever.materials.parameters import parameter_named
-from hotlever.measurands import OBSERVABLES
+from hotlever.measurands import FITTED, OBSERVABLES
 from hotlever.text import BAND, value_with_error
 from hotlever.types import Array
 
@@ -70,9 +70,10 @@ def data_and_model(
     data = measured if in_time else model
     panels = {
         name: column.name
-        for name, column in OBSERVABLES.items()
-        if (column.name in data and data[column.name].notnull().any())
-        or (in_time and name == "tip")
+        for name, column in FITTED.items()
+        # what a contact shows is there if it was measured
+        if (column.name in (data if name in OBSERVABLES else measured) and column.name in model)
+        and (data[column.name].notnull().any() or (in_time and name == "tip"))
     }
     size, heights = (3.4 if in_time else 2.8) * len(panels), (1.8, 1.0)
     with figure(size, 4.6, 2, len(panels), sharex=True, height_ratios=heights) as (made, grid):
@@ -81,7 +82,8 @@ def data_and_model(
             if band is not None and name == "tip":
                 _tip_in_time(upper, band)
             else:
-                curve(upper, model, along, column, color=BLUE, label="model")
+                known = model.dropna(along, subset=[column])
+                curve(upper, known, along, column, color=BLUE, label="model")
             if seen:
                 points = {**MEASURED, "ms": 2.5, "zorder": 1} if in_time else MEASURED
                 curve(upper, measured, along, column, **points)
@@ -119,8 +121,8 @@ def _differences(axes: Axes, measured: xr.Dataset, model: xr.Dataset, name: str)
     """Draw data minus model of an observable, and mark what is off by more than is usual."""
     (along,), column, (unit, factor) = (
         measured.sizes,
-        OBSERVABLES[name].name,
-        OBSERVABLES[name].small,
+        FITTED[name].name,
+        FITTED[name].small,
     )
     x, data = measured[along].values, measured[column].values
     difference = data - model[column].values
@@ -130,8 +132,8 @@ def _differences(axes: Axes, measured: xr.Dataset, model: xr.Dataset, name: str)
         axes.plot(x, difference * factor, "o", color=VERMILION, ms=2)
         return
     axes.plot(x, difference * factor, "o-", color=VERMILION, lw=0.8, ms=3.5)
-    if name == "tip":
-        error = measured.tip_error_K
+    if unit == "K":
+        error = measured[column.replace("_K", "_error_K")]
         axes.fill_between(x, -error, error, color="0.9", label="± dT")
         return
     off = np.abs(difference) > USUAL_SCATTER * np.nanmax(np.abs(data), initial=0.0)

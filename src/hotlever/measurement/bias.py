@@ -6,7 +6,8 @@ import numpy as np
 
 from hotlever.errors import InputError
 from hotlever.lever.transient.waveform import Polyline, Waveform
-from hotlever.measurands import MEASURANDS, OBSERVABLES
+from hotlever.measurands import FITTED, MEASURANDS
+from hotlever.measurement.columns import constant_bias
 from hotlever.measurement.contents import NOISE, Contents
 from hotlever.measurement.data import LEVER, TIME, noise_about_neighbours
 from hotlever.probe import Circuit
@@ -43,6 +44,9 @@ def find_bias(contents: Contents, circuit: Circuit | None, waveform: Waveform | 
         contents.origin["V_b"] = "the wave form"
     elif "V_b" in columns:
         contents.refuse(np.isnan(values["V_b"]), "a bias", "V_b")
+    elif (bias := constant_bias(contents.table)) is not None and LEVER not in columns:
+        values["V_b"] = np.full_like(values["V_b"], bias)
+        contents.origin["V_b"] = "a comment, the same for all rows"
     else:
         _bias_of_lever_voltage(contents, circuit)
     if LEVER in columns and TIME in columns and "I_h" not in columns:
@@ -191,7 +195,7 @@ def leave_out_jumps(contents: Contents, waveform: Waveform) -> None:
     pieces = waveform.pieces(float(times[-1]) * (1.0 + _SAME) + _SAME)
     jumps = np.array([piece.start for piece in pieces if piece.jumps])
     at_jump = np.isclose(times[:, None], jumps, rtol=_SAME, atol=0.0).any(axis=1)
-    for column in OBSERVABLES.values():
+    for column in FITTED.values():
         values[column.symbol] = np.where(at_jump, np.nan, values[column.symbol])
     contents.note_rows(at_jump, "the bias jumps at this time, so that the row is not used")
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from hotlever.errors import InputError, shown, unknown_name
 from hotlever.files import read_bytes
-from hotlever.measurands import MEASURANDS, OBSERVABLES, PLAIN
-from hotlever.measurement.data import LEVER, MEASURED, TIME
+from hotlever.measurands import FITTED, MEASURANDS, PLAIN
+from hotlever.measurement.data import DISTANCE, LEVER, MEASURED, TIME
 from hotlever.tables import TextTable, read_table
 from hotlever.tables.cells import text_lines
 from hotlever.types import Array
-from hotlever.units import TIMES, conversion, name_and_unit, unknown_unit
+from hotlever.units import TIMES, amount, conversion, name_and_unit, unknown_unit
 
 _SYMBOLS = {
     heading: measurand.symbol for measurand in MEASURANDS.values() for heading in measurand.headings
@@ -293,10 +293,11 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
             f"wave form; another name with --column 't (s)={shown(table.names[0]) or 1}'"
         )
     observed = {
-        *(column.symbol for column in OBSERVABLES.values()),
+        *(column.symbol for column in FITTED.values()),
         *([LEVER] if TIME in columns else []),
     }
     has_bias = driven or "V_b" in columns or {LEVER, "I_h"} <= columns.keys()
+    has_bias = has_bias or (DISTANCE in columns and constant_bias(table) is not None)
     if has_bias and observed & columns.keys():
         return
     names = ", ".join(repr(shown(name)) for name in table.names[:9])
@@ -309,6 +310,15 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
         "or a wave form "
         f"such as --pulse 10V,5us, and any of them; other names with {_assignment('V_b', example)}"
     )
+
+
+def constant_bias(table: TextTable) -> float | None:
+    """Return the one bias (V) of a table that a comment states, such as ``# V_b (V): 8``."""
+    for key, value in table.settings.items():
+        symbol, unit = _quantity(key)
+        if symbol == "V_b":
+            return amount(value, unit, MEASURANDS[symbol].unit, f"{table.path}: {shown(key)}")
+    return None
 
 
 def is_taken_as_bias(columns: Mapping[str, Column], assigned: Mapping[str, str]) -> bool:

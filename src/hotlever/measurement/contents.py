@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hotlever.errors import InputError, shown
-from hotlever.measurands import MEASURANDS
+from hotlever.measurands import FITTED, MEASURANDS
 from hotlever.measurement.columns import Column
-from hotlever.measurement.data import LEVER, MEASURED, TIME
+from hotlever.measurement.data import DISTANCE, LEVER, MEASURED, TIME
 from hotlever.measurement.settings import Settings
 from hotlever.probe import Circuit
 from hotlever.tables import TextTable
@@ -124,8 +124,8 @@ def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) 
         if symbol != of:
             expected = f"a standard error above 0 and up to {high:g} {unit}, or an empty cell"
             contents.refuse((data <= _LEAST_ERROR * size) | (data > high), expected, symbol)
-        elif not np.isnan(data).all():
-            if symbol == "T_tip":
+        elif symbol != DISTANCE and not np.isnan(data).all():
+            if unit == "K":
                 contents.refuse(data <= 0.0, "a temperature above 0 K", symbol)
             where = f"{contents.table.path}: the largest {symbol}"
             either = signed or MEASURANDS[of].signed
@@ -135,10 +135,11 @@ def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) 
             contents.note_rows(negative, f"{symbol} is negative")
 
     base = settings.get("base_temperature_K", _COLDEST_BASE_K)
-    contents.note_rows(
-        colder_than_base(values["T_tip"], values["dT_tip"], base),
-        f"T_tip is below the base temperature ({base:g} K), perhaps in another unit",
-    )
+    for symbol in (each.symbol for each in FITTED.values() if each.unit == "K"):
+        contents.note_rows(
+            colder_than_base(values[symbol], values["d" + symbol], base),
+            f"{symbol} is below the base temperature ({base:g} K), perhaps in another unit",
+        )
     if not signed:
         _check_lever_voltage(contents, series_ohm)
 

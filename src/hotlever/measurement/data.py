@@ -13,7 +13,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.lever.dataset import circuit_of
 from hotlever.lever.transient.history import checked_times
 from hotlever.lever.transient.waveform import Waveform
-from hotlever.measurands import MEASURANDS, OBSERVABLES
+from hotlever.measurands import FITTED, MEASURANDS, OBSERVABLES
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.surroundings import Medium
 from hotlever.types import Array, Mask
@@ -27,6 +27,8 @@ TIME = "t"
 LEVER = "V_l"
 #: The columns that a measurement keeps: the bias, observables and standard errors.
 MEASURED = [measurand for symbol, measurand in MEASURANDS.items() if symbol not in (TIME, LEVER)]
+#: The distance of the apex to the sample, by which the rows of one lever differ.
+DISTANCE = "D"
 #: mbar; between these the pressure is no matter to a lever without a temperature jump.
 _DENSE_MBAR = 700.0, 1200.0
 
@@ -43,6 +45,13 @@ class Measurement:
         Standard errors of the others.
     bridge_output_V, bridge_output_error_V : ndarray, shape (n,), or None
         Of a Wheatstone bridge, with its standard error.
+    apex_K, surface_K : ndarray, shape (n,), or None
+        Temperatures of the apex and of the sample's surface under it, of a tip in contact: where a
+        sample begins to melt, the latter is its melting temperature.
+    apex_error_K, surface_error_K : ndarray, shape (n,), or None
+        Their standard errors.
+    distance_um : ndarray, shape (n,), or None
+        From the apex to the sample; the tip touches it at 0 or less, and where nothing is said.
     series_resistance_ohm, base_temperature_K : float or None
         If the file gives them.
     medium : {"vacuum", "air"} or None
@@ -78,6 +87,11 @@ class Measurement:
     notes: tuple[str, ...] = ()
     current_error_mA: Array | None = None
     reader_error_V: Array | None = None
+    apex_K: Array | None = None
+    apex_error_K: Array | None = None
+    surface_K: Array | None = None
+    surface_error_K: Array | None = None
+    distance_um: Array | None = None
     gas_conductivity: float | None = None
     pressure_mbar: float | None = None
     unused: tuple[str, ...] = ()
@@ -188,7 +202,7 @@ class Measurement:
         return labelled(columns, coordinates={"bias": self.bias_V}).sortby("bias")
 
     def observable(self, name: str) -> Array:
-        """Return the data of one of `hotlever.measurands.OBSERVABLES`, NaN where there are none.
+        """Return the data of one of `hotlever.measurands.FITTED`, NaN where there are none.
 
         Raises
         ------
@@ -202,9 +216,9 @@ class Measurement:
         return self._column(name, "d")
 
     def _column(self, observable: str, start: str = "") -> Array:
-        if observable not in OBSERVABLES:
-            raise unknown_name("observable", observable, OBSERVABLES)
-        symbol = start + OBSERVABLES[observable].symbol
+        if observable not in FITTED:
+            raise unknown_name("observable", observable, FITTED)
+        symbol = start + FITTED[observable].symbol
         values: Array | None = getattr(self, MEASURANDS[symbol].name)
         return np.full(self.bias_V.shape, np.nan) if values is None else values
 
@@ -212,6 +226,13 @@ class Measurement:
         """Return the heater current (mA), measured or as the bridge of a circuit shows it."""
         bridge = circuit.current_of_bridge(self.observable("bridge"), self.bias_V)
         return np.where(np.isnan(self.current_mA), bridge, self.current_mA)
+
+    @property
+    def out_of_contact(self) -> Mask:
+        """Which rows were measured at a distance from the sample, (n,)."""
+        if self.distance_um is None:
+            return np.zeros(self.bias_V.shape, dtype=bool)
+        return np.asarray(self.distance_um > 0.0)
 
     def part(self, rows: Mask) -> Measurement:
         """Return some rows, (n,) of bool, as a measurement."""
@@ -222,7 +243,7 @@ class Measurement:
     @property
     def observables(self) -> tuple[str, ...]:
         """Names of the observables that have any data."""
-        return tuple(name for name in OBSERVABLES if np.isfinite(self.observable(name)).any())
+        return tuple(name for name in FITTED if np.isfinite(self.observable(name)).any())
 
 
 #: Columns that a measurement may be without; of the others it has NaN where nothing was measured.

@@ -10,7 +10,7 @@ import numpy as np
 
 from hotlever.errors import InputError, shown
 from hotlever.lever.transient.waveform import Waveform
-from hotlever.measurands import MEASURANDS, OBSERVABLES
+from hotlever.measurands import FITTED, MEASURANDS
 from hotlever.measurement.bias import check_times, find_bias, find_waveform, leave_out_jumps, mirror
 from hotlever.measurement.columns import (
     find_columns,
@@ -21,7 +21,7 @@ from hotlever.measurement.columns import (
     parse_columns,
 )
 from hotlever.measurement.contents import Contents, check
-from hotlever.measurement.data import MEASURED, OPTIONAL, TIME, Measurement
+from hotlever.measurement.data import DISTANCE, MEASURED, OPTIONAL, TIME, Measurement
 from hotlever.measurement.rows import described, disagreements, sweeps_of
 from hotlever.measurement.settings import Settings
 from hotlever.probe import Circuit, Probe
@@ -109,7 +109,7 @@ def read_measurement(
         understood=_understood(contents, order),
     )
     if not measurement.observables:
-        symbols = ", ".join(column.symbol for column in OBSERVABLES.values())
+        symbols = ", ".join(column.symbol for column in FITTED.values())
         raise InputError(f"{path}: no values in any of the columns {symbols}")
     return measurement
 
@@ -141,7 +141,8 @@ def _complete_at_rest(
     order = described(bias, sweeps)
     if len(sweeps) > 1:
         contents.note(f"{len(sweeps)} sweeps, all of them used: {order}")
-        data = {column.symbol: contents.values[column.symbol] for column in OBSERVABLES.values()}
+    if len(sweeps) > 1 and DISTANCE not in contents.columns:
+        data = {column.symbol: contents.values[column.symbol] for column in FITTED.values()}
         for text in disagreements(bias, sweeps, data, symmetric):
             contents.note(text)
     return order

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.measurands import OBSERVABLES
+from hotlever.measurands import FITTED
 from hotlever.measurement.data import MEASURED, Measurement
 from hotlever.types import Array, Index, Mask
 
@@ -153,10 +153,15 @@ def averaged(measurement: Measurement, robust: bool = False) -> Measurement:
     columns = {column.name: getattr(measurement, column.name) for column in MEASURED}
     columns = {name: values for name, values in columns.items() if values is not None}
     step = _steps(measurement.bias_V)
+    if measurement.distance_um is not None:
+        # other distances from a sample are other states of the lever
+        distance = np.nan_to_num(measurement.distance_um)
+        step = np.unique([step, distance], axis=1, return_inverse=True)[1]
     if robust:
-        for name in (OBSERVABLES[observable].name for observable in measurement.observables):
+        for name in (FITTED[observable].name for observable in measurement.observables):
             columns[name] = np.where(_far_off(columns[name], step), np.nan, columns[name])
-    shown = np.isfinite([measurement.observable(name) for name in OBSERVABLES]).any(axis=0)
+    observed = [columns[FITTED[name].name] for name in measurement.observables]
+    shown = np.isfinite(observed).any(axis=0)
     used = {name: values[shown] for name, values in columns.items()}
     # rows with the same columns filled have the same mean bias for all of them
     filled = np.isfinite(list(used.values()))

@@ -6,7 +6,9 @@ added, and what the probe's values say of bounds and scales.
 
 from __future__ import annotations
 
-from hotlever.errors import unknown_name
+import math
+
+from hotlever.errors import InputError, unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
 from hotlever.materials.parameters import IN_TIME, parameter_named
 from hotlever.probe.contact import OUT_OF_CONTACT
@@ -21,24 +23,31 @@ _OF_THE_VALUE, _OF_THE_BASE, _OF_THE_GAS = (0.5, 1.5), (0.8, 1.2), (0.2, 5.0)
 _DIMENSIONS, RESISTANCE = 0.05, 1e-3
 #: Of the base temperature (K): a room, or a hot plate and its thermocouple.
 _BASE_K = 1.0
-#: Of a tip, as far as it is stated: its height and half-angle, from a micrograph.
+#: Of a tip, as far as it is stated: its height, half-angle and radius, from a micrograph.
 _TIP = 0.2
 #: Of what air takes up: humidity, what is around, and dimensions as far as they matter to it.
 _GAS = 0.1
 #: Of the distance to a surface below.
 _GAP = 0.1
-#: Of an interface, of which nothing is known but its power of ten.
-_OF_THE_INTERFACE = (1e-3, 1e3)
+#: Bounds of an interface, of which nothing is known but its power of ten.
+_OF_THE_INTERFACE, _INTERFACE = (1e-3, 1e3), math.log(10.0)
 #: How far off all edges usually are (µm).
 _USUAL_BIAS = 0.1
-#: Dimensions of a tip that matter to its lever, and of a shape that do not matter to the tip.
-OF_THE_TIP = ("height_um", "half_angle_deg")
+#: Dimensions of a tip that matter to its lever, the last in contact only, and of a shape that do
+#: not matter to the tip.
+OF_THE_TIP = ("height_um", "half_angle_deg", "apex_radius_um")
 _HARMLESS = ("reader_length_um", "reader_centre_um", EDGE_BIAS)
 
 
 def dimensions_of(probe: ProbeParts) -> list[str]:
     """Return the names of all that the drawing says, and the tip if there is one."""
-    return [*probe.shape.dimensions(), *(OF_THE_TIP if probe.tip is not None else ())]
+    return [*probe.shape.dimensions(), *_of_the_tip(probe)]
+
+
+def _of_the_tip(probe: ProbeParts) -> tuple[str, ...]:
+    if probe.tip is None:
+        return ()
+    return OF_THE_TIP if probe.contact is not None else OF_THE_TIP[:-1]
 
 
 def nuisances(probe: ProbeParts) -> list[str]:
@@ -161,10 +170,10 @@ def parameters_of(
         table[EDGE_BIAS] = table[EDGE_BIAS]._replace(
             scale=_USUAL_BIAS, lower=-MOST_EDGE_BIAS, upper=MOST_EDGE_BIAS
         )
-    for name in OF_THE_TIP if probe.tip is not None else ():
+    for name in _of_the_tip(probe):
         add(name, _TIP)
     if probe.contact is not None and 0 < probe.contact.interface_K_per_mW < OUT_OF_CONTACT:
-        add("interface_K_per_mW", None, _OF_THE_INTERFACE)
+        add("interface_K_per_mW", _INTERFACE, _OF_THE_INTERFACE)
     add("base_temperature_K", _BASE_K, _OF_THE_BASE)
     table["base_temperature_K"] = table["base_temperature_K"]._replace(relative=False)
     if probe.circuit.series_resistance_ohm > 0:
@@ -190,6 +199,11 @@ def parameter_of(
         If there is none of this name; the text gives the nearest one.
     """
     table = parameters_of(probe, in_time=in_time)
+    if name == "interface_K_per_mW" and name not in table and probe.contact is not None:
+        raise InputError(
+            f"{where}{': ' * bool(where)}{name} = {probe.contact.interface_K_per_mW:g}: expected a "
+            "value above 0 to start from, in [contact] of the probe file"
+        )
     if name not in table:
         raise unknown_name("parameter", name, table, where)
     return table[name]

@@ -10,7 +10,7 @@ from hotlever import figures
 from hotlever.calibration import Calibration
 from hotlever.calibration.levers import calibration_rows, calibration_statements, law_rows
 from hotlever.calibration.summary import calibration_parts
-from hotlever.calibration.table import STATED, TABLE_COLUMNS, even_rows
+from hotlever.calibration.table import OF_THE_CONTACT, STATED, TABLE_COLUMNS, even_rows
 from hotlever.datasets import QUANTITIES
 from hotlever.estimation.batch import Batch
 from hotlever.materials.parameters import sentence
@@ -45,7 +45,11 @@ def calibration_page(
         else "The nearest lever, which is no estimate: tip temperature against power and bias, the "
         "I-V curve, and what the data differ by.",
     )
-    names = [name for name in TABLE_COLUMNS if described or name not in STATED]
+    names = [
+        name
+        for name in (*TABLE_COLUMNS, *OF_THE_CONTACT)
+        if name in calibration.table and (described or not (name in STATED or "stderr" in name))
+    ]
     shown = even_rows(calibration.heating, names, "tip_K", fewest=_ROWS)
     page.table(
         [f"{QUANTITIES[name][1]} ({QUANTITIES[name][0]})" for name in names],

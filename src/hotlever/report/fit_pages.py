@@ -46,7 +46,8 @@ def add_fit(page: Page, fit: Fit) -> None:
     measured = fit.measurement.dataset(fit.probe.circuit)
     # solved once for both
     lever = Lever(fit.probe)
-    model = lever.sweep(measured.bias.values)
+    touches = fit.probe.contact is not None
+    model = fit.model().sortby("bias") if touches else lever.sweep(measured.bias.values)
     page.figure(
         "fit_data_and_model",
         figures.data_and_model(measured, model, fit.observables),

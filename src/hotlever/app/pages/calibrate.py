@@ -120,8 +120,12 @@ class _Question:
 
 def _answer(row: dict[str, float]) -> str:
     low, high = row["tip_low_K"], row["tip_high_K"]
+    apex = ""
+    if "apex_K" in row:
+        apex = f", apex {value_with_error(row['apex_K'], row['apex_stderr_K'])} K"
     return (
         f"set a bias of {row['bias_V']:.3f} V: lever {row['lever_V']:.3f} V, "
         f"{row['current_mA']:.4f} mA, {row['power_mW']:.3f} mW; tip "
-        f"{value_with_error(row['tip_K'], row['tip_stderr_K'])} K (95 %: {low:.0f} to {high:.0f} K)"
+        f"{value_with_error(row['tip_K'], row['tip_stderr_K'])} K "
+        f"(95 %: {low:.0f} to {high:.0f} K){apex}"
     )

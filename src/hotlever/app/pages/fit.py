@@ -11,7 +11,7 @@ from hotlever.app.pages.frame import download_button
 from hotlever.app.pages.measured import MeasuredPage
 from hotlever.app.pages.page import MEDIA, several
 from hotlever.app.project import FIT, FITS
-from hotlever.measurands import OBSERVABLES
+from hotlever.measurands import FITTED
 
 _FLAGS = {
     "robust": ("robust", "Lessen the weight of points far off the others"),
@@ -35,7 +35,7 @@ class FitPage(MeasuredPage):
         with ui.column().classes("gap-0"):
             ui.label("Fitted").classes("text-sm text-bold")
             self._boxes = {}
-            for name, measurand in OBSERVABLES.items():
+            for name, measurand in FITTED.items():
                 label, fitted = f"{name} {measurand.symbol}", name not in self.chosen["without"]
                 self._boxes[name] = ui.checkbox(label, value=fitted, on_change=self._choose)
         with ui.expansion("More"):
