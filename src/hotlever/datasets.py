@@ -65,6 +65,18 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "current_change_mA": ("mA", "change of the heater current by the contact"),
     "tip_change_K": ("K", "change of the tip temperature by the contact"),
     "current_by_resistance": ("mA mW/K", "change of the heater current by the resistances"),
+    # held by a controller
+    "set_ohm": ("ohm", "set point of the resistance"),
+    "set_mW": ("mW", "set point of the power"),
+    "state": ("1", "number of the state at its set point, the coldest first"),
+    "slope_ohm_per_K": ("ohm/K", "change of the resistance by that of the tip temperature"),
+    "slope_mW_per_K": ("mW/K", "change of the power by that of the tip temperature"),
+    "resistance_ohm": ("ohm", "lever voltage over heater current"),
+    "proportional": ("V/kohm", "proportional gain P"),
+    "integral": ("V/(kohm ms)", "integral gain I"),
+    "growth_per_us": ("1/µs", "rate at which the slowest pole grows"),
+    "settling_us": ("µs", "time after which a step has settled within 2 %"),
+    "overshoot": ("1", "overshoot as a share of a step"),
     # in time
     "time": ("µs", "time"),
     "time_us": ("µs", "time"),
@@ -213,15 +225,21 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "error": ("K", "line reads less true temperature"),
     "paper_error": ("K", "error stated in the paper"),
 }
+#: What sweeps and histories of a lever have that a controller holds.
+_OF_SET_POINTS = {
+    *("set_ohm", "set_mW", "state", "slope_ohm_per_K", "slope_mW_per_K"),
+    "resistance_ohm",
+}
 
 
 def in_a_file(data: xr.Dataset, columns: Sequence[str]) -> list[str]:
     """Return the columns of a file: the usual ones, and those that only some levers have.
 
-    These are of a bridge, and of terminals and monitors, which are named by users.
+    These are of a bridge, of set points, and of terminals and monitors, which are named by users.
     """
-    own = (str(name) for name in data.data_vars)
-    return [*columns, *(name for name in own if "bridge_" in name or name not in QUANTITIES)]
+    own = [str(name) for name in data.data_vars]
+    some = {name for name in own if "bridge_" in name or name in _OF_SET_POINTS}
+    return [*columns, *(name for name in own if name in some or name not in QUANTITIES)]
 
 
 def labelled(

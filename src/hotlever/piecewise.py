@@ -49,6 +49,21 @@ class Piecewise:
             values = values * away + coefficients[before]
         return np.asarray(values)
 
+    def __mul__(self, other: Piecewise | float) -> Piecewise:
+        """Return the product with a number, or of single quantities with the same nodes."""
+        if not isinstance(other, Piecewise):
+            return Piecewise(self.c * other, self.x)
+        product = np.zeros((len(self.c) + len(other.c) - 1, self.x.size - 1))
+        for power, row in enumerate(self.c):
+            product[power : power + len(other.c)] += row * other.c
+        return Piecewise(product, self.x)
+
+    def __sub__(self, other: Piecewise | float) -> Piecewise:
+        """Return the difference from a number, or from one of the same degree and nodes."""
+        if isinstance(other, Piecewise):
+            return Piecewise(self.c - other.c, self.x)
+        return Piecewise(np.concatenate([self.c[:-1], self.c[-1:] - other]), self.x)
+
     def derivative(self) -> Piecewise:
         """Return the first derivative."""
         powers = np.arange(len(self.c) - 1, 0, -1).reshape(-1, *(1,) * (self.c.ndim - 1))

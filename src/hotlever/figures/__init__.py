@@ -30,6 +30,7 @@ from hotlever.figures.fit import (
     profile_curves,
     tip_band,
 )
+from hotlever.figures.holding import gain_map, held_states
 from hotlever.figures.lever import (
     doping_profile,
     heater_profiles,

@@ -17,6 +17,7 @@ from hotlever.figures.claims import thermoelectric_shift
 from hotlever.figures.contact import contact_overview
 from hotlever.figures.design import design_study
 from hotlever.figures.fit import lever_parameters, posterior_corner, profile_curves, tip_band
+from hotlever.figures.holding import gain_map, held_states
 from hotlever.figures.lever import doping_profile, sweep_overview
 from hotlever.figures.raman import raman_check
 from hotlever.figures.reader import reader_overview
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
 #: The first figure counts for which a dataset holds all that is named.
 _FIGURES: dict[str, Callable[[Any], Figure]] = {
     "apex_K current_change_mA": lambda data: contact_overview(data, probe_of(data)),
+    "state set_ohm tip_K": held_states,
+    "state set_mW tip_K": held_states,
+    "growth_per_us settling_us overshoot": gain_map,
     "supplied_nJ air_stored_nJ bias_V lever_V reader_V tip_K": history_overview,
     "bias_V current_mA lever_V reader_V tip_K heater_ohm": sweep_overview,
     "dlnR_dz_per_um source_V_per_rtHz": reader_overview,

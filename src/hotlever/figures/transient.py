@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 def history_overview(history: xr.Dataset) -> Figure:
     """Draw what a lever shows in time: voltages, current, tip temperature, heat.
 
-    Where the bias stays what it is, time is logarithmic.
+    Where the bias stays what it is, time is logarithmic. Where a controller sets it, the resistance
+    that it holds takes the place of the current.
     """
     data = history.isel(time=history.time > 0) if settled(history) else history
     style: Any = {"marker": marker(data, "time"), "ms": 3}
@@ -42,7 +43,10 @@ def history_overview(history: xr.Dataset) -> Figure:
         ):
             curve(voltage, data, "time", name, color=colour, label=label, **style)
         voltage.set(ylabel="voltage (V)")
-        curve(current, data, "time", "current_mA", color=BLUE, **style)
+        if "resistance_ohm" in data:
+            _resistance(current, data, style)
+        else:
+            curve(current, data, "time", "current_mA", color=BLUE, **style)
         curve(tip, data, "time", "tip_K", color=VERMILION, **style)
         for name, (label, colour) in energies.items():
             curve(heat, data, "time", name, color=colour, label=label, **style)
@@ -54,6 +58,14 @@ def history_overview(history: xr.Dataset) -> Figure:
             tip.set_xscale("log")
         entitle(made, history, more=history.attrs.get("waveform", ""))
     return made
+
+
+def _resistance(axes: Axes, data: xr.Dataset, style: Any) -> None:
+    """Draw what a controller holds, and its set point."""
+    axes.plot(data.time, data.resistance_ohm / 1000, color=BLUE, label="V$_l$/I$_h$", **style)
+    axes.plot(data.time, data.set_ohm / 1000, "--", color="0.4", label="set point")
+    axes.set(ylabel="resistance (kΩ)")
+    axes.legend()
 
 
 def small_signals(spectrum: xr.Dataset) -> Figure:

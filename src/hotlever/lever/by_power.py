@@ -33,11 +33,10 @@ class ByPower:
     @cached_property
     def _power(self) -> Piecewise:
         """P_l (mW) by u."""
-        lever, current = (self._curve.c[..., column] for column in (0, 1))
-        product = np.zeros((len(lever) + len(current) - 1, lever.shape[1]))
-        for power, row in enumerate(lever):
-            product[power : power + len(current)] += row * current
-        return Piecewise(product, self._curve.x)
+        lever_V, current = (
+            Piecewise(self._curve.c[..., column], self._curve.x) for column in (0, 1)
+        )
+        return lever_V * current
 
     @cached_property
     def turn_u(self) -> float | None:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from hotlever.probe import Probe
 
-_BIAS = "1:11:25"
 #: Radii that a contact may have (µm).
 _SMALLEST, _LARGEST = 1e-4, 10.0
 #: How well a change of the current is known, for the note on what it tells, over the current.
@@ -45,7 +44,7 @@ def touch(reporter: Reporter, request: ContactRequest) -> None:
         if waveform is None and given is not None:
             raise InputError(f"{name}: goes with a wave form, such as --pulse")
     probe = probe_in_contact(reporter, request)
-    biases = parse_bias(request.bias or _BIAS, probe.lowest_bias_V)
+    biases = parse_bias(request.bias, probe.lowest_bias_V)
     lever = make_lever(reporter, probe)
     with reporter.progress("contact") as update:
         options: Any = {"progress": update}

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from hotlever.lever.transient import Waveform
     from hotlever.probe import Probe
     from hotlever.tasks.reporter import Reporter
+    from hotlever.types import Array
 
 #: Times that may be asked for.
 MOST_TIMES = 10_000
@@ -120,7 +121,20 @@ class TableRequest(PlotRequest):
 class SweepRequest(TableRequest, LeverRequest):
     """A lever over a range of bias."""
 
-    bias: str = option("1:11:25", help="START:STOP:COUNT in volts, ends included.")
+    bias: str | None = option(
+        None,
+        metavar="START:STOP:COUNT",
+        help="In volts, ends included; 1:11:25 if left out.",
+    )
+    hold_resistance: str | None = option(
+        None,
+        metavar="OHM",
+        help="The states that a controller of V_l/I_h holds, in place of a bias: such as 3kohm, "
+        "2.5kohm,3kohm or 2.5kohm:3.3kohm:9.",
+    )
+    hold_power: str | None = option(
+        None, metavar="WATT", help="The same of V_l I_h, such as 2.5mW or 1mW:4mW:7."
+    )
     model: str = option(
         "flat",
         help="flat: the lever in its plane; full-3d: its true thickness and the air around it "
@@ -129,7 +143,24 @@ class SweepRequest(TableRequest, LeverRequest):
     map: File = option(
         None, help="Draw the temperature at the highest tip temperature to this file, as --plot."
     )
-    fields: File = option(None, help="Write the fields at each bias as VTU to this folder.")
+    fields: File = option(None, help="Write the fields of each state as VTU to this folder.")
+
+    @property
+    def set_points(self) -> tuple[str, str, Array] | None:
+        """What is held, by which option, and the set points (Ω, mW); None of a range of bias."""
+        from hotlever.tasks.texts import parse_set_points
+
+        asked = {"--hold-resistance": self.hold_resistance, "--hold-power": self.hold_power}
+        given = {name: text for name, text in asked.items() if text is not None}
+        if not given:
+            return None
+        others = [*given, *(["--bias"] if self.bias is not None else [])]
+        if len(others) > 1:
+            raise InputError(f"found {', '.join(others)}: expected one of them")
+        if self.model != "flat":
+            raise InputError(f"{others[0]}: goes with --model flat, found {shown(self.model)}")
+        (name, text), unit = *given.items(), "mW" if self.hold_power else "ohm"
+        return name.removeprefix("--hold-"), name, parse_set_points(text, unit, name)
 
 
 @dataclass(kw_only=True)
@@ -208,6 +239,26 @@ class TimesRequest(DriveRequest):
 class PulseRequest(TableRequest, LeverRequest, TimesRequest):
     """A lever in time."""
 
+    hold_resistance: str | None = option(
+        None,
+        metavar="OHM",
+        help="Begin at rest at this V_l/I_h, held by --controller; --step is then that of the set "
+        "point, such as 3kohm.",
+    )
+    controller: str | None = option(
+        None,
+        metavar="P,I",
+        help="Gains in V/kohm and V/(kohm ms), such as 1,30: below 0 where the resistance falls "
+        "with the temperature.",
+    )
+    filter: str = option("1us", metavar="TIME", help="Time constant of the measured resistance.")
+    limit: str | None = option(
+        None,
+        metavar="V",
+        help="Highest bias of the controller; 1.5 times that at rest if left out.",
+    )
+    gain_map: File = option(None, help="Draw the gains that are stable to this file, as --plot.")
+
     fields: File = option(None, help="Write the fields as a series of VTU to this folder.")
     film: File = option(
         None,
@@ -220,6 +271,7 @@ class PulseRequest(TableRequest, LeverRequest, TimesRequest):
     def need_no_waveform(self) -> None:
         """Refuse what does not go with a page, which has wave forms of its own."""
         others = {"--until": self.until, "--at": self.at, "--output": self.output}
+        others |= {"--controller": self.controller, "--hold-resistance": self.hold_resistance}
         others |= {"--plot": self.plot, "--fields": self.fields, "--film": self.film}
         for name in (*self.drive, *(name for name, value in others.items() if value)):
             raise InputError(f"{name}: does not go with --report, which has wave forms of its own")

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from hotlever.errors import HistoryEndError
-from hotlever.files import FILM_TYPES, Outputs, output_folder
+from hotlever.files import FIGURE_TYPES, FILM_TYPES, Outputs, output_folder
 from hotlever.lever import State
 from hotlever.lever.fields import write_fields_in_time
 from hotlever.lever.transient import (
@@ -24,6 +24,7 @@ from hotlever.lever.transient import (
     write_history,
 )
 from hotlever.tasks.files import draw
+from hotlever.tasks.holding import Control, check_control, control
 from hotlever.tasks.probes import make_lever
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.requests import PulseRequest
@@ -47,11 +48,22 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
         request.need_no_waveform()
         _write_page(reporter, request, request.report)
         return
-    waveform, until, times = request.required_waveform(), request.end_us, request.times_us
+    given = None if check_control(request) else request.required_waveform()
+    until, times = request.end_us, request.times_us
     outputs = request.outputs(request.probe, request.waveform)
     outputs.folder(request.fields)
     outputs.file(request.film, *FILM_TYPES)
+    outputs.file(request.gain_map, *FIGURE_TYPES)
     lever = make_lever(reporter, request.read_probe(reporter))
+    held: Control | None = None
+    options: Any = {}
+    if given is not None:
+        waveform = given
+    else:
+        held = control(reporter, lever, request)
+        waveform = held.controller
+        until = held.usual_end if until is None and times is None else until
+        options |= {"start": held.start, "tolerance_K": held.tolerance_K}
     frames = None if request.film is None else _Frames(times or _even(waveform, until))
     failure: HistoryEndError | None = None
     # figures and rise times are of smooth curves, the table of the steps alone
@@ -70,21 +82,25 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
                 kept_at.append(t)
                 states.append(state)
 
-        options: Any = {"per_step": per_step, "progress": update, "callback": keep}
+        options |= {"per_step": per_step, "progress": update, "callback": keep}
         try:
             curve = simulate(lever, waveform, until, times, **options)
         except HistoryEndError as error:
             curve, failure = error.partial, error
-    if ends:
+    if ends and held is None:
         curve = with_times(curve, ends[0], ends[-1], resolved=times is None)
     data = curve.isel(time=slice(None, None, per_step))
     reporter.note(*filter(None, data.attrs["notes"].split("\n")))
-    reporter.tell_table(_times(data))
+    if held is not None:
+        reporter.note(*held.notes(curve))
+    reporter.tell_table(_times(data) if held is None else held.rows(curve))
     with outputs.together():
         if request.output is not None:
             write_history(data, request.output)
         if data.sizes["time"]:
             draw(request.plot, lambda figures: figures.history_overview(curve))
+        if held is not None:
+            draw(request.gain_map, held.gain_map)
         if request.fields is not None:
             write_fields_in_time(lever, kept_at, states, output_folder(request.fields))
         if frames is not None and request.film is not None and frames.states:

@@ -17,9 +17,11 @@ if TYPE_CHECKING:
 
 #: A sweep of so many biases takes minutes, as does a design varied so often.
 MOST_BIASES, MOST_DESIGNS = 10_000, 1000
-MOST_FREQUENCIES = 10_000
+MOST_FREQUENCIES, MOST_SET_POINTS = 10_000, 1000
 #: Distances to a surface, of which each takes seconds, and between which they are (µm).
 MOST_DISTANCES, NEAREST, FARTHEST = 1000, 0.001, 1e4
+#: The paper's sweep.
+_BIAS = "1:11:25"
 #: Of priors: those of a calibration, where none is stated.
 USUAL = "usual"
 
@@ -164,8 +166,8 @@ def parse_setting(text: str) -> tuple[str, float]:
 # --- ranges: START:STOP:COUNT ---------------------------------------------------------------------
 
 
-def parse_bias(text: str, lowest_V: float = 0.0) -> Array:
-    """Parse ``START:STOP:COUNT`` in volts, ends included.
+def parse_bias(text: str | None, lowest_V: float = 0.0) -> Array:
+    """Parse ``START:STOP:COUNT`` in volts, ends included; ``1:11:25`` if there is none.
 
     Where the lowest bias that a lever is told of is negative, as with held supplies or
     thermoelectricity, the start may be negative.
@@ -177,6 +179,7 @@ def parse_bias(text: str, lowest_V: float = 0.0) -> Array:
     """
     import numpy as np
 
+    text = _BIAS if text is None else text
     where = f"--bias {shown(text)}"
     start, stop, count = _parse_range(text, where, "such as 1:11:25 (V)", MOST_BIASES)
     if start < lowest_V or stop < start:
@@ -192,6 +195,30 @@ def parse_bias(text: str, lowest_V: float = 0.0) -> Array:
             f"{where}: expected biases of 0, or from {LEAST_BIAS:g} to {MOST_BIAS:g} V"
         )
     return biases
+
+
+def parse_set_points(text: str, unit: str, where: str) -> Array:
+    """Parse ``3kohm``, several with commas between, or ``START:STOP:COUNT``, in a unit.
+
+    Examples
+    --------
+    >>> parse_set_points("2.5kohm,3kohm", "ohm", "--hold-resistance").tolist()
+    [2500.0, 3000.0]
+    >>> parse_set_points("1mW:2mW:3", "mW", "--hold-power").tolist()
+    [1.0, 1.5, 2.0]
+    """
+    import numpy as np
+
+    def value(part: str) -> float:
+        number = setting(part, unit, where)
+        if not 0.0 < number < math.inf:
+            raise InputError(f"{where}: found '{shown(part)}', expected more than 0 {unit}")
+        return number
+
+    if ":" not in text:
+        return np.array([value(part) for part in text.split(",")])
+    example = "2kohm:3kohm:11" if unit == "ohm" else f"1{unit}:4{unit}:7"
+    return np.linspace(*_parse_range(text, where, f"such as {example}", MOST_SET_POINTS, value))
 
 
 def parse_frequencies(text: str) -> Array:

@@ -1,5 +1,6 @@
 """Levers in time: wave forms, what a lever shows under them, and its time constants."""
 
+from hotlever.lever.transient.controller import Controller
 from hotlever.lever.transient.frequency_domain import spectrum
 from hotlever.lever.transient.history import history_csv, integrate, write_history
 from hotlever.lever.transient.modes import rise_times, time_constants, with_times
@@ -15,6 +16,7 @@ from hotlever.lever.transient.waveform import (
 )
 
 __all__ = [
+    "Controller",
     "Waveform",
     "history_csv",
     "integrate",

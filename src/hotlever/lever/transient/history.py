@@ -17,7 +17,7 @@ from hotlever.lever.dataset import in_a_file, probe_attributes, range_notes
 from hotlever.lever.lever import State
 from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.lever.observables import with_bridge
-from hotlever.lever.transient.problem import MONITORED, TransientProblem
+from hotlever.lever.transient.problem import MONITORED
 from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.types import Array, Progress
@@ -111,9 +111,10 @@ def time_steps(
         rise = _SHARE_OF_RISE * _expected_rise(lever, waveform.highest_V)
         tolerance_K = max(min(tolerance_K, rise), _LEAST_TOLERANCE)
     length: float | None = None
-    x = begin.unknowns
+    x: Array | None = None
     for piece in waveform.pieces(until):
-        problem = TransientProblem(lever.equations, lever.circuit, piece.bias)
+        problem = waveform.problem(lever.equations, lever.circuit, piece)
+        x = problem.begin(begin) if x is None else x
         stepper = Stepper(problem, tolerance_K)
         first = None if piece.jumps else length
         for step in stepper.steps(piece.start, piece.end, x, piece.longest, first, stops):
@@ -252,8 +253,10 @@ class _Recorder:
         self.bias.append(piece.bias(t))
         self.values.append(hermite(step.start, step.end, values, slopes, t))
         if self._callback is not None:
-            unknowns, own = step.between(t), self._lever.space.size + 1
-            self._callback(t, State(self._lever, unknowns[:own], unknowns[own:]))
+            own = self._lever.space.size + 1
+            both = own + self._lever.equations.heat_in_air.size
+            x, in_air, _ = np.split(step.between(t), [own, both])
+            self._callback(t, State(self._lever, x, in_air))
 
 
 def _melts(step: Step, values: Array, slopes: Array, limit_K: float) -> float | None:
@@ -294,7 +297,8 @@ def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Datase
         columns[name] = np.where(np.abs(columns[name]) < noise, 0.0, columns[name])
     columns["power_mW"] = columns["lever_V"] * columns["current_mA"]
     # the reader, where there is none, is NaN throughout
-    variables = {"time_us": np.array(recorder.time), "bias_V": np.array(recorder.bias)}
+    variables = {"time_us": np.array(recorder.time)}
+    variables |= waveform.shown(lever.circuit, columns, np.array(recorder.bias))
     more = ("max_K", "supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ")
     variables |= {name: columns[name] for name in (*TIME_COLUMNS[2:], *more)}
     variables |= observer.monitors.columns(values[:, count:])

@@ -12,6 +12,7 @@ Air lets heat through as it does at rest, and holds some itself: the temperature
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from hotlever.lever.laws import GAS
 from hotlever.lever.space import LEVER, Factors
 from hotlever.probe import Circuit
 from hotlever.types import Array, Index
+
+if TYPE_CHECKING:
+    from hotlever.lever.lever import State
 
 #: What is monitored: V_l, I_h, V_r and the rise of the tip (K); the power and the heat that leaves
 #: as it does at rest (mW); the heat in the lever and in the air (nJ), and how much of both is
@@ -104,6 +108,10 @@ class TransientProblem:
         self.equations, self._circuit, self._bias = equations, circuit, bias
         self._air, self._own = equations.heat_in_air, len(equations.scale)
         self.scale = np.concatenate([equations.scale, np.ones((self._air.size, 1))])
+
+    def begin(self, state: State) -> Array:
+        """Return the unknowns at a state."""
+        return state.unknowns
 
     def parts(self, x: Array) -> tuple[Array, Array]:
         """Return the unknowns of the lever, and the temperatures in the air."""

@@ -9,13 +9,17 @@ import math
 import os
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from hotlever.errors import InputError, shown
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.transient.problem import TransientProblem
+from hotlever.probe import Circuit
 from hotlever.tables import read_table
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS, name_and_unit
@@ -40,7 +44,7 @@ class Piece:
     start, end : float
         µs.
     bias : callable
-        V_b (V) at a time (µs).
+        V_b (V) at a time (µs); of a controller its set point (kΩ).
     jumps : bool
         Whether the bias jumps at its start.
     longest : float
@@ -87,6 +91,16 @@ class Waveform(ABC):
     @abstractmethod
     def pieces(self, until: float) -> Iterator[Piece]:
         """Give the smooth parts up to a time (µs)."""
+
+    def problem(self, equations: LeverEquations, circuit: Circuit, piece: Piece) -> Any:
+        """Return what is stepped in time while one of the pieces lasts."""
+        return TransientProblem(equations, circuit, piece.bias)
+
+    def shown(
+        self, circuit: Circuit, columns: Mapping[str, Array], driven: Array
+    ) -> dict[str, Array]:
+        """Return what a history shows of it, by its columns and the values of the pieces."""
+        return {"bias_V": driven}
 
     def bias(self, times: Array) -> Array:
         """Return the bias (V) at times (µs, rising); where it jumps that before, but at 0."""
@@ -177,13 +191,13 @@ class Sine(Waveform):
 
 def step(volts: float) -> Waveform:
     """Return a bias that is switched on at t = 0 and stays."""
-    _check(volts)
+    check_bias(volts)
     return Polyline(f"step to {volts:g} V", (0.0,), (volts,), _SETTLING)
 
 
 def switched_off(volts: float) -> Waveform:
     """Return a bias at which the lever has come to rest, and that is switched off at t = 0."""
-    _check(volts)
+    check_bias(volts)
     return Polyline(f"{volts:g} V switched off", (0.0,), (0.0,), _SETTLING, volts)
 
 
@@ -200,7 +214,7 @@ def pulse(volts: float, length: float, period: float | None = None, count: int =
     >>> [(piece.start, piece.end, piece.bias(5.0)) for piece in pulse(10.0, 5.0).pieces(20.0)]
     [(0.0, 5.0, 10.0), (5.0, 20.0, 0.0)]
     """
-    _check(volts, length)
+    check_bias(volts, length)
     if not 1 <= count <= MOST_PULSES:
         raise InputError(f"found {count} pulses, expected from 1 to {MOST_PULSES}")
     text = f"pulse of {volts:g} V for {length:g} µs"
@@ -224,22 +238,23 @@ def pulse(volts: float, length: float, period: float | None = None, count: int =
 
 def ramp(volts: float, length: float) -> Waveform:
     """Return a bias that rises from zero within some time (µs) and stays."""
-    _check(volts, length)
+    check_bias(volts, length)
     text = f"ramp to {volts:g} V within {length:g} µs"
     return Polyline(text, (0.0, length), (0.0, volts), length + _AFTERWARDS)
 
 
 def sine(offset: float, amplitude: float, frequency_Hz: float) -> Waveform:
     """Return a sine about an offset (V), at which the lever rests before."""
-    _check(offset)
-    _check(amplitude)
+    check_bias(offset)
+    check_bias(amplitude)
     if not 1e6 / LONGEST <= frequency_Hz <= 1e12:
         raise InputError(f"found a frequency of {frequency_Hz:g} Hz, expected 1e-6 to 1e12 Hz")
     text = f"{offset:g} V + {amplitude:g} V sine of {frequency_Hz:g} Hz"
     return Sine(text, offset, amplitude, frequency_Hz)
 
 
-def _check(volts: float, length: float = 1.0) -> None:
+def check_bias(volts: float, length: float = 1.0) -> None:
+    """Refuse a bias (V) or a time (µs) out of bounds."""
     if not abs(volts) <= MOST_BIAS:
         raise InputError(f"found a bias of {volts:g} V, expected at most {MOST_BIAS:g} V")
     if not 1e-6 <= length <= LONGEST:

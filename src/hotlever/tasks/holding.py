@@ -1,0 +1,195 @@
+"""A lever that a PI controller brings from one resistance to another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from hotlever.errors import InputError, shown
+from hotlever.lever import Lever, State
+from hotlever.lever.set_points import hold
+from hotlever.lever.transient import Controller
+from hotlever.lever.transient.closed_loop import ClosedLoop
+from hotlever.tasks.reporter import Reporter
+from hotlever.tasks.requests import PulseRequest
+from hotlever.tasks.texts import parse_number
+from hotlever.units import bias_setting, setting
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Highest bias, where none is given, over that at rest.
+_LIMIT = 1.5
+#: Most error of a step (K), and the same as a share of the way of the tip.
+_TOLERANCE_K, _SHARE, _LEAST_TOLERANCE_K = 0.1, 2e-3, 1e-4
+#: Time constants of the closed loop that are simulated if nobody says, and the longest time (µs).
+_CONSTANTS, _LONGEST = 10.0, 1e4
+
+
+@dataclass(frozen=True)
+class Control:
+    """What brings a lever from one resistance to another.
+
+    Attributes
+    ----------
+    controller : Controller
+    start, end : State
+        At rest before and, if the loop is stable, after.
+    loop : ClosedLoop
+        At the end.
+    """
+
+    controller: Controller
+    start: State
+    end: State
+    loop: ClosedLoop
+
+    @property
+    def settling(self) -> tuple[float, float]:
+        """Time constant (µs) and damping of the closed loop at the end; negative if it grows."""
+        law = self.controller
+        return self.loop.settling(law.proportional, law.integral, law.filter_us)
+
+    @property
+    def usual_end(self) -> float:
+        """Time (µs) that is simulated if nobody says."""
+        return min(_CONSTANTS * abs(self.settling[0]), _LONGEST)
+
+    @property
+    def tolerance_K(self) -> float:
+        """Largest error of a step in time (K)."""
+        way = _SHARE * abs(self.end.tip_K - self.start.tip_K)
+        return max(min(_TOLERANCE_K, way), _LEAST_TOLERANCE_K)
+
+    def gain_map(self, figures: Any) -> Figure:
+        """Draw which gains of this sign are stable."""
+        law = self.controller
+        data = self.loop.gain_map(float(np.sign(law.integral)), law.filter_us)
+        made: Figure = figures.gain_map(data, (law.proportional, law.integral))
+        return made
+
+    def notes(self, history: xr.Dataset) -> list[str]:
+        """Say that the lever is not held at the end, if its bias is at the limit."""
+        if history.bias_V.values[-1] < (1.0 - 1e-6) * self.controller.limit_V:
+            return []
+        return [
+            f"at the end the bias is at its limit of {self.controller.limit_V:.4g} V, and nothing "
+            "is held: beyond a highest resistance a lever only gets hotter with these gains"
+        ]
+
+    def rows(self, history: xr.Dataset) -> list[list[str]]:
+        """Return rows that say what the controller does."""
+        time, ratio = self.settling
+        way, tip = self.end.tip_K - self.start.tip_K, history.tip_K.values
+        over = float(np.max(np.sign(way) * (tip - self.end.tip_K)))
+        told = f"{over:.2g} K ({over / abs(way):.0%} of the step)" if over > 0.0 else "none"
+        kind = "time constant" if time > 0.0 else "grows by e in"
+        return [
+            ["tip, at rest before and after", f"{self.start.tip_K:.1f} K, {self.end.tip_K:.1f} K"],
+            ["tip, overshoot", told],
+            ["tip, at the end", f"{tip[-1]:.1f} K at {history.time[-1].item():.4g} µs"],
+            ["closed loop", f"{kind} {abs(time):.3g} µs, damping ratio {ratio:.2g}"],
+        ]
+
+
+def control(reporter: Reporter, lever: Lever, request: PulseRequest) -> Control:
+    """Return the controller that is asked for, at the state where it begins.
+
+    Its gains choose the states: above zero those where the resistance rises with the tip
+    temperature, below zero those where it falls. What is not stable is told.
+
+    Raises
+    ------
+    InputError
+        If a resistance has no state that gains of this sign hold.
+    """
+    proportional, integral = _gains(request)
+    resistances = [_resistance(request.hold_resistance, "--hold-resistance")]
+    resistances.append(_resistance(request.step, "--step"))
+    start, end = _states(lever, resistances, integral)
+    at_rest = max(start.bias_V, end.bias_V)
+    limit = _LIMIT * at_rest if request.limit is None else bias_setting(request.limit, "--limit")
+    filter_us = setting(request.filter, "us", "--filter")
+    try:
+        law = Controller(
+            resistances[1], proportional, integral, start.bias_V, limit, filter_us=filter_us
+        )
+    except InputError as error:
+        raise InputError(f"--controller: {error}") from None
+    if limit < at_rest:
+        reporter.note(
+            f"{resistances[1]:.5g} ohm takes a bias of {end.bias_V:.4g} V, which is above the "
+            f"limit of {limit:.4g} V"
+        )
+    made = Control(law, start, end, ClosedLoop.at(end))
+    time, _ = made.settling
+    if time < 0.0:
+        reporter.note(
+            f"with these gains the loop is not stable at {resistances[1]:.5g} ohm: what is off "
+            f"grows by e in {-time:.3g} µs (--gain-map draws stable ones)"
+        )
+    return made
+
+
+def check_control(request: PulseRequest) -> bool:
+    """Return whether a controller is asked for, and refuse what does not go with it, or alone."""
+    needed = {"--hold-resistance": request.hold_resistance, "--step": request.step}
+    if request.controller is None:
+        others = {"--limit": request.limit, "--gain-map": request.gain_map, **needed}
+        del others["--step"]
+        for name, value in others.items():
+            if value is not None:
+                raise InputError(f"{name}: goes with --controller P,I")
+        return False
+    for name in request.drive:
+        if name != "--step":
+            raise InputError(
+                f"{name}: does not go with --controller, expected --step, such as 3kohm"
+            )
+    for name, value in needed.items():
+        if value is None:
+            raise InputError(f"--controller: goes with {name} and a resistance, such as 3kohm")
+    return True
+
+
+def _gains(request: PulseRequest) -> tuple[float, float]:
+    text = request.controller or ""
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise InputError(
+            f"--controller: found '{shown(text)}', expected P,I in V/kohm and V/(kohm ms), such as "
+            "1,30"
+        )
+    P, per_ms = (parse_number(part, "--controller") for part in parts)
+    return P, per_ms
+
+
+def _resistance(text: str | None, where: str) -> float:
+    return setting(text or "", "ohm", where)
+
+
+def _states(lever: Lever, resistances: list[float], integral: float) -> tuple[State, State]:
+    """Return the states at both resistances that an integral of some sign leads to."""
+    try:
+        found = hold(lever, "resistance", resistances)
+    except InputError as error:
+        raise InputError(f"--controller: {error}") from None
+    chosen: list[State] = []
+    for value in resistances:
+        here = np.flatnonzero(found.data.set_ohm.values == value)
+        rises = found.data.slope_ohm_per_K.values[here] > 0.0
+        held = [found.states[k] for k in here[rises == (integral > 0.0)].tolist()]
+        if not held:
+            tips = ", ".join(f"{found.states[k].tip_K:.0f} K" for k in here.tolist())
+            other = ("rises", "above") if integral < 0.0 else ("falls", "below")
+            raise InputError(
+                f"--controller: found I = {integral:g}, expected gains {other[1]} 0: at "
+                f"{value:g} ohm (tip at {tips}) the resistance {other[0]} with the temperature"
+            )
+        before = chosen[0].tip_K if chosen else 0.0
+        chosen.append(min(held, key=lambda state: abs(state.tip_K - before)))
+    start, end = chosen
+    return start, end
