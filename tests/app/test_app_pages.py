@@ -230,6 +230,13 @@ def test_a_dropped_measurement_is_understood(tmp_path: Path) -> None:
         await user.should_see("hotlever fit mine.csv -o mine.fit.json")
         user.find("tip T_tip").click()
         await user.should_see("hotlever fit mine.csv --observables current,reader -o mine.fit.json")
+        reader = next(
+            one
+            for one in user.client.elements.values()
+            if isinstance(one, ui.select) and one.value == "V_r"
+        )
+        reader.set_value("")
+        await user.should_see("--column 'unused=V_r", retries=50)
 
     visit(tmp_path, story)
 

@@ -98,7 +98,8 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
                 f"{where}: found '{shown(line)}', expected one like 'I_h (uA)=Current'"
             )
         if _is_unused(quantity):
-            headings[f"{UNUSED} {heading}"] = f"{UNUSED} {heading}", heading
+            told = f"{UNUSED} {len(headings) + 1}"
+            headings[told] = told, heading
             continue
         symbol, unit = _quantity(quantity, assigned=True)
         if symbol is None:

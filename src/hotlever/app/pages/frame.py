@@ -74,7 +74,7 @@ def framed(session: Session, page: str) -> Iterator[ErrorBanner]:
                 ui.menu_item(name, partial(ui.navigate.to, f"/{other}"))
         menu.props("color=white").classes("lt-md")
         ui.label("hotlever").classes("text-bold text-lg q-mr-md gt-sm")
-        with ui.element("nav").classes("row gt-sm").props('aria-label="Pages"'):
+        with ui.element("nav").classes("row no-wrap shrink-0 gt-sm").props('aria-label="Pages"'):
             for other, (name, icon) in PAGES.items():
                 here = other == page
                 link = ui.button(name, icon=icon, on_click=partial(ui.navigate.to, f"/{other}"))
@@ -237,7 +237,7 @@ def lines_shown(lines: str, kind: str, what: str) -> None:
             ui.label(lines)
         copy = partial(ui.clipboard.write, lines)
         flat_button("", copy, icon="content_copy", label=f"Copy the {kind}")
-    caption(what)
+    caption(what).classes("remark")
 
 
 def text_shown(text: str) -> None:
