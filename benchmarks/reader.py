@@ -83,8 +83,13 @@ def from_the_middle(gap: float, **more: object) -> float:
     probe = wide_plate().with_(medium="air", surface_gap_um=gap, **more)
     air = PanelledAir(plate_of(probe), probe.surroundings, BASE, PLATE)
     flux = air.densities(np.ones((len(air.surface.sites), 1)))[:, 0]
-    away = np.linalg.norm(air.panels.centres - [40.0, 0.0, -0.2], axis=1)
-    return float(flux[away.argmin()])
+    lower = air.surface.across[:, 1]
+    away = np.linalg.norm(air.panels.centres[lower] - [40.0, 0.0, -0.2], axis=1)
+    face = air.panels.centres[lower[[away.argmin()]]]
+    # the slope of θ below the face
+    below = [[0.0, 0.0, -share * gap] for share in (0.05, 0.15)]
+    near, far = air.theta(face + below, flux)
+    return float((near - far) / (0.1 * gap))
 
 
 def jump(T: float) -> float:
@@ -152,7 +157,8 @@ def noise() -> None:
     for number, (tau, mode) in enumerate(zip(taus, modes.T, strict=True)):
         shape = np.where(lever.space.is_temperature, mode, 0.0)[:, None]
         capacity = 1e-9 * (shape * lever.equations.storage_change(cold, shape)).sum()
-        fluxes = 1e-6 * of_temperature(Response(lever.equations, cold, shape, 0.0, 0.0))
+        cold_lever = Response(lever.equations, cold, shape, 0.0, 0.0, np.negative)
+        fluxes = 1e-6 * of_temperature(cold_lever)
         # the integral of S over all frequencies, of a mode that decays in τ
         variance = fluxes * 1e-6 * tau / (4.0 * capacity**2)
         thermal = Boltzmann * BASE**2 / capacity

@@ -114,6 +114,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "noise_V_per_rtHz": ("V/√Hz", "noise of the reader voltage"),
     "source_V_per_rtHz": ("V/√Hz", "noise by source"),
     "resolution_nm_per_rtHz": ("nm/√Hz", "distance that equals the noise"),
+    "delay_us": ("µs", "delay of the reader voltage after the distance"),
     "crosstalk_V_per_V": ("V/V", "change of the reader voltage with the bias of the heater"),
     "crosstalk_V_per_mW": ("V/mW", "change of the reader voltage with the power of the heater"),
     # along the heater

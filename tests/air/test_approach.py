@@ -9,10 +9,12 @@ import pytest
 
 from hotlever.air.approach import Approach
 from hotlever.air.laplace import Laplace
-from hotlever.air.operator import AirOperator, air_operator
+from hotlever.air.operator import AirOperator, PanelledAir, air_operator
 from hotlever.air.panels import PanelOptions, Panels
 from hotlever.materials.air import temperature_jump_length
 from hotlever.probe import Probe
+from hotlever.probe.drawing import Drawing, Layer
+from hotlever.probe.drawing import rectangle as rectangle_of
 from hotlever.probe.surroundings import Surroundings
 
 LAYOUT = Probe.reference().layout()
@@ -105,3 +107,24 @@ def test_near_a_surface_the_loss_is_that_of_plates(pressure_mbar):
     slopes = [-operator(gap, **more).matrix_by_gap.sum() for gap in gaps.tolist()]
     area = sum(float(np.prod(np.ptp(np.array(r.outline), axis=0))) for r in LAYOUT.regions)
     assert np.array(slopes) * (gaps + jumps) ** 2 / area == pytest.approx(1.0, abs=0.02)
+
+
+def test_the_air_inside_a_plate_carries_nothing_from_face_to_face():
+    """In the middle of a wide strip all the jumps are in series with the gap."""
+    drawing = Drawing(
+        layers={"silicon": Layer(rectangle_of(0.0, -15.0, 40.0, 15.0), "strip")},
+        terminals={name: [(x, -15), (x, 15)] for name, x in (("supply", 0.0), ("ground", 40.0))},
+        tip_um=(20.0, 0.0),
+        thickness_um=0.1,
+    )
+    materials = {"strip": Probe.reference().kinds["low-doped"]}
+    layout = Probe.from_sections({**drawing.sections(), "materials": materials}, "strip").layout()
+    around = Surroundings(surface_gap_um=0.2, accommodation=1.0)
+    air = PanelledAir(layout, around, 293.0, PanelOptions(refinement=0.3))
+    flux = air.densities(np.ones((len(air.surface.sites), 1)))[:, 0]
+    lower = air.surface.across[:, 1]
+    away = np.linalg.norm(air.panels.centres[lower, :2] - [20.0, 0.0], axis=1)
+    face = air.panels.centres[lower[[away.argmin()]]]
+    near, far = air.theta(face - [[0.0, 0.0, 0.02], [0.0, 0.0, 0.04]], flux)
+    jumps = sum(float(temperature_jump_length(T, 1013.25, 1.0)[0]) for T in (600.0, 293.0))
+    assert (near - far) / 0.02 * (0.2 + jumps) == pytest.approx(1.0, abs=1e-3)

@@ -16,7 +16,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, lu_factor, lu_solve
 
 from hotlever.air.approach import Approach
 from hotlever.air.chip import BaseLine, chip_panels
@@ -177,10 +177,12 @@ class PanelledAir:
         mid_plane = [Mirror.in_plane((0, 0, 0), (0, 0, 1), +1.0)] if symmetric else []
         self._halves = 1.0 + len(mid_plane)
         self.mirrors = mirror_group([*mid_plane, *below])
-        self._layer = single_layer_matrix(self.panels, Laplace(), self.mirrors, progress)
         own = np.arange(len(self.surface.panels))
         jump = np.full(len(self.panels), surroundings.jump_length_um(base_temperature_K))
         jump[own] = surroundings.jump_length_um(surroundings.jump_temperature_K)
+        self._over_thickness = float(jump[0]) / layout.thickness_um
+        layer = single_layer_matrix(self.panels, Laplace(), self.mirrors, progress)
+        self._layer = self._outside(layer)
         self._resistances = jump * self.panels.areas
         self._layer[np.diag_indices_from(self._layer)] += self._resistances
         through_tip = self.surface.through_tip
@@ -190,22 +192,49 @@ class PanelledAir:
         self._moments = np.zeros((len(self.panels), len(self.surface.sites)))
         self._moments[own, self.surface.site] = self.surface.panels.areas
 
+    def _outside(self, layer: Numbers) -> Numbers:
+        """Return a single layer of which a jump lets through only what flows outside the plate.
+
+        Where the jumps at both faces differ, the air that fills the plate would conduct from one to
+        the other, by its thickness.
+        """
+        if not self._over_thickness:
+            return layer
+        upper, lower = self.surface.across.T
+        between = self._over_thickness * (layer[upper] - layer[lower])
+        outside = layer.copy()
+        outside[upper] -= between
+        outside[lower] += between
+        return outside
+
     @cached_property
-    def _factors(self) -> tuple[Array, bool]:
+    def _factors(self) -> tuple[Any, Any]:
+        factors: tuple[Any, Any]
+        if self._over_thickness and self.surface.across.size:
+            factors = lu_factor(self._layer)
+            return factors
         try:
-            factors: tuple[Array, bool] = cho_factor(self._layer)
+            factors = cho_factor(self._layer)
         except LinAlgError as error:
             raise ComputationError("the air operator of this geometry is not positive") from error
         return factors
 
+    def _solve(self, right: Array, *, transposed: bool = False) -> Array:
+        """Return the densities whose layer has some moments."""
+        if self._over_thickness and self.surface.across.size:
+            return np.asarray(lu_solve(self._factors, right, trans=int(transposed)))
+        return np.asarray(cho_solve(self._factors, right))
+
     def densities(self, theta: Array) -> Array:
-        """Return the heat flux (mW/µm²) into air from every panel, for θ (mW/µm) at the sites."""
-        flux: Array = cho_solve(self._factors, self._moments @ theta)
-        return flux
+        """Return the densities (mW/µm²) of the single layer, for θ (mW/µm) at the sites.
+
+        Those of both faces together are the heat flux into air.
+        """
+        return self._solve(self._moments @ theta)
 
     def operator(self) -> AirOperator:
         """Return the matrix from θ at the sites to heat, and how full of air the lever seems."""
-        flux = cho_solve(self._factors, self._moments)
+        flux = self._solve(self._moments)
         heat = self._halves * (self._moments.T @ flux)
         # of a lever of one temperature: θ of the air at the surface as a share of the lever's; the
         # energy of the air inside goes with its square
@@ -218,9 +247,9 @@ class PanelledAir:
         )
         if math.isnan(self._gap):
             return operator
-        change = self._layer_by_gap()
-        more = -self._halves * (flux.T @ change @ flux)
-        jumped_more = -shares @ cho_solve(self._factors, change @ whole)[:own]
+        change = self._outside(self._layer_by_gap())
+        more = -self._halves * (self._solve(self._moments, transposed=True).T @ (change @ flux))
+        jumped_more = -shares @ self._solve(change @ whole)[:own]
         return replace(
             operator,
             matrix_by_gap=0.5 * (more + more.T),
@@ -252,7 +281,8 @@ class PanelledAir:
         moments = self._moments @ shapes
         heat = []
         for screened in single_layer_matrix(self.panels, Screened(q), self.mirrors):
-            flux = np.linalg.solve(self._layer + screened, moments.astype(screened.dtype))
+            layer = self._layer + self._outside(screened)
+            flux = np.linalg.solve(layer, moments.astype(screened.dtype))
             heat.append(self._halves * (moments.T @ flux))
         heats = np.array(heat)
         return np.asarray(0.5 * (heats + heats.swapaxes(1, 2)))

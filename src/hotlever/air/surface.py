@@ -46,6 +46,8 @@ class LeverSurface:
         Places in the plane of the lever (µm); the temperature does not depend on z.
     site : ndarray of int, shape (len(panels),)
         The site of each panel.
+    across : ndarray of int, shape (m, 2)
+        Panels of both faces above each other; none where one face stands for both.
     through_tip : ndarray, shape (k, k)
         By how much θ is lower than at their sites on the last k panels, those of a tip, per heat
         from each of them (1/µm).
@@ -54,6 +56,7 @@ class LeverSurface:
     panels: Panels
     sites: Array
     site: Index
+    across: Index
     through_tip: Array
 
 
@@ -76,6 +79,7 @@ def lever_surface(
     cells = outline.cells()
     corners = [np.insert(cells, 2, z, axis=2) for z in ([half] if mirrored else [half, -half])]
     corners += [_wall(line, upright) for line in outline.divided_edges()]
+    across = np.arange(0 if mirrored else 2 * len(cells)).reshape(2, -1).T
     through_tip = np.empty((0, 0))
     if (cone := layout.cone_in_air) is not None:
         of_cone = cone_panels(cone, options.refinement)
@@ -86,7 +90,7 @@ def lever_surface(
     placed = panels.corners.copy()
     placed[..., :2] = outline.on_the_lever(panels.corners[..., :2])
     within = outline.on_the_lever(outline.moved_inside(sites))
-    return LeverSurface(Panels(placed), within, site.ravel(), through_tip)
+    return LeverSurface(Panels(placed), within, site.ravel(), across, through_tip)
 
 
 class _Outline:

@@ -36,6 +36,8 @@ READER_COLUMNS = (
 )
 #: Biases that are tried for the best one, and on either side of the best of these.
 _TRIED, _REFINED = 11, 4
+#: Share of the heat by which one jump length for the whole lever may be off without a note.
+_HEAT_OFF = 0.03
 
 
 class Signal(NamedTuple):
@@ -50,10 +52,11 @@ class Signal(NamedTuple):
     source_V_per_rtHz: Array
     crosstalk_V_per_V: float
     crosstalk_V_per_mW: float
+    delay_us: float
     tip_K: float
 
 
-_NOTHING = Signal._make([*[np.nan] * 6, np.full(len(SOURCES), np.nan), *[np.nan] * 3])
+_NOTHING = Signal._make([*[np.nan] * 6, np.full(len(SOURCES), np.nan), *[np.nan] * 4])
 
 
 class Reader:
@@ -69,8 +72,11 @@ class Reader:
 
     Attributes
     ----------
+    noise : NoiseOptions
     terminal : str
         Where the voltage is read.
+    is_held : bool
+        Whether its supply is held while another is swept.
 
     Raises
     ------
@@ -81,13 +87,9 @@ class Reader:
     def __init__(self, probe: Probe, noise: NoiseOptions | None = None) -> None:
         if probe.surroundings.medium == "vacuum":
             raise InputError("in vacuum a reader sees no surface, expected air: --medium air")
-        if probe.contact is not None:
-            raise InputError(
-                "[contact]: the tip touches a sample, expected a lever above a surface"
-            )
         circuit = probe.circuit
         contact, section = circuit.contact("reader"), "[circuit.reader]"
-        self._noise, self.is_held = noise or NoiseOptions(), contact.is_held
+        self.noise, self.is_held = noise or NoiseOptions(), contact.is_held
         self._conductance, self._source_mA = contact.norton
         behind = contact.series_resistance_ohm or contact.current_mA is not None
         if not self.is_held:
@@ -110,8 +112,8 @@ class Reader:
         if self.is_held:
             voltage = state.reader_V
             current = self._source_mA - self._conductance * voltage
-        slope = response.by_parameter(GAP)
-        by_source = spectral_densities(response, self._noise, slope)
+        slope, delay = response.by_parameter(GAP)
+        by_source = spectral_densities(response, self.noise, slope)
         noise = float(np.sqrt(by_source.sum()))
         per_V = response.by_bias if self.is_held else np.nan
         return Signal(
@@ -124,6 +126,7 @@ class Reader:
             source_V_per_rtHz=np.sqrt(by_source),
             crosstalk_V_per_V=per_V,
             crosstalk_V_per_mW=per_V / response.power_by_bias,
+            delay_us=delay,
             tip_K=state.tip_K,
         )
 
@@ -193,6 +196,8 @@ def over_surface(
     columns["surface_gap_um"] = "distance", distances
     columns["bias_V"] = "bias", values
     notes += _turns(distances, values, columns["dV_dz_V_per_um"])
+    notes += _too_fast(reader.noise, columns["delay_us"])
+    notes += _jump_of_others(lever.probe, distances, values, columns["tip_K"])
     return labelled(
         {**columns, "source_V_per_rtHz": by_source},
         ("distance", "bias"),
@@ -216,6 +221,38 @@ def _turns(distances: Array, biases: Array, slopes: Array) -> list[str]:
                 f"{high:.4g} µm, where it does not tell the distance"
             )
     return notes
+
+
+def _too_fast(noise: NoiseOptions, delay_us: Array) -> list[str]:
+    """Say where the band ends above what the lever follows."""
+    if np.isnan(delay_us).all():
+        return []
+    slowest = float(np.nanmax(np.abs(delay_us)))
+    corner = 1e6 / (2.0 * np.pi * slowest)
+    if noise.high_Hz <= corner:
+        return []
+    return [
+        f"the band ends at {1e-3 * noise.high_Hz:g} kHz, above the {1e-3 * corner:.2g} kHz up to "
+        f"which the lever follows (a delay of {slowest:.3g} µs): there the signal is smaller"
+    ]
+
+
+def _jump_of_others(probe: Probe, distances: Array, biases: Array, tip_K: Array) -> list[str]:
+    """Say how far heat is off where the tip, (k, n), is not as warm as the jump is stated for."""
+    around, base = probe.surroundings, probe.circuit.base_temperature_K
+    stated, cold = map(around.jump_length_um, (around.jump_temperature_K, base))
+    own = np.vectorize(around.jump_length_um, otypes=[float])(tip_K)
+    # between plates heat goes with the inverse of the gap and both jump lengths
+    off = (own - stated) / (distances[:, None] + stated + cold)
+    if not (np.abs(off) > _HEAT_OFF).any():
+        return []
+    at, which = np.unravel_index(np.nanargmax(np.abs(off)), off.shape)
+    return [
+        f"the temperature of the air jumps as at {around.jump_temperature_K:g} K "
+        f"(jump_temperature_K), the tip is at {tip_K[at, which]:.0f} K with "
+        f"{biases[which]:.4g} V at {distances[at]:.4g} µm: heat to the surface is off by some "
+        f"{100.0 * off[at, which]:+.0f} %"
+    ]
 
 
 def _over_pressures(

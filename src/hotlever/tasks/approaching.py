@@ -20,6 +20,7 @@ from hotlever.units import setting
 if TYPE_CHECKING:
     import xarray as xr
 
+    from hotlever.lever import Lever
     from hotlever.lever.noise import NoiseOptions
     from hotlever.probe import Probe
 
@@ -34,7 +35,7 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
     outputs = request.outputs(request.probe)
     distances, noise = parse_distances(request.distance), noise_of(request)
     pressures = None if request.pressure is None else parse_pressures(request.pressure)
-    probe = probe_over_surface(reporter, request, distances)
+    probe, stated = probe_over_surface(reporter, request, distances)
     biases = None if request.bias is None else parse_bias(request.bias, probe.lowest_bias_V)
     reader = Reader(probe, noise)
     lever = make_lever(reporter, probe)
@@ -45,6 +46,8 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
                 f"of all biases up to {_HIGHEST_V:g} V {biases.item():.4g} V resolves these "
                 "distances best (--bias chooses others)"
             )
+        if stated is None:
+            lever = jumping_at_tip(reporter, lever, float(biases[biases.size // 2]))
         data = over_surface(lever, distances, biases, noise, pressures, progress=update)
     if not reader.is_held and probe.circuit.swept != "reader":
         reporter.note(
@@ -65,22 +68,35 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
         reporter.give(csv_text(rows, columns))
 
 
-def probe_over_surface(reporter: Reporter, request: ReaderRequest, distances: Array) -> Probe:
-    """Read the probe, in air over a surface at the nearest of some distances (µm)."""
+def probe_over_surface(
+    reporter: Reporter, request: ReaderRequest, distances: Array
+) -> tuple[Probe, float | None]:
+    """Read the probe, in air over a surface at the nearest of some distances (µm).
+
+    And the accommodation that it states.
+    """
     from hotlever.lever.reader import check_distances
 
     probe = request.read_probe(reporter)
     check_distances(probe, distances)
+    around = probe.surroundings
     changes: dict[str, Any] = {"surface_gap_um": float(distances.min())}
-    if request.medium is None and probe.surroundings.medium == "vacuum":
+    if request.medium is None and around.medium == "vacuum":
         reporter.note("in vacuum a reader sees no surface: the lever is taken in air")
         changes["medium"] = "air"
-    if probe.surroundings.accommodation is None:
-        reporter.note(
-            "no accommodation is stated: it is taken as 1 (--set accommodation=0.9 states one)"
-        )
-        changes["accommodation"] = probe.surroundings.with_jump.accommodation
-    return probe.with_(**changes)
+    changes["accommodation"] = around.with_jump.accommodation
+    return probe.with_(**changes), around.accommodation
+
+
+def jumping_at_tip(reporter: Reporter, lever: Lever, bias_V: float) -> Lever:
+    """Return a lever with the jump of the air as at the temperature of its tip at a bias."""
+    (state,) = lever.solve([bias_V])
+    T = round(state.tip_K)
+    reporter.note(
+        f"no accommodation is stated: it is taken as 1, and the air's temperature jumps as at {T} "
+        f"K, the tip's at {bias_V:.4g} V (--set accommodation=0.9, jump_temperature_K=450)"
+    )
+    return lever.with_probe(lever.probe.with_(jump_temperature_K=T))
 
 
 def noise_of(request: ReaderRequest) -> NoiseOptions:
