@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hotlever.datasets import csv_text, write_dataset
-from hotlever.errors import InputError, shown
+from hotlever.errors import ComputationError, InputError, shown
 from hotlever.probe.contact import length_um
+from hotlever.probe.surroundings import Surroundings
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import make_lever
 from hotlever.tasks.reporter import Reporter
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 #: Up to this bias (V) the best one is looked for.
 _HIGHEST_V = 11.0
+#: What probe files have where they do not state of what temperature the jumping air is (K).
+_USUAL_K = Surroundings.model_fields["jump_temperature_K"].default
 
 
 def approach(reporter: Reporter, request: ReaderRequest) -> None:
@@ -35,7 +38,7 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
     outputs = request.outputs(request.probe)
     distances, noise = parse_distances(request.distance), noise_of(request)
     pressures = None if request.pressure is None else parse_pressures(request.pressure)
-    probe, stated = probe_over_surface(reporter, request, distances)
+    probe = probe_over_surface(reporter, request, distances)
     biases = None if request.bias is None else parse_bias(request.bias, probe.lowest_bias_V)
     reader = Reader(probe, noise)
     lever = make_lever(reporter, probe)
@@ -46,7 +49,7 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
                 f"of all biases up to {_HIGHEST_V:g} V {biases.item():.4g} V resolves these "
                 "distances best (--bias chooses others)"
             )
-        if stated is None:
+        if probe.surroundings.jump_temperature_K == _USUAL_K:
             lever = jumping_at_tip(reporter, lever, float(biases[biases.size // 2]))
         data = over_surface(lever, distances, biases, noise, pressures, progress=update)
     if not reader.is_held and probe.circuit.swept != "reader":
@@ -68,13 +71,8 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
         reporter.give(csv_text(rows, columns))
 
 
-def probe_over_surface(
-    reporter: Reporter, request: ReaderRequest, distances: Array
-) -> tuple[Probe, float | None]:
-    """Read the probe, in air over a surface at the nearest of some distances (µm).
-
-    And the accommodation that it states.
-    """
+def probe_over_surface(reporter: Reporter, request: ReaderRequest, distances: Array) -> Probe:
+    """Read the probe, in air over a surface at the nearest of some distances (µm)."""
     from hotlever.lever.reader import check_distances
 
     probe = request.read_probe(reporter)
@@ -84,17 +82,27 @@ def probe_over_surface(
     if request.medium is None and around.medium == "vacuum":
         reporter.note("in vacuum a reader sees no surface: the lever is taken in air")
         changes["medium"] = "air"
-    changes["accommodation"] = around.with_jump.accommodation
-    return probe.with_(**changes), around.accommodation
+    if around.accommodation is None:
+        changes["accommodation"] = around.with_jump.accommodation
+        reporter.note(
+            "no accommodation is stated: it is taken as 1 (--set accommodation=0.9 states one)"
+        )
+    return probe.with_(**changes)
 
 
 def jumping_at_tip(reporter: Reporter, lever: Lever, bias_V: float) -> Lever:
-    """Return a lever with the jump of the air as at the temperature of its tip at a bias."""
-    (state,) = lever.solve([bias_V])
+    """Return a lever with the jump of the air as at the temperature of its tip at a bias.
+
+    The same lever where there is no state at this bias.
+    """
+    try:
+        (state,) = lever.solve([bias_V])
+    except ComputationError:
+        return lever
     T = round(state.tip_K)
     reporter.note(
-        f"no accommodation is stated: it is taken as 1, and the air's temperature jumps as at {T} "
-        f"K, the tip's at {bias_V:.4g} V (--set accommodation=0.9, jump_temperature_K=450)"
+        f"the air's temperature jumps as at {T} K, the tip's at {bias_V:.4g} V "
+        f"(--set jump_temperature_K=... states another one than {_USUAL_K:g})"
     )
     return lever.with_probe(lever.probe.with_(jump_temperature_K=T))
 
